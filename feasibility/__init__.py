@@ -1,0 +1,1 @@
+"""The question: can this arm cover this surface in one continuous motion?"""

@@ -1,0 +1,51 @@
+"""How to search: the method and its settings."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """Settings of a search; `Search()` is what `feasibility.check` does when nothing is said.
+
+    Raises:
+        ValueError: a setting is out of its range.
+    """
+
+    method: Literal["complete", "greedy"] = "complete"
+    """'greedy' is the paper's Algorithms 1 and 2, 'complete' decides the question."""
+    seed: int = 0
+    """Seed of every random choice; the same seed gives the same verdict and the same motion."""
+    time_limit: float | None = None
+    """Seconds after which the verdict is "undecided"."""
+    step_deg: float = 0.01
+    """Greedy: delta q of revolute joints, degrees. A prismatic joint steps by the length that the
+    same angle sweeps at the arm's reach."""
+    moves: Literal["single", "all"] = "single"
+    """Greedy: change one joint a step (2 n neighbours), or any of them (3^n - 1)."""
+    starts: int | Literal["all"] = "all"
+    """Greedy: how many start configurations over the start cell to try, one per branch."""
+    cap: int = 400_000
+    """Greedy: J-cells that one call of Algorithm 1 may check before it stops as "capped"."""
+
+    def __post_init__(self) -> None:
+        """Refuse settings that describe no search."""
+        if self.method not in ("complete", "greedy"):
+            raise ValueError(f"method must be 'complete' or 'greedy', got {self.method!r}")
+        if self.seed < 0:
+            raise ValueError(f"seed must be >= 0, got {self.seed}")
+        if self.time_limit is not None and not (
+            math.isfinite(self.time_limit) and self.time_limit > 0
+        ):
+            raise ValueError(f"time_limit must be a finite number > 0 (s), got {self.time_limit}")
+        if not 1e-4 <= self.step_deg <= 30.0:
+            raise ValueError(f"step_deg must lie in 0.0001 .. 30 (degrees), got {self.step_deg}")
+        if self.moves not in ("single", "all"):
+            raise ValueError(f"moves must be 'single' or 'all', got {self.moves!r}")
+        if self.starts != "all" and not (isinstance(self.starts, int) and self.starts >= 1):
+            raise ValueError(f"starts must be 'all' or a whole number >= 1, got {self.starts!r}")
+        if self.cap < 1:
+            raise ValueError(f"cap must be >= 1, got {self.cap}")

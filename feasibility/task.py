@@ -1,0 +1,72 @@
+"""The task: how the tool is to be held over the surface."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces import Cells
+
+
+DEFAULT_TOLERANCE = 1e-3  # [m]
+
+
+class Targets(NamedTuple):
+    """A task applied to cells: where the tool point has to be, and which way its axis points."""
+
+    points: NDArray[np.float64]
+    """(N, 3) m, in the root frame: centre -+ standoff * normal."""
+    approaches: NDArray[np.float64]
+    """(N, 3) unit: +normal for the inside of a surface, -normal for the outside."""
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """Hold the tool point at a standoff from the surface, and the tool axis within a cone.
+
+    Example:
+        >>> task = Task(standoff=0.005, cone_deg=45)
+        >>> round(task.cone, 4)
+        0.7854
+
+    Raises:
+        ValueError: standoff or tolerance is negative or not finite, or the cone is outside
+            0 to 180 degrees.
+    """
+
+    standoff: float
+    """d, metres between surface and tool point."""
+    cone_deg: float
+    """alpha, the largest angle in degrees between tool axis and approach direction."""
+    tolerance: float | None = None
+    """How far the tool point may stray from its target surface, metres. None leaves it to the
+    method: `DEFAULT_TOLERANCE` for the complete search, step times reach for the greedy one; the
+    verdict states what was used."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that describe no task."""
+        if not (math.isfinite(self.standoff) and self.standoff >= 0.0):
+            raise ValueError(f"standoff must be a finite number >= 0 (metres), got {self.standoff}")
+        if not 0.0 <= self.cone_deg <= 180.0:
+            raise ValueError(f"cone_deg must lie in 0 .. 180 (degrees), got {self.cone_deg}")
+        if self.tolerance is not None and not (
+            math.isfinite(self.tolerance) and self.tolerance > 0.0
+        ):
+            raise ValueError(f"tolerance must be a finite number > 0 (metres), got {self.tolerance}")
+
+    @property
+    def cone(self) -> float:
+        """The half angle alpha of the cone, radians."""
+        return math.radians(self.cone_deg)
+
+    def targets(self, cells: Cells) -> Targets:
+        """Target points and approach directions of the centres of `cells` (eqs. 1 and 2)."""
+        sign = cells.surface.side_sign
+        return Targets(
+            points=cells.centres + sign * self.standoff * cells.normals,
+            approaches=-sign * cells.normals,
+        )

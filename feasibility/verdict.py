@@ -1,0 +1,137 @@
+"""What is said about a surface, and why: the verdict, its evidence, and a cause per missed cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
+
+
+class Answer(StrEnum):
+    """Can one continuous motion cover the surface?"""
+
+    FEASIBLE = "feasible"
+    INFEASIBLE = "infeasible"
+    UNDECIDED = "undecided"
+
+
+class Evidence(StrEnum):
+    """What an answer rests on."""
+
+    WITNESS = "witness"
+    """A covering motion that an independent replay accepted."""
+    PROOF = "proof"
+    """A bound that rules a cell out."""
+    EXHAUSTED = "exhausted"
+    """The search ended at its stated resolution without finding a covering motion."""
+    BUDGET = "budget"
+    """The search was stopped before it ended."""
+
+
+class CauseKind(StrEnum):
+    """Why a cell is missed."""
+
+    OUT_OF_REACH = "out_of_reach"
+    JOINT_LIMITS = "joint_limits"
+    ORIENTATION = "orientation"
+    COLLISION = "collision"
+    DISCONNECTED = "disconnected"
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Why one cell is not covered."""
+
+    cell: int
+    """Flat index of the cell."""
+    kind: CauseKind
+    proved: bool
+    """True where a bound shows it; False where a search ended without finding a way."""
+    detail: str
+    """One sentence with the figures: by how much, which joint, which angle."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Walk:
+    """One continuous motion: straight lines in joint space between waypoints."""
+
+    q: NDArray[np.float64]
+    """(m, n) waypoints, rad or m, unwrapped."""
+    cell: NDArray[np.int64]
+    """(m,) flat index of the cell whose centre target the tool point is at; -1 between centres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What an independent replay of the witness measured, between waypoints too."""
+
+    waypoints: int
+    max_position_error: float
+    """m, bound on the distance of the tool point from its target surface along the whole walk."""
+    max_angle: float
+    """rad, bound on the angle between tool axis and approach direction along the whole walk."""
+    min_limit_margin: float
+    """rad or m, smallest distance of a joint from a limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """The answer for one robot, one set of cells and one task; see `feasibility.check`."""
+
+    answer: Answer
+    evidence: Evidence
+    message: str
+    """One or two sentences: what was found or tried, at which resolution."""
+    robot: Robot
+    cells: Cells
+    task: Task
+    method: str
+    """'complete' or 'greedy'."""
+    seed: int
+    graph: nx.Graph
+    """Graph G. Nodes: every flat cell index, with `q` (n,) or None where the best component does
+    not reach it. Edges: pairs of cells that a motion joins, with `motion` (k, n) from the smaller
+    index to the larger."""
+    covered: NDArray[np.bool_]
+    """(N,) cells that the best single component visits."""
+    causes: tuple[Cause, ...] = ()
+    """One for each cell that is not covered, in order of index."""
+    components: tuple[NDArray[np.int64], ...] = ()
+    """Cells of each connected component found, the best first."""
+    tree: nx.DiGraph | None = None
+    """Tree T of the paper's search; None for other methods."""
+    start: int | None = None
+    """Flat index of the cell where the search (or the witness) starts."""
+    witness: Walk | None = None
+    certificate: Certificate | None = None
+    timing: Mapping[str, float] = field(default_factory=dict)
+    """Seconds: load_s, search_s, certify_s, total_s."""
+    statistics: Mapping[str, Any] = field(default_factory=dict)
+    """Counts of work done (FK evaluations, calls, proofs), for benchmarks and the curious."""
+
+    @property
+    def feasible(self) -> bool:
+        """True when one continuous motion is known to cover every cell."""
+        return self.answer is Answer.FEASIBLE
+
+    @property
+    def n_covered(self) -> int:
+        """Number of cells that the best single component visits."""
+        return int(self.covered.sum())
+
+    def __repr__(self) -> str:
+        """The verdict in one line."""
+        pairs = len(self.cells.pairs)
+        return (
+            f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
+            f"{self.graph.number_of_edges()} of {pairs} edges. {self.message}"
+        )

@@ -1,0 +1,231 @@
+"""The compiled chain: forward kinematics and Jacobian for the search loops.
+
+Every constant is read from the `pin.Model`, so there is one source of truth; Pinocchio's frame
+placements remain the authority (`robots.kinematics`), and the two are compared when a robot is
+first loaded.
+
+Each joint i turns or slides about the z axis of its own frame:
+
+    T(q) = C_0 M_0(q_0) C_1 M_1(q_1) ... C_{n-1} M_{n-1}(q_{n-1}) C_tool
+
+with C_i constant, M_i(q) = Rot(z, q) or Trans(z, q). Pinocchio lets an axis point anywhere; the
+rotation that brings it onto z is folded into the constants once, so that the loop below needs only
+one sine, one cosine and one matrix product per joint.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numba import njit
+from numpy.typing import NDArray
+
+from robots.robot import Robot, RobotError
+
+AGREEMENT = 1e-9  # [m], [1]: largest difference from Pinocchio that `checked` accepts
+
+
+class Chain(NamedTuple):
+    """Constants of a serial chain of n one-dof joints; a plain tuple of arrays, as numba likes it."""
+
+    rotations: NDArray[np.float64]
+    """(n, 3, 3) joint frame in the previous joint's frame, before the joint moves."""
+    translations: NDArray[np.float64]
+    """(n + 1, 3) origins of the same, m; the last row is the tool point in the last joint's frame."""
+    prismatic: NDArray[np.bool_]
+    """(n,) True where a joint slides along z, False where it turns about it."""
+    approach: NDArray[np.float64]
+    """(3,) the approach axis in the last joint's frame."""
+
+    @staticmethod
+    def of(robot: Robot) -> Chain:
+        """Read the constants of `robot` from its Pinocchio model.
+
+        Raises:
+            RobotError: a joint has more than one degree of freedom, or the joints do not form one
+                chain that ends at the tool frame.
+        """
+        model = robot.model
+        n = robot.n
+        frame = model.frames[model.getFrameId(robot.tool_frame)]
+        if model.nv != n or list(model.parents)[1:] != list(range(n)) or frame.parentJoint != n:
+            raise RobotError(
+                f"robot {robot.name!r}: its {model.nv} free joints do not form one serial chain of "
+                f"one-dof joints that ends at {robot.tool_frame!r}; lock the joints off the chain"
+            )
+        data = model.createData()
+        pin.forwardKinematics(model, data, pin.neutral(model))
+        rotations = np.empty((n, 3, 3))
+        translations = np.empty((n + 1, 3))
+        prismatic = np.empty(n, dtype=bool)
+        align = np.eye(3)  # brings z onto the axis of the previous joint
+        for i in range(n):
+            # The joint's motion subspace, in its own frame: (linear, angular).
+            subspace = pin.getJointJacobian(
+                model, pin_jacobians(model, data), i + 1, pin.ReferenceFrame.LOCAL
+            )[:, i]
+            linear, angular = subspace[:3], subspace[3:]
+            prismatic[i] = np.linalg.norm(angular) < 0.5
+            placement = model.jointPlacements[i + 1]
+            next_align = _rotation_onto(linear if prismatic[i] else angular)
+            rotations[i] = align.T @ placement.rotation @ next_align
+            translations[i] = align.T @ placement.translation
+            align = next_align
+        translations[n] = align.T @ frame.placement.translation
+        approach = align.T @ frame.placement.rotation @ robot.approach_axis
+        return Chain(rotations, translations, prismatic, approach)
+
+    @staticmethod
+    def checked(robot: Robot, samples: int = 20) -> Chain:
+        """Like `of`, and compared with Pinocchio at random configurations.
+
+        Raises:
+            RobotError: the two differ by more than 1e-9 m or 1e-9 in the axis.
+        """
+        from robots.kinematics import Kinematics
+
+        chain = Chain.of(robot)
+        authority = Kinematics(robot)
+        rng = np.random.default_rng(0)
+        for _ in range(samples):
+            q = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi) + 1e-9)
+            point, axis = tool(chain, q)
+            expected_point, expected_axis = authority.tool(q)
+            error = max(np.abs(point - expected_point).max(), np.abs(axis - expected_axis).max())
+            if not error <= AGREEMENT:
+                raise RobotError(
+                    f"robot {robot.name!r}: the compiled chain and Pinocchio differ by {error:.2g} "
+                    f"at q = {q.tolist()}; this is a defect of coverable, please report it"
+                )
+        return chain
+
+
+def pin_jacobians(model: pin.Model, data: pin.Data) -> pin.Data:
+    """Fill `data` with the joint Jacobians at the neutral configuration and return it."""
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    return data
+
+
+def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A rotation whose z column is `axis`; the identity when the axis is z already."""
+    z = axis / np.linalg.norm(axis)
+    if z[2] > 1.0 - 1e-15:
+        return np.eye(3)
+    helper = np.eye(3)[np.argmin(np.abs(z))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])
+
+
+@njit(cache=True, error_model="numpy")
+def frames(chain, q, origins, axes, point, axis):  # type: ignore[no-untyped-def]
+    """Tool point, approach axis, and every joint's axis, in the root frame.
+
+    Args:
+        chain: a `Chain`.
+        q: (n,) configuration.
+        origins: (n, 3) out, a point on each joint axis, m.
+        axes: (n, 3) out, unit joint axes.
+        point: (3,) out, the tool point, m.
+        axis: (3,) out, the unit approach axis.
+    """
+    n = q.shape[0]
+    xx, xy, xz = 1.0, 0.0, 0.0  # columns of the rotation so far
+    yx, yy, yz = 0.0, 1.0, 0.0
+    zx, zy, zz = 0.0, 0.0, 1.0
+    px, py, pz = 0.0, 0.0, 0.0
+    for i in range(n):
+        t = chain.translations[i]
+        px += xx * t[0] + yx * t[1] + zx * t[2]
+        py += xy * t[0] + yy * t[1] + zy * t[2]
+        pz += xz * t[0] + yz * t[1] + zz * t[2]
+        r = chain.rotations[i]
+        ax = xx * r[0, 0] + yx * r[1, 0] + zx * r[2, 0]
+        ay = xy * r[0, 0] + yy * r[1, 0] + zy * r[2, 0]
+        az = xz * r[0, 0] + yz * r[1, 0] + zz * r[2, 0]
+        bx = xx * r[0, 1] + yx * r[1, 1] + zx * r[2, 1]
+        by = xy * r[0, 1] + yy * r[1, 1] + zy * r[2, 1]
+        bz = xz * r[0, 1] + yz * r[1, 1] + zz * r[2, 1]
+        # The third column of a rotation is the cross product of the first two.
+        zx = ay * bz - az * by
+        zy = az * bx - ax * bz
+        zz = ax * by - ay * bx
+        origins[i, 0] = px
+        origins[i, 1] = py
+        origins[i, 2] = pz
+        axes[i, 0] = zx
+        axes[i, 1] = zy
+        axes[i, 2] = zz
+        if chain.prismatic[i]:
+            xx, xy, xz = ax, ay, az
+            yx, yy, yz = bx, by, bz
+            px += zx * q[i]
+            py += zy * q[i]
+            pz += zz * q[i]
+        else:
+            c = np.cos(q[i])
+            s = np.sin(q[i])
+            xx = c * ax + s * bx
+            xy = c * ay + s * by
+            xz = c * az + s * bz
+            yx = c * bx - s * ax
+            yy = c * by - s * ay
+            yz = c * bz - s * az
+    t = chain.translations[n]
+    point[0] = px + xx * t[0] + yx * t[1] + zx * t[2]
+    point[1] = py + xy * t[0] + yy * t[1] + zy * t[2]
+    point[2] = pz + xz * t[0] + yz * t[1] + zz * t[2]
+    t = chain.approach
+    axis[0] = xx * t[0] + yx * t[1] + zx * t[2]
+    axis[1] = xy * t[0] + yy * t[1] + zy * t[2]
+    axis[2] = xz * t[0] + yz * t[1] + zz * t[2]
+
+
+@njit(cache=True, error_model="numpy")
+def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # type: ignore[no-untyped-def]
+    """Derivatives of tool point and approach axis by q, from what `frames` returned.
+
+    Revolute joint: dp = z x (p - o), da = z x a. Prismatic joint: dp = z, da = 0.
+
+    Args:
+        chain: a `Chain`.
+        origins: (n, 3) from `frames`.
+        axes: (n, 3) from `frames`.
+        point: (3,) from `frames`.
+        axis: (3,) from `frames`.
+        point_rows: (3, n) out, d point / dq.
+        axis_rows: (3, n) out, d axis / dq.
+    """
+    for i in range(axes.shape[0]):
+        zx, zy, zz = axes[i, 0], axes[i, 1], axes[i, 2]
+        if chain.prismatic[i]:
+            point_rows[0, i] = zx
+            point_rows[1, i] = zy
+            point_rows[2, i] = zz
+            axis_rows[0, i] = 0.0
+            axis_rows[1, i] = 0.0
+            axis_rows[2, i] = 0.0
+        else:
+            rx = point[0] - origins[i, 0]
+            ry = point[1] - origins[i, 1]
+            rz = point[2] - origins[i, 2]
+            point_rows[0, i] = zy * rz - zz * ry
+            point_rows[1, i] = zz * rx - zx * rz
+            point_rows[2, i] = zx * ry - zy * rx
+            axis_rows[0, i] = zy * axis[2] - zz * axis[1]
+            axis_rows[1, i] = zz * axis[0] - zx * axis[2]
+            axis_rows[2, i] = zx * axis[1] - zy * axis[0]
+
+
+def tool(
+    chain: Chain, q: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Tool point (3,) m and approach axis (3,) at one configuration; a convenience around `frames`."""
+    n = len(q)
+    point, axis = np.empty(3), np.empty(3)
+    frames(
+        chain, np.ascontiguousarray(q, float), np.empty((n, 3)), np.empty((n, 3)), point, axis
+    )
+    return point, axis

@@ -1,0 +1,61 @@
+"""Where the tool is: Pinocchio's frame placements, the authority that everything else answers to."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from robots.robot import Robot
+
+
+class Kinematics:
+    """Tool point, approach axis and their Jacobians of one robot, evaluated by Pinocchio.
+
+    Holds Pinocchio's working memory, so use one per thread.
+
+    Example:
+        >>> from robots import load_robot
+        >>> point, axis = Kinematics(load_robot("puma560")).tool([0, 0, 0, 0, 0, 0])
+        >>> point.round(6).tolist(), axis.round(6).tolist()
+        ([0.8, 0.1, -0.7], [0.0, 0.0, -1.0])
+    """
+
+    def __init__(self, robot: Robot) -> None:
+        """Create the working memory for `robot`."""
+        self.robot = robot
+        self._model = robot.model
+        self._data = robot.model.createData()
+        self._neutral = pin.neutral(robot.model)
+        # A continuous joint is (cos, sin) to Pinocchio and has no plain coordinate.
+        self._plain = robot.model.nq == robot.model.nv
+        self._frame = robot.model.getFrameId(robot.tool_frame)
+        self._approach = robot.approach_axis
+        placement = self._data.oMf[self._frame]
+        self._translation = placement.translation  # live views: looked up once, copied when kept
+        self._rotation = placement.rotation
+
+    def configuration(self, q: ArrayLike) -> NDArray[np.float64]:
+        """Pinocchio's configuration vector (nq,) for n real joint values (rad or m)."""
+        values = np.ascontiguousarray(q, dtype=float)
+        if values.shape != (self.robot.n,):
+            raise ValueError(f"q must have shape ({self.robot.n},), got {values.shape}")
+        return values if self._plain else pin.integrate(self._model, self._neutral, values)
+
+    def tool(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Tool point (3,) m and unit approach axis (3,) in the frame of the URDF's root link."""
+        pin.forwardKinematics(self._model, self._data, self.configuration(q))
+        pin.updateFramePlacement(self._model, self._data, self._frame)
+        return self._translation.copy(), self._rotation @ self._approach
+
+    def jacobians(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Derivatives (3, n) of tool point and of approach axis by q."""
+        jacobian = pin.computeFrameJacobian(
+            self._model,
+            self._data,
+            self.configuration(q),
+            self._frame,
+            pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
+        )
+        _, axis = self.tool(q)
+        return jacobian[:3].copy(), np.cross(jacobian[3:].T, axis).T

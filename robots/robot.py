@@ -1,0 +1,156 @@
+"""What an arm is: a Pinocchio model of its free joints, a tool, and limits that are real intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    import pinocchio as pin
+
+
+class RobotError(ValueError):
+    """A robot that cannot be used as asked: what was wrong, where, and what would do."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Robot:
+    """A serial chain of n one-dof joints from the URDF's root link to a tool frame.
+
+    A configuration q is n real numbers, base to tip: radians for revolute and continuous joints,
+    metres for prismatic ones. It is *unwrapped*: q and q + 2 pi place the arm alike, yet are two
+    configurations, because cables and hard stops know the difference.
+
+    Robots are values: they pickle (19 kB), hold no geometry, and are never changed in place.
+    """
+
+    name: str
+    model: pin.Model
+    """The reduced model: the n free joints, all others locked."""
+    tool_frame: str
+    """Name of the frame of `model` whose origin is the tool point."""
+    approach_axis: NDArray[np.float64]
+    """(3,) unit vector in the tool frame; it points from the tool towards the surface."""
+    joint_names: tuple[str, ...]
+    joint_kinds: tuple[str, ...]
+    """'revolute', 'continuous' or 'prismatic', one per joint."""
+    lower: NDArray[np.float64]
+    """(n,) rad or m; -inf where the joint turns freely."""
+    upper: NDArray[np.float64]
+    """(n,) rad or m; +inf where the joint turns freely."""
+    limit_sets: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    """Named limits, each (n, 2) rad or m, that `with_limits` knows."""
+    urdf: str | None = None
+    """Path of the URDF file, for the viewer; None for a robot that was built in memory."""
+    package_dirs: tuple[str, ...] = ()
+    """Folders that `package://` mesh names are looked up in."""
+    locked: Mapping[str, float] = field(default_factory=dict)
+    """Every moving joint of the URDF that is not free here, with the value it is held at."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the arrays, and check that they fit together."""
+        n = len(self.joint_names)
+        for name, shape in (("approach_axis", (3,)), ("lower", (n,)), ("upper", (n,))):
+            array = np.array(getattr(self, name), dtype=float)
+            if array.shape != shape:
+                raise RobotError(f"robot {self.name!r}: {name} has shape {array.shape}, not {shape}")
+            if np.isnan(array).any():
+                raise RobotError(f"robot {self.name!r}: {name} holds NaN")
+            object.__setattr__(self, name, array)
+        length = float(np.linalg.norm(self.approach_axis))
+        if not (np.isfinite(length) and length > 1e-9):
+            raise RobotError(
+                f"robot {self.name!r}: approach_axis must be a finite vector that is not zero, "
+                f"such as [0, 0, 1]; got {self.approach_axis.tolist()}"
+            )
+        object.__setattr__(self, "approach_axis", self.approach_axis / length)
+        for array in (self.approach_axis, self.lower, self.upper):
+            array.flags.writeable = False
+        for joint, low, high in zip(self.joint_names, self.lower, self.upper, strict=True):
+            if not low <= high:
+                raise RobotError(
+                    f"robot {self.name!r}: joint {joint!r} has lower limit {low:g} above upper {high:g}"
+                )
+        object.__setattr__(self, "limit_sets", MappingProxyType(dict(self.limit_sets)))
+        object.__setattr__(self, "locked", MappingProxyType(dict(self.locked)))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle as a call of the constructor (mapping proxies do not pickle)."""
+        return (
+            Robot,
+            (
+                self.name, self.model, self.tool_frame, self.approach_axis, self.joint_names,
+                self.joint_kinds, self.lower, self.upper, dict(self.limit_sets), self.urdf,
+                self.package_dirs, dict(self.locked),
+            ),
+        )  # fmt: skip
+
+    @property
+    def n(self) -> int:
+        """Number of free joints."""
+        return len(self.joint_names)
+
+    @property
+    def prismatic(self) -> NDArray[np.bool_]:
+        """(n,) True where a joint slides."""
+        return np.array([kind == "prismatic" for kind in self.joint_kinds], dtype=bool)
+
+    @property
+    def reach(self) -> float:
+        """Upper bound (m) on the distance of the tool point from the first joint's axis origin.
+
+        The sum of the link lengths, plus the longest stroke of each prismatic joint after the
+        first; inf where such a joint has no limits. No configuration puts the tool further out.
+        """
+        from robots.chain import Chain
+
+        lengths = np.linalg.norm(Chain.of(self).translations, axis=1)
+        stroke = np.maximum(np.abs(self.lower), np.abs(self.upper))[self.prismatic]
+        return float(lengths[1:].sum() + stroke.sum())
+
+    def with_limits(self, limits: str | Mapping[str, ArrayLike] | ArrayLike) -> Robot:
+        """Return the same arm with other limits.
+
+        Args:
+            limits: the name of one of `limit_sets`; or (n, 2) lower and upper, rad or m; or a
+                mapping from joint names to (lower, upper) for some of the joints.
+
+        Raises:
+            RobotError: the name or a joint is unknown, the shape is wrong, or lower > upper.
+        """
+        if isinstance(limits, str):
+            if limits not in self.limit_sets:
+                known = ", ".join(sorted(self.limit_sets)) or "none"
+                raise RobotError(
+                    f"robot {self.name!r} has no limit set {limits!r}; it has: {known}"
+                )
+            table = np.array(self.limit_sets[limits], dtype=float)
+        elif isinstance(limits, Mapping):
+            table = np.column_stack([self.lower, self.upper])
+            for joint, pair in limits.items():
+                if joint not in self.joint_names:
+                    raise RobotError(
+                        f"robot {self.name!r} has no free joint {joint!r}; "
+                        f"its joints are: {', '.join(self.joint_names)}"
+                    )
+                values = np.asarray(pair, dtype=float)
+                if values.shape != (2,):
+                    raise RobotError(f"limits of joint {joint!r} must be a pair (lower, upper)")
+                table[self.joint_names.index(joint)] = values
+        else:
+            table = np.asarray(limits, dtype=float)
+        if table.shape != (self.n, 2):
+            raise RobotError(
+                f"limits of robot {self.name!r} must have shape ({self.n}, 2), one (lower, upper) "
+                f"for each of {', '.join(self.joint_names)}; got shape {table.shape}"
+            )
+        return replace(self, lower=table[:, 0], upper=table[:, 1])
+
+    def __repr__(self) -> str:
+        """One line that says which arm this is."""
+        return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r})"
