@@ -1,0 +1,181 @@
+"""From Denavit-Hartenberg rows to a URDF, and the PUMA 560 that the project ships.
+
+Craig's modified convention: frame i follows from frame i-1 by
+
+    Rot(x, alpha_{i-1}) Trans(x, a_{i-1}) Rot(z, theta_i) Trans(z, d_i).
+
+One row becomes one URDF joint about z, whose origin is that transform at theta_i = 0:
+xyz = (a, -d sin(alpha), d cos(alpha)), rpy = (alpha, 0, 0). So every link frame of the URDF *is* the
+DH frame of that link, and the URDF's root link carries frame 0.
+
+`python -m robots.dh` writes `robots/puma560/puma560.urdf` anew.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+PUMA560_URDF = Path(__file__).with_name("puma560") / "puma560.urdf"
+
+
+@dataclass(frozen=True, slots=True)
+class DHRow:
+    """One row of a table in Craig's modified convention; the joint turns about z by theta."""
+
+    alpha: float
+    """rad, twist from z_{i-1} to z_i about x_{i-1}."""
+    a: float
+    """m, distance from z_{i-1} to z_i along x_{i-1}."""
+    d: float
+    """m, offset from x_{i-1} to x_i along z_i."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """One coloured solid of a link's picture; it has no part in the kinematics."""
+
+    link: int
+    """Index of the DH frame that carries the shape; 0 is the root link."""
+    size: tuple[float, ...]
+    """m: (x, y, z) of a box, (radius, length) of a cylinder along z, (radius,) of a sphere."""
+    xyz: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """m, centre of the shape in the link's frame."""
+    rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """rad, fixed-axis roll, pitch and yaw of the shape."""
+    colour: str = "body"
+    """One of the keys of the table of colours handed to `dh_urdf`."""
+
+
+def dh_urdf(
+    name: str,
+    rows: Sequence[DHRow],
+    limits_deg: Sequence[tuple[float, float]],
+    shapes: Sequence[Shape] = (),
+    colours: dict[str, tuple[float, float, float, float]] | None = None,
+) -> str:
+    """Return the URDF text of a serial arm of revolute joints given by DH rows.
+
+    Links are called `base`, `link1`, `link2`, ..., joints `joint1`, `joint2`, ...
+
+    Args:
+        name: the robot's name.
+        rows: n rows, base to tip.
+        limits_deg: n pairs (lower, upper), degrees.
+        shapes: solids to draw.
+        colours: red, green, blue and alpha in 0 .. 1 of each colour that `shapes` names.
+
+    Raises:
+        ValueError: the number of limits is not the number of rows, or a shape names a link or
+            colour that does not exist.
+    """
+    palette = colours or {}
+    if len(limits_deg) != len(rows):
+        raise ValueError(f"{len(rows)} DH rows need as many limits, got {len(limits_deg)}")
+    for shape in shapes:
+        if not 0 <= shape.link <= len(rows) or shape.colour not in palette:
+            raise ValueError(
+                f"{shape} must name a link in 0 .. {len(rows)} and a colour of {sorted(palette)}"
+            )
+    lines = [
+        '<?xml version="1.0"?>',
+        "<!-- Written by `python -m robots.dh`; change that file, not this one. -->",
+        f"<robot name={quoteattr(name)}>",
+    ]
+    for key, rgba in palette.items():
+        lines.append(f'  <material name={quoteattr(key)}><color rgba="{_text(rgba)}"/></material>')
+    for i in range(len(rows) + 1):
+        lines += _link(i, [shape for shape in shapes if shape.link == i])
+    for i, (row, limits) in enumerate(zip(rows, limits_deg, strict=True), start=1):
+        lines += _joint(i, row, limits)
+    lines.append("</robot>")
+    return "\n".join(lines) + "\n"
+
+
+def _link(index: int, shapes: Sequence[Shape]) -> list[str]:
+    """URDF lines of one link and its pictures."""
+    if not shapes:
+        return [f'  <link name="{_link_name(index)}"/>']
+    lines = [f'  <link name="{_link_name(index)}">']
+    for shape in shapes:
+        lines += [
+            "    <visual>",
+            f'      <origin xyz="{_text(shape.xyz)}" rpy="{_text(shape.rpy)}"/>',
+            f"      <geometry>{_geometry(shape.size)}</geometry>",
+            f"      <material name={quoteattr(shape.colour)}/>",
+            "    </visual>",
+        ]
+    return [*lines, "  </link>"]
+
+
+def _joint(index: int, row: DHRow, limits_deg: tuple[float, float]) -> list[str]:
+    """URDF lines of one revolute joint about z."""
+    xyz = (row.a, -math.sin(row.alpha) * row.d, math.cos(row.alpha) * row.d)
+    lower, upper = (math.radians(limit) for limit in limits_deg)
+    return [
+        f'  <joint name="joint{index}" type="revolute">',
+        f'    <parent link="{_link_name(index - 1)}"/>',
+        f'    <child link="{_link_name(index)}"/>',
+        f'    <origin xyz="{_text(xyz)}" rpy="{_text((row.alpha, 0.0, 0.0))}"/>',
+        '    <axis xyz="0 0 1"/>',
+        f'    <limit lower="{lower!r}" upper="{upper!r}" effort="100" velocity="3"/>',
+        "  </joint>",
+    ]
+
+
+def _link_name(index: int) -> str:
+    return f"link{index}" if index else "base"
+
+
+def _geometry(size: tuple[float, ...]) -> str:
+    """URDF element of a box, cylinder or sphere, told apart by how many sizes it has."""
+    if len(size) == 3:
+        return f'<box size="{_text(size)}"/>'
+    if len(size) == 2:
+        return f'<cylinder radius="{size[0]!r}" length="{size[1]!r}"/>'
+    return f'<sphere radius="{size[0]!r}"/>'
+
+
+def _text(values: Sequence[float]) -> str:
+    """Numbers as URDF text; 1e-15 is far below what matters and hides cos(pi/2) = 6e-17."""
+    return " ".join(_number(value) for value in values)
+
+
+def _number(value: float) -> str:
+    # Adding zero turns -0.0 into 0.0.
+    rounded = round(value, 16) + 0.0
+    return repr(int(rounded)) if rounded == int(rounded) else repr(rounded)
+
+
+_QUARTER = math.pi / 2
+
+PUMA560_ROWS = (
+    DHRow(alpha=0.0, a=0.0, d=0.0),
+    DHRow(alpha=-_QUARTER, a=0.0, d=0.0),
+    DHRow(alpha=0.0, a=0.7, d=0.1),
+    DHRow(alpha=-_QUARTER, a=0.1, d=0.7),
+    DHRow(alpha=_QUARTER, a=0.0, d=0.0),
+    DHRow(alpha=-_QUARTER, a=0.0, d=0.0),
+)
+"""The paper's arm: a2 = 0.7, a3 = 0.1, d3 = 0.1, d4 = 0.7 m."""
+
+PUMA560_COLOURS = {
+    "body": (0.87, 0.87, 0.84, 1.0),
+    "joint": (0.25, 0.28, 0.32, 1.0),
+    "tool": (0.90, 0.35, 0.10, 1.0),
+}
+
+PUMA560_SHAPES: tuple[Shape, ...] = ()
+
+
+def puma560_urdf() -> str:
+    """Return the text of `robots/puma560/puma560.urdf`; limits are those of the paper's set 1."""
+    limits = [(-180.0, 180.0)] * len(PUMA560_ROWS)
+    return dh_urdf("puma560", PUMA560_ROWS, limits, PUMA560_SHAPES, PUMA560_COLOURS)
+
+
+if __name__ == "__main__":
+    PUMA560_URDF.write_text(puma560_urdf(), encoding="utf-8")

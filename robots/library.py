@@ -1,0 +1,178 @@
+"""Robots by name: the shipped ones, the arms of example-robot-data, and any URDF file.
+
+`library.toml` says for each name where the URDF is, which link is the tool, which way the tool points
+and which joints on the way are held. example-robot-data is only ever read as files: its arms are
+found through the metadata of the installed distribution.
+"""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from robots.reduce import robot_from_urdf, suggestion
+from robots.robot import Robot, RobotError
+
+HERE = Path(__file__).parent
+SHIPPED = "coverable"
+DATA = "example-robot-data"
+
+
+@dataclass(frozen=True, slots=True)
+class RobotInfo:
+    """What the library knows about one arm before its URDF is read."""
+
+    name: str
+    source: str
+    """'coverable' for a shipped robot, else the distribution that holds the URDF."""
+    description: str
+    urdf: str
+    """Path of the URDF file."""
+    tool_frame: str
+    approach_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    """In the tool frame: where a tool mounted on the flange points."""
+    lock: Mapping[str, float] = field(default_factory=dict)
+    """Joints on the way to the tool that are held by default, rad or m."""
+    limits: str | None = None
+    """Path of a file of named limit sets."""
+    package_dirs: tuple[str, ...] = ()
+
+
+def list_robots() -> tuple[RobotInfo, ...]:
+    """Every robot that `load_robot` knows by name, in the order of the library; reads no URDF.
+
+    Example:
+        >>> [info.name for info in list_robots()][:3]
+        ['puma560', 'ur3', 'ur5']
+    """
+    return tuple(_library().values())
+
+
+def load_robot(
+    name_or_path: str | os.PathLike[str],
+    limits: str | Mapping[str, ArrayLike] | ArrayLike | None = None,
+    tool_frame: str | None = None,
+    approach_axis: ArrayLike | None = None,
+    lock: Mapping[str, float] | None = None,
+    package_dirs: tuple[str | os.PathLike[str], ...] = (),
+) -> Robot:
+    """Load an arm by its name in the library, or from a URDF file.
+
+    Free are the joints between the URDF's root link and the tool frame; every other joint is held
+    at zero, brought into its limits. A continuous joint is one real coordinate without limits
+    (whatever the URDF writes there) until `limits` gives it some.
+
+    Args:
+        name_or_path: a name of `list_robots()`, or the path of a URDF file.
+        limits: replaces the URDF's limits: a named set, (n, 2) rad or m, or joint -> (lower, upper).
+        tool_frame: the link whose origin is the tool point; default from the library, and for a
+            URDF file its only leaf link.
+        approach_axis: (3,) in the tool frame; default from the library, else +z.
+        lock: joints to hold, name -> rad or m, in addition to those the library holds.
+        package_dirs: folders in which `package://` meshes are looked up.
+
+    Raises:
+        RobotError: the name is unknown, or the URDF, frame, limits or a locked joint is wrong.
+
+    Example:
+        >>> load_robot("puma560", limits="set-1")
+        Robot('puma560', 6 joints, tool 'link6')
+    """
+    try:
+        from robots.urdf import check_urdf
+    except ImportError:
+        from robots._urdf_fallback import check_urdf
+
+    info = _find(name_or_path)
+    folders = tuple(str(folder) for folder in package_dirs)
+    if info is None:
+        path = Path(name_or_path).expanduser()
+        info = RobotInfo(path.stem, "file", "", str(path), tool_frame or "")
+    changed = tool_frame is not None and tool_frame != info.tool_frame
+    if approach_axis is None:
+        # The library's axis belongs to the library's tool frame.
+        approach_axis = (0.0, 0.0, 1.0) if changed else info.approach_axis
+    robot = robot_from_urdf(
+        check_urdf(info.urdf, package_dirs=(*folders, *info.package_dirs)),
+        name=info.name,
+        tool_frame=tool_frame or info.tool_frame or None,
+        approach_axis=approach_axis,
+        lock={**info.lock, **(lock or {})},
+    )
+    if info.limits is not None:
+        robot = replace(robot, limit_sets=_limit_sets(Path(info.limits), robot))
+    return robot if limits is None else robot.with_limits(limits)
+
+
+def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:
+    """The library's entry of that name; None where a path was given."""
+    if not isinstance(name_or_path, str):
+        return None
+    library = _library()
+    if name_or_path in library:
+        return library[name_or_path]
+    is_path = os.sep in name_or_path or name_or_path.lower().endswith((".urdf", ".xml", ".xacro"))
+    if is_path or Path(name_or_path).is_file():
+        return None
+    raise RobotError(
+        f"there is no robot {name_or_path!r} in the library; "
+        f"{suggestion(name_or_path, list(library))} "
+        "`coverable robots` lists them all, and a path ending in .urdf loads a file"
+    )
+
+
+@cache
+def _library() -> Mapping[str, RobotInfo]:
+    """The entries of library.toml with their paths filled in."""
+    table = tomllib.loads((HERE / "library.toml").read_text(encoding="utf-8"))
+    share = _data_folder()
+    entries = {}
+    for name, entry in table.items():
+        shipped = entry["source"] == SHIPPED
+        root = HERE if shipped else share / DATA / "robots"
+        entries[name] = RobotInfo(
+            name=name,
+            source=entry["source"],
+            description=entry["description"],
+            urdf=str(root / entry["urdf"]),
+            tool_frame=entry["tool_frame"],
+            approach_axis=tuple(entry.get("approach_axis", (0.0, 0.0, 1.0))),
+            lock=MappingProxyType(entry.get("lock", {})),
+            limits=str(HERE / entry["limits"]) if "limits" in entry else None,
+            package_dirs=() if shipped else (str(share),),
+        )
+    return MappingProxyType(entries)
+
+
+def _data_folder() -> Path:
+    """The folder that `package://example-robot-data/...` is relative to."""
+    try:
+        files = distribution(DATA).files or ()
+    except PackageNotFoundError as error:
+        raise RobotError(f"the package {DATA} is not installed; pip install {DATA}") from error
+    for file in files:
+        if file.parts[-1] == "package.xml" and file.parts[-2] == DATA:
+            return Path(str(file.locate())).resolve().parent.parent
+    raise RobotError(f"the installed package {DATA} holds no robots; it should be 6.0 or later")
+
+
+def _limit_sets(path: Path, robot: Robot) -> dict[str, NDArray[np.float64]]:
+    """Named limits (n, 2) in rad or m, for the joints of `robot` that are free.
+
+    The file has one row for each joint named in its `joints`; rows of joints that are held are left out.
+    """
+    table = tomllib.loads(path.read_text(encoding="utf-8"))
+    joints = table.pop("joints")
+    if not set(robot.joint_names) <= set(joints):
+        return {}
+    rows = [joints.index(joint) for joint in robot.joint_names]
+    return {name: np.radians(entry["limits_deg"])[rows] for name, entry in table.items()}
