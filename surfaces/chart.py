@@ -1,0 +1,213 @@
+"""The surface as compiled loops see it: the foot of a point, and the cell it falls in.
+
+One implementation serves `Surface.closest` and the search kernels alike. A new kind of surface
+adds a code, a `_..._foot` function in its own frame, and a branch in `foot`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+PLANE, SPHERE, CYLINDER, HYPERBOLOID = 0, 1, 2, 3
+EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lies on it
+_TURN = 2.0 * math.pi
+
+
+class Chart(NamedTuple):
+    """A patch of a surface, cut into cells; a plain tuple of numbers and arrays, as numba likes it.
+
+    Built by `Surface.chart` and `Cells.chart`.
+    """
+
+    code: int
+    """Which kind of surface: PLANE, SPHERE, ..."""
+    shape: NDArray[np.float64]
+    """(k,) m, lengths of the surface: radius; waist and flare."""
+    rotation: NDArray[np.float64]
+    """(3, 3) own frame in the root frame."""
+    position: NDArray[np.float64]
+    """(3,) m, origin of the own frame in the root frame."""
+    side_sign: float
+    """-1.0 inside, +1.0 outside."""
+    low: NDArray[np.float64]
+    """(2,) rad or m, where the ranges of u and v begin."""
+    high: NDArray[np.float64]
+    """(2,) rad or m, where they end."""
+    closed: NDArray[np.bool_]
+    """(2,) True where the range is a full turn."""
+    cells: NDArray[np.int64]
+    """(2,) number of cells along u and v."""
+
+
+@njit(cache=True, error_model="numpy")
+def wrap(angle, low, high):  # type: ignore[no-untyped-def]
+    """The value angle + 2 pi k (rad) that lies in low..high, or failing that, nearest to it."""
+    a = low + (angle - low) % _TURN
+    if a > high and a - high > low - (a - _TURN):
+        a -= _TURN
+    return a
+
+
+@njit(cache=True, error_model="numpy")
+def _sphere_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+    """Foot on the sphere about the origin: u, v, height, normal, in its own frame."""
+    rho = math.hypot(x, y)
+    distance = math.hypot(rho, z)
+    if distance == 0.0:  # every point is equally near: take the patch's first corner
+        u, v = low[0], low[1]
+        s = math.sin(u)
+        return u, v, -radius, s * math.cos(v), s * math.sin(v), math.cos(u)
+    u = math.atan2(rho, z)
+    # On the polar axis every azimuth is the same point: take one of the patch.
+    v = low[1] if rho <= 1e-15 * distance else wrap(math.atan2(y, x), low[1], high[1])
+    return u, v, distance - radius, x / distance, y / distance, z / distance
+
+
+@njit(cache=True, error_model="numpy")
+def _cylinder_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+    """Foot on the cylinder about z: u, v, height, normal, in its own frame."""
+    rho = math.hypot(x, y)
+    if rho == 0.0:
+        u = low[0]
+        return u, z, -radius, math.cos(u), math.sin(u), 0.0
+    return wrap(math.atan2(y, x), low[0], high[0]), z, rho - radius, x / rho, y / rho, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def hyperbola_foot(waist, slope, rho, z):  # type: ignore[no-untyped-def]
+    """Abscissa t of the point of r(t) = sqrt(waist^2 + slope^2 t^2) nearest to (z, rho).
+
+    It is a root of f(t) = (1 + s^2) t - s^2 rho t / r(t) - z. For z >= 0, f is convex on t >= 0
+    with f(0) <= 0, so it has one root there where it rises, and the nearest point is that one.
+    Newton from a bound on its right falls onto it monotonically, and stops when rounding ends
+    the fall.
+    """
+    target = abs(z)
+    square = slope * slope
+    t = (target + slope * rho) / (1.0 + square)
+    for _ in range(200):
+        r = math.sqrt(waist * waist + square * t * t)
+        pull = square * rho / r
+        value = (1.0 + square - pull) * t - target
+        rise = 1.0 + square - pull * (waist / r) ** 2
+        if not (value > 0.0 and rise > 0.0):
+            break
+        following = max(t - value / rise, 0.0)
+        if following >= t:
+            break
+        t = following
+    return math.copysign(t, z)
+
+
+@njit(cache=True, error_model="numpy")
+def _hyperboloid_foot(waist, flare, x, y, z, low, high):  # type: ignore[no-untyped-def]
+    """Foot on the hyperboloid of one sheet about z: u, v, height, normal, in its own frame."""
+    rho = math.hypot(x, y)
+    slope = waist / flare
+    t = hyperbola_foot(waist, slope, rho, z)
+    r = math.sqrt(waist * waist + slope * slope * t * t)
+    rise = slope * slope * t / r
+    length = math.sqrt(1.0 + rise * rise)
+    height = ((rho - r) - rise * (z - t)) / length
+    if rho == 0.0:
+        u = low[0]
+        cosine, sine = math.cos(u), math.sin(u)
+    else:
+        u = wrap(math.atan2(y, x), low[0], high[0])
+        cosine, sine = x / rho, y / rho
+    return u, t, height, cosine / length, sine / length, -rise / length
+
+
+@njit(cache=True, error_model="numpy")
+def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
+    """The point of the surface nearest to (x, y, z), all in the root frame.
+
+    Args:
+        chart: a `Chart`.
+        x: m, as y and z.
+        y: m.
+        z: m.
+
+    Returns:
+        (u, v, height, nx, ny, nz): parameters (rad or m; an angle is wrapped into the patch's
+        range, or stays outside it if no turn brings it in), signed height along the outward
+        normal (m), and that unit normal.
+    """
+    r = chart.rotation
+    dx = x - chart.position[0]
+    dy = y - chart.position[1]
+    dz = z - chart.position[2]
+    a = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
+    b = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
+    c = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
+    if chart.code == SPHERE:
+        u, v, height, na, nb, nc = _sphere_foot(chart.shape[0], a, b, c, chart.low, chart.high)
+    elif chart.code == CYLINDER:
+        u, v, height, na, nb, nc = _cylinder_foot(chart.shape[0], a, b, c, chart.low, chart.high)
+    elif chart.code == HYPERBOLOID:
+        u, v, height, na, nb, nc = _hyperboloid_foot(
+            chart.shape[0], chart.shape[1], a, b, c, chart.low, chart.high
+        )
+    elif chart.code == PLANE:
+        u, v, height, na, nb, nc = a, b, c, 0.0, 0.0, 1.0
+    else:
+        u, v, height, na, nb, nc = math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
+    return (
+        u,
+        v,
+        height,
+        r[0, 0] * na + r[0, 1] * nb + r[0, 2] * nc,
+        r[1, 0] * na + r[1, 1] * nb + r[1, 2] * nc,
+        r[2, 0] * na + r[2, 1] * nb + r[2, 2] * nc,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def on_patch(chart, u, v):  # type: ignore[no-untyped-def]
+    """True where u and v (rad or m, wrapped as `foot` returns them) lie in the patch's ranges."""
+    return (
+        chart.low[0] - EDGE <= u <= chart.high[0] + EDGE
+        and chart.low[1] - EDGE <= v <= chart.high[1] + EDGE
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def cell_at(chart, u, v):  # type: ignore[no-untyped-def]
+    """Flat row-major index of the cell at u, v (rad or m), or -1 outside the patch.
+
+    A closed parameter may be off by any number of turns. A border belongs to the cell of higher
+    index, the outermost border to the last cell.
+    """
+    if chart.closed[0]:
+        u = wrap(u, chart.low[0], chart.high[0])
+    if chart.closed[1]:
+        v = wrap(v, chart.low[1], chart.high[1])
+    rows, columns = chart.cells[0], chart.cells[1]
+    if rows == 0 or columns == 0 or not on_patch(chart, u, v):
+        return -1
+    i = math.floor((u - chart.low[0]) / (chart.high[0] - chart.low[0]) * rows)
+    j = math.floor((v - chart.low[1]) / (chart.high[1] - chart.low[1]) * columns)
+    return min(max(i, 0), rows - 1) * columns + min(max(j, 0), columns - 1)
+
+
+@njit(cache=True, error_model="numpy")
+def feet(chart, points):  # type: ignore[no-untyped-def]
+    """`foot` of many points (k, 3): values (k, 6) in the order of `foot`, and `on_patch` (k,)."""
+    count = points.shape[0]
+    values = np.empty((count, 6))
+    inside = np.empty(count, dtype=np.bool_)
+    for k in range(count):
+        u, v, height, nx, ny, nz = foot(chart, points[k, 0], points[k, 1], points[k, 2])
+        values[k, 0] = u
+        values[k, 1] = v
+        values[k, 2] = height
+        values[k, 3] = nx
+        values[k, 4] = ny
+        values[k, 5] = nz
+        inside[k] = on_patch(chart, u, v)
+    return values, inside

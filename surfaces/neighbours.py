@@ -1,0 +1,119 @@
+"""Which cells of a grid touch: 8 neighbours in clockwise order, across seams and poles too."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+# Clockwise from the upper left; row = u grows downwards, column = v grows to the right.
+_TOP = ((-1, -1), (-1, 0), (-1, 1))
+_RIGHT = ((0, 1),)
+_BOTTOM = ((1, 1), (1, 0), (1, -1))
+_LEFT = ((0, -1),)
+
+
+class Neighbours(NamedTuple):
+    """Neighbours of N cells, in compressed rows: see `of` for those of one cell."""
+
+    indptr: NDArray[np.int64]
+    """(N + 1,) where each cell's list begins, and the end of the last."""
+    indices: NDArray[np.int64]
+    """Flat cell indices, each cell's list clockwise from its upper left neighbour."""
+
+    def of(self, k: int) -> NDArray[np.int64]:
+        """The neighbours of cell k, clockwise."""
+        return self.indices[self.indptr[k] : self.indptr[k + 1]]
+
+    @property
+    def pairs(self) -> NDArray[np.int64]:
+        """(M, 2) pairs i < j of cells that touch, each once, sorted."""
+        count = len(self.indptr) - 1
+        owner = np.repeat(np.arange(count, dtype=np.int64), np.diff(self.indptr))
+        forward = owner < self.indices
+        keys = np.sort(owner[forward] * count + self.indices[forward])
+        return np.column_stack(np.divmod(keys, max(count, 1)))
+
+
+def grid_neighbours(
+    rows: int,
+    columns: int,
+    closed: tuple[bool, bool] = (False, False),
+    poles: tuple[bool, bool] = (False, False),
+) -> Neighbours:
+    """Neighbours in a grid of rows x columns cells, numbered row by row.
+
+    No cell neighbours itself, and none is listed twice, however few cells go round.
+
+    Args:
+        rows: number of rows (u).
+        columns: number of columns (v).
+        closed: whether the first and last row, and the first and last column, are joined.
+        poles: whether the first and the last row close around a pole. Its cells then touch those
+            on the other side: half the columns further, or the two about that place if their
+            number is odd, and one more on each side.
+    """
+    i, j = np.divmod(np.arange(rows * columns, dtype=np.int64), max(columns, 1))
+    slots = [
+        *_vertical(i, j, rows, columns, closed, _TOP, i == 0, poles[0]),
+        *(_step(i, j, rows, columns, closed, offset) for offset in _RIGHT),
+        *_vertical(i, j, rows, columns, closed, _BOTTOM, i == rows - 1, poles[1]),
+        *(_step(i, j, rows, columns, closed, offset) for offset in _LEFT),
+    ]
+    table = np.stack(slots, axis=1)
+    valid = (table >= 0) & (table != np.arange(rows * columns)[:, None])
+    if any(closed) or any(poles):  # only then can one cell be met twice
+        for later in range(1, table.shape[1]):
+            for earlier in range(later):
+                valid[:, later] &= table[:, later] != table[:, earlier]
+    indptr = np.zeros(rows * columns + 1, dtype=np.int64)
+    np.cumsum(valid.sum(axis=1), out=indptr[1:])
+    return Neighbours(indptr, table[valid])
+
+
+def _step(
+    i: NDArray[np.int64],
+    j: NDArray[np.int64],
+    rows: int,
+    columns: int,
+    closed: tuple[bool, bool],
+    offset: tuple[int, int],
+) -> NDArray[np.int64]:
+    """Flat index one offset further, across closed seams; -1 where the grid ends."""
+    row, column = i + offset[0], j + offset[1]
+    if closed[0]:
+        row = row % max(rows, 1)
+    if closed[1]:
+        column = column % max(columns, 1)
+    there = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    return np.where(there, row * columns + column, -1)
+
+
+def _vertical(
+    i: NDArray[np.int64],
+    j: NDArray[np.int64],
+    rows: int,
+    columns: int,
+    closed: tuple[bool, bool],
+    offsets: tuple[tuple[int, int], ...],
+    last: NDArray[np.bool_],
+    pole: bool,
+) -> list[NDArray[np.int64]]:
+    """Slots of the neighbours above or below, clockwise, and across the pole if there is one.
+
+    Walking clockwise around a cell at the upper pole, one meets the columns across it in falling
+    order; at the lower pole in rising order.
+    """
+    plain = [_step(i, j, rows, columns, closed, offset) for offset in offsets]
+    if not pole:
+        return plain
+    half = columns // 2
+    across = [half - 1, half, half + 1] + ([half + 2] if columns % 2 else [])
+    if offsets is _TOP:
+        across.reverse()
+    plain += [np.full_like(i, -1)] * (len(across) - len(plain))
+    return [
+        np.where(last, i * columns + (j + shift) % max(columns, 1), slot)
+        for shift, slot in zip(across, plain, strict=True)
+    ]
