@@ -1,0 +1,199 @@
+"""Untrusted XML into a small tree with line numbers, or one clear refusal.
+
+Nothing here knows robots. The reader caps bytes, elements and nesting, opens regular files only,
+and refuses DOCTYPE, which is where entity bombs and external entities live. No name in the file is
+ever followed: what is not in the bytes given is not read.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from dataclasses import dataclass, field
+from xml.parsers import expat
+
+from robots.robot import RobotError
+
+MAX_BYTES = 8 * 2**20  # the largest URDF in example-robot-data has 0.2 MB
+MAX_ELEMENTS = 100_000  # the same file has 3,900
+MAX_DEPTH = 64  # URDF needs 6
+MAX_SHOWN = 20  # faults in one message; `faults` has them all
+
+
+class UrdfError(RobotError):
+    """A URDF that cannot be used: every fault that was found, each with what would do."""
+
+    def __init__(self, path: str, faults: tuple[str, ...]) -> None:
+        """Make the message from `path` and the list of `faults`."""
+        self.path = path
+        self.faults = faults
+        if len(faults) == 1:
+            message = f"{path}: {faults[0]}"
+        else:
+            lines = [f"{path}: {len(faults)} faults", *faults[:MAX_SHOWN]]
+            if len(faults) > MAX_SHOWN:
+                lines.append(f"... and {len(faults) - MAX_SHOWN} more")
+            message = "\n  ".join(lines)
+        super().__init__(message)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle as a call of the constructor, so that workers can report it."""
+        return (UrdfError, (self.path, self.faults))
+
+
+@dataclass(eq=False, slots=True)
+class Node:
+    """One XML element: tag, attributes, the line it starts on, and the elements inside."""
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Node] = field(default_factory=list)
+
+    def all(self, tag: str) -> list[Node]:
+        """The direct children of that tag."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Node | None:
+        """The first direct child of that tag."""
+        return next((child for child in self.children if child.tag == tag), None)
+
+
+def shown(text: str, width: int = 60) -> str:
+    """`text` quoted for a message: escaped, and cut when it is long."""
+    return repr(text if len(text) <= width else text[: width - 3] + "...")
+
+
+def read_bytes(path: str) -> bytes:
+    """Read a regular file of at most MAX_BYTES; never blocks on a pipe or a device.
+
+    Raises:
+        UrdfError: it is missing, unreadable, empty, too big or not a regular file.
+    """
+    try:
+        _check_regular(path, os.stat(path))
+        # Without O_NONBLOCK, a pipe put in its place since would hang the open.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        with open(descriptor, "rb") as stream:
+            _check_regular(path, os.fstat(descriptor))
+            data = stream.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise UrdfError(path, ("there is no such file; give the path of a URDF file",)) from None
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise UrdfError(path, (f"cannot be read: {reason}; check its permissions",)) from None
+    except ValueError as error:  # a NUL in the path
+        raise UrdfError(shown(path), (f"is not a file's path: {error}",)) from None
+    if len(data) > MAX_BYTES:
+        raise UrdfError(path, (_too_big(len(data)),))
+    return data
+
+
+def _check_regular(path: str, status: os.stat_result) -> None:
+    if stat.S_ISDIR(status.st_mode):
+        raise UrdfError(path, ("is a folder; give the path of the URDF file in it",))
+    if not stat.S_ISREG(status.st_mode):
+        raise UrdfError(path, ("is a pipe, socket or device; save the URDF to a regular file",))
+    if status.st_size > MAX_BYTES:
+        raise UrdfError(path, (_too_big(status.st_size),))
+
+
+def _too_big(size: int) -> str:
+    return (
+        f"has {size:,} bytes or more, and a URDF may have {MAX_BYTES:,}; "
+        "keep links and joints in it, and meshes in files of their own"
+    )
+
+
+def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
+    """Parse XML into nodes.
+
+    Args:
+        data: the whole document.
+        path: what to call it in messages.
+        encoding: overrides what the document declares.
+
+    Raises:
+        UrdfError: not well-formed, a DOCTYPE, or over a cap.
+    """
+    if len(data) > MAX_BYTES:
+        raise UrdfError(path, (_too_big(len(data)),))
+    hint = _foreign(data)
+    if hint:
+        raise UrdfError(path, (f"{hint}; a URDF is XML that starts with <robot name=...>",))
+    parser = expat.ParserCreate(encoding)
+    builder = _Builder(parser, path)
+    try:
+        parser.Parse(data, True)
+    except expat.ExpatError as error:
+        what = expat.ErrorString(error.code) or "not XML"
+        raise UrdfError(
+            path,
+            (f"line {error.lineno}: broken XML ({what}); mend the file or export it again",),
+        ) from None
+    except (LookupError, ValueError) as error:
+        if isinstance(error, UrdfError):
+            raise
+        raise UrdfError(
+            path, (f"line 1: its encoding cannot be read ({error}); save it as UTF-8",)
+        ) from None
+    if builder.root is None:
+        raise UrdfError(path, ("holds no XML element; a URDF starts with <robot name=...>",))
+    return builder.root
+
+
+def _foreign(data: bytes) -> str | None:
+    """What a file is that is plainly no XML, or None."""
+    head = data[:512].lstrip(b"\xef\xbb\xbf \t\r\n")
+    if not data.lstrip(b"\xef\xbb\xbf \t\r\n"):
+        return "is empty"
+    if head.startswith((b"\xff\xfe", b"\xfe\xff", b"<\x00", b"\x00<")):
+        return None  # UTF-16
+    if b"\0" in head or head.startswith((b"\x89PNG", b"\x1f\x8b", b"PK", b"\xff\xd8")):
+        return "is a binary file"
+    if not head.startswith(b"<"):
+        return f"starts with {shown(head[:20].decode('latin-1'))}, so it is not XML"
+    return None
+
+
+class _Builder:
+    """Collects the elements that expat reports, and stops it at the first thing not allowed."""
+
+    def __init__(self, parser: expat.XMLParserType, path: str) -> None:
+        self.parser = parser
+        self.path = path
+        self.root: Node | None = None
+        self.open: list[Node] = []
+        self.count = 0
+        parser.StartElementHandler = self.start
+        parser.EndElementHandler = self.end
+        parser.StartDoctypeDeclHandler = self.doctype
+        parser.EntityDeclHandler = self.doctype
+
+    def refuse(self, what: str) -> None:
+        raise UrdfError(self.path, (f"line {self.parser.CurrentLineNumber}: {what}",))
+
+    def doctype(self, *_: object) -> None:
+        self.refuse(
+            "holds a DOCTYPE, which can pull in other files or grow without bound; delete it "
+            "(a URDF needs none; a web page is not a URDF)"
+        )
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self.count += 1
+        if self.count > MAX_ELEMENTS:
+            self.refuse(f"has more than {MAX_ELEMENTS:,} XML elements; give the arm alone")
+        if len(self.open) >= MAX_DEPTH:
+            self.refuse(
+                f"elements are nested more than {MAX_DEPTH} deep; a URDF lists its links and "
+                "joints side by side"
+            )
+        node = Node(tag, attributes, self.parser.CurrentLineNumber)
+        if self.open:
+            self.open[-1].children.append(node)
+        else:
+            self.root = node
+        self.open.append(node)
+
+    def end(self, _: str) -> None:
+        self.open.pop()
