@@ -28,12 +28,12 @@ AGREEMENT = 1e-9  # [m], [1]: largest difference from Pinocchio that `checked` a
 
 
 class Chain(NamedTuple):
-    """Constants of a serial chain of n one-dof joints; a plain tuple of arrays, as numba likes it."""
+    """Constants of a serial chain of n one-dof joints; a plain tuple of arrays for numba."""
 
     rotations: NDArray[np.float64]
     """(n, 3, 3) joint frame in the previous joint's frame, before the joint moves."""
     translations: NDArray[np.float64]
-    """(n + 1, 3) origins of the same, m; the last row is the tool point in the last joint's frame."""
+    """(n + 1, 3) origins of the same, m; last the tool point in the last joint's frame."""
     prismatic: NDArray[np.bool_]
     """(n,) True where a joint slides along z, False where it turns about it."""
     approach: NDArray[np.float64]
@@ -49,7 +49,7 @@ class Chain(NamedTuple):
         """
         model = robot.model
         n = robot.n
-        frame = model.frames[model.getFrameId(robot.tool_frame)]
+        frame = model.frames[robot.tool_frame_id]
         if model.nv != n or list(model.parents)[1:] != list(range(n)) or frame.parentJoint != n:
             raise RobotError(
                 f"robot {robot.name!r}: its {model.nv} free joints do not form one serial chain of "
@@ -89,8 +89,10 @@ class Chain(NamedTuple):
         chain = Chain.of(robot)
         authority = Kinematics(robot)
         rng = np.random.default_rng(0)
+        lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
+        upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
         for _ in range(samples):
-            q = rng.uniform(np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi) + 1e-9)
+            q = lower + (upper - lower) * rng.random(robot.n)
             point, axis = tool(chain, q)
             expected_point, expected_axis = authority.tool(q)
             error = max(np.abs(point - expected_point).max(), np.abs(axis - expected_axis).max())
@@ -111,7 +113,7 @@ def pin_jacobians(model: pin.Model, data: pin.Data) -> pin.Data:
 def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """A rotation whose z column is `axis`; the identity when the axis is z already."""
     z = axis / np.linalg.norm(axis)
-    if z[2] > 1.0 - 1e-15:
+    if z[2] == 1.0 and z[0] == z[1] == 0.0:
         return np.eye(3)
     helper = np.eye(3)[np.argmin(np.abs(z))]
     x = np.cross(helper, z)
@@ -219,13 +221,9 @@ def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # type
             axis_rows[2, i] = zx * axis[1] - zy * axis[0]
 
 
-def tool(
-    chain: Chain, q: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Tool point (3,) m and approach axis (3,) at one configuration; a convenience around `frames`."""
+def tool(chain: Chain, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Tool point (3,) m and approach axis (3,) at one configuration, by `frames`."""
     n = len(q)
     point, axis = np.empty(3), np.empty(3)
-    frames(
-        chain, np.ascontiguousarray(q, float), np.empty((n, 3)), np.empty((n, 3)), point, axis
-    )
+    frames(chain, np.ascontiguousarray(q, float), np.empty((n, 3)), np.empty((n, 3)), point, axis)
     return point, axis

@@ -5,8 +5,8 @@ Craig's modified convention: frame i follows from frame i-1 by
     Rot(x, alpha_{i-1}) Trans(x, a_{i-1}) Rot(z, theta_i) Trans(z, d_i).
 
 One row becomes one URDF joint about z, whose origin is that transform at theta_i = 0:
-xyz = (a, -d sin(alpha), d cos(alpha)), rpy = (alpha, 0, 0). So every link frame of the URDF *is* the
-DH frame of that link, and the URDF's root link carries frame 0.
+xyz = (a, -d sin(alpha), d cos(alpha)), rpy = (alpha, 0, 0). So every link frame of the URDF *is*
+the DH frame of that link, and the URDF's root link carries frame 0.
 
 `python -m robots.dh` writes `robots/puma560/puma560.urdf` anew.
 """

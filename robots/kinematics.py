@@ -1,4 +1,4 @@
-"""Where the tool is: Pinocchio's frame placements, the authority that everything else answers to."""
+"""Where the tool is: Pinocchio's frame placements, the authority for everything else."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Kinematics:
         self._neutral = pin.neutral(robot.model)
         # A continuous joint is (cos, sin) to Pinocchio and has no plain coordinate.
         self._plain = robot.model.nq == robot.model.nv
-        self._frame = robot.model.getFrameId(robot.tool_frame)
+        self._frame = robot.tool_frame_id
         self._approach = robot.approach_axis
         placement = self._data.oMf[self._frame]
         self._translation = placement.translation  # live views: looked up once, copied when kept
@@ -57,5 +57,6 @@ class Kinematics:
             self._frame,
             pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
         )
-        _, axis = self.tool(q)
+        pin.updateFramePlacement(self._model, self._data, self._frame)
+        axis = self._rotation @ self._approach
         return jacobian[:3].copy(), np.cross(jacobian[3:].T, axis).T

@@ -1,23 +1,23 @@
 """Robots by name: the shipped ones, the arms of example-robot-data, and any URDF file.
 
-`library.toml` says for each name where the URDF is, which link is the tool, which way the tool points
-and which joints on the way are held. example-robot-data is only ever read as files: its arms are
-found through the metadata of the installed distribution.
+`library.toml` says for each name where the URDF is, which link is the tool, which way the tool
+points and which joints on the way are held. example-robot-data is only ever read as files: its
+arms are found through the metadata of the installed distribution.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import MappingProxyType
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from robots.reduce import robot_from_urdf, suggestion
 from robots.robot import Robot, RobotError
@@ -73,7 +73,8 @@ def load_robot(
 
     Args:
         name_or_path: a name of `list_robots()`, or the path of a URDF file.
-        limits: replaces the URDF's limits: a named set, (n, 2) rad or m, or joint -> (lower, upper).
+        limits: replaces the URDF's limits: a named set, (n, 2) rad or m, or a mapping
+            joint -> (lower, upper).
         tool_frame: the link whose origin is the tool point; default from the library, and for a
             URDF file its only leaf link.
         approach_axis: (3,) in the tool frame; default from the library, else +z.
@@ -87,10 +88,7 @@ def load_robot(
         >>> load_robot("puma560", limits="set-1")
         Robot('puma560', 6 joints, tool 'link6')
     """
-    try:
-        from robots.urdf import check_urdf
-    except ImportError:
-        from robots._urdf_fallback import check_urdf
+    from robots.urdf import check_urdf
 
     info = _find(name_or_path)
     folders = tuple(str(folder) for folder in package_dirs)
@@ -101,16 +99,15 @@ def load_robot(
     if approach_axis is None:
         # The library's axis belongs to the library's tool frame.
         approach_axis = (0.0, 0.0, 1.0) if changed else info.approach_axis
-    robot = robot_from_urdf(
+    return robot_from_urdf(
         check_urdf(info.urdf, package_dirs=(*folders, *info.package_dirs)),
         name=info.name,
         tool_frame=tool_frame or info.tool_frame or None,
         approach_axis=approach_axis,
         lock={**info.lock, **(lock or {})},
+        limits=limits,
+        limit_sets=_limit_sets(Path(info.limits)) if info.limits is not None else None,
     )
-    if info.limits is not None:
-        robot = replace(robot, limit_sets=_limit_sets(Path(info.limits), robot))
-    return robot if limits is None else robot.with_limits(limits)
 
 
 def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:
@@ -165,14 +162,14 @@ def _data_folder() -> Path:
     raise RobotError(f"the installed package {DATA} holds no robots; it should be 6.0 or later")
 
 
-def _limit_sets(path: Path, robot: Robot) -> dict[str, NDArray[np.float64]]:
-    """Named limits (n, 2) in rad or m, for the joints of `robot` that are free.
-
-    The file has one row for each joint named in its `joints`; rows of joints that are held are left out.
-    """
+def _limit_sets(path: Path) -> dict[str, dict[str, tuple[float, float]]]:
+    """Named limits of a file: set name -> joint name -> (lower, upper), rad."""
     table = tomllib.loads(path.read_text(encoding="utf-8"))
     joints = table.pop("joints")
-    if not set(robot.joint_names) <= set(joints):
-        return {}
-    rows = [joints.index(joint) for joint in robot.joint_names]
-    return {name: np.radians(entry["limits_deg"])[rows] for name, entry in table.items()}
+    return {
+        name: {
+            joint: (math.radians(low), math.radians(high))
+            for joint, (low, high) in zip(joints, entry["limits_deg"], strict=True)
+        }
+        for name, entry in table.items()
+    }

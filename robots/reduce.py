@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from robots.urdf import CheckedUrdf, JointInfo
 
-ONE_DOF = ("revolute", "continuous", "prismatic")
-
 
 def robot_from_urdf(
     checked: CheckedUrdf,
@@ -28,6 +26,8 @@ def robot_from_urdf(
     tool_frame: str | None = None,
     approach_axis: ArrayLike = (0.0, 0.0, 1.0),
     lock: Mapping[str, float] | None = None,
+    limits: str | Mapping[str, ArrayLike] | ArrayLike | None = None,
+    limit_sets: Mapping[str, Mapping[str, tuple[float, float]]] | None = None,
 ) -> Robot:
     """Reduce a URDF to the chain from its root link to the tool frame.
 
@@ -41,47 +41,43 @@ def robot_from_urdf(
         tool_frame: a link; None takes the only leaf.
         approach_axis: (3,) in the tool frame.
         lock: joint name -> value, rad or m.
+        limits: replaces the URDF's limits, see `Robot.with_limits`. A joint whose own limits are
+            missing or senseless needs them.
+        limit_sets: name -> joint name -> (lower, upper), rad or m. A set that lacks a free joint
+            is left out.
 
     Raises:
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
-            limits, or the path holds a joint that is no free one-dof joint.
+            limits, or a joint on the path cannot be used as it stands and is not locked.
     """
     tool = _tool_frame(checked, name, tool_frame)
     fixed_values = {joint: float(value) for joint, value in (lock or {}).items()}
     _check_lock(checked, name, fixed_values)
-    path = joints_between(checked, tool)
-    free = [joint for joint in path if joint.kind != "fixed" and joint.name not in fixed_values]
-    _check_free(name, tool, free)
+    path = checked.path_to(tool)
+    free = [joint for joint in path if joint.moves and joint.name not in fixed_values]
+    _check_free(checked, name, tool, free, limits)
     locked = _locked_values(checked, {joint.name for joint in free}, fixed_values)
-    model = reduced_model(name, parse(checked.text, str(checked.path)), locked, free, tool)
-    turning = [joint.kind == "continuous" for joint in free]
-    return Robot(
+    model = _reduced_model(name, parse(checked.text, checked.path), locked, free, tool)
+    robot = Robot(
         name=name,
         model=model,
         tool_frame=tool,
         approach_axis=np.asarray(approach_axis, dtype=float),
         joint_names=tuple(joint.name for joint in free),
         joint_kinds=tuple(joint.kind for joint in free),
-        lower=np.where(turning, -np.inf, [_or(joint.lower, -math.inf) for joint in free]),
-        upper=np.where(turning, np.inf, [_or(joint.upper, math.inf) for joint in free]),
-        urdf=str(checked.path),
-        package_dirs=tuple(str(folder) for folder in checked.package_dirs),
+        # Pinocchio's own limits are not asked: it loses those of continuous joints.
+        lower=np.array([_range(joint)[0] for joint in free]),
+        upper=np.array([_range(joint)[1] for joint in free]),
+        limit_sets={
+            title: np.array([rows[joint.name] for joint in free])
+            for title, rows in (limit_sets or {}).items()
+            if all(joint.name in rows for joint in free)
+        },
+        urdf=os.path.abspath(checked.path),
+        package_dirs=checked.package_dirs,
         locked=locked,
     )
-
-
-def joints_between(checked: CheckedUrdf, link: str) -> list[JointInfo]:
-    """Joints from the root link to `link`, root first, fixed ones included."""
-    above = {joint.child: joint for joint in checked.joints}
-    path: list[JointInfo] = []
-    while link in above:
-        path.append(above[link])
-        link = above[link].parent
-    return path[::-1]
-
-
-def _or(value: float | None, default: float) -> float:
-    return default if value is None else value
+    return robot if limits is None else robot.with_limits(limits)
 
 
 def _tool_frame(checked: CheckedUrdf, name: str, asked: str | None) -> str:
@@ -114,7 +110,7 @@ def suggestion(asked: str, known: Sequence[str], limit: int = 40) -> str:
 
 def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> None:
     """Refuse locked joints that do not exist, do not move, or stand outside their limits."""
-    moving = {joint.name: joint for joint in checked.joints if joint.kind in ONE_DOF}
+    moving = {joint.name: joint for joint in checked.joints if joint.moves}
     faults = []
     for joint_name, value in lock.items():
         joint = moving.get(joint_name)
@@ -134,45 +130,70 @@ def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> N
 
 
 def _range(joint: JointInfo) -> tuple[float, float]:
-    """Limits of a joint; a continuous one turns freely whatever its <limit> says."""
-    if joint.kind == "continuous":
+    """Limits of a joint, rad or m; infinite where the file gives none that make sense."""
+    if joint.lower is None or joint.upper is None:
         return -math.inf, math.inf
-    return _or(joint.lower, -math.inf), _or(joint.upper, math.inf)
+    return joint.lower, joint.upper
 
 
-def _check_free(name: str, tool: str, free: Sequence[JointInfo]) -> None:
-    """Refuse a path without free joints, or with joints that the chain cannot hold."""
+def _check_free(
+    checked: CheckedUrdf,
+    name: str,
+    tool: str,
+    free: Sequence[JointInfo],
+    limits: str | Mapping[str, ArrayLike] | ArrayLike | None,
+) -> None:
+    """Refuse a path without free joints, or with joints that cannot move freely."""
     if not free:
         raise RobotError(
-            f"robot {name!r}: no free joint lies between the root link and {tool!r}; "
-            "choose a tool_frame further out, or lock fewer joints"
+            f"robot {name!r}: no free joint lies between the root link {checked.root!r} and "
+            f"{tool!r} of {checked.path}; choose a tool_frame further out, or lock fewer joints"
         )
     faults = []
     for joint in free:
-        if joint.kind not in ONE_DOF:
+        if joint.mimic is not None and joint.fault is None:
             faults.append(
-                f"joint {joint.name!r} on the way to {tool!r} is {joint.kind}; only "
-                f"{', '.join(ONE_DOF)} and fixed joints can carry the tool"
+                f"line {joint.line}: joint {joint.name!r} on the way to {tool!r} mimics "
+                f"{joint.mimic.joint!r}; lock it at a value, or choose another tool_frame"
             )
-        elif joint.mimic:
-            faults.append(
-                f"joint {joint.name!r} on the way to {tool!r} mimics another joint; "
-                f"hold it with lock = {{ {joint.name} = ... }}, or choose another tool_frame"
+        elif joint.fault is not None:
+            gets_limits = limits is not None and (
+                not isinstance(limits, Mapping) or joint.name in limits
             )
+            # Given limits mend limits, not a mimic that leads nowhere.
+            if not (gets_limits and joint.lower is None and joint.mimic is None):
+                faults.append(joint.fault)
     if faults:
-        raise RobotError(f"robot {name!r}: " + "; ".join(faults))
+        raise RobotError(f"robot {name!r}, {checked.path}: " + "; ".join(faults))
 
 
 def _locked_values(
     checked: CheckedUrdf, free: set[str], lock: Mapping[str, float]
 ) -> dict[str, float]:
     """Where every one-dof joint that is not free is held, rad or m."""
+    by_name = {joint.name: joint for joint in checked.joints}
     held: dict[str, float] = {}
     for joint in checked.joints:
-        if joint.kind in ONE_DOF and joint.name not in free:
+        if joint.moves and joint.name not in free:
             low, high = _range(joint)
             held[joint.name] = lock.get(joint.name, min(max(0.0, low), high))
+    for joint in checked.joints:
+        if joint.name in held and joint.name not in lock and joint.fault is None:
+            held[joint.name] = _followed(joint, by_name, held)
     return held
+
+
+def _followed(
+    joint: JointInfo, joints: Mapping[str, JointInfo], held: Mapping[str, float]
+) -> float:
+    """Where a held joint stands that may mimic another one.
+
+    A mimic joint whose leader is free stays where it is; it moves nothing that carries the tool.
+    """
+    if joint.mimic is None or joint.mimic.joint not in held:
+        return held[joint.name]
+    leader = _followed(joints[joint.mimic.joint], joints, held)
+    return joint.mimic.multiplier * leader + joint.mimic.offset
 
 
 def parse(text: str, path: str) -> pin.Model:
@@ -201,7 +222,7 @@ def parse(text: str, path: str) -> pin.Model:
     return model
 
 
-def reduced_model(
+def _reduced_model(
     name: str,
     model: pin.Model,
     locked: Mapping[str, float],
@@ -211,21 +232,48 @@ def reduced_model(
     """Lock every joint of `model` but the free ones, and make sure that just those are left."""
     import pinocchio as pin
 
-    names = tuple(joint.name for joint in free)
+    called = _rename_clashing_joints(model)
+    expected = [called.get(joint.name, joint.name) for joint in free]
     reference = pin.neutral(model)
     for joint, value in locked.items():
-        if not model.existJointName(joint):
+        title = called.get(joint, joint)
+        if not model.existJointName(title):  # getJointId would return the number of joints
             raise RobotError(f"robot {name!r}: Pinocchio reads no joint {joint!r}")
-        entry = model.joints[model.getJointId(joint)]
+        entry = model.joints[model.getJointId(title)]
         if entry.nq == 2:  # continuous
             reference[entry.idx_q : entry.idx_q + 2] = math.cos(value), math.sin(value)
         else:
             reference[entry.idx_q] = value
-    drop = [i for i in range(1, model.njoints) if model.names[i] not in names]
+    drop = [i for i in range(1, model.njoints) if model.names[i] not in expected]
     reduced = pin.buildReducedModel(model, drop, reference)
-    if tuple(reduced.names)[1:] != names or not reduced.existFrame(tool):
+    if list(reduced.names)[1:] != expected or not reduced.existFrame(tool, pin.FrameType.BODY):
         raise RobotError(
             f"robot {name!r}: Pinocchio reads the joints {', '.join(list(reduced.names)[1:])} "
-            f"where {', '.join(names)} lead to {tool!r}"
+            f"where {', '.join(expected)} lead to {tool!r}"
         )
     return reduced
+
+
+def _rename_clashing_joints(model: pin.Model) -> dict[str, str]:
+    """Give moving joints that are named like a link another name in `model`; return old -> new.
+
+    A URDF may name both alike; Pinocchio parses it, and then cannot lock the joint, because it asks
+    for its frame by name alone.
+    """
+    import pinocchio as pin
+
+    links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
+    taken = {frame.name for frame in model.frames}
+    called: dict[str, str] = {}
+    for i in range(1, model.njoints):
+        old = model.names[i]
+        if old in links:
+            new = old + "/joint"
+            while new in taken:
+                new += "/joint"
+            taken.add(new)
+            called[old] = model.names[i] = new
+    for frame in model.frames:
+        if frame.type == pin.FrameType.JOINT and frame.name in called:
+            frame.name = called[frame.name]
+    return called

@@ -1,4 +1,4 @@
-"""What an arm is: a Pinocchio model of its free joints, a tool, and limits that are real intervals."""
+"""What an arm is: a Pinocchio model of its free joints, a tool, and limits in real numbers."""
 
 from __future__ import annotations
 
@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 if TYPE_CHECKING:
     import pinocchio as pin
+
+
+KINDS = ("revolute", "continuous", "prismatic")
 
 
 class RobotError(ValueError):
@@ -33,7 +36,7 @@ class Robot:
     model: pin.Model
     """The reduced model: the n free joints, all others locked."""
     tool_frame: str
-    """Name of the frame of `model` whose origin is the tool point."""
+    """Name of the link whose frame's origin is the tool point."""
     approach_axis: NDArray[np.float64]
     """(3,) unit vector in the tool frame; it points from the tool towards the surface."""
     joint_names: tuple[str, ...]
@@ -58,7 +61,9 @@ class Robot:
         for name, shape in (("approach_axis", (3,)), ("lower", (n,)), ("upper", (n,))):
             array = np.array(getattr(self, name), dtype=float)
             if array.shape != shape:
-                raise RobotError(f"robot {self.name!r}: {name} has shape {array.shape}, not {shape}")
+                raise RobotError(
+                    f"robot {self.name!r}: {name} has shape {array.shape}, not {shape}"
+                )
             if np.isnan(array).any():
                 raise RobotError(f"robot {self.name!r}: {name} holds NaN")
             object.__setattr__(self, name, array)
@@ -71,13 +76,36 @@ class Robot:
         object.__setattr__(self, "approach_axis", self.approach_axis / length)
         for array in (self.approach_axis, self.lower, self.upper):
             array.flags.writeable = False
-        for joint, low, high in zip(self.joint_names, self.lower, self.upper, strict=True):
-            if not low <= high:
+        self._check_joints()
+        sets = {name: np.array(table, dtype=float) for name, table in self.limit_sets.items()}
+        for name, table in sets.items():
+            if table.shape != (n, 2):
                 raise RobotError(
-                    f"robot {self.name!r}: joint {joint!r} has lower limit {low:g} above upper {high:g}"
+                    f"robot {self.name!r}: limit set {name!r} has shape {table.shape}, not {(n, 2)}"
                 )
-        object.__setattr__(self, "limit_sets", MappingProxyType(dict(self.limit_sets)))
+            table.flags.writeable = False
+        object.__setattr__(self, "limit_sets", MappingProxyType(sets))
         object.__setattr__(self, "locked", MappingProxyType(dict(self.locked)))
+
+    def _check_joints(self) -> None:
+        """Refuse joints of unknown kind, and limits that leave no room."""
+        faults = []
+        if not self.joint_names or len(self.joint_kinds) != len(self.joint_names):
+            faults.append(
+                f"{len(self.joint_names)} joint names and {len(self.joint_kinds)} kinds; "
+                "there must be at least one joint, and one kind for each"
+            )
+        for joint, kind in zip(self.joint_names, self.joint_kinds, strict=False):
+            if kind not in KINDS:
+                faults.append(f"joint {joint!r} is {kind!r}, not one of {', '.join(KINDS)}")
+        for joint, low, high in zip(self.joint_names, self.lower, self.upper, strict=True):
+            if not (low <= high and low < np.inf and high > -np.inf):
+                faults.append(
+                    f"joint {joint!r} has limits {low:g} .. {high:g}; the lower one must not be "
+                    "above the upper one (rad or m)"
+                )
+        if faults:
+            raise RobotError(f"robot {self.name!r}: " + "; ".join(faults))
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle as a call of the constructor (mapping proxies do not pickle)."""
@@ -101,17 +129,28 @@ class Robot:
         return np.array([kind == "prismatic" for kind in self.joint_kinds], dtype=bool)
 
     @property
+    def tool_frame_id(self) -> int:
+        """Index of the tool frame in `model.frames`.
+
+        A URDF may give a link and a joint the same name, and `getFrameId(name)` alone then refuses.
+        """
+        import pinocchio as pin
+
+        kind = pin.FrameType.BODY
+        if not self.model.existFrame(self.tool_frame, kind):
+            raise RobotError(f"robot {self.name!r} has no link {self.tool_frame!r} for its tool")
+        return int(self.model.getFrameId(self.tool_frame, kind))
+
+    @property
     def reach(self) -> float:
         """Upper bound (m) on the distance of the tool point from the first joint's axis origin.
 
-        The sum of the link lengths, plus the longest stroke of each prismatic joint after the
-        first; inf where such a joint has no limits. No configuration puts the tool further out.
+        See `robots.reach.reach_bound`; inf where a prismatic joint has no limits. No configuration
+        inside the limits puts the tool further out.
         """
-        from robots.chain import Chain
+        from robots.reach import reach_bound
 
-        lengths = np.linalg.norm(Chain.of(self).translations, axis=1)
-        stroke = np.maximum(np.abs(self.lower), np.abs(self.upper))[self.prismatic]
-        return float(lengths[1:].sum() + stroke.sum())
+        return reach_bound(self)
 
     def with_limits(self, limits: str | Mapping[str, ArrayLike] | ArrayLike) -> Robot:
         """Return the same arm with other limits.
@@ -131,19 +170,9 @@ class Robot:
                 )
             table = np.array(self.limit_sets[limits], dtype=float)
         elif isinstance(limits, Mapping):
-            table = np.column_stack([self.lower, self.upper])
-            for joint, pair in limits.items():
-                if joint not in self.joint_names:
-                    raise RobotError(
-                        f"robot {self.name!r} has no free joint {joint!r}; "
-                        f"its joints are: {', '.join(self.joint_names)}"
-                    )
-                values = np.asarray(pair, dtype=float)
-                if values.shape != (2,):
-                    raise RobotError(f"limits of joint {joint!r} must be a pair (lower, upper)")
-                table[self.joint_names.index(joint)] = values
+            table = self._limits_by_name(limits)
         else:
-            table = np.asarray(limits, dtype=float)
+            table = _numbers(limits, f"limits of robot {self.name!r}")
         if table.shape != (self.n, 2):
             raise RobotError(
                 f"limits of robot {self.name!r} must have shape ({self.n}, 2), one (lower, upper) "
@@ -151,6 +180,34 @@ class Robot:
             )
         return replace(self, lower=table[:, 0], upper=table[:, 1])
 
+    def _limits_by_name(self, limits: Mapping[str, ArrayLike]) -> NDArray[np.float64]:
+        """The present limits (n, 2) with those of some joints replaced."""
+        table = np.column_stack([self.lower, self.upper])
+        faults = []
+        for joint, pair in limits.items():
+            if joint not in self.joint_names:
+                faults.append(f"there is no free joint {joint!r}")
+                continue
+            values = _numbers(pair, f"limits of joint {joint!r}")
+            if values.shape != (2,):
+                faults.append(f"limits of joint {joint!r} must be a pair (lower, upper)")
+                continue
+            table[self.joint_names.index(joint)] = values
+        if faults:
+            raise RobotError(
+                f"robot {self.name!r}: {'; '.join(faults)}; "
+                f"its free joints are: {', '.join(self.joint_names)}"
+            )
+        return table
+
     def __repr__(self) -> str:
         """One line that says which arm this is."""
         return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r})"
+
+
+def _numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
+    """`values` as an array of floats; raises RobotError where they are none."""
+    try:
+        return np.array(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise RobotError(f"{what} must be numbers (rad or m), got {values!r}") from error

@@ -1,0 +1,91 @@
+"""How far an arm can reach: an upper bound that needs no search."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from robots.robot import Robot
+
+SWEEPS = 60  # of the descent below; any number gives a bound, more a tighter one
+MOST_SLIDES = 10  # prismatic joints in a row whose 2^k end positions are looked at one by one
+
+
+def reach_bound(robot: Robot) -> float:
+    """Upper bound (m) on the distance of the tool point from the origin of the first joint.
+
+    A revolute joint leaves every point of its axis where it is. So put one anchor on each revolute
+    axis: neighbouring anchors keep their distance whatever the joints do, and the tool point is
+    never further from the first anchor than these distances add up to (the triangle inequality).
+    The anchors may slide along their axes; sliding them until the string of distances is short
+    gives a good bound. Where prismatic joints lie between two anchors, the distance is convex in their
+    positions, so its maximum stands at an end of the strokes.
+
+    Returns:
+        The bound; inf where a prismatic joint has no limits.
+    """
+    model, data = robot.model, robot.model.createData()
+    columns = pin.computeJointJacobians(model, data, pin.neutral(model))  # in the root frame
+    pin.updateFramePlacements(model, data)
+    anchors = [data.oMi[1].translation.copy()]
+    axes: list[NDArray[np.float64] | None] = [None]  # None: this anchor does not slide
+    slides: list[list[int]] = [[]]  # prismatic joints between an anchor and the next one
+    for i in range(robot.n):
+        if robot.prismatic[i]:
+            slides[-1].append(i)
+        elif i > 0:
+            anchors.append(data.oMi[i + 1].translation.copy())
+            axes.append(columns[3:, i])
+            slides.append([])
+    anchors.append(data.oMf[robot.tool_frame_id].translation.copy())
+    _shorten(anchors, axes, slides)
+    strokes = np.column_stack([robot.lower, robot.upper])
+    return float(
+        sum(
+            _longest(end - start, columns[:3, joints].T, strokes[joints])
+            for start, end, joints in zip(anchors, anchors[1:], slides, strict=False)
+        )
+    )
+
+
+def _shorten(
+    anchors: list[NDArray[np.float64]],
+    axes: list[NDArray[np.float64] | None],
+    slides: list[list[int]],
+) -> None:
+    """Slide the anchors, one at a time, to where the way past each is shortest; in place.
+
+    For a point on a line, the way from a over it to b is shortest where a mirror would put it: the
+    feet of a and b on the line, weighted by the other's distance from it.
+    """
+    for _ in range(SWEEPS):
+        for k, axis in enumerate(axes):
+            if axis is None or slides[k - 1] or slides[k]:
+                continue
+            before, after = anchors[k - 1] - anchors[k], anchors[k + 1] - anchors[k]
+            foot_before, foot_after = float(before @ axis), float(after @ axis)
+            far_before = float(np.linalg.norm(before - foot_before * axis))
+            far_after = float(np.linalg.norm(after - foot_after * axis))
+            total = far_before + far_after
+            if total > 1e-12:
+                shift = (foot_before * far_after + foot_after * far_before) / total
+                anchors[k] = anchors[k] + shift * axis
+
+
+def _longest(
+    apart: NDArray[np.float64], directions: NDArray[np.float64], strokes: NDArray[np.float64]
+) -> float:
+    """Largest |apart + sum_i s_i directions_i| with lower_i <= s_i <= upper_i, m."""
+    if not np.isfinite(strokes).all():
+        return float("inf")
+    if len(strokes) > MOST_SLIDES:
+        return float(np.linalg.norm(apart) + np.abs(strokes).max(axis=1).sum())
+    return max(
+        float(np.linalg.norm(apart + np.array(ends) @ directions))
+        for ends in itertools.product(*strokes)
+    )
