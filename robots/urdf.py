@@ -9,13 +9,13 @@ links and joints and nothing else of the file.
 from __future__ import annotations
 
 import os
-from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from robots.urdf_joints import JointInfo, Mimic, read_joint
-from robots.urdf_values import MAX_LENGTH, Faults, name_of
+from robots.urdf_joints import JointInfo, Mimic
+from robots.urdf_tree import MAX_LINKS, read_links, read_tree, refuse_other_formats
+from robots.urdf_values import MAX_LENGTH, Faults
 from robots.urdf_visuals import (
     Box,
     Capsule,
@@ -25,7 +25,6 @@ from robots.urdf_visuals import (
     MeshFolders,
     Sphere,
     Visual,
-    leaves_package,
     read_visuals,
 )
 from robots.urdf_xml import Node, UrdfError, parse_xml, read_bytes, shown
@@ -34,8 +33,6 @@ __all__ = [
     "MAX_LINKS", "Box", "Capsule", "CheckedUrdf", "Cylinder", "Geometry", "JointInfo", "MeshFile",
     "Mimic", "Sphere", "UrdfError", "Visual", "check_urdf", "check_urdf_text",
 ]  # fmt: skip
-
-MAX_LINKS = 1000  # native readers recurse along a chain: 4,000 links overflow the stack
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -100,7 +97,7 @@ def check_urdf(
     Raises:
         UrdfError: with every fault that was found, each with its line and what would do.
     """
-    name = os.fspath(path)
+    name = os.fsdecode(path)
     root = parse_xml(read_bytes(name), name)
     return _check(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
 
@@ -127,28 +124,24 @@ def check_urdf_text(
     except UnicodeEncodeError as error:
         raise UrdfError(name, (f"is no text: {error.reason} at {error.start}",)) from None
     root = parse_xml(data, name, encoding="utf-8")
-    return _check(root, name, os.fspath(base_dir) if base_dir is not None else None, package_dirs)
+    return _check(root, name, os.fsdecode(base_dir) if base_dir is not None else None, package_dirs)
 
 
 def _check(
     robot: Node, path: str, base_dir: str | None, package_dirs: Sequence[str | os.PathLike[str]]
 ) -> CheckedUrdf:
-    _refuse_other_formats(robot, path)
+    refuse_other_formats(robot, path)
     faults = Faults()
-    folders = tuple(os.path.abspath(os.fspath(folder)) for folder in package_dirs)
+    folders = tuple(os.path.abspath(os.fsdecode(folder)) for folder in package_dirs)
     faults.errors += [
         f"package_dirs: {shown(folder, 200)} is not a folder"
         for folder in folders
         if not os.path.isdir(folder)
     ]
-    links = _links(robot, faults)
-    declared = _joints(robot, links, faults)
-    if faults.errors:  # the tree would only echo them
-        raise UrdfError(path, tuple(faults.errors))
-    order = _tree(links, declared, faults)
+    links = read_links(robot, faults)
+    joints = read_tree(robot, links, faults)
     if faults.errors:
         raise UrdfError(path, tuple(faults.errors))
-    joints = _with_mimic_faults(order)
     visuals = read_visuals(robot, MeshFolders(base_dir, folders), faults)
     parents = {joint.parent for joint in joints}
     root = next(iter(set(links) - {joint.child for joint in joints}))
@@ -166,174 +159,6 @@ def _check(
         warnings=tuple(faults.warnings),
         package_dirs=folders,
     )
-
-
-def _refuse_other_formats(robot: Node, path: str) -> None:
-    """One clear error for a file that is no URDF yet, instead of one for each of its elements."""
-    tag = robot.tag
-    if tag != "robot":
-        known = {
-            "sdf": "SDF; convert it to URDF",
-            "mujoco": "a MuJoCo model; convert it to URDF",
-            "html": "a web page; download the raw file",
-            "COLLADA": "a COLLADA mesh; give the URDF that names it",
-        }
-        what = known.get(tag, "not a URDF, which starts with <robot name=...>")
-        raise UrdfError(path, (f"line {robot.line}: its first element is <{tag[:60]}>: {what}",))
-    pending = deque(
-        child for child in robot.children if child.tag not in ("gazebo", "transmission", "sensor")
-    )
-    while pending:
-        node = pending.popleft()
-        values = " ".join(node.attributes.values())
-        if node.tag.startswith("xacro:") or "${" in values or "$(" in values:
-            raise UrdfError(
-                path,
-                (
-                    f"line {node.line}: <{node.tag[:60]}> still holds xacro; expand it first: "
-                    "xacro robot.urdf.xacro > robot.urdf",
-                ),
-            )
-        if node.tag.split(":")[-1] == "include":
-            raise UrdfError(
-                path,
-                (
-                    f"line {node.line}: <{node.tag[:60]}> would include another file, which is "
-                    "not done; write one URDF that holds every link",
-                ),
-            )
-        pending.extend(node.children)
-
-
-def _links(robot: Node, faults: Faults) -> dict[str, Node]:
-    nodes = robot.all("link")
-    if not nodes:
-        faults.error(robot, 'has no links; a URDF has a <link name="..."/> for each body')
-    if len(nodes) > MAX_LINKS:
-        faults.error(
-            robot,
-            f"has {len(nodes):,} links, more than {MAX_LINKS:,}; give the arm alone, or merge "
-            "links that do not move",
-        )
-        return {}
-    links: dict[str, Node] = {}
-    for node in nodes:
-        name = name_of(node, faults)
-        if name is not None and name in links:
-            faults.error(
-                node, f"link {shown(name)} stands already on line {links[name].line}; rename one"
-            )
-        elif name is not None:
-            links[name] = node
-        for visual in node.all("visual"):
-            for mesh in (mesh for shape in visual.all("geometry") for mesh in shape.all("mesh")):
-                if leaves_package(mesh.attributes.get("filename", "")):
-                    faults.error(
-                        mesh,
-                        f"link {shown(name or '?')}: mesh {shown(mesh.attributes['filename'])} "
-                        "climbs out of its package; write the path inside the package",
-                    )
-    return links
-
-
-def _joints(robot: Node, links: dict[str, Node], faults: Faults) -> dict[str, JointInfo]:
-    nodes = robot.all("joint")
-    if len(nodes) >= MAX_LINKS:
-        faults.error(robot, f"has {len(nodes):,} joints, more than {MAX_LINKS - 1:,}")
-        return {}
-    joints: dict[str, JointInfo] = {}
-    lines: dict[str, int] = {}
-    for node in nodes:
-        name = node.attributes.get("name", "")
-        if name and name in lines:
-            faults.error(
-                node, f"joint {shown(name)} stands already on line {lines[name]}; rename one"
-            )
-        lines.setdefault(name, node.line)
-        joint = read_joint(node, faults)
-        if joint is None:
-            continue
-        joints[joint.name] = joint
-        for role, link in (("parent", joint.parent), ("child", joint.child)):
-            if links and link not in links:
-                faults.error(
-                    node,
-                    f"joint {shown(joint.name)} has the unknown {role} link {shown(link)}; "
-                    "mend the name or add the link",
-                )
-    return joints
-
-
-def _tree(
-    links: dict[str, Node], joints: dict[str, JointInfo], faults: Faults
-) -> tuple[JointInfo, ...]:
-    """The joints from the root outwards, or the faults that keep them from being one tree."""
-    above: dict[str, JointInfo] = {}
-    below: dict[str, list[JointInfo]] = {}
-    for joint in joints.values():
-        below.setdefault(joint.parent, []).append(joint)
-        if joint.child in above:
-            faults.errors.append(
-                f"line {joint.line}: link {shown(joint.child)} is the child of two joints, "
-                f"{shown(above[joint.child].name)} and {shown(joint.name)}: a loop; a URDF is a "
-                "tree, so cut the loop by removing one"
-            )
-        above.setdefault(joint.child, joint)
-    roots = [name for name in links if name not in above]
-    if len(roots) > 1:
-        listed = ", ".join(shown(name) for name in roots[:10])
-        faults.errors.append(
-            f"has {len(roots)} links that no joint moves ({listed}); only the base may stand "
-            "alone, so join the others to it or remove them"
-        )
-    reached: set[str] = set(roots)
-    order: list[JointInfo] = []
-    pending = deque(roots)
-    while pending:
-        for joint in below.get(pending.popleft(), ()):
-            if joint.child not in reached:
-                reached.add(joint.child)
-                order.append(joint)
-                pending.append(joint.child)
-    lost = [name for name in links if name not in reached]
-    if lost:
-        listed = ", ".join(shown(name) for name in lost[:10])
-        faults.errors.append(
-            f"the links {listed} form a closed loop that hangs on no base; remove the joint that "
-            "closes it"
-        )
-    return tuple(order)
-
-
-def _with_mimic_faults(joints: tuple[JointInfo, ...]) -> tuple[JointInfo, ...]:
-    """Mark the joints whose mimic leads nowhere."""
-    by_name = {joint.name: joint for joint in joints}
-    marked = []
-    for joint in joints:
-        fault = _mimic_fault(joint, by_name)
-        if fault is not None and joint.fault is None:
-            said = (
-                f"line {joint.line}: joint {shown(joint.name)} {fault}; mend it, or lock the joint"
-            )
-            joint = replace(joint, fault=said)
-        marked.append(joint)
-    return tuple(marked)
-
-
-def _mimic_fault(joint: JointInfo, by_name: dict[str, JointInfo]) -> str | None:
-    seen = {joint.name}
-    follower = joint
-    while follower.mimic is not None:
-        leader = by_name.get(follower.mimic.joint)
-        if leader is None:
-            return f"mimics the unknown joint {shown(follower.mimic.joint)}"
-        if not leader.moves:
-            return f"mimics joint {shown(leader.name)}, which is fixed"
-        if leader.name in seen:
-            return "mimics itself" + ("" if leader is follower else " through other joints")
-        seen.add(leader.name)
-        follower = leader
-    return None
 
 
 def _written(title: str, links: tuple[str, ...], joints: tuple[JointInfo, ...]) -> str:

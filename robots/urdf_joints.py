@@ -9,6 +9,12 @@ from dataclasses import dataclass
 from robots.urdf_values import MAX_LENGTH, BadValue, Faults, Triple, name_of, numbers, only, triple
 from robots.urdf_xml import Node, shown
 
+# fmt: off
+CHILDREN = (
+    "parent", "child", "origin", "axis", "limit", "mimic", "calibration", "dynamics",
+    "safety_controller",
+)
+# fmt: on
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 MIN_AXIS = 1e-6  # a shorter axis has no direction worth trusting
 FREE_TURN = MAX_LENGTH  # [rad] a revolute limit this wide (1e16 is the custom) means "none"
@@ -74,6 +80,7 @@ def read_joint(node: Node, faults: Faults) -> JointInfo | None:
     before = len(faults.errors)
     name = name_of(node, faults)
     owner = f"joint {shown(name or '?')}"
+    _check_children(node, owner, faults)
     kind = _kind(node, owner, faults)
     ends = [_link_name(node, tag, owner, faults) for tag in ("parent", "child")]
     origin = only(node, "origin", faults, owner)
@@ -132,15 +139,30 @@ def _link_name(node: Node, tag: str, owner: str, faults: Faults) -> str | None:
     return name_of(end, faults, "link")
 
 
+def _check_children(node: Node, owner: str, faults: Faults) -> None:
+    """A misspelt <origin> is an origin of zero in silence."""
+    for child in node.children:
+        if child.tag in CHILDREN:
+            continue
+        near = difflib.get_close_matches(child.tag.lower(), CHILDREN, 1, cutoff=0.75)
+        if near:
+            faults.error(child, f"{owner}: <{child.tag[:60]}> is no element; write <{near[0]}>")
+        else:
+            faults.warn(child, f"{owner}: the unknown element <{child.tag[:60]}> is ignored")
+
+
 def _check_attributes(
     node: Node | None, known: tuple[str, ...], owner: str, faults: Faults
 ) -> None:
-    """A pose in an attribute that we do not read would be a wrong pose in silence."""
-    for attribute in node.attributes if node is not None else ():
-        if node is None or attribute in known:
+    """A pose in an attribute that is not read would be a wrong pose in silence."""
+    if node is None:
+        return
+    for attribute in node.attributes:
+        if attribute in known:
             continue
         what = f"{owner}: <{node.tag}> has the unknown attribute {shown(attribute)}"
-        if "quat" in attribute.lower() or attribute.lower() in known:
+        near = difflib.get_close_matches(attribute.lower(), known, 1)
+        if near or "quat" in attribute.lower():
             faults.error(node, f"{what}; write {' and '.join(known)}")
         else:
             faults.warn(node, f"{what}, which is ignored")
@@ -228,28 +250,24 @@ def _range(node: Node, limit: Node | None, kind: str, owner: str, faults: Faults
             limit,
             f"{owner} has limits [{lower:g}, {upper:g}], read in radians; were degrees meant?",
         )
-    _warn_soft_limits(node, lower, upper, owner, faults)
+    if _has_narrower_soft_limits(node, lower, upper):
+        faults.soft_limits.append(owner.removeprefix("joint "))
     return _Range(kind, lower, upper)
 
 
-def _warn_soft_limits(node: Node, lower: float, upper: float, owner: str, faults: Faults) -> None:
-    """Say so when the controller would stop earlier than the limits do."""
+def _has_narrower_soft_limits(node: Node, lower: float, upper: float) -> bool:
+    """Whether the joint's controller would stop it earlier than its limits do."""
     soft = node.first("safety_controller")
     if soft is None:
-        return
+        return False
     try:
         low, high = (
             numbers(soft, attribute, 1)[0] if attribute in soft.attributes else 0.0
             for attribute in ("soft_lower_limit", "soft_upper_limit")
         )
     except BadValue:
-        return  # not used, so not judged
-    if (low, high) != (0.0, 0.0) and (low > lower + 1e-9 or high < upper - 1e-9):
-        faults.warn(
-            soft,
-            f"{owner}: the soft limits [{low:g}, {high:g}] of its safety_controller are not used, "
-            f"its <limit> [{lower:g}, {upper:g}] is",
-        )
+        return False  # not used, so not judged
+    return (low, high) != (0.0, 0.0) and (low > lower + 1e-9 or high < upper - 1e-9)
 
 
 def _mimic(node: Node | None) -> tuple[Mimic | None, str | None]:

@@ -23,6 +23,8 @@ class Faults:
         """Start with none."""
         self.errors: list[str] = []
         self.warnings: list[str] = []
+        self.soft_limits: list[str] = []
+        """Names of joints whose controller would stop earlier than the limits do."""
 
     def error(self, node: Node, what: str) -> None:
         """Note something that makes the robot unusable."""
@@ -53,7 +55,8 @@ def numbers(node: Node, attribute: str, count: int, bound: float = MAX_LENGTH) -
     values = [float(word) for word in words]
     if not all(math.isfinite(value) and abs(value) <= bound for value in values):
         raise BadValue(f"{label} must hold finite numbers of at most {bound:g}")
-    return values
+    # Some readers refuse subnormal numbers.
+    return [value if abs(value) > 1e-200 else 0.0 for value in values]
 
 
 def triple(node: Node | None, attribute: str, default: Triple) -> Triple:

@@ -20,7 +20,14 @@ from numpy.typing import NDArray
 from robots.urdf_values import BadValue, Faults, Triple, numbers, triple
 from robots.urdf_xml import Node, shown
 
-MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".off", ".glb", ".gltf")
+MESH_SUFFIXES = (
+    ".stl",
+    ".dae",
+    ".obj",
+    ".ply",
+    ".off",
+    ".glb",
+)  # .gltf and the like pull in other files
 MAX_MESH_BYTES = 256 * 2**20
 MAX_VISUALS = 2000
 PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for
@@ -150,7 +157,7 @@ def _package_around(folder: Path) -> Path | None:
     """The nearest folder at or above `folder` that is a ROS package, so ../meshes works in one."""
     folder = Path(os.path.abspath(folder))
     for candidate in [folder, *folder.parents][:PACKAGE_LEVELS]:
-        if (candidate / "package.xml").is_file():
+        if os.path.isfile(candidate / "package.xml"):
             return candidate
     return None
 
