@@ -1,0 +1,241 @@
+"""What is drawn of a verdict: surface, cells, graph G, causes, other components, and the legend.
+
+Everything here is plain drawing commands with plain names, so that meshcat's own scene tree can
+show and hide each part; `feasibility.page` and `feasibility.meshcat_server` say where it appears.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility import threejs
+from feasibility.meshes import tubes
+from feasibility.page import Entry
+from feasibility.threejs import Colour, Command
+from feasibility.verdict import CauseKind, Verdict
+from robots.kinematics import Kinematics
+from surfaces import Cells
+
+SURFACE: Colour = (0.62, 0.71, 0.80)
+OUTLINES: Colour = (0.45, 0.50, 0.56)
+CENTRES: Colour = (0.25, 0.30, 0.36)
+EDGES: Colour = (0.05, 0.25, 0.85)
+START: Colour = (0.0, 0.62, 0.25)
+MISSED: Colour = (0.84, 0.12, 0.12)
+TRAIL: Colour = (0.95, 0.55, 0.05)
+CAUSES: dict[CauseKind, Colour] = {  # told apart by colour-blind eyes too (Okabe and Ito)
+    CauseKind.OUT_OF_REACH: (0.84, 0.12, 0.12),
+    CauseKind.JOINT_LIMITS: (0.90, 0.60, 0.00),
+    CauseKind.ORIENTATION: (0.80, 0.47, 0.65),
+    CauseKind.COLLISION: (0.20, 0.20, 0.20),
+    CauseKind.DISCONNECTED: (0.94, 0.86, 0.20),
+}
+COMPONENTS: tuple[Colour, ...] = (
+    (0.34, 0.71, 0.91),
+    (0.00, 0.62, 0.45),
+    (0.80, 0.47, 0.65),
+    (0.90, 0.60, 0.00),
+)
+EDGE_POINTS = 9  # on the way from cell to cell
+FULL_DETAIL = 5_000  # cells; more are drawn without centre marks, and edges as plain lines
+LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """One part of the picture."""
+
+    commands: tuple[Command, ...]
+    entry: Entry
+    count: int
+    """Cells or edges in it."""
+
+
+def layers(verdict: Verdict) -> list[Layer]:
+    """Every part of the picture but the arm, in the order of the legend."""
+    parts = [_surface(verdict.cells), *_cell_marks(verdict.cells)]
+    if len(verdict.cells) == 0:
+        return []
+    parts += _graph(verdict)
+    parts += _start(verdict)
+    parts += _missed(verdict)
+    parts += _components(verdict)
+    return parts
+
+
+def edge_lines(verdict: Verdict) -> list[NDArray[np.float64]]:
+    """Where the tool point goes along each edge of G, (k, 3) m, in the order of `graph.edges`.
+
+    An edge without a motion is drawn over the surface from target to target.
+    """
+    kinematics = Kinematics(verdict.robot)
+    targets = verdict.task.targets(verdict.cells).points
+    lines = []
+    for a, b, motion in verdict.graph.edges(data="motion"):
+        if motion is None or len(motion) < 2:
+            lines.append(_over_surface(verdict, targets[[a, b]]))
+            continue
+        rows = np.unique(np.linspace(0, len(motion) - 1, EDGE_POINTS).round().astype(int))
+        lines.append(np.array([kinematics.tool(motion[row])[0] for row in rows]))
+    return lines
+
+
+def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64]]:
+    """Flat indices of the cells that are not covered, by cause; None where no cause is known."""
+    kinds = {cause.cell: cause.kind for cause in verdict.causes}
+    missed = np.flatnonzero(~verdict.covered)
+    found: dict[CauseKind | None, NDArray[np.int64]] = {}
+    for kind in (*CauseKind, None):
+        cells = np.array([cell for cell in missed if kinds.get(int(cell)) == kind], dtype=np.int64)
+        if len(cells):
+            found[kind] = cells
+    return found
+
+
+def patch(
+    cells: Cells, which: NDArray[np.int64], inset: float = 0.0
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
+    """Triangles that fill some cells, smooth where the surface bends.
+
+    Args:
+        cells: of a parametric surface.
+        which: (k,) flat indices.
+        inset: share of its width that a cell is drawn smaller by.
+
+    Returns:
+        Vertices (V, 3) m, faces (F, 3) and outward unit normals (V, 3).
+    """
+    surface = cells.surface
+    pieces = int(np.clip(np.ceil(64 / max(*cells.shape, 1)), 2, 32))  # a cell's side, cut up
+    if len(cells) > FULL_DETAIL:
+        pieces = 1
+    t = (np.linspace(0.0, 1.0, pieces + 1) - 0.5) * (1.0 - inset)
+    du, dv = (part.reshape(-1) for part in np.meshgrid(t, t, indexing="ij"))
+    width_u = (surface.u_range[1] - surface.u_range[0]) / cells.shape[0]
+    width_v = (surface.v_range[1] - surface.v_range[0]) / cells.shape[1]
+    u = cells.u[which, None] + du * width_u
+    v = cells.v[which, None] + dv * width_v
+    i, j = (part.reshape(-1) for part in np.meshgrid(*[np.arange(pieces)] * 2, indexing="ij"))
+    corner = i * (pieces + 1) + j
+    right, up = corner + 1, corner + pieces + 1
+    one = np.concatenate(
+        [np.column_stack([corner, right, up + 1]), np.column_stack([corner, up + 1, up])]
+    )
+    starts = np.arange(len(which)) * (pieces + 1) ** 2
+    faces = (starts[:, None, None] + one).reshape(-1, 3)
+    return surface.point(u, v).reshape(-1, 3), faces, surface.normal(u, v).reshape(-1, 3)
+
+
+def cell_size(cells: Cells) -> float:
+    """A typical width of a cell, m."""
+    return float(np.sqrt(cells.areas.mean())) if len(cells) else 0.0
+
+
+def _surface(cells: Cells) -> Layer:
+    """The patch, shaded and half transparent."""
+    path = "/surface/patch"
+    commands: tuple[Command, ...] = ()
+    if len(cells):
+        vertices, faces, normals = patch(cells, np.arange(len(cells)))
+        commands = (threejs.mesh(path, vertices, faces, SURFACE, normals=normals, opacity=0.45),)
+    return Layer(commands, Entry("surface", SURFACE, path), len(cells))
+
+
+def _cell_marks(cells: Cells) -> Iterator[Layer]:
+    """Outlines of the cells, and a mark at each centre."""
+    if len(cells) == 0:
+        return
+    path = "/surface/cell outlines"
+    outlines = cells.outlines(8 if len(cells) <= FULL_DETAIL else 1)
+    ends = np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 3)
+    lines = threejs.segments(path, ends, OUTLINES, opacity=0.8)
+    rows = " x ".join(str(part) for part in cells.shape)
+    yield Layer((lines,), Entry(f"{len(cells)} cells ({rows})", OUTLINES, path), len(cells))
+    if len(cells) <= FULL_DETAIL:
+        path = "/surface/cell centres"
+        vertices, faces = _marks(cells.centres, 0.035 * cell_size(cells))
+        marks = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
+        yield Layer((marks,), Entry("cell centres", CENTRES, path), len(cells))
+
+
+def _graph(verdict: Verdict) -> Iterator[Layer]:
+    """Graph G: one line for each edge, where the tool goes."""
+    lines = edge_lines(verdict)
+    if not lines:
+        return
+    path = f"/graph/edges of G ({len(lines)})"
+    if len(verdict.cells) <= FULL_DETAIL:
+        vertices, faces = tubes(lines, 0.022 * cell_size(verdict.cells))
+        command = threejs.mesh(path, vertices, faces, EDGES, lit=False)
+    else:
+        ends = [np.stack([line[:-1], line[1:]], axis=1).reshape(-1, 3) for line in lines]
+        command = threejs.segments(path, np.concatenate(ends), EDGES)
+    pairs = len(verdict.cells.pairs)
+    label = f"{len(lines)} edges of G (of {pairs} pairs)"
+    yield Layer((command,), Entry(label, EDGES, path), len(lines))
+
+
+def _start(verdict: Verdict) -> Iterator[Layer]:
+    """A ball at the target of the cell where the search starts."""
+    if verdict.start is None:
+        return
+    import trimesh
+
+    path = f"/graph/start, cell {verdict.start}"
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1 * cell_size(verdict.cells))
+    centre = verdict.task.targets(verdict.cells).points[verdict.start]
+    command = threejs.mesh(path, ball.vertices + centre, ball.faces, START)
+    yield Layer((command,), Entry("start cell", START, path), 1)
+
+
+def _missed(verdict: Verdict) -> Iterator[Layer]:
+    """Cells that are not covered, in the colour of their cause."""
+    for kind, cells in missed_by_cause(verdict).items():
+        colour = MISSED if kind is None else CAUSES[kind]
+        words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
+        path = f"/cells/{words} ({len(cells)})"
+        vertices, faces, normals = patch(verdict.cells, cells, inset=0.06)
+        command = threejs.mesh(path, vertices, faces, colour, normals=normals, opacity=0.85)
+        yield Layer((command,), Entry(f"{words} ({len(cells)})", colour, path), len(cells))
+
+
+def _components(verdict: Verdict) -> Iterator[Layer]:
+    """The cells of each connected component, hidden until they are asked for."""
+    if len(verdict.components) < 2:
+        return
+    for number, cells in enumerate(verdict.components[:LISTED_COMPONENTS], start=1):
+        colour = COMPONENTS[(number - 1) % len(COMPONENTS)]
+        words = f"component {number} ({len(cells)} cells)"
+        path = f"/components/{words}"
+        vertices, faces, normals = patch(verdict.cells, np.asarray(cells), inset=0.15)
+        commands = (
+            threejs.mesh(path, vertices, faces, colour, normals=normals, opacity=0.9),
+            threejs.set_property(path, "visible", False),
+        )
+        yield Layer(commands, Entry(words, colour, path, shown=False), len(cells))
+
+
+def _over_surface(verdict: Verdict, ends: NDArray[np.float64]) -> NDArray[np.float64]:
+    """A line (k, 3) m at the standoff over the surface between two points (2, 3) m."""
+    t = np.linspace(0.0, 1.0, EDGE_POINTS)[:, None]
+    points = (1.0 - t) * ends[0] + t * ends[1]
+    foot = verdict.cells.surface.closest(points)
+    height = verdict.cells.surface.side_sign * verdict.task.standoff
+    return points + (height - foot.height)[:, None] * foot.normal
+
+
+def _marks(
+    centres: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """A small octahedron at each centre: vertices and faces."""
+    corners = radius * np.concatenate([np.eye(3), -np.eye(3)])
+    one = np.array(
+        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
+    )
+    vertices = (centres[:, None] + corners).reshape(-1, 3)
+    faces = (6 * np.arange(len(centres))[:, None, None] + one).reshape(-1, 3)
+    return vertices, faces

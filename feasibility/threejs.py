@@ -1,0 +1,212 @@
+"""Drawing commands of the meshcat page, written as plain data.
+
+The page understands a handful of commands, each a MessagePack map: put an object at a path of the
+scene tree, place it, set a property, play an animation. They are written here directly, so that a
+scene can be packed into a file without any server, with vertex normals (which meshcat's Python
+classes cannot send) and without random identifiers: the same scene gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Command = dict[str, Any]
+Colour = tuple[float, float, float]
+"""Red, green, blue, each 0 to 1."""
+
+_EXTENSION = {"int8": 0x11, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
+_JAVASCRIPT = {
+    "int8": "Int8Array",
+    "uint16": "Uint16Array",
+    "uint32": "Uint32Array",
+    "float32": "Float32Array",
+}
+_GRID = 2.0**16  # [1/m]: positions are rounded to 15 um, which lets them compress
+_DOUBLE_SIDED = 2
+_PING_PONG = 2202  # three.js: there and back
+_REPEAT = 2201
+
+
+def safe_name(text: str) -> str:
+    """A name for the scene tree: no path separator and no markup.
+
+    The page writes these names into its HTML as they are, and URDF files are not to be trusted.
+    """
+    return re.sub(r"[^\w .,:()+-]", "_", text)[:80].strip() or "_"
+
+
+def hex_colour(colour: Colour) -> int:
+    """A colour as the integer 0xrrggbb."""
+    red, green, blue = (round(255 * min(max(part, 0.0), 1.0)) for part in colour)
+    return (red << 16) | (green << 8) | blue
+
+
+def mesh(
+    path: str,
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    colour: Colour,
+    *,
+    normals: ArrayLike | None = None,
+    opacity: float = 1.0,
+    lit: bool = True,
+) -> Command:
+    """Triangles of one colour, visible from both sides.
+
+    Args:
+        path: where in the scene tree.
+        vertices: (V, 3) m.
+        faces: (F, 3) indices of vertices.
+        colour: of all triangles.
+        normals: (V, 3) unit; averaged over the faces by the page where not given.
+        opacity: 1 hides what is behind.
+        lit: shaded by the lights; False shows the plain colour.
+    """
+    index = np.asarray(faces)
+    small = len(np.asarray(vertices)) < 2**16
+    data: dict[str, Any] = {
+        "attributes": {"position": _positions(vertices)},
+        "index": _array(index.reshape(-1), 1, "uint16" if small else "uint32"),
+    }
+    if normals is not None:
+        rounded = np.rint(np.asarray(normals) * 127.0)
+        data["attributes"]["normal"] = {**_array(rounded, 3, "int8"), "normalized": True}
+    material = {
+        "type": "MeshPhongMaterial" if lit else "MeshBasicMaterial",
+        "color": hex_colour(colour),
+        "side": _DOUBLE_SIDED,
+        "opacity": opacity,
+        "transparent": opacity < 1.0,
+        "depthWrite": opacity >= 1.0,
+    }
+    if lit:
+        material |= {"shininess": 25, "specular": 0x222222}
+    return _object(path, "Mesh", data, material)
+
+
+def segments(
+    path: str, points: ArrayLike, colour: Colour, *, opacity: float = 1.0, colours: Any = None
+) -> Command:
+    """Line segments, one pixel wide on most machines.
+
+    Args:
+        path: where in the scene tree.
+        points: (2 k, 3) m: the ends of k segments.
+        colour: of all segments, unless `colours` says otherwise.
+        opacity: 1 hides what is behind.
+        colours: (2 k, 3) one colour for each point, 0 to 1.
+    """
+    data: dict[str, Any] = {"attributes": {"position": _positions(points)}}
+    material = {
+        "type": "LineBasicMaterial",
+        "color": 0xFFFFFF if colours is not None else hex_colour(colour),
+        "vertexColors": 2 if colours is not None else 0,
+        "opacity": opacity,
+        "transparent": opacity < 1.0,
+    }
+    if colours is not None:
+        data["attributes"]["color"] = _array(np.asarray(colours), 3, "float32")
+    return _object(path, "LineSegments", data, material)
+
+
+def transform(path: str, matrix: NDArray[np.float64]) -> Command:
+    """Place what is at `path` by a homogeneous (4, 4) matrix."""
+    values = [float(value) for value in matrix.T.reshape(-1)]
+    return {"type": "set_transform", "path": path, "matrix": values}
+
+
+def set_property(path: str, name: str, value: Any) -> Command:
+    """Set one property, such as `visible`, of what is at `path`."""
+    return {"type": "set_property", "path": path, "property": name, "value": value}
+
+
+def track(
+    path: str, name: str, times: NDArray[np.float64], values: NDArray[np.float64]
+) -> dict[str, Any]:
+    """How one property of one path changes with time.
+
+    Args:
+        path: of the group that moves.
+        name: 'position' with values (k, 3), or 'quaternion' with values (k, 4) as x, y, z, w.
+        times: (k,) s.
+        values: one row per time.
+    """
+    kind = "quaternion" if name == "quaternion" else "vector3"
+    keys = {
+        "name": f".{name}",
+        "type": kind,
+        "times": _packed(times, "float32"),
+        "values": _packed(values, "float32"),
+    }
+    return {"path": path, "clip": {"fps": 1, "name": "default", "tracks": [keys]}}
+
+
+def animation(tracks: Sequence[dict[str, Any]], *, play: bool, there_and_back: bool) -> Command:
+    """Play tracks together, for ever."""
+    options = {
+        "play": play,
+        "repetitions": float("inf"),
+        "loopMode": _PING_PONG if there_and_back else _REPEAT,
+    }
+    return {"type": "set_animation", "animations": list(tracks), "options": options, "path": ""}
+
+
+def pack(commands: Iterable[Command]) -> list[bytes]:
+    """Each command as the bytes that the page reads."""
+    import umsgpack  # type: ignore[import-untyped]
+
+    return [umsgpack.packb(command) for command in commands]
+
+
+def _object(path: str, kind: str, data: dict[str, Any], material: dict[str, Any]) -> Command:
+    """The command that puts one object at `path`."""
+    geometry = {"uuid": f"{path}#geometry", "type": "BufferGeometry", "data": data}
+    surface = {"uuid": f"{path}#material", **material}
+    placed = {
+        "uuid": f"{path}#object",
+        "type": kind,
+        "geometry": geometry["uuid"],
+        "material": surface["uuid"],
+        "matrix": [1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0],
+    }
+    return {
+        "type": "set_object",
+        "path": path,
+        "object": {
+            "metadata": {"version": 4.5, "type": "Object"},
+            "geometries": [geometry],
+            "materials": [surface],
+            "object": placed,
+        },
+    }
+
+
+def _positions(points: ArrayLike) -> dict[str, Any]:
+    """Points (k, 3) as a vertex attribute."""
+    values = np.asarray(points, dtype=float)
+    if not np.isfinite(values).all():
+        raise ValueError("points to draw must be finite; got NaN or infinity")
+    return _array(np.round(values * _GRID) / _GRID, 3, "float32")
+
+
+def _array(values: NDArray[Any], size: int, dtype: str) -> dict[str, Any]:
+    """An array as a vertex attribute with `size` numbers a vertex."""
+    return {
+        "itemSize": size,
+        "type": _JAVASCRIPT[dtype],
+        "array": _packed(values, dtype),
+        "normalized": False,
+    }
+
+
+def _packed(values: NDArray[Any], dtype: str) -> Any:
+    """Numbers as the typed array that the page's MessagePack reader makes of them."""
+    import umsgpack
+
+    little = np.ascontiguousarray(values, dtype=np.dtype(dtype).newbyteorder("<"))
+    return umsgpack.Ext(_EXTENSION[dtype], little.tobytes())
