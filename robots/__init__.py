@@ -1,6 +1,6 @@
 """What an arm is: its chain, tool and limits, read from a URDF through Pinocchio."""
 
-from robots.library import list_robots, load_robot
+from robots.library import RobotInfo, list_robots, load_robot
 from robots.robot import Robot, RobotError
 
-__all__ = ["Robot", "RobotError", "list_robots", "load_robot"]
+__all__ = ["Robot", "RobotError", "RobotInfo", "list_robots", "load_robot"]

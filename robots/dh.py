@@ -163,12 +163,56 @@ PUMA560_ROWS = (
 """The paper's arm: a2 = 0.7, a3 = 0.1, d3 = 0.1, d4 = 0.7 m."""
 
 PUMA560_COLOURS = {
-    "body": (0.87, 0.87, 0.84, 1.0),
-    "joint": (0.25, 0.28, 0.32, 1.0),
-    "tool": (0.90, 0.35, 0.10, 1.0),
+    "base": (0.32, 0.35, 0.39, 1.0),
+    "body": (0.90, 0.89, 0.85, 1.0),
+    "joint": (0.20, 0.34, 0.50, 1.0),
+    "tool": (0.93, 0.36, 0.08, 1.0),
 }
 
-PUMA560_SHAPES: tuple[Shape, ...] = ()
+_ALONG_X = (0.0, _QUARTER, 0.0)
+_ALONG_Y = (_QUARTER, 0.0, 0.0)
+
+# The paper puts the tool point at the wrist centre, so the nozzle's tip has to be there: the nozzle
+# swings between the cheeks of a fork, and points back into it when theta5 = 0. The upper arm stands
+# outboard of the plane d3 in which the forearm moves, as on the real arm, and so the forearm passes
+# it on the inside.
+PUMA560_SHAPES = (
+    # Frame 0, z up at shoulder height: pedestal.
+    Shape(0, (0.17, 0.04), (0.0, 0.0, -0.68), colour="base"),
+    Shape(0, (0.095, 0.50), (0.0, 0.0, -0.42), colour="base"),
+    # Frame 1 turns about the column: shoulder block, and the housing of joint 2 along y1.
+    Shape(1, (0.105, 0.09), (0.0, 0.0, -0.125), colour="joint"),
+    Shape(1, (0.18, 0.18, 0.10), (0.0, 0.0, -0.04), colour="body"),
+    Shape(1, (0.10, 0.34), (0.0, -0.02, 0.0), _ALONG_Y, colour="body"),
+    # Frame 2, x2 along the upper arm, z2 along the shoulder axis.
+    Shape(2, (0.115, 0.10), (0.0, 0.0, 0.20), colour="joint"),
+    Shape(2, (0.70, 0.17, 0.085), (0.35, 0.0, 0.20), colour="body"),
+    Shape(2, (0.20, 0.12, 0.085), (-0.12, 0.0, 0.20), colour="body"),
+    Shape(2, (0.085, 0.085), (0.70, 0.0, 0.20), colour="body"),
+    # Frame 3, forearm along y3 at x3 = a3: elbow, tail with the wrist motors, beam, tube.
+    Shape(3, (0.075, 0.206), (0.0, 0.0, 0.052), colour="joint"),
+    Shape(3, (0.17, 0.16, 0.09), (0.055, 0.0, 0.0), colour="body"),
+    Shape(3, (0.10, 0.52, 0.085), (0.10, 0.16, 0.0), colour="body"),
+    Shape(3, (0.042, 0.06), (0.10, 0.45, 0.0), _ALONG_Y, colour="joint"),
+    # Frame 4, z4 along the forearm, y4 along the wrist's bending axis: roll tube and fork.
+    Shape(4, (0.035, 0.08), (0.0, 0.0, -0.20), colour="body"),
+    Shape(4, (0.06, 0.128, 0.03), (0.0, 0.0, -0.16), colour="body"),
+    Shape(4, (0.045, 0.012, 0.16), (0.0, 0.058, -0.08), colour="body"),
+    Shape(4, (0.045, 0.012, 0.16), (0.0, -0.058, -0.08), colour="body"),
+    Shape(4, (0.028, 0.016), (0.0, 0.058, 0.0), _ALONG_Y, colour="joint"),
+    Shape(4, (0.028, 0.016), (0.0, -0.058, 0.0), _ALONG_Y, colour="joint"),
+    # Frame 5, z5 the bending axis, y5 the approach direction: the bow that carries the nozzle.
+    Shape(5, (0.010, 0.09, 0.010), (0.0, -0.04, 0.045), colour="joint"),
+    Shape(5, (0.010, 0.09, 0.010), (0.0, -0.04, -0.045), colour="joint"),
+    Shape(5, (0.03, 0.012, 0.10), (0.0, -0.085, 0.0), colour="joint"),
+    # Frame 6, z6 the approach direction: nozzle with its tip at the origin; the block on its side
+    # shows theta6.
+    Shape(6, (0.032, 0.045), (0.0, 0.0, -0.112), colour="tool"),
+    Shape(6, (0.020, 0.07), (0.0, 0.0, -0.060), colour="tool"),
+    Shape(6, (0.008, 0.028), (0.0, 0.0, -0.014), colour="tool"),
+    Shape(6, (0.03, 0.022), (0.032, 0.0, -0.112), _ALONG_X, colour="base"),
+)
+"""What the arm is drawn as."""
 
 
 def puma560_urdf() -> str:

@@ -52,7 +52,7 @@ def list_robots() -> tuple[RobotInfo, ...]:
 
     Example:
         >>> [info.name for info in list_robots()][:3]
-        ['puma560', 'ur3', 'ur5']
+        ['puma560', 'ur3', 'ur3_limited']
     """
     return tuple(_library().values())
 

@@ -23,8 +23,8 @@ def reach_bound(robot: Robot) -> float:
     axis: neighbouring anchors keep their distance whatever the joints do, and the tool point is
     never further from the first anchor than these distances add up to (the triangle inequality).
     The anchors may slide along their axes; sliding them until the string of distances is short
-    gives a good bound. Where prismatic joints lie between two anchors, the distance is convex in their
-    positions, so its maximum stands at an end of the strokes.
+    gives a good bound. Where prismatic joints lie between two anchors, the distance is convex in
+    their positions, so its maximum stands at an end of the strokes.
 
     Returns:
         The bound; inf where a prismatic joint has no limits.

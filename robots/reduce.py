@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,8 +14,6 @@ from numpy.typing import ArrayLike
 from robots.robot import Robot, RobotError
 
 if TYPE_CHECKING:
-    import pinocchio as pin
-
     from robots.urdf import CheckedUrdf, JointInfo
 
 
@@ -50,20 +48,23 @@ def robot_from_urdf(
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
             limits, or a joint on the path cannot be used as it stands and is not locked.
     """
+    from robots.native import parse, reduced_model
+
     tool = _tool_frame(checked, name, tool_frame)
-    fixed_values = {joint: float(value) for joint, value in (lock or {}).items()}
+    fixed_values = dict(lock or {})
     _check_lock(checked, name, fixed_values)
     path = checked.path_to(tool)
     free = [joint for joint in path if joint.moves and joint.name not in fixed_values]
     _check_free(checked, name, tool, free, limits)
     locked = _locked_values(checked, {joint.name for joint in free}, fixed_values)
-    model = _reduced_model(name, parse(checked.text, checked.path), locked, free, tool)
+    free_names = [joint.name for joint in free]
+    model = reduced_model(parse(checked.text, checked.path), free_names, locked, tool)
     robot = Robot(
         name=name,
         model=model,
         tool_frame=tool,
-        approach_axis=np.asarray(approach_axis, dtype=float),
-        joint_names=tuple(joint.name for joint in free),
+        approach_axis=np.asarray(approach_axis),
+        joint_names=tuple(free_names),
         joint_kinds=tuple(joint.kind for joint in free),
         # Pinocchio's own limits are not asked: it loses those of continuous joints.
         lower=np.array([_range(joint)[0] for joint in free]),
@@ -120,7 +121,9 @@ def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> N
             continue
         unit = "m" if joint.kind == "prismatic" else "rad"
         low, high = _range(joint)
-        if not (math.isfinite(value) and low <= value <= high):
+        if isinstance(value, bool) or not isinstance(value, Real):
+            faults.append(f"lock holds joint {joint_name!r} at {value!r}, not a number ({unit})")
+        elif not (math.isfinite(value) and low <= value <= high):
             faults.append(
                 f"lock holds joint {joint_name!r} at {value:g} {unit}, outside its limits "
                 f"{low:g} .. {high:g} {unit}"
@@ -176,104 +179,23 @@ def _locked_values(
     for joint in checked.joints:
         if joint.moves and joint.name not in free:
             low, high = _range(joint)
-            held[joint.name] = lock.get(joint.name, min(max(0.0, low), high))
-    for joint in checked.joints:
-        if joint.name in held and joint.name not in lock and joint.fault is None:
-            held[joint.name] = _followed(joint, by_name, held)
-    return held
+            held[joint.name] = float(lock.get(joint.name, min(max(0.0, low), high)))
+    return {title: _followed(by_name[title], by_name, held, lock) for title in held}
 
 
 def _followed(
-    joint: JointInfo, joints: Mapping[str, JointInfo], held: Mapping[str, float]
+    joint: JointInfo,
+    joints: Mapping[str, JointInfo],
+    held: Mapping[str, float],
+    lock: Mapping[str, float],
 ) -> float:
     """Where a held joint stands that may mimic another one.
 
     A mimic joint whose leader is free stays where it is; it moves nothing that carries the tool.
+    A joint with a fault follows nothing, so that a ring of mimics ends here.
     """
-    if joint.mimic is None or joint.mimic.joint not in held:
+    on_its_own = joint.fault is not None or joint.name in lock
+    if joint.mimic is None or on_its_own or joint.mimic.joint not in held:
         return held[joint.name]
-    leader = _followed(joints[joint.mimic.joint], joints, held)
+    leader = _followed(joints[joint.mimic.joint], joints, held, lock)
     return joint.mimic.multiplier * leader + joint.mimic.offset
-
-
-def parse(text: str, path: str) -> pin.Model:
-    """Parse checked URDF text with Pinocchio.
-
-    Pinocchio prints what is wrong on the C stderr and raises only "not a valid URDF", so file
-    descriptor 2 is caught meanwhile.
-
-    Raises:
-        RobotError: Pinocchio refuses the text.
-    """
-    import pinocchio as pin
-
-    with tempfile.TemporaryFile() as caught:
-        saved = os.dup(2)
-        try:
-            os.dup2(caught.fileno(), 2)
-            model = pin.buildModelFromXML(text)
-        except (ValueError, RuntimeError) as error:
-            caught.seek(0)
-            printed = " ".join(caught.read().decode(errors="replace").split())
-            raise RobotError(f"{path}: Pinocchio refuses this URDF: {printed or error}") from error
-        finally:
-            os.dup2(saved, 2)
-            os.close(saved)
-    return model
-
-
-def _reduced_model(
-    name: str,
-    model: pin.Model,
-    locked: Mapping[str, float],
-    free: Sequence[JointInfo],
-    tool: str,
-) -> pin.Model:
-    """Lock every joint of `model` but the free ones, and make sure that just those are left."""
-    import pinocchio as pin
-
-    called = _rename_clashing_joints(model)
-    expected = [called.get(joint.name, joint.name) for joint in free]
-    reference = pin.neutral(model)
-    for joint, value in locked.items():
-        title = called.get(joint, joint)
-        if not model.existJointName(title):  # getJointId would return the number of joints
-            raise RobotError(f"robot {name!r}: Pinocchio reads no joint {joint!r}")
-        entry = model.joints[model.getJointId(title)]
-        if entry.nq == 2:  # continuous
-            reference[entry.idx_q : entry.idx_q + 2] = math.cos(value), math.sin(value)
-        else:
-            reference[entry.idx_q] = value
-    drop = [i for i in range(1, model.njoints) if model.names[i] not in expected]
-    reduced = pin.buildReducedModel(model, drop, reference)
-    if list(reduced.names)[1:] != expected or not reduced.existFrame(tool, pin.FrameType.BODY):
-        raise RobotError(
-            f"robot {name!r}: Pinocchio reads the joints {', '.join(list(reduced.names)[1:])} "
-            f"where {', '.join(expected)} lead to {tool!r}"
-        )
-    return reduced
-
-
-def _rename_clashing_joints(model: pin.Model) -> dict[str, str]:
-    """Give moving joints that are named like a link another name in `model`; return old -> new.
-
-    A URDF may name both alike; Pinocchio parses it, and then cannot lock the joint, because it asks
-    for its frame by name alone.
-    """
-    import pinocchio as pin
-
-    links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
-    taken = {frame.name for frame in model.frames}
-    called: dict[str, str] = {}
-    for i in range(1, model.njoints):
-        old = model.names[i]
-        if old in links:
-            new = old + "/joint"
-            while new in taken:
-                new += "/joint"
-            taken.add(new)
-            called[old] = model.names[i] = new
-    for frame in model.frames:
-        if frame.type == pin.FrameType.JOINT and frame.name in called:
-            frame.name = called[frame.name]
-    return called

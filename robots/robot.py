@@ -59,7 +59,7 @@ class Robot:
         """Copy and write-protect the arrays, and check that they fit together."""
         n = len(self.joint_names)
         for name, shape in (("approach_axis", (3,)), ("lower", (n,)), ("upper", (n,))):
-            array = np.array(getattr(self, name), dtype=float)
+            array = _numbers(getattr(self, name), f"robot {self.name!r}: {name}")
             if array.shape != shape:
                 raise RobotError(
                     f"robot {self.name!r}: {name} has shape {array.shape}, not {shape}"
@@ -206,8 +206,8 @@ class Robot:
 
 
 def _numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """`values` as an array of floats; raises RobotError where they are none."""
+    """A copy of `values` as an array of floats; raises RobotError where they are none."""
     try:
         return np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise RobotError(f"{what} must be numbers (rad or m), got {values!r}") from error
+        raise RobotError(f"{what} must be an array of numbers, got {values!r}") from error
