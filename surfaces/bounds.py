@@ -59,20 +59,25 @@ class CurvatureSlices(NamedTuple):
     """(s,) 1/m^2, at least |d kappa_1 / ds|."""
     parallel_slope: NDArray[np.float64]
     """(s,) 1/m^2, at least |d kappa_2 / ds|."""
+    reach: NDArray[np.float64]
+    """(s,) m, the signed height up to which points above the slice have their foot on it."""
 
     @staticmethod
     def constant(meridian: float, parallel: float) -> CurvatureSlices:
         """One slice of constant curvatures (1/m)."""
         k1, k2, zero = np.array([meridian]), np.array([parallel]), np.zeros(1)
-        return CurvatureSlices(k1, k1, k2, k2, zero, zero)
+        return CurvatureSlices(k1, k1, k2, k2, zero, zero, np.full(1, np.inf))
 
 
 def normal_bounds(slices: CurvatureSlices, height: float, slack: float) -> NormalBounds:
     """Bounds over all slices and all signed heights within `slack` (m) of `height` (m).
 
     Both k = kappa / (1 + kappa h) and its stretch 1 / (1 + kappa h) are monotone in kappa and in h
-    as long as the parallel surface does not fold, so the corners of each interval decide.
+    as long as the parallel surface does not fold, so the corners of each interval decide. Where it
+    folds or meets itself the foot jumps, and no bound holds.
     """
+    if (height + slack >= slices.reach).any():
+        return NormalBounds(math.inf, math.inf)
     k1, stretch1 = _corners(slices.meridian_low, slices.meridian_high, height, slack)
     k2, stretch2 = _corners(slices.parallel_low, slices.parallel_high, height, slack)
     curvature = float(np.maximum(k1, k2).max())

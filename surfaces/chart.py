@@ -63,8 +63,9 @@ def _sphere_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
         s = math.sin(u)
         return u, v, -radius, s * math.cos(v), s * math.sin(v), math.cos(u)
     u = math.atan2(rho, z)
-    # On the polar axis every azimuth is the same point: take one of the patch.
-    v = low[1] if rho <= 1e-15 * distance else wrap(math.atan2(y, x), low[1], high[1])
+    v = wrap(math.atan2(y, x), low[1], high[1])
+    if rho <= EDGE * distance:  # a pole is one point for every azimuth: take one of the patch
+        v = min(max(v, low[1]), high[1])
     return u, v, distance - radius, x / distance, y / distance, z / distance
 
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from surfaces.surface import TURN_TOLERANCE, Side, SurfaceError, rotation_from_rpy
 
+LARGEST_RATIO = 1e6  # of two lengths of one surface
+
 
 class Checks:
     """Reads arguments one by one, collects what is wrong, and raises once at the end."""
@@ -27,6 +29,14 @@ class Checks:
             self.faults.append(f"{name} must be a finite number > 0 (metres), got {value!r}")
             return 1.0
         return number
+
+    def ratio(self, name: str, value: float, remedy: str) -> None:
+        """A ratio of lengths that leaves room for squares and cubes in floating point."""
+        if not 1.0 / LARGEST_RATIO <= value <= LARGEST_RATIO:
+            self.faults.append(
+                f"{name} must lie in {1.0 / LARGEST_RATIO:g} .. {LARGEST_RATIO:g}, "
+                f"got {value:g}; {remedy}"
+            )
 
     def interval(self, name: str, value: Any) -> tuple[float, float]:
         """A pair (low, high) of finite metres, low < high."""

@@ -110,11 +110,13 @@ def hyperboloid(
         SurfaceError: one or more of the numbers do not describe a patch; all are named.
     """
     check = Checks("hyperboloid")
+    waist, flare = check.positive("waist", waist), check.positive("flare", flare)
+    check.ratio("waist / flare", waist / flare, "beyond that use a cylinder or a plane")
     made = Hyperboloid(
         u_range=check.angles("angle_deg", angle_deg),
         v_range=check.interval("height", height),
-        waist=check.positive("waist", waist),
-        flare=check.positive("flare", flare),
+        waist=waist,
+        flare=flare,
         side=check.side(side),
         position=check.vector("position", position, "metres"),
         rotation=check.rotation("rpy_deg", rpy_deg),

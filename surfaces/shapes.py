@@ -135,14 +135,15 @@ class Hyperboloid(Surface):
         return np.stack([np.cos(u) / length, np.sin(u) / length, -rise / length], axis=-1)
 
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
-        """(u1 - u0) times the integral of g: (z g + waist^2 / b asinh(b z / waist)) / 2."""
+        """(u1 - u0) times the integral of g, z (g + waist asinh(x) / x) / 2, x = b z / waist."""
         u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
         slope = self.waist / self.flare
         b = slope * math.sqrt(1.0 + slope**2)
 
         def integral(z: Array) -> Array:
-            g = np.hypot(self.waist, b * z)
-            return (z * g + self.waist**2 / b * np.arcsinh(b * z / self.waist)) / 2.0
+            x = b * z / self.waist
+            ratio = np.divide(np.arcsinh(x), x, out=np.ones_like(x), where=x != 0.0)
+            return z * self.waist * (np.hypot(1.0, x) + ratio) / 2.0
 
         return np.asarray((u1 - u0) * (integral(v1) - integral(v0)))
 
@@ -150,14 +151,21 @@ class Hyperboloid(Surface):
         """Interval bounds on each of many slices of z: rigorous, not sampled.
 
         d kappa_2 / ds = -b^2 z r / g^4 and d kappa_1 / ds = 3 s^2 waist^2 b^2 z r / g^6, where
-        b^2 = s^2 (1 + s^2); r and g grow with |z|.
+        b^2 = s^2 (1 + s^2); r and g grow with |z|. Outward normals from z and -z meet in the plane
+        z = 0 at height g / s^2, which is never beyond the meridian's centre of curvature; inward
+        normals meet on the axis, at the centre of curvature 1 / kappa_2.
         """
-        edges = np.linspace(self.v_range[0] - margin, self.v_range[1] + margin, _SLICES + 1)
+        square = (self.waist / self.flare) ** 2
+        growth = square * (1.0 + square)
+        # Equal steps of asinh(b z / waist): fine at the waist, where the curvatures change fastest.
+        scale = self.waist / math.sqrt(growth)
+        low, high = self.v_range[0] - margin, self.v_range[1] + margin
+        steps = np.linspace(math.asinh(low / scale), math.asinh(high / scale), _SLICES + 1)
+        edges = scale * np.sinh(steps)
+        edges[0], edges[-1] = low, high
         a, b = np.abs(edges[:-1]), np.abs(edges[1:])
         far = np.maximum(a, b)
         near = np.where(edges[:-1] * edges[1:] <= 0.0, 0.0, np.minimum(a, b))
-        square = (self.waist / self.flare) ** 2
-        growth = square * (1.0 + square)
         g_near = np.hypot(self.waist, math.sqrt(growth) * near)
         g_far = np.hypot(self.waist, math.sqrt(growth) * far)
         dent = square * self.waist**2
@@ -169,6 +177,7 @@ class Hyperboloid(Surface):
             parallel_high=1.0 / g_near,
             meridian_slope=3.0 * dent * lever / g_near**6,
             parallel_slope=lever / g_near**4,
+            reach=g_near / square,
         )
 
 

@@ -156,7 +156,7 @@ class Surface(ABC):
         if points.shape[-1:] != (3,):
             raise ValueError(f"points must have shape (..., 3), got {points.shape}")
         shape = points.shape[:-1]
-        values, inside = feet(self.chart(), np.ascontiguousarray(points.reshape(-1, 3)))
+        values, inside = feet(self.chart(), np.array(points.reshape(-1, 3)))
         return Foot(
             u=values[:, 0].reshape(shape),
             v=values[:, 1].reshape(shape),
@@ -172,8 +172,8 @@ class Surface(ABC):
         return Chart(
             code=self.code,
             shape=np.array(self.shape, dtype=float),
-            rotation=np.ascontiguousarray(self.rotation),
-            position=np.ascontiguousarray(self.position),
+            rotation=np.array(self.rotation),  # writeable copies: read-only is another numba type
+            position=np.array(self.position),
             side_sign=self.side_sign,
             low=np.array([self.u_range[0], self.v_range[0]]),
             high=np.array([self.u_range[1], self.v_range[1]]),
