@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from feasibility import threejs
 from feasibility.meshes import tubes
+from feasibility.motion import Motion
 from feasibility.page import Entry
 from feasibility.threejs import Colour, Command
 from feasibility.verdict import CauseKind, Verdict
@@ -28,7 +29,7 @@ START: Colour = (0.0, 0.62, 0.25)
 MISSED: Colour = (0.84, 0.12, 0.12)
 TRAIL: Colour = (0.95, 0.55, 0.05)
 CAUSES: dict[CauseKind, Colour] = {  # told apart by colour-blind eyes too (Okabe and Ito)
-    CauseKind.OUT_OF_REACH: (0.84, 0.12, 0.12),
+    CauseKind.OUT_OF_REACH: (0.50, 0.05, 0.22),
     CauseKind.JOINT_LIMITS: (0.90, 0.60, 0.00),
     CauseKind.ORIENTATION: (0.80, 0.47, 0.65),
     CauseKind.COLLISION: (0.20, 0.20, 0.20),
@@ -42,6 +43,7 @@ COMPONENTS: tuple[Colour, ...] = (
 )
 EDGE_POINTS = 9  # on the way from cell to cell
 FULL_DETAIL = 5_000  # cells; more are drawn without centre marks, and edges as plain lines
+TRAIL_POINTS = 2_000
 LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
 
 
@@ -217,6 +219,24 @@ def _components(verdict: Verdict) -> Iterator[Layer]:
             threejs.set_property(path, "visible", False),
         )
         yield Layer(commands, Entry(words, colour, path, shown=False), len(cells))
+
+
+def trail(verdict: Verdict, motion: Motion) -> Layer:
+    """Where the tool goes in the motion that is played.
+
+    A covering motion runs along most edges of G, so it is hidden until it is asked for.
+    """
+    path = f"/motion/tool path, {motion.label}"
+    shown = motion.there_and_back
+    even = np.linspace(0.0, motion.seconds[-1], TRAIL_POINTS)
+    line = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
+    size = cell_size(verdict.cells)
+    vertices, faces = tubes([line], 0.035 * size)
+    commands = (
+        threejs.mesh(path, vertices, faces, TRAIL, lit=False),
+        threejs.set_property(path, "visible", shown),
+    )
+    return Layer(commands, Entry(f"tool path: {motion.label}", TRAIL, path, shown), 1)
 
 
 def _over_surface(verdict: Verdict, ends: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -21,11 +21,12 @@ from feasibility import robot_visuals, threejs
 from feasibility.meshcat_server import LiveView
 from feasibility.motion import Motion, animate, motion_of
 from feasibility.page import Camera, Entry, Legend, page
-from feasibility.scene import TRAIL, layers
+from feasibility.scene import layers, trail
 from feasibility.threejs import Command
 from feasibility.verdict import Verdict
 from robots import Robot
 
+ARM: threejs.Colour = (0.35, 0.37, 0.40)
 FRAMED = 0.36  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
 
 
@@ -99,19 +100,16 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     """
     motion = motion_of(verdict)
     drawing = robot_visuals.draw(verdict.robot)
-    parts = layers(verdict)
-    commands = [*_stage(verdict, drawing.lowest)]
-    commands += drawing.commands
-    entries = []
-    for part in parts:
+    commands = _stage(verdict, drawing.lowest) + list(drawing.commands)
+    entries = [Entry(verdict.robot.name, ARM, robot_visuals.ROOT)]
+    for part in layers(verdict):
         commands += part.commands
         entries.append(part.entry)
     q = _resting(verdict)
     if motion is not None:
-        trail = f"/motion/tool path ({motion.label})"
-        ends = np.stack([motion.points[:-1], motion.points[1:]], axis=1).reshape(-1, 3)
-        commands.append(threejs.segments(trail, ends, TRAIL))
-        entries.append(Entry(f"tool path: {motion.label}", TRAIL, trail))
+        tool_path = trail(verdict, motion)
+        commands += tool_path.commands
+        entries.append(tool_path.entry)
         commands.append(animate(verdict.robot, motion, play=play))
         q = motion.at(np.array([at * motion.seconds[-1]]))[0]
     commands += robot_visuals.pose(verdict.robot, q)
@@ -119,7 +117,7 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
         robot=verdict.robot,
         commands=tuple(commands),
         legend=Legend(_title(verdict, case), _text(verdict, drawing.notes), tuple(entries)),
-        camera=_camera(verdict, q),
+        camera=_camera(verdict, q, drawing.lowest),
         motion=motion,
         notes=drawing.notes,
     )
@@ -216,7 +214,7 @@ def _points(verdict: Verdict) -> NDArray[np.float64]:
     return np.concatenate([base, corners])
 
 
-def _camera(verdict: Verdict, q: NDArray[np.float64]) -> Camera:
+def _camera(verdict: Verdict, q: NDArray[np.float64], floor: float) -> Camera:
     """Look at arm and surface from the tool's side, a little from above."""
     placements = robot_visuals.joint_placements(verdict.robot, q)[0]
     place = np.eye(4)
@@ -224,7 +222,7 @@ def _camera(verdict: Verdict, q: NDArray[np.float64]) -> Camera:
     for step in placements:
         place = place @ step
         joints.append(place[:3, 3].copy())
-    points = np.concatenate([_points(verdict), joints])
+    points = np.concatenate([_points(verdict), joints, [[0.0, 0.0, floor]]])
     target = (points.min(axis=0) + points.max(axis=0)) / 2.0
     radius = max(float(np.linalg.norm(points - target, axis=1).max()), 0.1)
     toward = np.zeros(3)
