@@ -165,3 +165,16 @@ def test_more_slack_never_tightens_a_bound(patch):
         bends = [bounds.bend for bounds in ladder]
         assert curvatures == sorted(curvatures)
         assert bends == sorted(bends)
+
+
+@pytest.mark.parametrize("height", [-0.5, 0.7])
+def test_slopes_scale_with_the_parallel_surface(height):
+    """With slopes that outweigh the curvatures, bend is theirs alone, at that height."""
+    k1, k2, steep = -0.8, 0.5, 1e9
+    scale1, scale2 = 1 + k1 * height, 1 + k2 * height
+    for p, q, expected in [
+        (steep, 0.0, steep / scale1**3),
+        (0.0, steep, 2 / math.sqrt(3) * steep / (scale2**2 * scale1)),
+    ]:
+        slices = CurvatureSlices(*(np.array([x]) for x in (k1, k1, k2, k2, p, q, np.inf)))
+        assert normal_bounds(slices, height, 0.0).bend == pytest.approx(expected, rel=1e-8)
