@@ -77,6 +77,8 @@ def read_bytes(path: str) -> bytes:
         with open(descriptor, "rb") as stream:
             _check_regular(path, os.fstat(descriptor))
             data = stream.read(MAX_BYTES + 1)
+    except UrdfError:  # a ValueError too
+        raise
     except FileNotFoundError:
         raise UrdfError(path, ("there is no such file; give the path of a URDF file",)) from None
     except OSError as error:
@@ -125,6 +127,8 @@ def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
     builder = _Builder(parser, path)
     try:
         parser.Parse(data, True)
+    except UrdfError:  # from the handlers; a ValueError too
+        raise
     except expat.ExpatError as error:
         what = expat.ErrorString(error.code) or "not XML"
         raise UrdfError(
@@ -132,8 +136,6 @@ def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
             (f"line {error.lineno}: broken XML ({what}); mend the file or export it again",),
         ) from None
     except (LookupError, ValueError) as error:
-        if isinstance(error, UrdfError):
-            raise
         raise UrdfError(
             path, (f"line 1: its encoding cannot be read ({error}); save it as UTF-8",)
         ) from None
