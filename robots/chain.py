@@ -65,7 +65,7 @@ class Chain(NamedTuple):
             # The joint's motion subspace, in its own frame: (linear, angular).
             subspace = pin.getJointJacobian(
                 model, pin_jacobians(model, data), i + 1, pin.ReferenceFrame.LOCAL
-            )[:, i]
+            ).reshape(6, n)[:, i]  # Pinocchio flattens a single column
             linear, angular = subspace[:3], subspace[3:]
             prismatic[i] = np.linalg.norm(angular) < 0.5
             placement = model.jointPlacements[i + 1]

@@ -121,7 +121,7 @@ def _joint(index: int, row: DHRow, limits_deg: tuple[float, float]) -> list[str]
         f'    <child link="{_link_name(index)}"/>',
         f'    <origin xyz="{_text(xyz)}" rpy="{_text((row.alpha, 0.0, 0.0))}"/>',
         '    <axis xyz="0 0 1"/>',
-        f'    <limit lower="{lower!r}" upper="{upper!r}" effort="100" velocity="3"/>',
+        f'    <limit lower="{_number(lower)}" upper="{_number(upper)}" effort="100" velocity="3"/>',
         "  </joint>",
     ]
 
@@ -135,18 +135,18 @@ def _geometry(size: tuple[float, ...]) -> str:
     if len(size) == 3:
         return f'<box size="{_text(size)}"/>'
     if len(size) == 2:
-        return f'<cylinder radius="{size[0]!r}" length="{size[1]!r}"/>'
-    return f'<sphere radius="{size[0]!r}"/>'
+        return f'<cylinder radius="{_number(size[0])}" length="{_number(size[1])}"/>'
+    return f'<sphere radius="{_number(size[0])}"/>'
 
 
 def _text(values: Sequence[float]) -> str:
-    """Numbers as URDF text; 1e-15 is far below what matters and hides cos(pi/2) = 6e-17."""
+    """Numbers as URDF text."""
     return " ".join(_number(value) for value in values)
 
 
 def _number(value: float) -> str:
-    # Adding zero turns -0.0 into 0.0.
-    rounded = round(value, 16) + 0.0
+    # 16 decimals keep what matters and hide cos(pi/2) = 6e-17; adding zero turns -0.0 into 0.0.
+    rounded = round(float(value), 16) + 0.0
     return repr(int(rounded)) if rounded == int(rounded) else repr(rounded)
 
 

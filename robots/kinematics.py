@@ -56,7 +56,7 @@ class Kinematics:
             self.configuration(q),
             self._frame,
             pin.ReferenceFrame.LOCAL_WORLD_ALIGNED,
-        )
+        ).reshape(6, self.robot.n)  # Pinocchio flattens a single column
         pin.updateFramePlacement(self._model, self._data, self._frame)
         axis = self._rotation @ self._approach
         return jacobian[:3].copy(), np.cross(jacobian[3:].T, axis).T

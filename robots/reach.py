@@ -30,7 +30,8 @@ def reach_bound(robot: Robot) -> float:
         The bound; inf where a prismatic joint has no limits.
     """
     model, data = robot.model, robot.model.createData()
-    columns = pin.computeJointJacobians(model, data, pin.neutral(model))  # in the root frame
+    columns = pin.computeJointJacobians(model, data, pin.neutral(model))
+    columns = columns.reshape(6, robot.n)  # in the root frame; Pinocchio flattens a single column
     pin.updateFramePlacements(model, data)
     anchors = [data.oMi[1].translation.copy()]
     axes: list[NDArray[np.float64] | None] = [None]  # None: this anchor does not slide

@@ -53,8 +53,7 @@ def robot_from_urdf(
     tool = _tool_frame(checked, name, tool_frame)
     fixed_values = dict(lock or {})
     _check_lock(checked, name, fixed_values)
-    path = checked.path_to(tool)
-    free = [joint for joint in path if joint.moves and joint.name not in fixed_values]
+    free = _free_joints(checked, tool, fixed_values)
     _check_free(checked, name, tool, free, limits)
     locked = _locked_values(checked, {joint.name for joint in free}, fixed_values)
     free_names = [joint.name for joint in free]
@@ -139,6 +138,26 @@ def _range(joint: JointInfo) -> tuple[float, float]:
     return joint.lower, joint.upper
 
 
+def _free_joints(
+    checked: CheckedUrdf, tool: str, lock: Mapping[str, float]
+) -> tuple[JointInfo, ...]:
+    """The moving joints on the way to the tool that nothing holds.
+
+    A mimic joint is held when the joint that leads it is.
+    """
+    free = [joint for joint in checked.path_to(tool) if joint.moves and joint.name not in lock]
+    names = {joint.name for joint in free}
+    while True:
+        led = {
+            joint.name
+            for joint in free
+            if joint.mimic is not None and joint.fault is None and joint.mimic.joint not in names
+        }
+        if not led & names:
+            return tuple(joint for joint in free if joint.name in names)
+        names -= led
+
+
 def _check_free(
     checked: CheckedUrdf,
     name: str,
@@ -157,7 +176,7 @@ def _check_free(
         if joint.mimic is not None and joint.fault is None:
             faults.append(
                 f"line {joint.line}: joint {joint.name!r} on the way to {tool!r} mimics "
-                f"{joint.mimic.joint!r}; lock it at a value, or choose another tool_frame"
+                f"{joint.mimic.joint!r}; lock one of the two, or choose another tool_frame"
             )
         elif joint.fault is not None:
             gets_limits = limits is not None and (

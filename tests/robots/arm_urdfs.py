@@ -1,0 +1,108 @@
+"""URDF texts that the tests of `robots` build, and an independent forward kinematics for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import Robot, load_robot
+from robots.urdf import JointInfo
+
+FREE = (-float("inf"), float("inf"))
+
+
+def joint(
+    index: int,
+    kind: str = "revolute",
+    xyz: Sequence[float] = (0.0, 0.0, 0.0),
+    rpy: Sequence[float] = (0.0, 0.0, 0.0),
+    axis: Sequence[float] = (0.0, 0.0, 1.0),
+    limits: tuple[float, float] = (-3.0, 3.0),
+    extra: str = "",
+) -> str:
+    """`j<index>` from `l<index - 1>` to `l<index>`."""
+
+    def text(values: Sequence[float]) -> str:
+        return " ".join(repr(float(value)) for value in values)
+
+    limit = f'<limit lower="{limits[0]!r}" upper="{limits[1]!r}" effort="1" velocity="1"/>'
+    return (
+        f'<joint name="j{index}" type="{kind}"><parent link="l{index - 1}"/>'
+        f'<child link="l{index}"/><origin xyz="{text(xyz)}" rpy="{text(rpy)}"/>'
+        + (f'<axis xyz="{text(axis)}"/>' if kind != "fixed" else "")
+        + (limit if kind in ("revolute", "prismatic") else "")
+        + extra
+        + "</joint>"
+    )
+
+
+def arm(joints: Sequence[str], more: str = "") -> str:
+    """A URDF of the links l0, l1, ... and the joints given."""
+    links = "".join(f'<link name="l{i}"/>' for i in range(len(joints) + 1))
+    return f'<robot name="test_arm">{links}{"".join(joints)}{more}</robot>'
+
+
+def random_arm(rng: np.random.Generator) -> str:
+    """A serial chain of 1 to 9 joints of every kind, with any axes, origins and limits."""
+    n = int(rng.integers(1, 10))
+    joints = []
+    for i in range(1, n + 1):
+        kinds = ["revolute", "continuous", "prismatic"] + ["fixed"] * (i > 1)
+        lower = float(rng.uniform(-4, 3))
+        joints.append(
+            joint(
+                i,
+                str(rng.choice(kinds)),
+                rng.uniform(-0.5, 0.5, 3),
+                rng.uniform(-np.pi, np.pi, 3),
+                # Close to a coordinate axis now and then: the rotation onto it must not lose that.
+                rng.normal(size=3) if rng.random() < 0.7 else [1e-7, 0, 1] * rng.normal(size=3),
+                (lower, lower + float(rng.uniform(0.1, 3))),
+            )
+        )
+    joints[0] = joint(1, "revolute", axis=(0, 0, -1)) if "fixed" in joints[0] else joints[0]
+    return arm(joints)
+
+
+def load_text(folder: Path, text: str, **options: object) -> Robot:
+    """Write a URDF into `folder` and load it."""
+    path = folder / "test_arm.urdf"
+    path.write_text(text, encoding="utf-8")
+    return load_robot(path, **options)  # type: ignore[arg-type]
+
+
+def random_q(robot: Robot, rng: np.random.Generator, turns: float = 2.0) -> NDArray[np.float64]:
+    """A configuration inside the limits; free joints turn several times."""
+    far = turns * 2 * np.pi
+    lower = np.where(np.isfinite(robot.lower), robot.lower, -far)
+    upper = np.where(np.isfinite(robot.upper), robot.upper, far)
+    return rng.uniform(lower, upper)
+
+
+def placement(path: Sequence[JointInfo], values: Mapping[str, float]) -> NDArray[np.float64]:
+    """(4, 4) placement of the last joint's child link in the root frame, by the URDF's rules.
+
+    Written without Pinocchio: origin, then Rodrigues' formula or a shift along the axis.
+    """
+    result = np.eye(4)
+    for info in path:
+        origin = np.eye(4)
+        (sr, sp, sy), (cr, cp, cy) = np.sin(info.rpy), np.cos(info.rpy)
+        roll = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+        pitch = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+        yaw = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+        origin[:3, :3] = yaw @ pitch @ roll
+        origin[:3, 3] = info.xyz
+        motion = np.eye(4)
+        if info.kind == "prismatic":
+            motion[:3, 3] = values[info.name] * np.array(info.axis)
+        elif info.kind != "fixed":
+            x, y, z = info.axis
+            skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+            angle = values[info.name]
+            motion[:3, :3] += np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+        result = result @ origin @ motion
+    return result

@@ -1,0 +1,87 @@
+"""Pinocchio's answers against the URDF's own rules, written out without Pinocchio."""
+
+import numpy as np
+import pytest
+from arm_urdfs import arm, joint, load_text, placement, random_arm, random_q
+
+from robots import list_robots, load_robot
+from robots.kinematics import Kinematics
+from robots.urdf import check_urdf
+
+
+@pytest.mark.parametrize("info", list_robots(), ids=lambda info: info.name)
+def test_tool_is_where_the_urdf_puts_it_with_the_locked_joints_held(info):
+    robot = load_robot(info.name)
+    path = check_urdf(robot.urdf, robot.package_dirs).path_to(robot.tool_frame)
+    tool = Kinematics(robot).tool
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        q = random_q(robot, rng)
+        values = {**robot.locked, **dict(zip(robot.joint_names, q, strict=True))}
+        expected = placement(path, values)
+        point, axis = tool(q)
+        np.testing.assert_allclose(point, expected[:3, 3], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(axis, expected[:3, :3] @ robot.approach_axis, rtol=0, atol=1e-12)
+        assert np.linalg.norm(axis) == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_jacobians_are_the_slopes_of_the_tool(seed, tmp_path):
+    rng = np.random.default_rng(100 + seed)
+    robot = load_text(tmp_path, random_arm(rng), approach_axis=rng.normal(size=3))
+    kinematics = Kinematics(robot)
+    q = random_q(robot, rng)
+    point_rows, axis_rows = kinematics.jacobians(q)
+    step = 1e-5
+    for i in range(robot.n):
+        shift = step * np.eye(robot.n)[i]
+        after, before = kinematics.tool(q + shift), kinematics.tool(q - shift)
+        for rows, ahead, behind in zip((point_rows, axis_rows), after, before, strict=True):
+            slope = (ahead - behind) / (2 * step)
+            np.testing.assert_allclose(rows[:, i], slope, rtol=0, atol=2e-9)
+
+
+def test_a_full_turn_is_another_configuration_with_the_same_placement():
+    robot = load_robot("kinova")
+    assert robot.joint_kinds.count("continuous") == 3
+    kinematics = Kinematics(robot)
+    q = np.array([0.3, 2.0, 1.5, -4.0, 3.0, 5.0])
+    for i, kind in enumerate(robot.joint_kinds):
+        turned = q + 2 * np.pi * np.eye(6)[i]
+        for value, expected in zip(kinematics.tool(turned), kinematics.tool(q), strict=True):
+            np.testing.assert_allclose(value, expected, rtol=0, atol=1e-12)
+        assert (robot.lower[i], robot.upper[i]) == (-np.inf, np.inf) or kind == "revolute"
+
+
+def test_an_arm_on_a_rail_moves_with_it(tmp_path):
+    text = arm(
+        [
+            joint(1, "prismatic", axis=(0, 1, 0), limits=(-1.0, 2.0)),
+            joint(2, xyz=(0, 0, 0.5)),
+            joint(3, "prismatic", xyz=(0.4, 0, 0), axis=(2, 0, 0), limits=(0.0, 0.3)),
+        ]
+    )
+    robot = load_text(tmp_path, text)
+    assert robot.joint_kinds == ("prismatic", "revolute", "prismatic")
+    np.testing.assert_array_equal(robot.prismatic, [True, False, True])
+    point, axis = Kinematics(robot).tool([1.5, np.pi / 2, 0.2])
+    np.testing.assert_allclose(point, [0, 1.5 + 0.4 + 0.2, 0.5], atol=1e-15)
+    np.testing.assert_allclose(axis, [0, 0, 1], atol=1e-15)
+    # Furthest from the rail's origin: at its end, stretched.
+    assert robot.reach == pytest.approx(np.hypot(0.5, 2.0) + 0.7)
+
+
+def test_answers_are_copies():
+    kinematics = Kinematics(load_robot("puma560"))
+    first = [*kinematics.tool(np.zeros(6)), *kinematics.jacobians(np.zeros(6))]
+    kept = [array.copy() for array in first]
+    kinematics.tool(np.ones(6))
+    kinematics.jacobians(np.ones(6))
+    for array, expected in zip(first, kept, strict=True):
+        np.testing.assert_array_equal(array, expected)
+
+
+@pytest.mark.parametrize("q", [[0.0] * 5, [0.0] * 7, [[0.0] * 6]])
+def test_a_configuration_of_the_wrong_shape_is_refused(q):
+    with pytest.raises(ValueError, match=r"q must have shape \(6,\)"):
+        Kinematics(load_robot("puma560")).tool(q)
