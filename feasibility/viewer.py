@@ -27,7 +27,7 @@ from feasibility.verdict import Verdict
 from robots import Robot
 
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
-FRAMED = 0.36  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
+FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
 
 
 @dataclass(frozen=True, eq=False, slots=True)
