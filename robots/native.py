@@ -73,23 +73,21 @@ def reduced_model(
 
 
 def _rename_clashing_joints(model: pin.Model) -> dict[str, str]:
-    """Give moving joints that are named like a link another name in `model`; return old -> new.
+    """Give joints that are named like a link another name in `model`; return old -> new.
 
-    A URDF may name both alike; Pinocchio parses it, and then cannot lock the joint, because it asks
-    for its frame by name alone.
+    A URDF may name both alike; Pinocchio parses it, and then cannot lock joints, because it asks
+    for frames by name alone.
     """
     links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
     taken = {frame.name for frame in model.frames}
     called: dict[str, str] = {}
-    for i in range(1, model.njoints):
-        old = model.names[i]
-        if old in links:
-            new = old + "/joint"
+    for frame in model.frames:
+        if frame.type in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT) and frame.name in links:
+            new = frame.name + "/joint"
             while new in taken:
                 new += "/joint"
             taken.add(new)
-            called[old] = model.names[i] = new
-    for frame in model.frames:
-        if frame.type == pin.FrameType.JOINT and frame.name in called:
-            frame.name = called[frame.name]
+            called[frame.name] = frame.name = new
+    for i in range(1, model.njoints):
+        model.names[i] = called.get(model.names[i], model.names[i])
     return called

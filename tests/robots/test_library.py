@@ -279,22 +279,25 @@ def test_a_chain_of_mimic_joints_is_held_as_one(tmp_path):
     held = load_text(tmp_path, text, lock={"j1": 0.25})
     assert held.locked == {"j1": 0.25, "j2": -0.25, "j3": 0.25}
     assert held.joint_names == ("j4",)
-    with pytest.raises(RobotError, match="'j2' .* mimics 'j1'.*'j3' .* mimics 'j2'"):
+    with pytest.raises(RobotError, match=r"'j2' .* mimics 'j1'.*'j3' .* mimics 'j2'"):
         load_text(tmp_path, text)
 
 
-def test_a_joint_may_have_the_name_of_a_link(tmp_path):
-    text = arm([joint(1), joint(2, xyz=(1, 0, 0)), joint(3, xyz=(1, 0, 0))])
-    clashing = text.replace('"j2"', '"l2"')
+@pytest.mark.parametrize("clash", ["l0", "l1", "l2", "l4"])
+@pytest.mark.parametrize("renamed", ["j1", "j2", "j3"])
+def test_a_joint_may_have_the_name_of_a_link(renamed, clash, tmp_path):
+    joints = [joint(1), joint(2, "fixed", xyz=(1, 0, 0)), joint(3, xyz=(1, 0, 0)), joint(4)]
+    text = arm(joints)
     plain = load_text(tmp_path, text)
+    clashing = text.replace(f'"{renamed}"', f'"{clash}"')
     robot = load_text(tmp_path, clashing)
-    assert robot.joint_names == ("j1", "l2", "j3")
-    held = load_text(tmp_path, clashing, lock={"l2": 0.4})
-    q = [0.3, 0.4, -0.2]
-    for other, values in ((robot, q), (held, [0.3, -0.2])):
-        np.testing.assert_allclose(
-            Kinematics(other).tool(values)[0], Kinematics(plain).tool(q)[0], atol=1e-15
-        )
+    assert robot.joint_names == tuple(clash if n == renamed else n for n in plain.joint_names)
+    held = load_text(tmp_path, clashing, lock={robot.joint_names[1]: 0.4})
+    for other, q in ((robot, [0.3, 0.4, -0.2]), (held, [0.3, -0.2])):
+        for value, expected in zip(
+            Kinematics(other).tool(q), Kinematics(plain).tool([0.3, 0.4, -0.2]), strict=True
+        ):
+            np.testing.assert_allclose(value, expected, atol=1e-15)
 
 
 # Names and files
