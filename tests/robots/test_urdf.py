@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import re
 import subprocess
 import sys
 from importlib.metadata import distribution
@@ -419,24 +420,41 @@ SEEDS = [
     (SHARE / "example-robot-data/robots/ur_description/urdf/ur5_robot.urdf").read_bytes(),
 ]
 TOKENS = [
-    b"nan", b"0 0 0", b"1e308", b"-1e16", b"inf", b"<", b">", b'"', b"&", b"/>", b"]]>", b"\0",
-    b"\xff", b"-", b"", b" ", b"9" * 400, b"fixed", b"continuous", b"prismatic", b"floating",
-    b"<origin/>", b"<axis/>", b"<limit/>", b'<mimic joint="x"/>', b"<!DOCTYPE a>", b"../../x.stl",
+    b"nan", b"0 0 0", b"0 0 2", b"1e308", b"-1e16", b"inf", b"0", b"-3.5", b"1 2", b"1,5", b"&lt;",
+    b"&x;", b"\xff", b"", b" ", b"9" * 400, b"fixed", b"revolute", b"continuous", b"prismatic",
+    b"floating", b"base_link", b"universe", b"a&#10;b", b"package://../../x.stl", b"${x}",
+]  # fmt: skip
+PIECES = [
+    b"<origin/>", b"<axis/>", b"<limit/>", b'<axis xyz="1 1 1"/>', b'<origin rpy="1 1 1"/>',
+    b'<mimic joint="x"/>', b"<!DOCTYPE a>", b"<", b">", b'"', b"&", b"/>", b"]]>", b"\0", b"-->",
+    b"<!--", b"</joint>", b"</robot>",
 ]  # fmt: skip
 
 
 @st.composite
 def mutated(draw: st.DrawFn) -> bytes:
+    """A sound URDF with some values, lines or bytes changed."""
     data = draw(st.sampled_from(SEEDS))
-    for _ in range(draw(st.integers(1, 4))):
-        at = draw(st.integers(0, len(data)))
-        if draw(st.booleans()):  # an attribute's value
-            start = data.find(b'"', at) + 1
-            end = data.find(b'"', start)
-            start, end = max(start, 0), max(end, start)
-        else:  # any bytes
-            start, end = at, min(len(data), at + draw(st.integers(0, 300)))
-        piece = draw(st.one_of(st.sampled_from(TOKENS), st.just(data[start:end] * 2)))
+    for _ in range(draw(st.integers(1, 3))):
+        what = draw(st.sampled_from(["value", "value", "value", "line", "bytes"]))
+        if what == "value":
+            spans = [found.span(1) for found in re.finditer(rb'="([^"]*)"', data)]
+            values = [data[start:end] for start, end in spans]
+            if not spans:
+                continue
+            start, end = draw(st.sampled_from(spans))
+            piece = draw(st.one_of(st.sampled_from(TOKENS), st.sampled_from(values)))
+        elif what == "line":
+            lines = [found.span() for found in re.finditer(rb"[^\n]+\n", data)]
+            if not lines:
+                continue
+            start, end = draw(st.sampled_from(lines))
+            other = draw(st.sampled_from(lines))
+            piece = draw(st.sampled_from([b"", data[start:end] * 2, data[slice(*other)]]))
+        else:
+            start = draw(st.integers(0, len(data)))
+            end = min(len(data), start + draw(st.integers(0, 50)))
+            piece = draw(st.one_of(st.sampled_from(PIECES), st.binary(max_size=3)))
         data = data[:start] + piece + data[end:]
     return data
 
