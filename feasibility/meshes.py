@@ -80,15 +80,17 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
 
     Vertices within one box of a grid become one, at their mean, and triangles that collapse go.
     The grid starts at 0.01 mm (which only joins what is equal) and coarsens by half from 0.4 mm to
-    at most 8 mm, so a robot of very many parts may stay above the budget.
+    at most 2 cm. Meshes that use less than a quarter of an even share of the budget are left as
+    they are, so that small parts do not vanish beside large ones.
 
     Returns:
         As many meshes as were given, in their order; some may have lost all their triangles.
     """
     result = [_clustered(mesh, 1e-5) for mesh in meshes]  # [m]
     spacing = 4e-4  # [m]
-    while sum(len(mesh.faces) for mesh in result) > budget and spacing <= 8e-3:
-        result = [_clustered(mesh, spacing) for mesh in result]
+    small = budget / (4 * max(len(meshes), 1))
+    while sum(len(mesh.faces) for mesh in result) > budget and spacing <= 2e-2:
+        result = [mesh if len(mesh.faces) < small else _clustered(mesh, spacing) for mesh in result]
         spacing *= 1.5
     return result
 

@@ -50,21 +50,19 @@ def motion_of(verdict: Verdict) -> Motion | None:
     """
     if verdict.witness is not None and len(verdict.witness.q) > 1:
         return paced(verdict.robot, verdict.witness.q, False, "covering motion")
-    cells = longest_path(verdict)
+    cells = longest_path(verdict.tree, verdict.cells.centres)
     if len(cells) < 2:
         return None
     return paced(verdict.robot, walk_along(verdict.graph, cells), True, "one path of the tree")
 
 
-def longest_path(verdict: Verdict) -> list[int]:
+def longest_path(tree: nx.DiGraph | None, centres: NDArray[np.float64]) -> list[int]:
     """Cells from the root of the search tree to the leaf furthest along it; empty without a tree.
 
-    The length of a step is the distance between the centres of its two cells.
+    The length of a step is the distance between the centres (N, 3) of its two cells.
     """
-    tree = verdict.tree
     if tree is None or tree.number_of_nodes() == 0:
         return []
-    centres = verdict.cells.centres
     best: list[int] = []
     longest = -1.0
     for root in sorted(node for node, degree in tree.in_degree() if degree == 0):

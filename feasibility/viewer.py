@@ -123,7 +123,9 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     )
 
 
-def show(verdict: Verdict, case: str | None = None, *, block: bool | None = None) -> View | None:
+def show(
+    verdict: Verdict, case: str | None = None, *, block: bool | None = None
+) -> View | LiveView:
     """Show a verdict: in the notebook's output, else in a browser window.
 
     Args:
@@ -133,7 +135,7 @@ def show(verdict: Verdict, case: str | None = None, *, block: bool | None = None
             served by this program and ends with it.
 
     Returns:
-        The view in a notebook (which displays it), else None.
+        In a notebook the view, which the notebook displays; else what serves the window.
     """
     drawn = view(verdict, case)
     if _in_notebook():
@@ -146,7 +148,7 @@ def show(verdict: Verdict, case: str | None = None, *, block: bool | None = None
             live.wait()
         except KeyboardInterrupt:
             live.close()
-    return None
+    return live
 
 
 def _in_notebook() -> bool:
