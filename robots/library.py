@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import os
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
@@ -63,7 +63,7 @@ def load_robot(
     tool_frame: str | None = None,
     approach_axis: ArrayLike | None = None,
     lock: Mapping[str, float] | None = None,
-    package_dirs: tuple[str | os.PathLike[str], ...] = (),
+    package_dirs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
 ) -> Robot:
     """Load an arm by its name in the library, or from a URDF file.
 
@@ -79,7 +79,7 @@ def load_robot(
             URDF file its only leaf link.
         approach_axis: (3,) in the tool frame; default from the library, else +z.
         lock: joints to hold, name -> rad or m, in addition to those the library holds.
-        package_dirs: folders in which `package://` meshes are looked up.
+        package_dirs: one or more folders in which `package://` meshes are looked up.
 
     Raises:
         RobotError: the name is unknown, or the URDF, frame, limits or a locked joint is wrong.
@@ -91,6 +91,8 @@ def load_robot(
     from robots.urdf import check_urdf
 
     info = _find(name_or_path)
+    if isinstance(package_dirs, (str, os.PathLike)):
+        package_dirs = (package_dirs,)
     folders = tuple(str(folder) for folder in package_dirs)
     if info is None:
         path = Path(name_or_path).expanduser()
@@ -123,7 +125,7 @@ def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:
     raise RobotError(
         f"there is no robot {name_or_path!r} in the library; "
         f"{suggestion(name_or_path, list(library))} "
-        "`coverable robots` lists them all, and a path ending in .urdf loads a file"
+        "(`coverable robots` lists them all; a path ending in .urdf loads a file)"
     )
 
 

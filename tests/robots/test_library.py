@@ -335,6 +335,8 @@ def test_meshes_in_packages_need_their_folder(tmp_path):
     (tmp_path / "packages" / "my_arm").mkdir(parents=True)
     robot = load_text(tmp_path, arm([joint(1)]), package_dirs=(tmp_path / "packages",))
     assert robot.package_dirs == (str(tmp_path / "packages"),)
+    single = load_text(tmp_path, arm([joint(1)]), package_dirs=str(tmp_path / "packages"))
+    assert single.package_dirs == robot.package_dirs
     shipped = load_robot("panda", package_dirs=(tmp_path / "packages",))
     assert shipped.package_dirs[0] == str(tmp_path / "packages")
     assert len(shipped.package_dirs) == 2
