@@ -35,6 +35,9 @@ __all__ = [
 ]  # fmt: skip
 
 
+MAX_WARNINGS = 100
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class CheckedUrdf:
     """A tree of links and joints that is safe to use, and what there is to draw."""
@@ -156,9 +159,14 @@ def _check(
         joints=joints,
         leaves=tuple(name for name in names if name not in parents),
         visuals=visuals,
-        warnings=tuple(faults.warnings),
+        warnings=_capped(faults.warnings),
         package_dirs=folders,
     )
+
+
+def _capped(warnings: list[str]) -> tuple[str, ...]:
+    more = len(warnings) - MAX_WARNINGS
+    return (*warnings[:MAX_WARNINGS], *([f"... and {more:,} more"] if more > 0 else []))
 
 
 def _written(title: str, links: tuple[str, ...], joints: tuple[JointInfo, ...]) -> str:

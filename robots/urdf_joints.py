@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass
 
 from robots.urdf_values import MAX_LENGTH, BadValue, Faults, Triple, name_of, numbers, only, triple
-from robots.urdf_xml import Node, shown
+from robots.urdf_xml import Node, nearest, shown
 
 # fmt: off
 CHILDREN = (
@@ -124,8 +123,8 @@ def _kind(node: Node, owner: str, faults: Faults) -> str:
             "stands still, or a chain of prismatic and revolute joints",
         )
         return "fixed"
-    near = difflib.get_close_matches((kind or "").strip().lower(), KINDS, 1)
-    did_you_mean = f" (did you mean {near[0]!r}?)" if near else ""
+    near = nearest(kind or "", KINDS)
+    did_you_mean = f" (did you mean {near!r}?)" if near else ""
     said = "has no type" if kind is None else f"has the unknown type {shown(kind)}"
     faults.error(node, f"{owner} {said}; expected one of {', '.join(KINDS)}{did_you_mean}")
     return "fixed"
@@ -144,9 +143,9 @@ def _check_children(node: Node, owner: str, faults: Faults) -> None:
     for child in node.children:
         if child.tag in CHILDREN:
             continue
-        near = difflib.get_close_matches(child.tag.lower(), CHILDREN, 1, cutoff=0.75)
+        near = nearest(child.tag, CHILDREN, cutoff=0.75)
         if near:
-            faults.error(child, f"{owner}: <{child.tag[:60]}> is no element; write <{near[0]}>")
+            faults.error(child, f"{owner}: <{child.tag[:60]}> is no element; write <{near}>")
         else:
             faults.warn(child, f"{owner}: the unknown element <{child.tag[:60]}> is ignored")
 
@@ -161,8 +160,7 @@ def _check_attributes(
         if attribute in known:
             continue
         what = f"{owner}: <{node.tag}> has the unknown attribute {shown(attribute)}"
-        near = difflib.get_close_matches(attribute.lower(), known, 1)
-        if near or "quat" in attribute.lower():
+        if nearest(attribute, known) or "quat" in attribute.lower():
             faults.error(node, f"{what}; write {' and '.join(known)}")
         else:
             faults.warn(node, f"{what}, which is ignored")

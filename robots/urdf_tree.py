@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
@@ -10,7 +9,7 @@ from dataclasses import replace
 from robots.urdf_joints import JointInfo, read_joint
 from robots.urdf_values import Faults, name_of
 from robots.urdf_visuals import leaves_package
-from robots.urdf_xml import Node, UrdfError, shown
+from robots.urdf_xml import Node, UrdfError, nearest, shown
 
 # Native readers recurse along a chain: 4,000 links overflow a stack of 8 MB, 250 one of 0.5 MB.
 MAX_LINKS = 1000
@@ -60,9 +59,8 @@ def _walk(robot: Node) -> Iterator[Node]:
 def read_links(robot: Node, faults: Faults) -> dict[str, Node]:
     """The <link> elements by name, in the order of the file."""
     for node in robot.children:
-        if node.tag not in ("link", "joint") and difflib.get_close_matches(
-            node.tag.lower(), ("link", "joint"), 1, cutoff=0.85
-        ):
+        known = node.tag in ("link", "joint")
+        if not known and nearest(node.tag, ("link", "joint"), cutoff=0.85):
             faults.error(node, f"<{node.tag}> is no element of URDF; write <link> or <joint>")
     nodes = robot.all("link")
     if not nodes:

@@ -30,6 +30,7 @@ MESH_SUFFIXES = (
 )  # .gltf and the like pull in other files
 MAX_MESH_BYTES = 256 * 2**20
 MAX_VISUALS = 2000
+MAX_PATH = 500  # characters; following a path takes time for each of its parts
 PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for
 
 Rgba = tuple[float, float, float, float]
@@ -125,7 +126,7 @@ class MeshFolders:
         Raises:
             BadValue: there is none that may be opened, and why.
         """
-        if not name or not name.isprintable():
+        if not name or not name.isprintable() or len(name) > MAX_PATH:
             raise BadValue("has no usable name")
         if "://" in name and not name.startswith(("package://", "model://", "file://")):
             raise BadValue("is not a file; download it and name the file")
@@ -180,17 +181,19 @@ def read_visuals(robot: Node, folders: MeshFolders, faults: Faults) -> tuple[Vis
         material.attributes.get("name", ""): _rgba(material) for material in robot.all("material")
     }
     visuals: list[Visual] = []
-    problems: dict[str, list[str]] = {}
-    for link in robot.all("link"):
-        for node in link.all("visual"):
-            if len(visuals) >= MAX_VISUALS:
-                problems.setdefault(f"beyond the first {MAX_VISUALS} shapes", []).append("the rest")
-                break
-            owner = f"of link {shown(link.attributes.get('name', '?'))} (line {node.line})"
-            try:
-                visuals.append(_visual(node, link.attributes.get("name", ""), folders, colours))
-            except BadValue as bad:
-                problems.setdefault(str(bad), []).append(owner)
+    problems: dict[str, list[str]] = {}  # what is wrong, "name :: reason" -> where
+    shapes = [
+        (link.attributes["name"], node) for link in robot.all("link") for node in link.all("visual")
+    ]
+    for link, node in shapes[:MAX_VISUALS]:
+        try:
+            visuals.append(_visual(node, link, folders, colours))
+        except BadValue as bad:
+            problems.setdefault(str(bad), []).append(f"of link {shown(link)} (line {node.line})")
+    if len(shapes) > MAX_VISUALS:
+        faults.warnings.append(
+            f"not drawn: {len(shapes) - MAX_VISUALS:,} shapes over {MAX_VISUALS:,}"
+        )
     grouped: dict[str, list[str]] = {}
     for reason, owners in problems.items():
         what, _, why = reason.rpartition(" :: ")

@@ -7,15 +7,18 @@ ever followed: what is not in the bytes given is not read.
 
 from __future__ import annotations
 
+import difflib
 import os
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from robots.robot import RobotError
 
 MAX_BYTES = 8 * 2**20  # the largest URDF in example-robot-data has 0.2 MB
-MAX_ELEMENTS = 100_000  # the same file has 3,900
+MAX_ELEMENTS = 50_000  # the same file has 3,900
+MAX_ATTRIBUTES = 64  # in one element; URDF needs 6
 MAX_DEPTH = 64  # URDF needs 6
 MAX_SHOWN = 20  # faults in one message; `faults` has them all
 
@@ -62,6 +65,13 @@ class Node:
 def shown(text: str, width: int = 60) -> str:
     """`text` quoted for a message: escaped, and cut when it is long."""
     return repr(text if len(text) <= width else text[: width - 3] + "...")
+
+
+def nearest(word: str, known: Sequence[str], cutoff: float = 0.6) -> str | None:
+    """The one of `known` that `word` was probably meant to be; None if there is none."""
+    if len(word) > 40:  # matching takes time, and nobody misspells at this length
+        return None
+    return next(iter(difflib.get_close_matches(word.strip().lower(), known, 1, cutoff)), None)
 
 
 def read_bytes(path: str) -> bytes:
@@ -190,6 +200,8 @@ class _Builder:
                 f"elements are nested more than {MAX_DEPTH} deep; a URDF lists its links and "
                 "joints side by side"
             )
+        if len(attributes) > MAX_ATTRIBUTES:
+            self.refuse(f"<{tag[:60]}> has {len(attributes):,} attributes, over {MAX_ATTRIBUTES}")
         node = Node(tag, attributes, self.parser.CurrentLineNumber)
         if self.open:
             self.open[-1].children.append(node)

@@ -186,7 +186,11 @@ REFUSED: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
     "chain of 300": (chain(300), ("299 joints in a row", "200")),
     "star of 300 moving": (star(300, "revolute"), ("299 moving joints", "150")),
     "deep nesting": (urdf("<a>" * 100_000 + "</a>" * 100_000), ("nested", "64")),
-    "many elements": (urdf("<a/>" * 200_000), ("100,000 XML elements",)),
+    "many elements": (urdf("<a/>" * 200_000), ("50,000 XML elements",)),
+    "many attributes": (
+        urdf("<a " + " ".join(f'a{i}=""' for i in range(500_000)) + "/>"),
+        ("500,000 attributes", "64"),
+    ),
     "9 MB of comment": (urdf("<!--" + " " * 9_000_000 + "-->"), ("bytes", "8,388,608")),
     # entities and other files
     "entity bomb": (BOMB, ("DOCTYPE", "delete it")),
@@ -325,7 +329,14 @@ ACCEPTED: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
     "mesh of no mesh format": (mesh("file:///etc/passwd"), ("'base'", "is not one of .stl")),
     "mesh from the network": (mesh("http://127.0.0.1:9/a.stl"), ("'base'", "download")),
     "mesh without a name": (mesh(""), ("'base'", "no usable name")),
-    "mesh with a name of 1 MB": (mesh("a" * 1_000_000 + ".stl"), ("'base'", "not found")),
+    "mesh with a name of 1 MB": (mesh("a/" * 500_000 + ".stl"), ("'base'", "no usable name")),
+    "mesh with a name too long for the system": (mesh("a" * 400 + ".stl"), ("not found",)),
+    "3,000 shapes": (
+        drawn("</visual><visual>".join(['<geometry><sphere radius="1"/></geometry>'] * 3000)),
+        ("not drawn: 1,000 shapes over 2,000",),
+    ),
+    "20,000 unknown elements": (arm(LIMIT + "<paint/>" * 20_000), ("... and 19,900 more",)),
+    "40,000 other elements": (urdf(link("base"), *(f"<l{i}/>" for i in range(40_000))), ()),
     "mesh without filename": (drawn("<geometry><mesh/></geometry>"), ("has no filename",)),
     "mesh scale NaN": (mesh("a.stl", ' scale="nan 1 1"'), ("'base'", "3 numbers")),
     "mesh scale zero": (mesh("a.stl", ' scale="1 0 1"'), ("'base'", "not zero")),
