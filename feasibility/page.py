@@ -79,7 +79,10 @@ def page(
 
 def _legend(legend: Legend, animated: bool) -> str:
     """The overlay as HTML."""
-    lines = [f"<h1>{html.escape(legend.title)}</h1>", f"<p>{html.escape(legend.text)}</p>"]
+    lines = [
+        f"<summary>{html.escape(legend.title)}</summary>",
+        f"<p>{html.escape(legend.text)}</p>",
+    ]
     for entry in legend.entries:
         swatch = f'<i style="background:#{hex_colour(entry.colour):06x}"></i>'
         box = ""
@@ -121,10 +124,10 @@ _TEMPLATE = """<!DOCTYPE html>
 <style>
 body {{ margin: 0; font: 13px/1.45 system-ui, sans-serif; color: #222; }}
 #meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#legend {{ position: absolute; left: 12px; top: 12px; max-width: 19em; padding: 10px 14px;
+#legend {{ position: absolute; left: 12px; bottom: 12px; max-width: 21em; padding: 10px 14px;
   background: rgba(255, 255, 255, 0.86); border-radius: 6px; box-shadow: 0 1px 4px #0003; }}
-#legend h1 {{ font-size: 15px; margin: 0 0 2px; }}
-#legend p {{ margin: 0 0 6px; color: #444; }}
+#legend summary {{ font-size: 15px; font-weight: 600; cursor: pointer; }}
+#legend p {{ margin: 2px 0 6px; color: #444; }}
 #legend label {{ display: flex; align-items: center; gap: 6px; }}
 #legend input {{ margin: 0; flex: none; }}
 #legend i {{ width: 14px; height: 14px; border-radius: 3px; flex: none; }}
@@ -133,9 +136,9 @@ body {{ margin: 0; font: 13px/1.45 system-ui, sans-serif; color: #222; }}
 </head>
 <body>
 <div id="meshcat-pane"></div>
-<div id="legend">
+<details id="legend" open>
 {legend}
-</div>
+</details>
 <script type="application/octet-stream" id="program">{program}</script>
 <script type="application/octet-stream" id="commands">{commands}</script>
 <script>
@@ -165,6 +168,7 @@ function controls(viewer) {{
   }}
 }}
 async function start() {{
+  document.getElementById("legend").open = window.innerWidth >= 640;
   const program = document.createElement("script");
   program.textContent = new TextDecoder().decode(await unpacked("program"));
   document.head.appendChild(program);

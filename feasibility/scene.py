@@ -41,8 +41,7 @@ COMPONENTS: tuple[Colour, ...] = (
     (0.80, 0.47, 0.65),
     (0.90, 0.60, 0.00),
 )
-EDGE_POINTS = 9  # on the way from cell to cell
-FULL_DETAIL = 5_000  # cells; more are drawn without centre marks, and edges as plain lines
+FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as plain lines
 TRAIL_POINTS = 2_000
 LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
 
@@ -76,12 +75,18 @@ def edge_lines(verdict: Verdict) -> list[NDArray[np.float64]]:
     """
     kinematics = Kinematics(verdict.robot)
     targets = verdict.task.targets(verdict.cells).points
+    edges = list(verdict.graph.edges(data="motion"))
+    count = _edge_points(verdict.cells)
+    t = np.linspace(0.0, 1.0, count)[:, None]
+    bare = np.array([[a, b] for a, b, motion in edges if motion is None], dtype=np.int64)
+    ends = targets[bare.reshape(-1, 2)]
+    over = iter(_over_surface(verdict, (1.0 - t) * ends[:, :1] + t * ends[:, 1:]))
     lines = []
-    for a, b, motion in verdict.graph.edges(data="motion"):
-        if motion is None or len(motion) < 2:
-            lines.append(_over_surface(verdict, targets[[a, b]]))
+    for _, _, motion in edges:
+        if motion is None:
+            lines.append(next(over))
             continue
-        rows = np.unique(np.linspace(0, len(motion) - 1, EDGE_POINTS).round().astype(int))
+        rows = np.unique(np.linspace(0, len(motion) - 1, count).round().astype(int))
         lines.append(np.array([kinematics.tool(motion[row])[0] for row in rows]))
     return lines
 
@@ -239,13 +244,18 @@ def trail(verdict: Verdict, motion: Motion) -> Layer:
     return Layer(commands, Entry(f"tool path: {motion.label}", TRAIL, path, shown), 1)
 
 
-def _over_surface(verdict: Verdict, ends: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A line (k, 3) m at the standoff over the surface between two points (2, 3) m."""
-    t = np.linspace(0.0, 1.0, EDGE_POINTS)[:, None]
-    points = (1.0 - t) * ends[0] + t * ends[1]
+def _over_surface(verdict: Verdict, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Points (..., 3) m brought to the standoff over the surface, each along its own normal."""
     foot = verdict.cells.surface.closest(points)
     height = verdict.cells.surface.side_sign * verdict.task.standoff
-    return points + (height - foot.height)[:, None] * foot.normal
+    return points + (height - foot.height)[..., None] * foot.normal
+
+
+def _edge_points(cells: Cells) -> int:
+    """On the way from cell to cell: the more cells, the shorter and straighter their edges."""
+    if len(cells) > FULL_DETAIL:
+        return 2
+    return 9 if len(cells) <= 400 else 5
 
 
 def _marks(
