@@ -121,6 +121,15 @@ def check_urdf_text(
 
     Raises:
         UrdfError: as `check_urdf`.
+
+    Example:
+        >>> two_links = '''<robot name="slider"> <link name="rail"/> <link name="cart"/>
+        ...   <joint name="slide" type="prismatic"> <parent link="rail"/> <child link="cart"/>
+        ...     <limit lower="0" upper="0.5"/> </joint> </robot>'''
+        >>> check_urdf_text(two_links)
+        CheckedUrdf('slider', 2 links, 1 moving joints)
+        >>> check_urdf_text(two_links.replace('"0.5"', '"-0.5"')).joints[0].fault.split("; ")[0]
+        "line 2: joint 'slide' has limits [0, -0.5]: lower lies above upper"
     """
     try:
         data = text.encode()
