@@ -135,7 +135,7 @@ def _link_name(node: Node, tag: str, owner: str, faults: Faults) -> str | None:
     if end is None:
         faults.error(node, f'{owner} has no {tag}; write <{tag} link="..."/>')
         return None
-    return name_of(end, faults, "link")
+    return name_of(end, faults, "link", owner)
 
 
 def _check_children(node: Node, owner: str, faults: Faults) -> None:

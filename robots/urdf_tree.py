@@ -116,7 +116,12 @@ def read_tree(robot: Node, links: dict[str, Node], faults: Faults) -> tuple[Join
 def _joints(robot: Node, links: dict[str, Node], faults: Faults) -> dict[str, JointInfo]:
     nodes = robot.all("joint")
     if len(nodes) >= MAX_LINKS:
-        faults.error(robot, f"has {len(nodes):,} joints, more than {MAX_LINKS - 1:,}")
+        if len(robot.all("link")) <= MAX_LINKS:  # else that was said
+            faults.error(
+                robot,
+                f"has {len(nodes):,} joints, more than {MAX_LINKS - 1:,}; a tree of links has one "
+                "joint fewer than links",
+            )
         return {}
     joints: dict[str, JointInfo] = {}
     lines: dict[str, int] = {}
@@ -132,7 +137,11 @@ def _joints(robot: Node, links: dict[str, Node], faults: Faults) -> dict[str, Jo
             continue
         joints[joint.name] = joint
         if "universe" in (joint.name, joint.child):
-            faults.error(node, "the name 'universe' is Pinocchio's for the world; rename it")
+            faults.error(
+                node,
+                f"joint {shown(joint.name)} to link {shown(joint.child)}: the name 'universe' is "
+                "Pinocchio's for the world; rename it",
+            )
         for role, link in (("parent", joint.parent), ("child", joint.child)):
             if links and link not in links:
                 faults.error(

@@ -50,11 +50,12 @@ def numbers(node: Node, attribute: str, count: int, bound: float = MAX_LENGTH) -
     example = " ".join(["0.1", "0", "0", "1"][:count])
     label = f"<{node.tag}> {attribute}={shown(text)}"
     if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
-        plural = "number" if count == 1 else "numbers separated by spaces"
+        plural = "finite number" if count == 1 else "finite numbers separated by spaces"
         raise BadValue(f'{label} must be {count} {plural}, such as "{example}"')
     values = [float(word) for word in words]
     if not all(math.isfinite(value) and abs(value) <= bound for value in values):
-        raise BadValue(f"{label} must hold finite numbers of at most {bound:g}")
+        most = f" of at most {bound:g}" if math.isfinite(bound) else ""
+        raise BadValue(f"{label} must hold finite numbers{most}")
     # Some readers refuse subnormal numbers.
     return [value if abs(value) > 1e-200 else 0.0 for value in values]
 
@@ -71,15 +72,18 @@ def triple(node: Node | None, attribute: str, default: Triple) -> Triple:
     return x, y, z
 
 
-def name_of(node: Node, faults: Faults, attribute: str = "name") -> str | None:
+def name_of(
+    node: Node, faults: Faults, attribute: str = "name", owner: str | None = None
+) -> str | None:
     """A usable name, or None with the fault noted."""
     text = node.attributes.get(attribute)
+    which = f"{owner}: <{node.tag}>" if owner else f"<{node.tag}>"
     if not text or not text.strip():
-        faults.error(node, f'<{node.tag}> has no {attribute}; write {attribute}="..."')
+        faults.error(node, f'{which} has no {attribute}; write {attribute}="..."')
     elif len(text) > MAX_NAME or not text.isprintable() or text != text.strip():
         faults.error(
             node,
-            f"<{node.tag}> {attribute}={shown(text)} must be 1 to {MAX_NAME} printable "
+            f"{which} {attribute}={shown(text)} must be 1 to {MAX_NAME} printable "
             "characters without spaces at its ends",
         )
     else:

@@ -201,7 +201,10 @@ class _Builder:
                 "joints side by side"
             )
         if len(attributes) > MAX_ATTRIBUTES:
-            self.refuse(f"<{tag[:60]}> has {len(attributes):,} attributes, over {MAX_ATTRIBUTES}")
+            self.refuse(
+                f"<{tag[:60]}> has {len(attributes):,} attributes, more than {MAX_ATTRIBUTES}; "
+                "no element of a URDF has as many"
+            )
         node = Node(tag, attributes, self.parser.CurrentLineNumber)
         if self.open:
             self.open[-1].children.append(node)
