@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import threejs
+from feasibility.cell_shapes import FULL_DETAIL, cell_size, marks, patch
 from feasibility.meshes import tubes
 from feasibility.motion import Motion
 from feasibility.page import Entry
@@ -41,7 +42,6 @@ COMPONENTS: tuple[Colour, ...] = (
     (0.80, 0.47, 0.65),
     (0.90, 0.60, 0.00),
 )
-FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as plain lines
 TRAIL_POINTS = 2_000
 LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
 
@@ -103,45 +103,6 @@ def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64
     return found
 
 
-def patch(
-    cells: Cells, which: NDArray[np.int64], inset: float = 0.0
-) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.float64]]:
-    """Triangles that fill some cells, smooth where the surface bends.
-
-    Args:
-        cells: of a parametric surface.
-        which: (k,) flat indices.
-        inset: share of its width that a cell is drawn smaller by.
-
-    Returns:
-        Vertices (V, 3) m, faces (F, 3) and outward unit normals (V, 3).
-    """
-    surface = cells.surface
-    pieces = int(np.clip(np.ceil(64 / max(*cells.shape, 1)), 2, 32))  # a cell's side, cut up
-    if len(cells) > FULL_DETAIL:
-        pieces = 1
-    t = (np.linspace(0.0, 1.0, pieces + 1) - 0.5) * (1.0 - inset)
-    du, dv = (part.reshape(-1) for part in np.meshgrid(t, t, indexing="ij"))
-    width_u = (surface.u_range[1] - surface.u_range[0]) / cells.shape[0]
-    width_v = (surface.v_range[1] - surface.v_range[0]) / cells.shape[1]
-    u = cells.u[which, None] + du * width_u
-    v = cells.v[which, None] + dv * width_v
-    i, j = (part.reshape(-1) for part in np.meshgrid(*[np.arange(pieces)] * 2, indexing="ij"))
-    corner = i * (pieces + 1) + j
-    right, up = corner + 1, corner + pieces + 1
-    one = np.concatenate(
-        [np.column_stack([corner, right, up + 1]), np.column_stack([corner, up + 1, up])]
-    )
-    starts = np.arange(len(which)) * (pieces + 1) ** 2
-    faces = (starts[:, None, None] + one).reshape(-1, 3)
-    return surface.point(u, v).reshape(-1, 3), faces, surface.normal(u, v).reshape(-1, 3)
-
-
-def cell_size(cells: Cells) -> float:
-    """A typical width of a cell, m."""
-    return float(np.sqrt(cells.areas.mean())) if len(cells) else 0.0
-
-
 def _surface(cells: Cells) -> Layer:
     """The patch, shaded and half transparent."""
     path = "/surface/patch"
@@ -164,9 +125,9 @@ def _cell_marks(cells: Cells) -> Iterator[Layer]:
     yield Layer((lines,), Entry(f"{len(cells)} cells ({rows})", OUTLINES, path), len(cells))
     if len(cells) <= FULL_DETAIL:
         path = "/surface/cell centres"
-        vertices, faces = _marks(cells.centres, 0.035 * cell_size(cells))
-        marks = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
-        yield Layer((marks,), Entry("cell centres", CENTRES, path), len(cells))
+        vertices, faces = marks(cells.centres, 0.035 * cell_size(cells))
+        dots = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
+        yield Layer((dots,), Entry("cell centres", CENTRES, path), len(cells))
 
 
 def _graph(verdict: Verdict) -> Iterator[Layer]:
@@ -205,8 +166,8 @@ def _missed(verdict: Verdict) -> Iterator[Layer]:
         colour = MISSED if kind is None else CAUSES[kind]
         words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
         path = f"/cells/{words} ({len(cells)})"
-        vertices, faces, normals = patch(verdict.cells, cells, inset=0.06)
-        command = threejs.mesh(path, vertices, faces, colour, normals=normals, opacity=0.85)
+        vertices, faces, _ = patch(verdict.cells, cells, inset=0.06)
+        command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
         yield Layer((command,), Entry(f"{words} ({len(cells)})", colour, path), len(cells))
 
 
@@ -218,9 +179,9 @@ def _components(verdict: Verdict) -> Iterator[Layer]:
         colour = COMPONENTS[(number - 1) % len(COMPONENTS)]
         words = f"component {number} ({len(cells)} cells)"
         path = f"/components/{words}"
-        vertices, faces, normals = patch(verdict.cells, np.asarray(cells), inset=0.15)
+        vertices, faces, _ = patch(verdict.cells, np.asarray(cells), inset=0.15)
         commands = (
-            threejs.mesh(path, vertices, faces, colour, normals=normals, opacity=0.9),
+            threejs.mesh(path, vertices, faces, colour, opacity=0.9, lit=False),
             threejs.set_property(path, "visible", False),
         )
         yield Layer(commands, Entry(words, colour, path, shown=False), len(cells))
@@ -256,16 +217,3 @@ def _edge_points(cells: Cells) -> int:
     if len(cells) > FULL_DETAIL:
         return 2
     return 9 if len(cells) <= 400 else 5
-
-
-def _marks(
-    centres: NDArray[np.float64], radius: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """A small octahedron at each centre: vertices and faces."""
-    corners = radius * np.concatenate([np.eye(3), -np.eye(3)])
-    one = np.array(
-        [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
-    )
-    vertices = (centres[:, None] + corners).reshape(-1, 3)
-    faces = (6 * np.arange(len(centres))[:, None, None] + one).reshape(-1, 3)
-    return vertices, faces

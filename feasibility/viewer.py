@@ -188,7 +188,7 @@ def _stage(verdict: Verdict, floor: float) -> list[Command]:
     """Background, a ground grid at the height of the lowest thing, and the root frame's axes."""
     box = _points(verdict)
     size = max(verdict.robot.reach if np.isfinite(verdict.robot.reach) else 1.0, 0.2)
-    spacing = 10.0 ** np.floor(np.log10(size)) / 4.0
+    spacing = _round_below(size / 5.0)
     extent = np.abs(box[:, :2]).max(initial=size)
     half = spacing * np.ceil(extent / spacing)
     lines = np.arange(-half, half + spacing / 2.0, spacing)
@@ -205,6 +205,12 @@ def _stage(verdict: Verdict, floor: float) -> list[Command]:
         threejs.segments("/ground", np.reshape(ends, (-1, 3)), (0.78, 0.80, 0.83)),
         threejs.segments("/root frame", np.array(frame), (0, 0, 0), colours=colours),
     ]
+
+
+def _round_below(value: float) -> float:
+    """The largest of 1, 2.5 and 5 times a power of ten that is at most `value`."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step * power for step in (1.0, 2.5, 5.0) if step * power <= value))
 
 
 def _points(verdict: Verdict) -> NDArray[np.float64]:

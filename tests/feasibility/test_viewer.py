@@ -26,7 +26,7 @@ import umsgpack
 from fabricated import DOME, STEPS, TASK, every_cause, verdict_on
 from scipy.spatial.transform import Rotation
 
-from feasibility import motion, scene, threejs
+from feasibility import cell_shapes, motion, scene, threejs
 from feasibility.meshcat_server import LiveView
 from feasibility.robot_visuals import joint_paths, pose
 from feasibility.verdict import CauseKind
@@ -156,7 +156,7 @@ def test_a_covered_surface_shows_no_missed_cells_and_marks_the_start(feasible, d
 
 
 def test_the_surface_is_smooth_and_its_normals_are_the_surfaces(feasible):
-    points, faces, normals = scene.patch(feasible.cells, np.arange(20))
+    points, faces, normals = cell_shapes.patch(feasible.cells, np.arange(20))
     foot = feasible.cells.surface.closest(points)
     assert np.allclose(foot.height, 0.0, atol=1e-12)
     assert np.allclose(foot.normal, normals, atol=1e-9)

@@ -1,0 +1,92 @@
+"""Make the pictures of the README with the project's own viewer and a headless Chromium.
+
+    python docs/pictures.py            # all of them
+    python docs/pictures.py paper-4a   # one
+
+Each picture is two files beside this one: NAME.html, the view itself, and NAME.png.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from feasibility import Search, Task, check
+from feasibility.viewer import View, view
+from robots import load_robot
+from surfaces import sphere
+
+HERE = Path(__file__).parent
+SIZE = (900, 650)  # [pixel]
+LARGEST = 200_000  # [byte] of a PNG
+
+
+def paper_4a() -> View:
+    """The paper's first case: a PUMA 560 inside a dome, limits set 1, by its own search."""
+    dome = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
+    verdict = check(
+        load_robot("puma560", limits="set-1"),
+        dome.cells(9, 10),
+        Task(standoff=0.005, cone_deg=45),
+        Search(method="greedy"),
+    )
+    return view(verdict, "paper/4a", play=False, at=0.6)
+
+
+PICTURES: dict[str, Callable[[], View]] = {"paper-4a": paper_4a}
+
+
+def photograph(page: Path, picture: Path) -> None:
+    """Let Chromium paint a page into a PNG of few colours.
+
+    Raises:
+        SystemExit: there is no Chromium, or it painted nothing.
+    """
+    browser = next(
+        filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None
+    )
+    if browser is None:
+        raise SystemExit("docs/pictures.py needs chromium on the PATH")
+    with tempfile.TemporaryDirectory() as profile:
+        subprocess.run(
+            [
+                browser, "--headless=new", "--no-sandbox", "--disable-gpu",
+                "--disable-dev-shm-usage", "--virtual-time-budget=15000",
+                f"--user-data-dir={profile}", f"--window-size={SIZE[0]},{SIZE[1]}",
+                f"--screenshot={picture}", page.resolve().as_uri(),
+            ],
+            check=True, capture_output=True, timeout=120,
+        )  # fmt: skip
+    with Image.open(picture) as image:
+        painted = image.convert("RGB")
+    # A browser without WebGL paints the background alone, and says that all went well.
+    if len(np.unique(np.asarray(painted).reshape(-1, 3), axis=0)) < 300:
+        raise SystemExit(f"{picture} is empty: this chromium has no WebGL")
+    for colours in (256, 128, 64):
+        painted.quantize(colours).save(picture, optimize=True)
+        if picture.stat().st_size <= LARGEST:
+            return
+    raise SystemExit(f"{picture} has more than {LARGEST} bytes")
+
+
+def main() -> None:
+    """Make the pictures that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}")
+    names = parser.parse_args().names or list(PICTURES)
+    for name in names:
+        if name not in PICTURES:
+            parser.error(f"there is no picture {name!r}; there are {', '.join(PICTURES)}")
+        page = PICTURES[name]().save_html(HERE / f"{name}.html")
+        photograph(page, HERE / f"{name}.png")
+
+
+if __name__ == "__main__":
+    main()
