@@ -44,7 +44,7 @@ PICTURES: dict[str, Callable[[], View]] = {"paper-4a": paper_4a}
 
 
 def photograph(page: Path, picture: Path) -> None:
-    """Let Chromium paint a page into a PNG of few colours.
+    """Let Chromium paint a page into a small PNG.
 
     Raises:
         SystemExit: there is no Chromium, or it painted nothing.
@@ -69,8 +69,9 @@ def photograph(page: Path, picture: Path) -> None:
     # A browser without WebGL paints the background alone, and says that all went well.
     if len(np.unique(np.asarray(painted).reshape(-1, 3), axis=0)) < 300:
         raise SystemExit(f"{picture} is empty: this chromium has no WebGL")
-    for colours in (256, 128, 64):
-        painted.quantize(colours).save(picture, optimize=True)
+    # Fewer colours only where the file would be too large: they shift the rare ones.
+    for smaller in (painted, painted.quantize(256), painted.quantize(64)):
+        smaller.save(picture, optimize=True)
         if picture.stat().st_size <= LARGEST:
             return
     raise SystemExit(f"{picture} has more than {LARGEST} bytes")

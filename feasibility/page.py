@@ -191,12 +191,28 @@ async function start() {{
   window.viewer = viewer;
   if (setup.socket) viewer.connect("ws://" + location.host + setup.socket);
 }}
-start().catch((error) => {{
+function complain(error) {{
   const note = document.createElement("p");
   note.textContent = "This browser cannot show the scene (it needs WebGL and DecompressionStream, "
     + "as in any browser since 2023): " + error;
   document.getElementById("legend").appendChild(note);
-}});
+}}
+// A notebook may hold many scenes: each starts when it is first seen, and rests out of sight.
+let started = false;
+let resting = false;
+new IntersectionObserver((changes) => {{
+  const seen = changes[changes.length - 1].isIntersecting;
+  const animator = window.viewer && window.viewer.animator;
+  if (seen && !started) {{
+    started = true;
+    start().catch(complain);
+  }} else if (animator && seen === resting) {{
+    if (seen) animator.play();
+    else if (animator.playing) animator.pause();
+    else return;
+    resting = !seen;
+  }}
+}}).observe(document.getElementById("meshcat-pane"));
 </script>
 </body>
 </html>

@@ -428,6 +428,30 @@ def test_show_serves_the_view_and_opens_a_window(feasible, monkeypatch):
         assert answer.read().decode().startswith("<!DOCTYPE html>")
 
 
+def test_show_in_a_notebook_is_the_view_itself(feasible, monkeypatch):
+    class Shell:
+        kernel = object()
+
+    class IPython:
+        get_ipython = staticmethod(Shell)
+
+    monkeypatch.setitem(sys.modules, "IPython", IPython)
+    monkeypatch.setattr("webbrowser.open", pytest.fail)
+    assert show(feasible)._repr_html_().startswith("<iframe srcdoc=")
+
+
+def test_a_script_waits_until_it_is_interrupted(feasible, monkeypatch):
+    def interrupt(live):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("webbrowser.open", lambda url: True)
+    monkeypatch.setattr(LiveView, "wait", interrupt)
+    monkeypatch.delattr(sys, "ps1", raising=False)
+    live = show(feasible)
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", live.port), timeout=5)
+
+
 if BROWSER is not None:  # the data of the scene is tested above, with and without one
 
     def test_a_browser_paints_the_scene(feasible, tmp_path):
