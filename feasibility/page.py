@@ -197,21 +197,24 @@ function complain(error) {{
     + "as in any browser since 2023): " + error;
   document.getElementById("legend").appendChild(note);
 }}
-// A notebook may hold many scenes: each starts when it is first seen, and rests out of sight.
+// A notebook may hold many scenes: there, each starts when it is first seen. None plays unseen.
 let started = false;
 let resting = false;
+function begin() {{
+  if (started) return;
+  started = true;
+  start().catch(complain);
+}}
+if (window.parent === window) begin();
 new IntersectionObserver((changes) => {{
   const seen = changes[changes.length - 1].isIntersecting;
+  if (seen) begin();
   const animator = window.viewer && window.viewer.animator;
-  if (seen && !started) {{
-    started = true;
-    start().catch(complain);
-  }} else if (animator && seen === resting) {{
-    if (seen) animator.play();
-    else if (animator.playing) animator.pause();
-    else return;
-    resting = !seen;
-  }}
+  if (!animator || seen !== resting) return;
+  if (seen) animator.play();
+  else if (animator.playing) animator.pause();
+  else return;
+  resting = !seen;
 }}).observe(document.getElementById("meshcat-pane"));
 </script>
 </body>
