@@ -1,0 +1,300 @@
+"""Proofs that a cell cannot be covered: the reach bound, and branch and bound over joint boxes.
+
+A box is a centre c and half widths h. With r_j the largest distance of the tool point from axis j
+over the box (the distance at c plus what the joints behind j can add), a tool point in the box is
+at most
+
+    sum_j r_j h_j                          from p(c)                (first order)
+    D / 2 = 1/2 sum_j r_j h_j (h_j + 2 sum_{i<j} h_i)   from p(c) + J d    (second order)
+
+and likewise for the axis, with sines s_j in place of r_j (see `feasibility.continuation` for D). A
+box is discarded when the target is further than that, less the tolerance; or when, seen along one
+of a few directions, no d in the box can bring p(c) + J d close enough. Along a direction every
+joint's interval can also be cut down to what the others leave open; thin boxes follow, which is
+why the widths may become very small before a box is called undecided.
+
+Joints that turn freely, or by a full turn or more, are searched over one turn: the tool cannot
+tell the difference. Proofs concern the centre of a cell, with its tolerance and its cone.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from feasibility.continuation import Problem, Work, place
+
+THINNEST = 1e-6  # [rad], [m]: a box with no wider joint that moves the tool is left undecided
+STACK = 4096  # boxes that may wait
+ROUNDING = 1e-12  # [m], [1]: what double arithmetic may get wrong in a cut
+_DIRECTIONS = np.array(
+    [
+        [1.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0],
+        [0.0, 0.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [1.0, 1.0, -1.0],
+        [1.0, -1.0, 1.0],
+        [-1.0, 1.0, 1.0],
+    ]
+)
+_DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1)[:, None]
+
+
+class Ruling(IntEnum):
+    """What branch and bound says of a cell."""
+
+    OPEN = 0
+    """Boxes are left: call again to go on."""
+    PROVED = 1
+    """No configuration covers the cell."""
+    REACHED = 2
+    """A box's centre covers the cell."""
+    UNKNOWN = 3
+    """A box too thin to split could not be discarded."""
+
+
+class Boxes(NamedTuple):
+    """Boxes that wait, last in first out."""
+
+    low: NDArray[np.float64]
+    """(STACK, n)"""
+    high: NDArray[np.float64]
+    """(STACK, n)"""
+    count: NDArray[np.int64]
+    """(2,) boxes waiting; boxes looked at so far."""
+
+
+def root_box(problem: Problem) -> Boxes:
+    """One box that holds every configuration inside the limits, up to full turns."""
+    n = len(problem.lower)
+    low, high = problem.lower.copy(), problem.upper.copy()
+    turns = ~problem.chain.prismatic & (high - low >= 2.0 * np.pi)
+    low[turns], high[turns] = -np.pi, np.pi
+    boxes = Boxes(np.empty((STACK, n)), np.empty((STACK, n)), np.zeros(2, dtype=np.int64))
+    boxes.low[0], boxes.high[0], boxes.count[0] = low, high, 1
+    return boxes
+
+
+@njit(cache=True, error_model="numpy")
+def _cut(rows, gap, radius, low, high, direction):  # type: ignore[no-untyped-def]
+    """Cut the box to d with |direction . (rows d - gap)| <= radius; False when nothing is left."""
+    n = low.shape[0]
+    goal = 0.0
+    for k in range(3):
+        goal += direction[k] * gap[k]
+    least, most = 0.0, 0.0
+    for j in range(n):
+        g = 0.0
+        for k in range(3):
+            g += direction[k] * rows[k, j]
+        a, b = g * low[j], g * high[j]
+        least += min(a, b)
+        most += max(a, b)
+    if least > goal + radius or most < goal - radius:
+        return False
+    for j in range(n):
+        g = 0.0
+        for k in range(3):
+            g += direction[k] * rows[k, j]
+        if abs(g) < 1e-9:
+            continue
+        a, b = g * low[j], g * high[j]
+        # What the other joints leave open for joint j.
+        left = goal - radius - (most - max(a, b))
+        right = goal + radius - (least - min(a, b))
+        if g > 0.0:
+            low[j] = max(low[j], left / g)
+            high[j] = min(high[j], right / g)
+        else:
+            low[j] = max(low[j], right / g)
+            high[j] = min(high[j], left / g)
+        if not low[j] <= high[j]:
+            return False
+        least += min(g * low[j], g * high[j]) - min(a, b)
+        most += max(g * low[j], g * high[j]) - max(a, b)
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _reach_of_box(problem, work, half, lever, sine):  # type: ignore[no-untyped-def]
+    """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2)."""
+    n = half.shape[0]
+    behind, behind_axis, before = 0.0, 0.0, 0.0
+    for j in range(n):
+        if not problem.chain.prismatic[j]:
+            before += half[j]
+    first, second, first_axis, second_axis = 0.0, 0.0, 0.0, 0.0
+    for j in range(n - 1, -1, -1):
+        h = half[j]
+        if problem.chain.prismatic[j]:
+            lever[j], sine[j] = 1.0, 0.0
+            first += h
+            second += h * before
+            behind += h
+            continue
+        before -= h
+        zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
+        x = work.point[1, 0] - work.origins[1, j, 0]
+        y = work.point[1, 1] - work.origins[1, j, 1]
+        z = work.point[1, 2] - work.origins[1, j, 2]
+        r = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
+        x, y, z = work.axis[1, 0], work.axis[1, 1], work.axis[1, 2]
+        s = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
+        lever[j] = r + behind
+        sine[j] = min(1.0, s + behind_axis)
+        first += lever[j] * h
+        second += 0.5 * lever[j] * h * (h + 2.0 * before)
+        first_axis += sine[j] * h
+        second_axis += 0.5 * sine[j] * h * (h + 2.0 * before)
+        behind += lever[j] * h
+        behind_axis += sine[j] * h
+    return first, second, first_axis, second_axis
+
+
+@njit(cache=True, error_model="numpy")
+def _jacobian_rows(problem, work):  # type: ignore[no-untyped-def]
+    """Fill `point_rows` and `axis_rows` at slot 1."""
+    for j in range(work.step.shape[0]):
+        zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
+        if problem.chain.prismatic[j]:
+            work.point_rows[0, j] = zx
+            work.point_rows[1, j] = zy
+            work.point_rows[2, j] = zz
+            for k in range(3):
+                work.axis_rows[k, j] = 0.0
+            continue
+        x = work.point[1, 0] - work.origins[1, j, 0]
+        y = work.point[1, 1] - work.origins[1, j, 1]
+        z = work.point[1, 2] - work.origins[1, j, 2]
+        work.point_rows[0, j] = zy * z - zz * y
+        work.point_rows[1, j] = zz * x - zx * z
+        work.point_rows[2, j] = zx * y - zy * x
+        x, y, z = work.axis[1, 0], work.axis[1, 1], work.axis[1, 2]
+        work.axis_rows[0, j] = zy * z - zz * y
+        work.axis_rows[1, j] = zz * x - zx * z
+        work.axis_rows[2, j] = zx * y - zy * x
+
+
+@njit(cache=True, error_model="numpy")
+def branch_and_bound(problem, work, target, approach, boxes, most, directions, found):  # type: ignore[no-untyped-def]
+    """Look at up to `most` boxes; see `Ruling` for what comes back.
+
+    Args:
+        problem: the `Problem`.
+        work: the `Work`.
+        target: (3,) target point of the cell.
+        approach: (3,) approach direction of the cell.
+        boxes: the `Boxes` that wait; start from `root_box`.
+        most: boxes to look at before coming back with OPEN.
+        directions: (m, 3) unit directions for the cuts.
+        found: (n,) receives the configuration when the ruling is REACHED.
+    """
+    n = found.shape[0]
+    q, half = np.empty(n), np.empty(n)
+    low, high = np.empty(n), np.empty(n)
+    lever, sine = np.empty(n), np.empty(n)
+    gap, tilt = np.empty(3), np.empty(3)
+    for k in range(3):
+        work.target[0, k] = target[k]
+        work.target[1, k] = approach[k]
+    for _ in range(most):
+        if boxes.count[0] == 0:
+            return 1
+        boxes.count[0] -= 1
+        boxes.count[1] += 1
+        top = boxes.count[0]
+        low[:] = boxes.low[top]
+        high[:] = boxes.high[top]
+        alive = True
+        for turn in range(3):
+            volume = 1.0
+            for j in range(n):
+                q[j] = 0.5 * (low[j] + high[j])
+                half[j] = 0.5 * (high[j] - low[j])
+            place(problem, work, 1, q)
+            if work.error[1, 0] <= problem.tolerance and work.error[1, 1] <= problem.rim:
+                found[:] = q
+                return 2
+            first, second, first_axis, second_axis = _reach_of_box(
+                problem, work, half, lever, sine
+            )
+            if (
+                work.error[1, 0] > first + problem.tolerance + ROUNDING
+                or work.error[1, 1] > first_axis + problem.rim + ROUNDING
+            ):
+                alive = False
+                break
+            near = problem.tolerance + second + ROUNDING
+            narrow = problem.rim + second_axis + ROUNDING
+            _jacobian_rows(problem, work)
+            for k in range(3):
+                gap[k] = work.target[0, k] - work.point[1, k]
+                tilt[k] = work.target[1, k] - work.axis[1, k]
+            for j in range(n):
+                low[j] -= q[j]
+                high[j] -= q[j]
+            distance = max(work.error[1, 0], 1e-12)
+            chord = max(work.error[1, 1], 1e-12)
+            alive = _cut(
+                work.point_rows, gap, near, low, high, gap / distance
+            ) and _cut(work.axis_rows, tilt, narrow, low, high, tilt / chord)
+            if alive:
+                for k in range(directions.shape[0]):
+                    if not (
+                        _cut(work.point_rows, gap, near, low, high, directions[k])
+                        and _cut(work.axis_rows, tilt, narrow, low, high, directions[k])
+                    ):
+                        alive = False
+                        break
+            if not alive:
+                break
+            for j in range(n):
+                low[j] += q[j]
+                high[j] += q[j]
+                if half[j] > 0.0:
+                    volume *= max((high[j] - low[j]) / (2.0 * half[j]), 1e-3)
+            if volume > 0.3:
+                break
+        if not alive:
+            continue
+        # Split the joint that moves the tool most.
+        worst, largest = -1, 0.0
+        for j in range(n):
+            width = high[j] - low[j]
+            if width > THINNEST:
+                move = (lever[j] / problem.scale + sine[j]) * width
+                if move > largest:
+                    worst, largest = j, move
+        if worst < 0 or boxes.count[0] + 2 > boxes.low.shape[0]:
+            return 3
+        middle = 0.5 * (low[worst] + high[worst])
+        for side in range(2):
+            top = boxes.count[0]
+            boxes.low[top] = low
+            boxes.high[top] = high
+            if side == 0:
+                boxes.high[top, worst] = middle
+            else:
+                boxes.low[top, worst] = middle
+            boxes.count[0] += 1
+    return 0
+
+
+def rule(
+    problem: Problem, work: Work, cell: int, boxes: Boxes, most: int
+) -> tuple[Ruling, NDArray[np.float64]]:
+    """Look at up to `most` more boxes for one cell.
+
+    Returns:
+        The ruling, and a configuration (n,) that covers the cell when it is REACHED.
+    """
+    found = np.empty(len(problem.lower))
+    code = branch_and_bound(
+        problem, work, problem.points[cell], problem.approaches[cell], boxes, most, _DIRECTIONS, found
+    )
+    return Ruling(code), found
