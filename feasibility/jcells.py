@@ -1,0 +1,248 @@
+"""Algorithm 1 of the paper: continuity between two neighbouring E-cells, searched over J-cells.
+
+`extend_search` is the paper's procedure CONT, and differs from the printed one only where that
+cannot run: its recursion is an explicit stack, the checked J-cells are an exact hash table, it
+stops at a cap, and the result of the inner calls is kept.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from feasibility.jgrid import (
+    HAIR,
+    cell_of,
+    distance,
+    move_tool,
+    neighbour,
+    place_joints,
+    place_tool,
+)
+
+RUNNING, FOUND, EXHAUSTED, CAPPED, FULL = 0, 1, 2, 3, 4  # what a call is doing: counters[STATE]
+STATE, DEPTH, NODES, CHECKED, PLACED, CALL = 0, 1, 2, 3, 4, 5  # places in `Memory.counters`
+
+REFRESH = 256  # levels of the stack between full evaluations of the tool: keeps rounding below HAIR
+
+
+class Memory(NamedTuple):
+    """Working memory of one call; all that it takes to stop it and go on later."""
+
+    counters: NDArray[np.int64]
+    """(6,) STATE, DEPTH, NODES, CHECKED, PLACED (joint frames computed), CALL (its number)."""
+    table: NDArray[np.int64]
+    """(2^k,) open-addressing hash table over `nodes`: CALL << 32 | node."""
+    nodes: NDArray[np.int32]
+    """(m, n) offsets of every J-cell checked in this call; row 0 is where it began."""
+    stack_node: NDArray[np.int64]
+    """(s,) J-cells from the first to the one being expanded."""
+    stack_next: NDArray[np.int64]
+    """(s,) number of the next neighbour to look at, for each of them."""
+    stack_tool: NDArray[np.float64]
+    """(s, 7) tool point, approach axis, distance from the target point, for each of them."""
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _mixed(key):  # type: ignore[no-untyped-def]
+    """Spread the bits of a linear key over the word."""
+    key ^= key >> 29
+    key *= -7046029254386353131
+    key ^= key >> 32
+    return key
+
+
+@njit(cache=True, error_model="numpy")
+def _key(offsets):  # type: ignore[no-untyped-def]
+    """A linear key of a J-cell: a neighbour's follows by adding one term per moved joint."""
+    key = 0
+    for i in range(offsets.shape[0]):
+        key += np.int64(offsets[i]) * _weight(i)
+    return key
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _weight(i):  # type: ignore[no-untyped-def]
+    """An odd 64-bit factor for joint i (wraps around on purpose)."""
+    return (2 * i + 1) * -7070675565921424023 + 2 * i
+
+
+@njit(cache=True, error_model="numpy")
+def rehash(memory):  # type: ignore[no-untyped-def]
+    """Enter all nodes of the running call into a new, empty table."""
+    counters, table, nodes = memory.counters, memory.table, memory.nodes
+    mask = table.shape[0] - 1
+    for node in range(counters[NODES]):
+        slot = _mixed(_key(nodes[node])) & mask
+        while table[slot] >> 32 == counters[CALL]:
+            slot = (slot + 1) & mask
+        table[slot] = counters[CALL] << 32 | node
+
+
+@njit(cache=True, error_model="numpy")
+def begin_search(chain, grid, offsets, target, memory):  # type: ignore[no-untyped-def]
+    """Start a call of Algorithm 1 at the J-cell `offsets` (n,) towards the point `target` (3,)."""
+    counters = memory.counters
+    counters[STATE], counters[DEPTH], counters[NODES] = RUNNING, 0, 1
+    counters[CHECKED], counters[PLACED] = 0, offsets.shape[0]
+    counters[CALL] += 1
+    memory.nodes[0] = offsets
+    slot = _mixed(_key(offsets)) & (memory.table.shape[0] - 1)
+    memory.table[slot] = counters[CALL] << 32
+    memory.stack_node[0] = 0
+    memory.stack_next[0] = 0
+    place_tool(chain, grid, offsets, memory.stack_tool[0, :6])
+    memory.stack_tool[0, 6] = distance(memory.stack_tool[0], target)
+
+
+@njit(cache=True, error_model="numpy")
+def _first_visit(table, nodes, call, count, offsets, delta, key):  # type: ignore[no-untyped-def]
+    """Enter the J-cell offsets + delta as nodes[count]; False when it was checked already."""
+    n = offsets.shape[0]
+    mask = table.shape[0] - 1
+    for i in range(n):
+        key += delta[i] * _weight(i)
+    slot = _mixed(key) & mask
+    while table[slot] >> 32 == call:
+        node = table[slot] & 0xFFFFFFFF
+        same = True
+        for i in range(n):
+            same &= nodes[node, i] == offsets[i] + delta[i]
+        if same:
+            return False
+        slot = (slot + 1) & mask
+    table[slot] = call << 32 | count
+    for i in range(n):
+        nodes[count, i] = offsets[i] + delta[i]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _inside(lowest, highest, offsets, delta):  # type: ignore[no-untyped-def]
+    """True when the J-cell offsets + delta obeys the joint limits."""
+    inside = True
+    for i in range(offsets.shape[0]):
+        inside &= lowest[i] <= offsets[i] + delta[i] <= highest[i]
+    return inside
+
+
+@njit(cache=True, error_model="numpy")
+def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
+    """Go on with a call of Algorithm 1 for at most `budget` more J-cells.
+
+    Leaves counters[STATE] at FOUND (the stack and the last node are the path), EXHAUSTED (no
+    unchecked neighbour is left), CAPPED (`cap` J-cells were checked), RUNNING (call again) or
+    FULL (enlarge the memory, and call again).
+
+    Args:
+        chain: a `Chain`.
+        chart: a `Chart`.
+        grid: a `Grid`.
+        target: (3,) p_T, m.
+        target_cell: flat index of ec_T.
+        budget: J-cells to check before it comes back.
+        cap: J-cells that the whole call may check.
+        memory: a `Memory`, started by `begin_search`.
+    """
+    # Fields are read before the first branch, and helpers get arrays: see surfaces.chart.cell_at.
+    rotations, translations, prismatic = chain.rotations, chain.translations, chain.prismatic
+    origin, step, sine, cosine = grid.origin, grid.step, grid.sine, grid.cosine
+    lowest, highest, moves_all = grid.lowest, grid.highest, grid.moves_all
+    height, tolerance, cone_cosine = grid.height, grid.tolerance, grid.cone_cosine
+    counters, table, nodes = memory.counters, memory.table, memory.nodes
+    stack_node, stack_next, stack_tool = memory.stack_node, memory.stack_next, memory.stack_tool
+    n = nodes.shape[1]
+    base, partial = np.empty((n, 12)), np.empty((n + 1, 6))
+    offsets, delta, held = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
+    call, count, checked, depth = (
+        counters[CALL],
+        counters[NODES],
+        counters[CHECKED],
+        counters[DEPTH],
+    )
+    tool = partial[0]
+    stop = min(checked + budget, cap)
+    placed = 0  # joints, from the base on, whose frames in `base` are those of the present J-cell
+    state = EXHAUSTED
+    while depth >= 0:
+        placed = min(
+            placed, _expand(nodes, stack_node[depth], stack_tool, depth, offsets, held, partial)
+        )
+        key = _key(offsets)
+        away = stack_tool[depth, 6]
+        number, deeper = stack_next[depth], False
+        while not deeper and neighbour(number, moves_all, delta):
+            if checked >= stop:
+                state = CAPPED if checked >= cap else RUNNING
+                break
+            if count == nodes.shape[0] or depth + 1 == stack_node.shape[0]:
+                state = FULL
+                break
+            number += 1
+            if not _inside(lowest, highest, offsets, delta):
+                continue
+            if not _first_visit(table, nodes, call, count, offsets, delta, key):
+                continue
+            count += 1
+            checked += 1
+            top = n - 1
+            while delta[top] == 0:
+                top -= 1
+            if top >= placed:
+                place_joints(
+                    rotations, translations, prismatic, origin, step, offsets, placed, top, base
+                )
+                counters[PLACED] += top + 1 - placed
+                placed = top + 1
+            move_tool(prismatic, step, sine, cosine, base, delta, held, partial)
+            cell = cell_of(chart, height, tolerance, cone_cosine, tool)
+            if cell == target_cell:
+                state = FOUND
+                break
+            deeper = cell >= 0 and distance(tool, target) < away - HAIR
+        stack_next[depth] = number
+        if state != EXHAUSTED:
+            break
+        depth += 1 if deeper else -1
+        if deeper:
+            _push(chain, grid, memory, depth, count - 1, partial[0], target)
+    counters[STATE], counters[DEPTH] = state, depth
+    counters[NODES], counters[CHECKED] = count, checked
+
+
+@njit(cache=True, error_model="numpy")
+def _expand(nodes, node, stack_tool, depth, offsets, held, partial):  # type: ignore[no-untyped-def]
+    """Make `node` the present J-cell.
+
+    Returns:
+        How many joint frames, from the base on, it shares with the J-cell before it: a joint's own
+        motion leaves its frame (before that motion) where it is.
+    """
+    n = offsets.shape[0]
+    shared = 1
+    while shared < n and offsets[shared - 1] == nodes[node, shared - 1]:
+        shared += 1
+    for i in range(n):
+        offsets[i] = nodes[node, i]
+        held[i] = 2
+    for k in range(6):
+        partial[n, k] = stack_tool[depth, k]
+    return shared
+
+
+@njit(cache=True, error_model="numpy")
+def _push(chain, grid, memory, depth, node, tool, target):  # type: ignore[no-untyped-def]
+    """Put a J-cell on the stack, with its tool (6,)."""
+    nodes, counters = memory.nodes, memory.counters
+    stack_node, stack_next, stack_tool = memory.stack_node, memory.stack_next, memory.stack_tool
+    stack_node[depth] = node
+    stack_next[depth] = 0
+    for k in range(6):
+        stack_tool[depth, k] = tool[k]
+    if depth % REFRESH == 0:
+        place_tool(chain, grid, nodes[node], stack_tool[depth, :6])
+        counters[PLACED] += nodes.shape[1]
+    stack_tool[depth, 6] = distance(stack_tool[depth], target)
