@@ -1,0 +1,284 @@
+"""A case: one question written down as TOML, and read back with every fault named."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from feasibility.case_faults import CaseError, Fault, close, printable, shown
+from feasibility.case_robot import RobotPart, read_robot
+from feasibility.case_surface import SurfacePart, read_surface
+from feasibility.case_task import read_search, read_task
+from feasibility.files import FileError, read_regular, shown_path
+from feasibility.search import Search
+from feasibility.task import Task
+from feasibility.toml_text import TomlError, parse_setting, parse_toml, toml_document
+
+if TYPE_CHECKING:
+    from robots import Robot
+    from surfaces import Cells
+
+__all__ = ["Case", "CaseError", "Fault", "Setup", "builtin_cases", "load_case"]
+
+BUILT_IN = Path(__file__).with_name("cases.toml")
+LARGEST_FILE = 256 * 1024  # bytes
+TABLES = ("robot", "surface", "task", "search")
+
+Tables = dict[str, Any]
+
+
+class Setup(NamedTuple):
+    """What `feasibility.check` is called with."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    search: Search
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A robot, a surface, a task and a search, as plain checked numbers.
+
+    Example:
+        >>> case = load_case("paper/4a").with_overrides(["task.cone_deg=10"])
+        >>> case.task.cone_deg
+        10.0
+        >>> Case.from_toml(case.to_toml()) == case
+        True
+    """
+
+    robot: RobotPart
+    surface: SurfacePart
+    task: Task
+    search: Search = field(default_factory=Search)
+    name: str = field(default="case", compare=False)
+    """What it is called in reports: the built-in name, or the file's."""
+    description: str = field(default="", compare=False)
+
+    def build(self) -> Setup:
+        """Load the arm and cut the surface.
+
+        Raises:
+            CaseError: the robot cannot be loaded as asked.
+        """
+        from robots import RobotError
+
+        try:
+            robot = self.robot.build()
+        except RobotError as error:
+            raise CaseError(self.name, [Fault("robot", str(error))]) from error
+        return Setup(robot, self.surface.build().cells(*self.surface.cells), self.task, self.search)
+
+    def to_tables(self) -> Tables:
+        """The case as the tables of its TOML; what is None is left out."""
+        task = {name: getattr(self.task, name) for name in ("standoff", "cone_deg", "tolerance")}
+        search = {name: getattr(self.search, name) for name in Search.__dataclass_fields__}
+        tables = {
+            "robot": self.robot.table(),
+            "surface": self.surface.table(),
+            "task": task,
+            "search": search,
+        }
+        return {
+            title: {key: value for key, value in table.items() if value is not None}
+            for title, table in tables.items()
+        }
+
+    def to_toml(self) -> str:
+        """The case as text that `from_toml` reads back as an equal case; paths are absolute."""
+        return toml_document(self.to_tables())
+
+    @staticmethod
+    def from_toml(
+        text: str,
+        base_dir: str | os.PathLike[str] | None = None,
+        name: str = "case",
+        overrides: Iterable[str] = (),
+    ) -> Case:
+        """Read a case.
+
+        Args:
+            text: TOML.
+            base_dir: folder that its paths are relative to; default the working directory.
+            name: what the case is called.
+            overrides: settings like "task.cone_deg=10" that replace what the text says; an empty
+                value removes a key. Their paths are relative to the working directory.
+
+        Raises:
+            CaseError: with everything that is wrong.
+        """
+        try:
+            tables = parse_toml(text)
+        except TomlError as error:
+            raise CaseError(name, [Fault("", str(error))]) from error
+        _make_absolute(tables, base_dir)
+        return _from_tables(tables, name, overrides)
+
+    def with_overrides(self, overrides: Iterable[str]) -> Case:
+        """The case with some keys replaced, as `--set` does; see `from_toml`.
+
+        Raises:
+            CaseError: a setting, or the case with the settings, is wrong.
+        """
+        tables = {
+            title: {key: _as_read(value) for key, value in table.items()}
+            for title, table in self.to_tables().items()
+        }
+        made = _from_tables(tables, self.name, overrides)
+        return replace(made, description=self.description)
+
+
+def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Case:
+    """Load a built-in case by its name, or a case file.
+
+    Args:
+        name_or_path: a name of `builtin_cases()`, or the path of a TOML file.
+        overrides: see `Case.from_toml`.
+
+    Raises:
+        CaseError: with everything that is wrong.
+    """
+    name = os.fspath(name_or_path)
+    if isinstance(name_or_path, str) and name in builtin_cases():
+        return builtin_cases()[name].with_overrides(overrides)
+    known = tuple(builtin_cases())
+    if not os.path.lexists(name) and not name.endswith(".toml"):
+        guess = close(name, known)
+        hint = f"did you mean {guess}? " if guess else ""
+        raise CaseError(
+            shown_path(name),
+            [
+                Fault(
+                    "",
+                    f"is neither a built-in case nor a file; {hint}`coverable cases` lists the "
+                    "built-in ones",
+                )
+            ],
+        )
+    try:
+        data = read_regular(name, LARGEST_FILE, "a case file (TOML)")
+        text = data.decode("utf-8-sig")
+    except FileError as error:
+        source, _, message = str(error).partition(": ")
+        raise CaseError(source, [Fault("", message)]) from error
+    except UnicodeDecodeError as error:
+        message = f"is not UTF-8 text (byte {error.start}); expected a case file (TOML)"
+        raise CaseError(shown_path(name), [Fault("", message)]) from error
+    return Case.from_toml(text, os.path.dirname(os.path.abspath(name)), shown_path(name), overrides)
+
+
+@cache
+def builtin_cases() -> Mapping[str, Case]:
+    """The built-in cases by name, in the order of their file."""
+    entries = parse_toml(BUILT_IN.read_text(encoding="utf-8"))
+    tables: dict[str, Tables] = {}
+    cases = {}
+    for name, entry in entries.items():
+        base = tables[entry["like"]] if "like" in entry else {}
+        tables[name] = {
+            title: {**base.get(title, {}), **entry.get(title, {})}
+            for title in TABLES
+            if title in base or title in entry
+        }
+        case = _from_tables(tables[name], name, ())
+        cases[name] = replace(case, description=entry["description"])
+    return cases
+
+
+def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
+    """Apply overrides, then check everything."""
+    faults: list[Fault] = []
+    for setting in overrides:
+        _override(tables, setting, faults)
+    for title in tables:
+        if title not in TABLES:
+            guess = close(title, TABLES)
+            hint = f"did you mean {guess}?" if guess else f"known are {', '.join(TABLES)}"
+            faults.append(Fault(printable(title), f"is not known here; {hint}"))
+    for title in TABLES[:3]:
+        if title not in tables:
+            faults.append(Fault(title, f"is missing; expected a table [{title}]"))
+    robot = read_robot(tables["robot"], faults) if "robot" in tables else None
+    surface = read_surface(tables["surface"], faults) if "surface" in tables else None
+    task = read_task(tables["task"], faults) if "task" in tables else None
+    search = read_search(tables.get("search", {}), faults)
+    if faults and "robot" in tables:
+        faults += _robot_faults(robot or _named_robot(tables["robot"]))
+    if faults or robot is None or surface is None or task is None or search is None:
+        raise CaseError(name, faults)
+    return Case(robot, surface, task, search, name)
+
+
+def _named_robot(table: Any) -> RobotPart | None:
+    """The robot as far as a faulty table names it."""
+    if not isinstance(table, dict) or "urdf" in table or "name" not in table:
+        return None
+    return read_robot({"name": table["name"]}, [])
+
+
+def _robot_faults(part: RobotPart | None) -> list[Fault]:
+    """What loading the arm would say, so that it comes together with the other faults."""
+    from robots import RobotError
+
+    if part is None:
+        return []
+    try:
+        part.build()
+    except RobotError as error:
+        return [Fault("robot", str(error))]
+    return []
+
+
+def _override(tables: Tables, setting: str, faults: list[Fault]) -> None:
+    """Replace, add or remove one key."""
+    label = f"--set {setting if setting.isprintable() and len(setting) <= 80 else shown(setting)}"
+    try:
+        path, value = parse_setting(setting)
+    except TomlError as error:
+        faults.append(Fault(label, str(error)))
+        return
+    *folders, key = path
+    if not folders:
+        faults.append(Fault(label, "needs a table and a key, such as task.cone_deg=10"))
+        return
+    table: Any = tables
+    for folder in folders:
+        table = table.setdefault(folder, {})
+        if not isinstance(table, dict):
+            faults.append(Fault(label, f"{folder} is not a table"))
+            return
+    if value is None:
+        table.pop(key, None)
+    else:
+        table[key] = value
+
+
+def _make_absolute(tables: Tables, base_dir: str | os.PathLike[str] | None) -> None:
+    """Make the paths of a case file independent of the working directory, where they are paths."""
+    robot = tables.get("robot")
+    if base_dir is None or not isinstance(robot, dict):
+        return
+
+    def absolute(value: Any) -> Any:
+        if not isinstance(value, str) or not value.strip():
+            return value
+        return os.path.join(base_dir, os.path.expanduser(value))
+
+    if "urdf" in robot:
+        robot["urdf"] = absolute(robot["urdf"])
+    if isinstance(robot.get("package_dirs"), list):
+        robot["package_dirs"] = [absolute(folder) for folder in robot["package_dirs"]]
+
+
+def _as_read(value: Any) -> Any:
+    """A value as the TOML parser would give it: lists and plain tables."""
+    if isinstance(value, Mapping):
+        return {key: _as_read(item) for key, item in value.items()}
+    if isinstance(value, tuple):
+        return [_as_read(item) for item in value]
+    return value
