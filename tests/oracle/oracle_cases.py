@@ -1,0 +1,201 @@
+"""Problems for the oracles: a patch, a task and limits, with geometry of the oracles' own.
+
+Nothing here is shared with the packages under test: surfaces are evaluated from their formulas,
+and neighbours are enumerated from the grid. A problem is plain numbers, so that it fits in JSON.
+
+Two domains stand for "the patch". A `net` is the cells' centres and the lines between neighbouring
+centres, straight in the parameters: where a search that goes from centre to centre can be. The
+`patch` is a fine grid over whole cells: wherever a tool could go without leaving the surface. A
+case is trusted only where both give the same answer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One question: can the arm cover these cells in one motion? Lengths in m, angles in degrees.
+
+    `u` and `v` are in degrees where the parameter is an angle, else in m.
+    """
+
+    kind: str
+    """'sphere', 'cylinder', 'hyperboloid' or 'plane'."""
+    size: tuple[float, ...]
+    """Sphere, cylinder: (radius,); hyperboloid: (waist, flare); plane: ()."""
+    u: tuple[float, float]
+    v: tuple[float, float]
+    position: tuple[float, float, float]
+    rpy_deg: tuple[float, float, float]
+    side: str
+    cells: tuple[int, int]
+    standoff: float
+    cone_deg: float
+    limits_deg: tuple[tuple[float, float], ...]
+    """(lower, upper) of each joint, base to tip."""
+
+    def varied(self, cone: float = 1.0, limits_deg: float = 0.0, standoff: float = 0.0) -> Problem:
+        """The same problem, a little wider or tighter.
+
+        Args:
+            cone: factor on the cone.
+            limits_deg: by how much every limit moves outwards (negative: inwards).
+            standoff: m, added to the standoff; may take it below zero.
+        """
+        moved = tuple((low - limits_deg, high + limits_deg) for low, high in self.limits_deg)
+        return replace(
+            self,
+            cone_deg=min(self.cone_deg * cone, 180.0),
+            limits_deg=moved,
+            standoff=self.standoff + standoff,
+        )
+
+    def plain(self) -> dict[str, Any]:
+        """The problem as JSON holds it."""
+        return asdict(self)
+
+    @staticmethod
+    def read(plain: dict[str, Any]) -> Problem:
+        """The problem from what JSON held."""
+        made = dict(plain)
+        for name in ("size", "u", "v", "position", "rpy_deg", "cells"):
+            made[name] = tuple(made[name])
+        made["limits_deg"] = tuple(tuple(pair) for pair in made["limits_deg"])
+        return Problem(**made)
+
+    @property
+    def limits(self) -> Floats:
+        """(n, 2) rad."""
+        return np.radians(np.array(self.limits_deg, dtype=float))
+
+    @property
+    def ranges(self) -> tuple[Floats, Floats]:
+        """Ranges of u and of v, rad or m."""
+        u, v = np.array(self.u, dtype=float), np.array(self.v, dtype=float)
+        return (
+            u if self.kind == "plane" else np.radians(u),
+            np.radians(v) if self.kind == "sphere" else v,
+        )
+
+    def rotation(self) -> Floats:
+        """(3, 3) Rz(yaw) Ry(pitch) Rx(roll)."""
+        (cr, cp, cy), (sr, sp, sy) = (
+            np.cos(np.radians(self.rpy_deg)),
+            np.sin(np.radians(self.rpy_deg)),
+        )
+        about_x = np.array([[1, 0, 0], [0, cr, -sr], [0, sr, cr]])
+        about_y = np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
+        about_z = np.array([[cy, -sy, 0], [sy, cy, 0], [0, 0, 1]])
+        return np.asarray(about_z @ about_y @ about_x, dtype=float)
+
+    def targets(self, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+        """Target points (..., 3) m and approach directions (..., 3) at parameters (rad or m)."""
+        one, zero = np.ones_like(u * v), np.zeros_like(u * v)
+        if self.kind == "sphere":
+            normal = np.stack(
+                [np.sin(u) * np.cos(v) * one, np.sin(u) * np.sin(v) * one, np.cos(u) * one], -1
+            )
+            point = self.size[0] * normal
+        elif self.kind == "plane":
+            normal = np.stack([zero, zero, one], -1)
+            point = np.stack([u * one, v * one, zero], -1)
+        else:
+            waist = self.size[0]
+            slant = v / self.size[1] if self.kind == "hyperboloid" else 0.0 * v
+            stretch = np.sqrt(1.0 + slant**2)
+            slope = waist * slant / (self.size[-1] * stretch)
+            radius = waist * stretch
+            normal = np.stack([np.cos(u) * one, np.sin(u) * one, -slope * one], -1)
+            normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+            point = np.stack([radius * np.cos(u), radius * np.sin(u), v * one], -1)
+        sign = -1.0 if self.side == "inside" else 1.0
+        turn = self.rotation()
+        placed = (point + sign * self.standoff * normal) @ turn.T + np.array(self.position)
+        return placed, -sign * normal @ turn.T
+
+
+class Domain(NamedTuple):
+    """Samples of the parameters, and which of them are next to each other."""
+
+    uv: Floats
+    """(S, 2) rad or m."""
+    links: Ints
+    """(L, 2) pairs of samples."""
+    centres: Ints
+    """(N,) the sample at each cell's centre, row by row."""
+
+
+def _pairs(nu: int, nv: int) -> Ints:
+    """Pairs of 8-neighbours in a grid that closes nowhere, (M, 2) flat indices."""
+    at = np.arange(nu * nv).reshape(nu, nv)
+    found = [
+        (at[:-1], at[1:]),
+        (at[:, :-1], at[:, 1:]),
+        (at[:-1, :-1], at[1:, 1:]),
+        (at[:-1, 1:], at[1:, :-1]),
+    ]
+    return np.concatenate([np.stack([a.ravel(), b.ravel()], 1) for a, b in found])
+
+
+def _middles(limits: Floats, count: int) -> Floats:
+    """Mid parameters of `count` equal steps."""
+    return np.asarray(limits[0] + (limits[1] - limits[0]) * (np.arange(count) + 0.5) / count)
+
+
+def patch(problem: Problem, refine: int) -> Domain:
+    """A grid of `refine` x `refine` samples a cell (odd: the centres are among them)."""
+    (nu, nv), (u_range, v_range) = problem.cells, problem.ranges
+    u, v = _middles(u_range, nu * refine), _middles(v_range, nv * refine)
+    uv = np.stack(np.meshgrid(u, v, indexing="ij"), -1).reshape(-1, 2)
+    at = np.arange(len(uv)).reshape(nu * refine, nv * refine)
+    half = refine // 2
+    return Domain(uv, _pairs(*at.shape), at[half::refine, half::refine].ravel())
+
+
+def net(problem: Problem, pieces: Ints | int) -> Domain:
+    """Centres, and the lines between neighbours cut into `pieces` (one number, or one a line)."""
+    (nu, nv), (u_range, v_range) = problem.cells, problem.ranges
+    centres = np.stack(
+        np.meshgrid(_middles(u_range, nu), _middles(v_range, nv), indexing="ij"), -1
+    ).reshape(-1, 2)
+    ends = _pairs(nu, nv)
+    counts = np.broadcast_to(pieces, len(ends))
+    samples, links = [centres], []
+    first = len(centres)
+    for (a, b), count in zip(ends, counts, strict=True):
+        part = np.arange(1, count)[:, None] / count
+        samples.append(centres[a] * (1.0 - part) + centres[b] * part)
+        chain = np.concatenate([[a], np.arange(first, first + count - 1), [b]])
+        links.append(np.stack([chain[:-1], chain[1:]], 1))
+        first += count - 1
+    joined = np.concatenate(links) if links else np.empty((0, 2), dtype=np.int64)
+    return Domain(np.concatenate(samples), joined, np.arange(len(centres)))
+
+
+class Answer(NamedTuple):
+    """What an oracle says."""
+
+    feasible: bool
+    """One component covers every cell."""
+    covered: int
+    """Cells of the best single component."""
+    reachable: int
+    """Cells that some component covers."""
+
+
+def answer(cells: int, cell: Ints, component: Ints) -> Answer:
+    """Count, from every (cell, component) that occurs."""
+    if len(cell) == 0:
+        return Answer(cells == 0, 0, 0)
+    pairs = np.unique(np.stack([component, cell], 1), axis=0)
+    best = int(np.unique(pairs[:, 0], return_counts=True)[1].max())
+    return Answer(best == cells, best, len(np.unique(cell)))

@@ -1,0 +1,276 @@
+"""Whether a PUMA covers a patch, from its closed-form inverse kinematics.
+
+The tool point of this PUMA is its wrist centre, so theta1 to theta3 alone place it: four arm
+branches (shoulder s, elbow e) for a target p, from eq. (8) of the paper:
+
+    K = (|p|^2 - a2^2 - a3^2 - d3^2 - d4^2) / (2 a2) = a3 cos theta3 - d4 sin theta3
+    -sin(theta1) p_x + cos(theta1) p_y = d3
+
+In link frame 3 the tool axis is (-s5 c4, c5, s5 s4): theta5 is a polar angle about the frame's y
+axis, theta4 an azimuth. With m the approach direction in that frame, rho = hypot(m_x, m_z) and
+phi = atan2(m_z, -m_x), the cone asks for
+
+    s5 rho cos(theta4 - phi) + c5 m_y >= cos(alpha),
+
+so at one theta5 the allowed theta4 are intervals about phi (phi + pi where s5 < 0), repeated every
+2 pi and cut by the limits, or the whole range. The wrist is therefore exact in theta4 and sampled
+in theta5 only; theta5 = 0 and +-pi are always among the samples, because there theta4 is free and
+joins what is separate elsewhere. theta6 moves neither point nor axis.
+
+A node is (sample of the surface, arm branch with its turns, theta5 row, theta4 interval). Nodes are
+joined where intervals overlap: in neighbouring rows, and in the same row of neighbouring samples
+with the same branch and continuous joints. Where a line of the patch leaves the arm's reach, its
+last reachable point is added as a sample: two elbows (or shoulders) meet there and are joined.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from oracle_cases import Answer, Domain, Floats, Ints, Problem, answer, net, patch
+
+A2, A3, D3, D4 = 0.7, 0.1, 0.1, 0.7  # [m]
+TAU = 2.0 * np.pi
+MOST_JUMP = 1.0  # [rad] between neighbouring samples of one branch
+MEETING = 1e-3  # [rad] two branches this close are one configuration
+BRANCHES = np.array([(s, e) for s in (1.0, -1.0) for e in (1.0, -1.0)])
+
+
+class Resolution(NamedTuple):
+    """How finely the oracle looks."""
+
+    rows: float = 7.0
+    """theta5 rows in one cone angle; the step stays within 0.4 .. 2.5 degrees."""
+    turn_deg: float = 4.0
+    """Largest change of a joint, or of the approach direction in link 3, between samples; never
+    more than a third of the cone, so that the cones of neighbouring samples overlap."""
+    samples: int = 6000
+    """Patch: most samples in all, where that leaves three across a cell."""
+
+
+STANDARD = Resolution()
+
+
+def slack(points: Floats) -> Floats:
+    """(..., 2) what is left under the roots for shoulder and elbow; negative: out of reach."""
+    across = np.sum(points[..., :2] ** 2, axis=-1) - D3**2
+    stretch = (np.sum(points**2, axis=-1) - A2**2 - A3**2 - D3**2 - D4**2) / (2.0 * A2)
+    return np.stack([across, A3**2 + D4**2 - stretch**2], axis=-1)
+
+
+def arms(points: Floats) -> Floats:
+    """(S, 4, 3) theta1 to theta3 of each branch, mod 2 pi; negative slack counts as none."""
+    root = np.sqrt(np.maximum(slack(points), 0.0))
+    x, y, z = points[:, 0], points[:, 1], points[:, 2]
+    stretch = (np.sum(points**2, axis=-1) - A2**2 - A3**2 - D3**2 - D4**2) / (2.0 * A2)
+    found = np.empty((len(points), 4, 3))
+    for branch, (s, e) in enumerate(BRANCHES):
+        theta1 = np.arctan2(y, x) - np.arctan2(D3, s * root[:, 0])
+        theta3 = np.arctan2(A3, D4) - np.arctan2(stretch, e * root[:, 1])
+        forward = np.cos(theta1) * x + np.sin(theta1) * y
+        # a2 c2 + a3 c23 - d4 s23 = forward and a2 s2 + a3 s23 + d4 c23 = -z, linear in (c2, s2).
+        along = A2 + A3 * np.cos(theta3) - D4 * np.sin(theta3)
+        aside = A3 * np.sin(theta3) + D4 * np.cos(theta3)
+        theta2 = np.arctan2(-z * along - forward * aside, forward * along - z * aside)
+        found[:, branch] = np.stack([theta1, theta2, theta3], axis=-1)
+    return found
+
+
+def in_link3(theta: Floats, directions: Floats) -> Floats:
+    """(..., 3) directions of the root frame, seen from link frame 3."""
+    c1, s1 = np.cos(theta[..., 0]), np.sin(theta[..., 0])
+    c23, s23 = np.cos(theta[..., 1] + theta[..., 2]), np.sin(theta[..., 1] + theta[..., 2])
+    x, y, z = directions[..., 0], directions[..., 1], directions[..., 2]
+    flat, side = c1 * x + s1 * y, c1 * y - s1 * x
+    return np.stack([c23 * flat - s23 * z, -s23 * flat - c23 * z, side], axis=-1)
+
+
+@njit(cache=True)
+def _intervals(
+    seen: Floats, rows: Floats, cos_cone: float, low: float, high: float, slots: int
+) -> Floats:
+    """(P, R, slots, 2) allowed theta4, ascending; empty ones have low > high."""
+    found = np.empty((len(seen), len(rows), slots, 2))
+    found[..., 0] = 1.0
+    found[..., 1] = -1.0
+    for p in range(len(seen)):
+        rho = np.hypot(seen[p, 0], seen[p, 2])
+        phi = np.arctan2(seen[p, 2], -seen[p, 0])
+        for r in range(len(rows)):
+            lift, across = cos_cone - np.cos(rows[r]) * seen[p, 1], np.sin(rows[r]) * rho
+            if abs(across) <= lift - 1e-12:
+                continue
+            if -abs(across) >= lift - 1e-12:
+                found[p, r, 0] = (low, high)
+                continue
+            half = np.arccos(lift / abs(across))
+            middle = phi if across > 0.0 else phi + np.pi
+            middle += TAU * np.ceil((low - half - middle) / TAU)
+            slot = 0
+            while middle - half <= high and slot < slots:
+                found[p, r, slot] = (max(low, middle - half), min(high, middle + half))
+                middle += TAU
+                slot += 1
+    return found
+
+
+@njit(cache=True)
+def _root(parent: NDArray[np.int32], node: int) -> int:
+    """The representative of a node, halving the path on the way."""
+    while parent[node] != node:
+        parent[node] = parent[parent[node]]
+        node = parent[node]
+    return node
+
+
+@njit(cache=True)
+def _join_rows(parent: NDArray[np.int32], one: Floats, base: int, two: Floats, other: int) -> None:
+    """Join overlapping intervals of two rows whose nodes start at `base` and `other`."""
+    for i in range(len(one)):
+        for j in range(len(two)):
+            if min(one[i, 1], two[j, 1]) >= max(one[i, 0], two[j, 0]):
+                a, b = _root(parent, base + i), _root(parent, other + j)
+                if a != b:
+                    parent[max(a, b)] = min(a, b)
+
+
+@njit(cache=True)
+def _components(
+    spans: Floats, arm: Ints, links: Ints, first: Ints
+) -> tuple[NDArray[np.int32], int]:
+    """Union-find over every (arm node, row, interval); see `components`."""
+    _, rows, slots, _ = spans.shape
+    size = rows * slots
+    parent = np.arange(len(arm) * size).astype(np.int32)
+    for node in range(len(arm)):
+        span = spans[arm[node]]
+        for r in range(rows - 1):
+            at = node * size + r * slots
+            _join_rows(parent, span[r], at, span[r + 1], at + slots)
+    for k in range(len(links)):
+        a, b = links[k]
+        for r in range(rows):
+            at = r * slots
+            _join_rows(parent, spans[arm[a], r], a * size + at, spans[arm[b], r], b * size + at)
+    for node in range(len(parent)):
+        parent[node] = _root(parent, node)
+    return parent, size
+
+
+def _turns(limits: Floats) -> Ints:
+    """(W, 3) whole turns that an angle of [lower, lower + 2 pi) may have on top, per joint."""
+    counts = np.maximum(np.ceil((limits[:3, 1] - limits[:3, 0]) / TAU - 1e-12), 1).astype(int)
+    return np.stack(np.meshgrid(*map(np.arange, counts), indexing="ij"), -1).reshape(-1, 3)
+
+
+def _fold_samples(problem: Problem, domain: Domain) -> tuple[Domain, Ints]:
+    """The domain with the last reachable point of every line that leaves the reach.
+
+    Also returns the indices of the samples that were added.
+    """
+    reached = (slack(problem.targets(*domain.uv.T)[0]) >= 0.0).all(axis=-1)
+    a, b = domain.links.T
+    cut = reached[a] != reached[b]
+    inside, outside = np.where(reached[a], a, b)[cut], np.where(reached[a], b, a)[cut]
+    near, far = domain.uv[inside], domain.uv[outside]
+    for _ in range(45):
+        middle = (near + far) / 2.0
+        holds = (slack(problem.targets(*middle.T)[0]) >= 0.0).all(axis=-1)[:, None]
+        near, far = np.where(holds, middle, near), np.where(holds, far, middle)
+    added = np.arange(len(domain.uv), len(domain.uv) + len(near))
+    links = np.concatenate([domain.links, np.stack([inside, added], 1)])
+    return Domain(np.concatenate([domain.uv, near]), links, domain.centres), added
+
+
+def _pieces(problem: Problem, turn_deg: float) -> Ints:
+    """Pieces of each line between centres in which nothing turns by more than `turn_deg`."""
+    probes = 8
+    coarse = net(problem, probes)
+    points, approaches = problem.targets(*coarse.uv.T)
+    theta = arms(points)
+    seen = in_link3(theta, approaches[:, None, :])
+    a, b = coarse.links.T
+    turned = np.abs((theta[a] - theta[b] + np.pi) % TAU - np.pi).max(axis=-1)
+    turned = np.maximum(turned, np.linalg.norm(seen[a] - seen[b], axis=-1))
+    held = (slack(points) >= 0.0).all(axis=-1)
+    turned = np.where((held[a] & held[b])[:, None], turned, 0.0).max(axis=1)
+    fastest = turned.reshape(-1, probes).max(axis=1) * probes
+    return np.ceil(fastest / np.radians(turn_deg)).astype(int)
+
+
+def components(problem: Problem, domain: Domain, folds: Ints, row_step: float) -> tuple[Ints, Ints]:
+    """Every (cell, component) that occurs, as two arrays, with repetitions."""
+    limits = problem.limits
+    points, approaches = problem.targets(*domain.uv.T)
+    theta = limits[:3, 0] + (arms(points) - limits[:3, 0]) % TAU
+    reached = (slack(points) >= -1e-9).all(axis=-1)
+    turns = _turns(limits)
+    real = theta[:, :, None, :] + TAU * turns
+    usable = reached[:, None, None] & (real <= limits[:3, 1]).all(axis=-1)
+
+    node_at = np.full(usable.shape, -1)
+    sample, branch, turn = np.nonzero(usable)
+    node_at[sample, branch, turn] = np.arange(len(sample))
+    arm_at = np.full(usable.shape[:2], -1)
+    arm_sample, arm_branch = np.nonzero(usable.any(axis=2))
+    arm_at[arm_sample, arm_branch] = np.arange(len(arm_sample))
+    arm = arm_at[sample, branch]
+    seen = in_link3(theta[arm_sample, arm_branch], approaches[arm_sample])
+
+    # Neighbouring samples: the same branch, and the turn that keeps every joint continuous.
+    links = []
+    sets = [(domain.links[:, 0], domain.links[:, 1], k, k, MOST_JUMP) for k in range(4)]
+    sets += [(folds, folds, k, j, MEETING) for k in range(4) for j in range(k)]
+    for a, b, k, j, most in sets:
+        for w in range(len(turns)):
+            for x in range(len(turns)):
+                close = np.abs(real[a, k, w] - real[b, j, x]).max(axis=-1, initial=0.0) < most
+                pair = np.stack([node_at[a, k, w], node_at[b, j, x]], 1)
+                links.append(pair[close & (pair >= 0).all(axis=1)])
+    rows = _rows(limits[4], row_step)
+    slots = int(np.ceil((limits[3, 1] - limits[3, 0]) / TAU - 1e-12)) + 1
+    spans = _intervals(seen, rows, np.cos(np.radians(problem.cone_deg)), *limits[3], slots)
+    parent, size = _components(spans, arm, np.concatenate(links), sample)
+
+    cell_of = np.full(len(domain.uv), -1)
+    cell_of[domain.centres] = np.arange(len(domain.centres))
+    over = np.flatnonzero(cell_of[sample] >= 0)
+    live = (spans[..., 0] <= spans[..., 1]).reshape(len(spans), size)[arm[over]]
+    which, at = np.nonzero(live)
+    return cell_of[sample[over]][which], parent[over[which] * size + at].astype(np.int64)
+
+
+def _rows(limits: Floats, step: float) -> Floats:
+    """theta5 from limit to limit, among them every multiple of pi in between."""
+    step = np.pi / np.ceil(np.pi / step)
+    inner = np.arange(np.ceil(limits[0] / step), np.floor(limits[1] / step) + 1) * step
+    return np.unique(np.concatenate([limits, inner[(inner > limits[0]) & (inner < limits[1])]]))
+
+
+def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD) -> Answer:
+    """The oracle's answer.
+
+    Args:
+        problem: what is asked.
+        on: the domain, 'patch' or 'net'; see `oracle_cases`. On the net a line that leaves the
+            reach leads nowhere; on the patch two branches may meet at its end.
+        resolution: how finely to look.
+    """
+    n_cells = problem.cells[0] * problem.cells[1]
+    limits = problem.limits
+    if (limits[:, 0] > limits[:, 1]).any():
+        return Answer(n_cells == 0, 0, 0)
+    step = np.radians(np.clip(problem.cone_deg / resolution.rows, 0.4, 2.5))
+    pieces = _pieces(problem, min(resolution.turn_deg, problem.cone_deg / 3.0))
+    if on == "patch":
+        across = np.quantile(pieces, 0.9) if len(pieces) else 3
+        across = int(min(across, np.sqrt(resolution.samples / n_cells)))
+        domain = patch(problem, max((across - 1) // 2 * 2 + 1, 3))
+        domain, folds = _fold_samples(problem, domain)
+    else:
+        domain = net(problem, np.clip(pieces, 6, 120))
+        folds = np.empty(0, dtype=np.int64)
+    return answer(n_cells, *components(problem, domain, folds, float(step)))
