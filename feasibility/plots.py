@@ -92,7 +92,7 @@ def plot_transition(verdict: Verdict, edge: tuple[int, int] | None = None) -> Pl
 
     Args:
         verdict: with at least one edge.
-        edge: two neighbouring cells; default is the edge whose joints move most.
+        edge: two neighbouring cells; default is the edge that moves a second joint most.
 
     Raises:
         ValueError: there is no such edge, or it has no motion.
@@ -115,6 +115,9 @@ def plot_transition(verdict: Verdict, edge: tuple[int, int] | None = None) -> Pl
         name = "off the patch" if cell < 0 else f"E-cell {_name(verdict.cells, cell)}"
         colour = colours[number % len(colours)]
         axes.scatter(x[mask], y[mask], s=12, color=[colour], label=name, zorder=2)
+        for end in (0, -1):  # a single dot in its cell is easily lost
+            if mask[end]:
+                axes.plot(x[end], y[end], "s", color=colour, markeredgecolor="k", zorder=3)
     axes.set_xlabel(_joint_label(verdict, first))
     axes.set_ylabel(_joint_label(verdict, second))
     axes.set_title(
@@ -197,7 +200,7 @@ def _edge(verdict: Verdict, edge: tuple[int, int] | None) -> tuple[int, int]:
     if edge is None:
         if not edges:
             raise ValueError("the verdict's graph has no edge with a motion to draw")
-        return max(edges, key=lambda key: float(np.ptp(edges[key], axis=0).max()))
+        return max(edges, key=lambda key: float(np.sort(np.ptp(edges[key], axis=0))[-2:].min()))
     key = (min(edge), max(edge))
     if key not in edges:
         raise ValueError(f"G has no edge between the cells {edge[0]} and {edge[1]} with a motion")

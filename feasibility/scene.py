@@ -19,7 +19,6 @@ from feasibility.motion import Motion
 from feasibility.page import Entry
 from feasibility.threejs import Colour, Command
 from feasibility.verdict import CauseKind, Verdict
-from robots.kinematics import Kinematics
 from surfaces import Cells
 
 SURFACE: Colour = (0.62, 0.71, 0.80)
@@ -68,27 +67,20 @@ def layers(verdict: Verdict) -> list[Layer]:
     return parts
 
 
-def edge_lines(verdict: Verdict) -> list[NDArray[np.float64]]:
-    """Where the tool point goes along each edge of G, (k, 3) m, in the order of `graph.edges`.
+def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
+    """The edges of G, in the order of `graph.edges`: lines (E, k, 3) m at the standoff.
 
-    An edge without a motion is drawn over the surface from target to target.
+    Each runs over the surface from target to target. It says that a motion joins the two cells; the
+    motion itself may take another way (the greedy search stops as soon as it has entered a cell).
     """
-    kinematics = Kinematics(verdict.robot)
+    surface, standoff = verdict.cells.surface, verdict.task.standoff
     targets = verdict.task.targets(verdict.cells).points
-    edges = list(verdict.graph.edges(data="motion"))
-    count = _edge_points(verdict.cells)
-    t = np.linspace(0.0, 1.0, count)[:, None]
-    bare = np.array([[a, b] for a, b, motion in edges if motion is None], dtype=np.int64)
-    ends = targets[bare.reshape(-1, 2)]
-    over = iter(_over_surface(verdict, (1.0 - t) * ends[:, :1] + t * ends[:, 1:]))
-    lines = []
-    for _, _, motion in edges:
-        if motion is None:
-            lines.append(next(over))
-            continue
-        rows = np.unique(np.linspace(0, len(motion) - 1, count).round().astype(int))
-        lines.append(np.array([kinematics.tool(motion[row])[0] for row in rows]))
-    return lines
+    pairs = np.array(list(verdict.graph.edges), dtype=np.int64).reshape(-1, 2)
+    t = np.linspace(0.0, 1.0, _edge_points(verdict.cells))[:, None]
+    ends = targets[pairs]
+    chords = (1.0 - t) * ends[:, :1] + t * ends[:, 1:]
+    foot = surface.closest(chords)
+    return chords + (surface.side_sign * standoff - foot.height)[..., None] * foot.normal
 
 
 def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64]]:
@@ -131,17 +123,17 @@ def _cell_marks(cells: Cells) -> Iterator[Layer]:
 
 
 def _graph(verdict: Verdict) -> Iterator[Layer]:
-    """Graph G: one line for each edge, where the tool goes."""
+    """Graph G: one line for each edge."""
     lines = edge_lines(verdict)
-    if not lines:
+    if len(lines) == 0:
         return
     path = f"/graph/edges of G ({len(lines)})"
     if len(verdict.cells) <= FULL_DETAIL:
-        vertices, faces = tubes(lines, 0.022 * cell_size(verdict.cells))
+        vertices, faces = tubes(list(lines), 0.022 * cell_size(verdict.cells))
         command = threejs.mesh(path, vertices, faces, EDGES, lit=False)
     else:
-        ends = [np.stack([line[:-1], line[1:]], axis=1).reshape(-1, 3) for line in lines]
-        command = threejs.segments(path, np.concatenate(ends), EDGES)
+        ends = np.stack([lines[:, :-1], lines[:, 1:]], axis=2)
+        command = threejs.segments(path, ends.reshape(-1, 3), EDGES)
     pairs = len(verdict.cells.pairs)
     label = f"{len(lines)} edges of G (of {pairs} pairs)"
     yield Layer((command,), Entry(label, EDGES, path), len(lines))
@@ -203,13 +195,6 @@ def trail(verdict: Verdict, motion: Motion) -> Layer:
         threejs.set_property(path, "visible", shown),
     )
     return Layer(commands, Entry(f"tool path: {motion.label}", TRAIL, path, shown), 1)
-
-
-def _over_surface(verdict: Verdict, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points (..., 3) m brought to the standoff over the surface, each along its own normal."""
-    foot = verdict.cells.surface.closest(points)
-    height = verdict.cells.surface.side_sign * verdict.task.standoff
-    return points + (height - foot.height)[..., None] * foot.normal
 
 
 def _edge_points(cells: Cells) -> int:

@@ -98,10 +98,10 @@ def test_a_transition_shows_every_waypoint_over_its_cell(verdict):
     assert figure.axes[0].get_title().endswith(f"{STEPS} configurations")
 
 
-def test_the_transition_that_moves_most_is_the_default(verdict):
+def test_the_transition_that_moves_two_joints_most_is_the_default(verdict):
     ranges = {}
     for a, b, motion in verdict.graph.edges(data="motion"):
-        ranges[min(a, b), max(a, b)] = np.ptp(motion, axis=0).max()
+        ranges[min(a, b), max(a, b)] = np.sort(np.ptp(motion, axis=0))[-2]
     most = max(ranges, key=ranges.get)
     names = [f"({cell // 6}, {cell % 6})" for cell in most]
     title = plot_transition(verdict).axes[0].get_title()
