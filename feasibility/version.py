@@ -1,0 +1,12 @@
+"""Which coverable this is."""
+
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed_version
+
+
+def version() -> str:
+    """The version of the installed distribution; "unknown" where the code runs uninstalled."""
+    try:
+        return installed_version("coverable")
+    except PackageNotFoundError:
+        return "unknown"
