@@ -1,0 +1,57 @@
+# make demo   set up .venv and decide paper/4a        make bench  the table of speeds
+# make test   set up .venv and run every check        make clean  remove what was made
+# PYTHON=/path/to/python chooses the interpreter (CPython 3.11 or later).
+
+BIN := .venv/bin
+NOTEBOOKS := $(wildcard notebooks/*.ipynb)
+CANDIDATES := python3.11 python3 python3.12 python3.13 python3.14 python
+IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
+
+.DELETE_ON_ERROR:
+.PHONY: help demo test lint bench clean distclean
+
+help:
+	@sed -n '1,3s/^# //p' Makefile
+
+# The stamp is younger than pyproject.toml once everything it names is installed.
+.venv/installed: pyproject.toml
+	@if ! $(BIN)/python -m pip --version >/dev/null 2>&1; then \
+	    for candidate in $(or $(PYTHON),$(CANDIDATES)); do \
+	        if "$$candidate" -c '$(IS_RECENT)' 2>/dev/null; then python="$$candidate"; break; fi; \
+	    done; \
+	    if [ -z "$$python" ]; then \
+	        echo "needs CPython 3.11 or later with venv; say where: make PYTHON=/path/to/python" >&2; \
+	        exit 2; \
+	    fi; \
+	    echo "making .venv with $$("$$python" --version)"; \
+	    "$$python" -m venv --clear .venv; \
+	fi
+	@echo "installing coverable and its libraries into .venv (a minute or two) ..."
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-input -e '.[dev]'
+	@touch $@
+
+demo: .venv/installed
+	@mkdir -p out
+	@$(BIN)/coverable check paper/4a --html out/paper-4a.html
+	@echo "Open it in a browser: file://$(CURDIR)/out/paper-4a.html"
+
+lint: .venv/installed
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+test: lint
+	$(BIN)/python -m pytest
+ifneq ($(NOTEBOOKS),)
+	$(BIN)/python -m pytest --nbmake --nbmake-timeout=900 $(NOTEBOOKS)
+endif
+
+bench: .venv/installed
+	$(BIN)/python -m pytest -q -s tests/benchmarks
+
+clean:
+	rm -rf out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+distclean: clean
+	rm -rf .venv

@@ -1,0 +1,116 @@
+"""What the command line writes to: stdout for answers, stderr for messages and progress."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import time
+from types import TracebackType
+from typing import Any, TextIO
+
+PAUSE = 0.05  # [s] between two updates of the progress bar
+
+
+def prepare() -> None:
+    """Make sure that no character of a message can fail to be written."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def say(text: str) -> None:
+    """Write an answer to stdout. A reader that has gone away (`| head`) is no error.
+
+    Raises:
+        OSError: stdout cannot be written for another reason, such as a full disk.
+    """
+    stream = sys.stdout
+    if stream is None:
+        return
+    try:
+        stream.write(text + "\n")
+        stream.flush()
+    except BrokenPipeError:
+        _discard(stream)
+    except OSError:
+        _discard(stream)
+        raise
+
+
+def tell(text: str) -> None:
+    """Write a message to stderr, if there is one that takes it."""
+    stream = sys.stderr
+    if stream is None:
+        return
+    try:
+        stream.write(text + "\n")
+        stream.flush()
+    except OSError:
+        _discard(stream)
+
+
+def _discard(stream: TextIO) -> None:
+    """Send what is still buffered nowhere, so that it does not fail again at the end."""
+    try:
+        descriptor = stream.fileno()
+    except (OSError, ValueError):  # a stream without a file
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, descriptor)
+    os.close(nowhere)
+
+
+class Bar:
+    """A progress bar on a terminal's stderr; nothing at all elsewhere.
+
+    Use it as a context and pass `callback` on; it appears with the first report.
+    """
+
+    def __init__(self) -> None:
+        """Look whether there is a terminal."""
+        self._bar: Any = None
+        self._task: Any = None
+        self._last = -1.0
+        self.shown = sys.stderr is not None and sys.stderr.isatty()
+
+    @property
+    def callback(self) -> Bar | None:
+        """What a search reports to; None without a terminal, so that it need not report."""
+        return self if self.shown else None
+
+    def __call__(self, done: int, total: int | None, text: str) -> None:
+        """Show that `done` of `total` parts (None: unknown how many) are done."""
+        now = time.monotonic()
+        if now - self._last < PAUSE and done != total:
+            return
+        self._last = now
+        if self._bar is None:
+            self._start()
+        self._bar.update(self._task, completed=done, total=total, description=text)
+
+    def _start(self) -> None:
+        """Draw the bar for the first time."""
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+        from rich.progress import TimeElapsedColumn as Elapsed
+
+        text = TextColumn("{task.description}", markup=False)
+        columns = (text, BarColumn(), MofNCompleteColumn(), Elapsed())
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=True)
+        self._task = self._bar.add_task("", total=None)
+        self._bar.start()
+
+    def __enter__(self) -> Bar:
+        """Nothing is drawn yet."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Remove the bar."""
+        if self._bar is not None:
+            self._bar.stop()

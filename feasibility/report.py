@@ -1,0 +1,216 @@
+"""A verdict as one JSON object, as text for people, and its motion as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from feasibility.case import Case
+from feasibility.result import plain
+from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
+from feasibility.version import version
+
+DETAILS = 3  # cells of one group whose details are told
+
+SENTENCES = {
+    Answer.FEASIBLE: "feasible: one continuous motion covers the whole surface.",
+    Answer.INFEASIBLE: "infeasible: no single continuous motion covers the whole surface.",
+    Answer.UNDECIDED: "undecided: the search was stopped before it could tell.",
+}
+GREEDY_NO = "infeasible: not found by the greedy search, which cannot rule a motion out."
+EVIDENCE = {
+    Evidence.WITNESS: "a motion that an independent replay accepted, between its waypoints too",
+    Evidence.PROOF: "a bound shows that at least one cell cannot be covered",
+    Evidence.EXHAUSTED: "the search ran to its end at the stated resolution",
+    Evidence.BUDGET: "the budget ran out",
+}
+CAUSES = {
+    CauseKind.OUT_OF_REACH: "out of reach",
+    CauseKind.JOINT_LIMITS: "joint limits",
+    CauseKind.ORIENTATION: "orientation (the tool axis cannot come inside the cone)",
+    CauseKind.COLLISION: "collision",
+    CauseKind.DISCONNECTED: "reachable, but not by the motion that covers the rest",
+}
+
+
+def as_json(verdict: Verdict) -> dict[str, Any]:
+    """The verdict as the object that `coverable check --json` prints."""
+    return {
+        "verdict": str(verdict.answer),
+        "evidence": str(verdict.evidence),
+        "cells": len(verdict.cells),
+        "covered": verdict.n_covered,
+        "edges": verdict.n_edges,
+        "uncovered": [
+            {
+                "cell": list(verdict.cells.unravel(cause.cell)),
+                "cause": str(cause.kind),
+                "proved": bool(cause.proved),
+                "detail": cause.detail,
+            }
+            for cause in verdict.causes
+        ],
+        "certificate": _certificate(verdict),
+        "timing": {
+            key: _rounded(verdict.timing.get(key, 0.0))
+            for key in ("load_s", "search_s", "certify_s", "total_s")
+        },
+        "robot": verdict.robot.name,
+        "method": verdict.method,
+        "seed": int(verdict.seed),
+        "version": version(),
+    }
+
+
+def _certificate(verdict: Verdict) -> dict[str, Any] | None:
+    """What the replay measured, with angles in degrees; null where it measured nothing."""
+    certificate = verdict.certificate
+    if certificate is None:
+        return None
+    return {
+        "waypoints": int(certificate.waypoints),
+        "max_position_error_m": plain(float(certificate.max_position_error)),
+        "max_angle_deg": plain(math.degrees(certificate.max_angle)),
+        "min_limit_margin_deg": plain(_turning_margin(verdict)),
+    }
+
+
+def _turning_margin(verdict: Verdict) -> float:
+    """Degrees that the turning joints keep from their limits; inf without such limits.
+
+    The certificate's own margin mixes radians and metres where an arm has sliding joints. Limits
+    are convex, so the waypoints of the walk decide.
+    """
+    robot, certificate = verdict.robot, verdict.certificate
+    turns = ~robot.prismatic
+    if certificate is None or (robot.prismatic.any() and verdict.witness is None):
+        return math.inf
+    if turns.all() or verdict.witness is None:
+        return math.degrees(certificate.min_limit_margin)
+    q = verdict.witness.q
+    margins = np.minimum(q - robot.lower, robot.upper - q)[:, turns]
+    return math.degrees(float(margins.min(initial=np.inf)))
+
+
+def _rounded(seconds: float) -> float:
+    """Seconds to the microsecond."""
+    return round(float(seconds), 6) if math.isfinite(seconds) else 0.0
+
+
+def as_text(verdict: Verdict, case: Case) -> str:
+    """The verdict for people: the answer first, what it rests on, why cells are missed."""
+    head = SENTENCES[verdict.answer]
+    if verdict.answer is Answer.INFEASIBLE and verdict.method == "greedy":
+        head = GREEDY_NO
+    rows = [
+        ("case", f"{case.name}  {case.description}".rstrip()),
+        ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
+        ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
+        ("evidence", f"{verdict.evidence}: {EVIDENCE[verdict.evidence]}"),
+        ("found", verdict.message),
+        ("certificate", _certificate_text(verdict)),
+        ("time", _time_text(verdict)),
+    ]
+    lines = [head, "", *(f"  {name:<12}{text}" for name, text in rows if text)]
+    groups = list(_groups(verdict))
+    if groups:
+        lines += ["", "Not covered:", *groups]
+    hints = _hints(verdict)
+    if hints:
+        lines += ["", "To try next:", *(f"  {hint}" for hint in hints)]
+    return "\n".join(lines)
+
+
+def _certificate_text(verdict: Verdict) -> str:
+    """The certificate in one line."""
+    found = _certificate(verdict)
+    if found is None or verdict.certificate is None:
+        return ""
+    parts = [f"{found['waypoints']:,} waypoints"]
+    error = verdict.certificate.max_position_error
+    allowed = verdict.task.tolerance
+    parts.append(
+        f"tool point within {1e3 * error:.3g} mm of its surface"
+        + (f" (allowed {1e3 * allowed:.3g})" if allowed is not None else "")
+    )
+    parts.append(
+        f"tool axis within {found['max_angle_deg']:.3g} deg (allowed {verdict.task.cone_deg:g})"
+    )
+    if found["min_limit_margin_deg"] is not None:
+        parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
+    return "; ".join(parts)
+
+
+def _time_text(verdict: Verdict) -> str:
+    """The timing in one line."""
+    timing = as_seconds(verdict)
+    return (
+        f"{timing['total_s']:.2f} s (loading {timing['load_s']:.2f}, "
+        f"search {timing['search_s']:.3f}, certificate {timing['certify_s']:.3f})"
+    )
+
+
+def as_seconds(verdict: Verdict) -> dict[str, float]:
+    """The four times of a verdict, zero where one was not taken."""
+    keys = ("load_s", "search_s", "certify_s", "total_s")
+    return {key: float(verdict.timing.get(key, 0.0)) for key in keys}
+
+
+def _groups(verdict: Verdict) -> Iterator[str]:
+    """Causes grouped by kind, the largest group first, with the first few details."""
+    groups: dict[tuple[CauseKind, bool], list[Cause]] = {}
+    for cause in verdict.causes:
+        groups.setdefault((cause.kind, cause.proved), []).append(cause)
+    for (kind, proved), causes in sorted(groups.items(), key=lambda item: -len(item[1])):
+        number = len(causes)
+        cells = "1 cell" if number == 1 else f"{number:,} cells"
+        yield f"  {cells}: {CAUSES[kind]}{', proved' if proved else ''}"
+        for cause in causes[:DETAILS]:
+            yield f"    {list(verdict.cells.unravel(cause.cell))} {cause.detail}".rstrip()
+        if number > DETAILS:
+            yield f"    ... and {number - DETAILS:,} more (--json lists all)"
+
+
+def _hints(verdict: Verdict) -> list[str]:
+    """What to try next."""
+    if verdict.answer is Answer.FEASIBLE:
+        walk = ["--witness walk.csv writes the motion"] if verdict.witness is not None else []
+        return [*walk, "--html view.html shows it"]
+    hints = []
+    if verdict.answer is Answer.UNDECIDED:
+        hints.append("--set search.time_limit=... gives the search more time")
+    elif verdict.method == "greedy":
+        hints.append("--set search.method=complete searches all postures of the arm")
+        hints.append("--set search.moves=all lets several joints move at once")
+    kinds = {cause.kind for cause in verdict.causes}
+    if kinds & {CauseKind.OUT_OF_REACH, CauseKind.JOINT_LIMITS}:
+        hints.append("--set 'surface.position=[x, y, z]' moves the surface nearer to the arm")
+    if CauseKind.JOINT_LIMITS in kinds:
+        hints.append("--set robot.limits=... tries other joint limits (`coverable robots`)")
+    if CauseKind.ORIENTATION in kinds:
+        hints.append(f"--set task.cone_deg=... opens the cone ({verdict.task.cone_deg:g} now)")
+    if CauseKind.DISCONNECTED in kinds:
+        hints.append("a narrower surface.u_deg or v_deg leaves out what needs a second motion")
+    hints.append("--html view.html shows which cells are missed")
+    return hints
+
+
+def witness_csv(verdict: Verdict) -> str | None:
+    """The covering motion as CSV: `cell`, then one column per joint; None where there is none.
+
+    Floats are written so that they read back as the same numbers.
+    """
+    walk = verdict.witness
+    if verdict.answer is not Answer.FEASIBLE or walk is None:
+        return None
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["cell", *verdict.robot.joint_names])
+    for cell, q in zip(walk.cell.tolist(), walk.q.tolist(), strict=True):
+        writer.writerow(["" if cell < 0 else cell, *map(repr, q)])
+    return text.getvalue()
