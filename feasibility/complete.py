@@ -23,7 +23,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.continuation import Problem, Work, work_for
+from feasibility.continuation import Problem, Work, problem_of, work_for
 from feasibility.proof import Boxes, Ruling, root_box, rule
 from feasibility.roadmap import (
     BEST,
@@ -55,7 +55,7 @@ DRY_ROUNDS = 10  # rounds without gain after which the search is exhausted
 MOST_ROUNDS = 200
 GUESSES = 4  # of one stir
 PATIENCE = 60  # failed connections of two components that stirring allows
-FIRST_BOXES = 300  # boxes for each cell that nothing has reached
+FIRST_BOXES = 1000  # boxes for each cell that nothing has reached
 MORE_BOXES = 20_000  # boxes once Newton has failed there too
 DEEP_BOXES = 2_000_000  # boxes for the few cells that are looked at until one is proved
 DEEP_CELLS = 3
@@ -129,6 +129,11 @@ class Explorer:
         """(N,) cells that some component covers."""
         return self.roadmap.first_node >= 0
 
+    @property
+    def n_edges(self) -> int:
+        """Neighbouring pairs of cells that `close` found a motion for."""
+        return int((self.pairs[:-1] == 1).sum())
+
     def roots(self) -> list[int]:
         """Root components, the largest first."""
         slots = np.arange(self.roadmap.counters[COMPONENTS])
@@ -186,9 +191,7 @@ class Explorer:
         """Explore the fibre over one cell and spread what is new."""
         guesses = self.guesses(GUESSES)
         while True:
-            status, used, _ = stir(
-                self.problem, self.work, self.roadmap, cell, guesses, PATIENCE
-            )
+            status, used, _ = stir(self.problem, self.work, self.roadmap, cell, guesses, PATIENCE)
             guesses = guesses[used:]
             if status != FULL:
                 break
@@ -350,3 +353,6 @@ def pair_edges(explorer: Explorer) -> dict[tuple[int, int], int]:
         if i != j and root_of(roadmap, roadmap.component[x]) == best:
             edges.setdefault((min(i, j), max(i, j)), e)
     return edges
+
+
+__all__ = ["Explorer", "OutOfTime", "close", "explore", "pair_edges", "problem_of"]

@@ -170,7 +170,7 @@ def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
     axes.set_ylim(*_scale(surface, "u", np.array(surface.u_range))[::-1])
     axes.set_xlabel(f"v ({_unit(surface, 'v')})")
     axes.set_ylabel(f"u ({_unit(surface, 'u')})")
-    edges = verdict.graph.number_of_edges()
+    edges = verdict.n_edges
     axes.set_title(
         title
         or f"{verdict.robot.name} on a {surface.kind}: {verdict.n_covered} of "

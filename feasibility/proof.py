@@ -121,7 +121,7 @@ def _cut(rows, gap, radius, low, high, direction):  # type: ignore[no-untyped-de
 
 
 @njit(cache=True, error_model="numpy")
-def _reach_of_box(problem, work, half, lever, sine):  # type: ignore[no-untyped-def]
+def _reach_of_box(problem, work, half, longest, lever, sine):  # type: ignore[no-untyped-def]
     """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2)."""
     n = half.shape[0]
     behind, behind_axis, before = 0.0, 0.0, 0.0
@@ -145,7 +145,7 @@ def _reach_of_box(problem, work, half, lever, sine):  # type: ignore[no-untyped-
         r = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
         x, y, z = work.axis[1, 0], work.axis[1, 1], work.axis[1, 2]
         s = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
-        lever[j] = r + behind
+        lever[j] = min(r + behind, longest[j])
         sine[j] = min(1.0, s + behind_axis)
         first += lever[j] * h
         second += 0.5 * lever[j] * h * (h + 2.0 * before)
@@ -199,6 +199,15 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
     low, high = np.empty(n), np.empty(n)
     lever, sine = np.empty(n), np.empty(n)
     gap, tilt = np.empty(3), np.empty(3)
+    longest = np.empty(n)  # static levers: the links behind a joint, stretched out
+    total = 0.0
+    for j in range(n - 1, -1, -1):
+        for k in range(3):
+            gap[k] = problem.chain.translations[j + 1, k]
+        total += np.sqrt(gap[0] ** 2 + gap[1] ** 2 + gap[2] ** 2)
+        longest[j] = total
+        if problem.chain.prismatic[j]:
+            total += max(abs(problem.lower[j]), abs(problem.upper[j]))
     for k in range(3):
         work.target[0, k] = target[k]
         work.target[1, k] = approach[k]
@@ -221,7 +230,7 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
                 found[:] = q
                 return 2
             first, second, first_axis, second_axis = _reach_of_box(
-                problem, work, half, lever, sine
+                problem, work, half, longest, lever, sine
             )
             if (
                 work.error[1, 0] > first + problem.tolerance + ROUNDING
@@ -240,17 +249,19 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
                 high[j] -= q[j]
             distance = max(work.error[1, 0], 1e-12)
             chord = max(work.error[1, 1], 1e-12)
-            alive = _cut(
-                work.point_rows, gap, near, low, high, gap / distance
-            ) and _cut(work.axis_rows, tilt, narrow, low, high, tilt / chord)
-            if alive:
+            # The second order is of use only where it beats the first.
+            if second < first:
+                alive = _cut(work.point_rows, gap, near, low, high, gap / distance)
                 for k in range(directions.shape[0]):
-                    if not (
-                        _cut(work.point_rows, gap, near, low, high, directions[k])
-                        and _cut(work.axis_rows, tilt, narrow, low, high, directions[k])
-                    ):
-                        alive = False
+                    if not alive:
                         break
+                    alive = _cut(work.point_rows, gap, near, low, high, directions[k])
+            if alive and second_axis < first_axis:
+                alive = _cut(work.axis_rows, tilt, narrow, low, high, tilt / chord)
+                for k in range(directions.shape[0]):
+                    if not alive:
+                        break
+                    alive = _cut(work.axis_rows, tilt, narrow, low, high, directions[k])
             if not alive:
                 break
             for j in range(n):
@@ -262,12 +273,16 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
                 break
         if not alive:
             continue
-        # Split the joint that moves the tool most.
+        # Split the joint that moves most what is nearest to ruling the box out.
+        position = work.error[1, 0] / (problem.tolerance + min(first, second))
+        cone = work.error[1, 1] / (problem.rim + min(first_axis, second_axis))
+        by_point = 1.0 if position > cone else 0.05
+        by_axis = 1.0 if cone >= position else 0.05
         worst, largest = -1, 0.0
         for j in range(n):
             width = high[j] - low[j]
             if width > THINNEST:
-                move = (lever[j] / problem.scale + sine[j]) * width
+                move = (by_point * lever[j] / problem.scale + by_axis * sine[j]) * width
                 if move > largest:
                     worst, largest = j, move
         if worst < 0 or boxes.count[0] + 2 > boxes.low.shape[0]:

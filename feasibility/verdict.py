@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import networkx as nx
+if TYPE_CHECKING:
+    import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -83,9 +84,23 @@ class Certificate:
     """rad or m, smallest distance of a joint from a limit."""
 
 
+def deferred(make: Callable[[], Any]) -> Any:
+    """Stand-in for a field of `Verdict` that is made when it is first read."""
+    return _Deferred(make)
+
+
+@dataclass(frozen=True, slots=True)
+class _Deferred:
+    make: Callable[[], Any]
+
+
 @dataclass(frozen=True, eq=False)
 class Verdict:
-    """The answer for one robot, one set of cells and one task; see `feasibility.check`."""
+    """The answer for one robot, one set of cells and one task; see `feasibility.check`.
+
+    Fields that take a while to make and that not everyone reads (the graph as networkx, the
+    causes) may be given as `deferred`.
+    """
 
     answer: Answer
     evidence: Evidence
@@ -103,7 +118,7 @@ class Verdict:
     index to the larger."""
     covered: NDArray[np.bool_]
     """(N,) cells that the best single component visits."""
-    causes: tuple[Cause, ...] = ()
+    causes: tuple[Cause, ...] = field(default_factory=tuple)
     """One for each cell that is not covered, in order of index."""
     components: tuple[NDArray[np.int64], ...] = ()
     """Cells of each connected component found, the best first."""
@@ -115,8 +130,25 @@ class Verdict:
     certificate: Certificate | None = None
     timing: Mapping[str, float] = field(default_factory=dict)
     """Seconds: load_s, search_s, certify_s, total_s."""
+    n_edges: int = 0
+    """Number of edges of graph G."""
     statistics: Mapping[str, Any] = field(default_factory=dict)
     """Counts of work done (FK evaluations, calls, proofs), for benchmarks and the curious."""
+
+    def __post_init__(self) -> None:
+        """Set deferred fields aside until they are read."""
+        for name, value in list(vars(self).items()):
+            if isinstance(value, _Deferred):
+                object.__delattr__(self, name)
+                vars(self)["_" + name] = value
+
+    def __getattr__(self, name: str) -> Any:
+        """Make a deferred field; called only while it is missing."""
+        source = vars(self).pop("_" + name, None)
+        if source is None:
+            raise AttributeError(name)
+        vars(self)[name] = source.make()
+        return vars(self)[name]
 
     @property
     def feasible(self) -> bool:
@@ -133,5 +165,5 @@ class Verdict:
         pairs = len(self.cells.pairs)
         return (
             f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
-            f"{self.graph.number_of_edges()} of {pairs} edges. {self.message}"
+            f"{self.n_edges} of {pairs} edges. {self.message}"
         )

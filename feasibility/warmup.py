@@ -32,3 +32,34 @@ def compiling_notice(patience: float = PATIENCE, notice: str = NOTICE) -> Iterat
         yield
     finally:
         timer.cancel()
+
+
+def warm_up() -> None:
+    """Load (or compile) the kernels of the complete search, by a search over one small cell.
+
+    What it does is thrown away; afterwards timings tell of the search, not of the compiler.
+    """
+    from feasibility.certificate import replay
+    from feasibility.complete import Explorer, close, explore, problem_of
+    from feasibility.proof import root_box
+    from feasibility.task import Task
+    from feasibility.walk import covering_walk
+    from robots import load_robot
+    from surfaces import plane
+
+    global _warm
+    if _warm:
+        return
+    robot = load_robot("puma560")
+    cells = plane(width=(0.7, 0.72), length=(0.1, 0.12), side="outside").cells(1, 2)
+    task = Task(standoff=0.01, cone_deg=60)
+    explorer = Explorer(robot, cells, problem_of(robot, cells, task), 0)
+    explore(explorer)
+    close(explorer)
+    explorer.stir(0)
+    explorer.rule(0, root_box(explorer.problem), 1)
+    replay(robot, cells, task, covering_walk(explorer.roadmap, explorer.best), explorer.covered)
+    _warm = True
+
+
+_warm = False

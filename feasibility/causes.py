@@ -1,0 +1,275 @@
+"""Why a cell is missed: what would have to give for the arm to cover it.
+
+A cell that no component reaches is asked three relaxed questions, each by Newton from random
+starts and a descent of what is in the way:
+
+- joint limits and cone dropped: how near does the tool point get?   -> out of reach, by how much
+- only the cone dropped: how small does the angle get?               -> orientation, which angle
+- only the limits dropped: how little does a joint have to pass its limit?  -> which joint, how far
+
+Where dropping the cone or dropping the limits would each do, the cause is the cone if the tool
+point is reached inside the limits, and the detail names both. A cell that another component
+reaches is disconnected: the detail says what that component covers and what stops the motion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from feasibility.complete import Explorer
+from feasibility.continuation import (
+    CONE,
+    LIMIT,
+    LONG,
+    SINGULAR,
+    Problem,
+    connect,
+    correct,
+    place,
+)
+from feasibility.proof import Ruling
+from feasibility.roadmap import NODES, root_of
+from feasibility.verdict import Cause, CauseKind
+from robots import Robot
+
+STARTS = 16  # Newton starts of each relaxed question
+ENOUGH = 5  # solutions among which the least violation is looked for
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(problem, work, cell, guesses, solutions):  # type: ignore[no-untyped-def]
+    """Fill `solutions` with configurations of a relaxed problem over one cell; returns how many."""
+    found = 0
+    q = np.empty(guesses.shape[1])
+    for g in range(guesses.shape[0]):
+        for k in range(3):
+            work.target[0, k] = problem.points[cell, k]
+            work.target[1, k] = problem.approaches[cell, k]
+        q[:] = guesses[g]
+        place(problem, work, 1, q)
+        work.wish[:] = 0.0
+        if correct(problem, work, q, 1e-6, np.inf, 60):
+            solutions[found] = q
+            found += 1
+            if found == solutions.shape[0]:
+                break
+    return found
+
+
+@njit(cache=True, error_model="numpy")
+def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def]
+    """Smallest distance of the tool point from the target, by damped descent from guesses."""
+    n = guesses.shape[1]
+    best = np.inf
+    q, step = np.empty(n), np.empty(n)
+    for k in range(3):
+        work.target[0, k] = problem.points[cell, k]
+        work.target[1, k] = problem.approaches[cell, k]
+    for g in range(guesses.shape[0]):
+        q[:] = guesses[g]
+        damping = 0.1
+        place(problem, work, 1, q)
+        error = work.error[1, 0]
+        for _ in range(80):
+            for j in range(n):
+                zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
+                x = work.point[1, 0] - work.origins[1, j, 0]
+                y = work.point[1, 1] - work.origins[1, j, 1]
+                z = work.point[1, 2] - work.origins[1, j, 2]
+                if problem.chain.prismatic[j]:
+                    cx, cy, cz = zx, zy, zz
+                else:
+                    cx, cy, cz = zy * z - zz * y, zz * x - zx * z, zx * y - zy * x
+                pull = (
+                    cx * (work.target[0, 0] - work.point[1, 0])
+                    + cy * (work.target[0, 1] - work.point[1, 1])
+                    + cz * (work.target[0, 2] - work.point[1, 2])
+                )
+                step[j] = pull / (cx * cx + cy * cy + cz * cz + damping) / n
+            for j in range(n):
+                step[j] += q[j]
+                step[j] = min(max(step[j], problem.lower[j]), problem.upper[j])
+            place(problem, work, 1, step)
+            if work.error[1, 0] < error:
+                gain = error - work.error[1, 0]
+                error = work.error[1, 0]
+                q[:] = step
+                damping *= 0.5
+                if gain < 1e-5 * problem.scale:
+                    break
+            else:
+                damping = 4.0 * damping + 1e-3
+                place(problem, work, 1, q)
+                if damping > 1e3:
+                    break
+        best = min(best, error)
+    return best
+
+
+@njit(cache=True, error_model="numpy")
+def _head_for(problem, work, cell, q, goal, ways):  # type: ignore[no-untyped-def]
+    """Self-motion of a relaxed problem towards a goal, as far as it goes (q in place)."""
+    connect(problem, work, problem.points[cell], problem.approaches[cell], q, goal, ways, 0, 60)
+
+
+def _excess(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) how far each joint lies past its limits, at the most favourable winding."""
+    turn = np.where(robot.prismatic, 0.0, 2.0 * np.pi)
+    past = []
+    for k in (-1.0, 0.0, 1.0):
+        value = q + k * turn
+        past.append(np.maximum(np.maximum(robot.lower - value, value - robot.upper), 0.0))
+    return np.min(past, axis=0)
+
+
+def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """q with each turning joint at the winding nearest to its limits."""
+    turn = np.where(robot.prismatic, 0.0, 2.0 * np.pi)
+    middle = np.where(np.isfinite(robot.lower + robot.upper), 0.5 * (robot.lower + robot.upper), q)
+    return q - turn * np.round((q - middle) / (2.0 * np.pi))
+
+
+def _smallest_excess(
+    explorer: Explorer, relaxed: Problem, cell: int, solutions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n,) excess of the solution that passes its limits least."""
+    robot = explorer.robot
+    ways = np.empty((64, robot.n))
+    best = np.full(robot.n, np.inf)
+    for q in solutions:
+        here = _wrapped(robot, q)
+        goal = np.clip(here, robot.lower, robot.upper)
+        _head_for(relaxed, explorer.work, cell, here, goal, ways)
+        excess = _excess(robot, here)
+        if excess.sum() < best.sum():
+            best = excess
+    return best
+
+
+def _one(explorer: Explorer) -> NDArray[np.float64]:
+    """Room for one solution."""
+    return np.empty((1, explorer.robot.n))
+
+
+def _smallest_angle(explorer: Explorer, relaxed: Problem, cell: int) -> float:
+    """Smallest angle (rad) between tool axis and approach direction with the point reached."""
+    low, high = 0.0, np.pi
+    # Bisect on the cone: is there a configuration inside it?
+    for _ in range(9):
+        middle = 0.5 * (low + high)
+        narrowed = relaxed._replace(rim=2.0 * np.sin(0.5 * middle))
+        if _solve(narrowed, explorer.work, cell, explorer.guesses(STARTS), _one(explorer)):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def _joint(robot: Robot, excess: NDArray[np.float64]) -> str:
+    """The joints that pass their limits, in words."""
+    parts = []
+    for j in np.argsort(-excess):
+        if excess[j] > 1e-6:
+            unit = (
+                f"{1e3 * excess[j]:.0f} mm"
+                if robot.prismatic[j]
+                else f"{np.degrees(excess[j]):.1f} deg"
+            )
+            parts.append(f"{robot.joint_names[j]} by {unit}")
+    return " and ".join(parts) + " would have to pass the limits" if parts else "no single joint"
+
+
+def diagnose(explorer: Explorer, cell: int) -> Cause:
+    """Why nothing reaches a cell.
+
+    Args:
+        explorer: a finished search.
+        cell: a cell that no component covers.
+
+    Returns:
+        The cause; proved where branch and bound or the reach bound ruled the cell out.
+    """
+    problem, robot, work = explorer.problem, explorer.robot, explorer.work
+    proved = explorer.rulings.get(cell) is Ruling.PROVED
+    n = robot.n
+    solutions = np.empty((ENOUGH, n))
+    turning = ~robot.prismatic
+    unlimited = problem._replace(
+        lower=np.where(turning, -np.inf, robot.lower), upper=np.where(turning, np.inf, robot.upper)
+    )
+    slack_cone = problem._replace(rim=np.inf)
+    anything = unlimited._replace(rim=np.inf)
+    guesses = explorer.guesses(STARTS)
+
+    if not _solve(anything, work, cell, guesses, _one(explorer)):
+        distance = _nearest_point(unlimited, work, cell, guesses[:6])
+        origin = robot.model.jointPlacements[1].translation
+        away = float(np.linalg.norm(problem.points[cell] - origin))
+        return Cause(
+            cell, CauseKind.OUT_OF_REACH, proved,
+            f"the tool point stays {1e3 * distance:.0f} mm short; the target is {away:.3f} m from "
+            f"the first joint, the arm reaches at most {robot.reach:.3f} m",
+        )  # fmt: skip
+    found = _solve(unlimited, work, cell, guesses, solutions)
+    past = _smallest_excess(explorer, unlimited, cell, solutions[:found]) if found else None
+    if _solve(slack_cone, work, cell, guesses, _one(explorer)):
+        angle = np.degrees(_smallest_angle(explorer, slack_cone, cell))
+        alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.rim, 1.0)))
+        detail = f"the tool tilts at least {angle:.1f} deg there, the cone allows {alpha:g} deg"
+        if past is not None and np.isfinite(past).all() and past.sum() > 1e-6:
+            detail += f"; or {_joint(robot, past)}"
+        return Cause(cell, CauseKind.ORIENTATION, proved, detail)
+    if past is None:
+        found = _solve(anything, work, cell, guesses, solutions)
+        past = _smallest_excess(explorer, anything, cell, solutions[:found])
+        return Cause(
+            cell, CauseKind.JOINT_LIMITS, proved,
+            f"for the tool point alone {_joint(robot, past)}; inside the cone nothing was found "
+            "even without limits",
+        )  # fmt: skip
+    return Cause(cell, CauseKind.JOINT_LIMITS, proved, _joint(robot, past))
+
+
+def disconnected(explorer: Explorer, cell: int) -> Cause:
+    """Why the best component misses a cell that another one covers."""
+    roadmap, robot = explorer.roadmap, explorer.robot
+    sizes = {int(root_of(roadmap, roadmap.component[x])): 0 for x in _nodes_over(explorer, cell)}
+    other = max(sizes, key=lambda root: int(roadmap.size[root]))
+    code, joint = (int(v) for v in roadmap.blocked[cell])
+    reason = {
+        LIMIT: f"{robot.joint_names[joint]} at its limit" if joint >= 0 else "a joint at its limit",
+        CONE: "the rim of the cone",
+        SINGULAR: "a singular configuration",
+        LONG: "a motion of too many steps",
+    }.get(code)
+    border = [int(k) for k in explorer.cells.neighbours.of(cell) if explorer.covered[k]]
+    detail = (
+        f"reached in another component, which covers {int(roadmap.size[other])} of "
+        f"{len(explorer.cells)} cells"
+    )
+    if border and reason:
+        detail += f"; from its neighbours {reason} stops the motion"
+    return Cause(cell, CauseKind.DISCONNECTED, False, detail)
+
+
+def _nodes_over(explorer: Explorer, cell: int) -> list[int]:
+    """Nodes of the roadmap over one cell."""
+    nodes = np.arange(explorer.roadmap.counters[NODES])
+    return [int(x) for x in nodes[explorer.roadmap.cell[: len(nodes)] == cell]]
+
+
+def causes_of(explorer: Explorer) -> tuple[Cause, ...]:
+    """One cause for each cell that the best component misses, in order of index.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    causes = []
+    reached = explorer.reached
+    for cell in np.flatnonzero(~explorer.covered):
+        explorer.tick("finding causes")
+        find = disconnected if reached[cell] else diagnose
+        causes.append(find(explorer, int(cell)))
+    return tuple(causes)

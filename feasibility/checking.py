@@ -1,0 +1,221 @@
+"""The question asked: `check` runs the method, has its motion replayed, and words the verdict."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from feasibility.search import Search
+from feasibility.task import DEFAULT_TOLERANCE, Task
+from feasibility.verdict import Answer, Evidence, Verdict, Walk, deferred
+from robots import Robot
+from surfaces import Cells
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+    from feasibility.certificate import Replay
+    from feasibility.complete import Explorer, Progress
+
+
+def check(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    search: Search | None = None,
+    progress: Progress | None = None,
+) -> Verdict:
+    """Can this arm move its tool over all of these cells in one continuous motion?
+
+    Args:
+        robot: the arm, with its limits.
+        cells: the surface, cut into E-cells.
+        task: standoff, cone and tolerance.
+        search: method and settings; the complete search by default.
+        progress: called as progress(done, total, text) now and then.
+
+    Returns:
+        The verdict. An infeasible surface is a result, not an error.
+
+    Example:
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> patch = plane(width=(0.4, 0.6), length=(-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+        >>> verdict = check(load_robot("ur5"), patch.cells(3, 3), Task(standoff=0.02, cone_deg=30))
+        >>> verdict.feasible, verdict.n_covered
+        (True, 9)
+    """
+    from feasibility.warmup import compiling_notice
+
+    search = Search() if search is None else search
+    if search.method == "greedy":
+        from feasibility.greedy import greedy_check
+
+        with compiling_notice():
+            return greedy_check(robot, cells, task, search, progress)
+    return _complete_check(robot, cells, task, search, progress)
+
+
+def _complete_check(
+    robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
+) -> Verdict:
+    """Run the complete search, replay its walk, and word the verdict."""
+    from feasibility.warmup import compiling_notice, warm_up
+
+    began = time.monotonic()
+    with compiling_notice():
+        from feasibility.causes import causes_of
+        from feasibility.certificate import replay
+        from feasibility.complete import Explorer, OutOfTime, close, explore, problem_of
+        from feasibility.walk import covering_walk
+
+        warm_up()
+    loaded = time.monotonic()
+    deadline = np.inf if search.time_limit is None else began + search.time_limit
+    explorer = Explorer(robot, cells, problem_of(robot, cells, task), search.seed, deadline, progress)
+    in_time = True
+    try:
+        explore(explorer)
+        close(explorer)
+    except OutOfTime:
+        in_time = False
+    searched = time.monotonic()
+    walk: Walk | None = None
+    replayed: Replay | None = None
+    if explorer.complete and len(cells):
+        walk = covering_walk(explorer.roadmap, explorer.best)
+        replayed = replay(robot, cells, task, walk, explorer.covered)
+    certified = time.monotonic()
+    answer, evidence, message = _answer(explorer, task, replayed, in_time)
+    feasible = answer is Answer.FEASIBLE
+    explorer.deadline, explorer.progress = np.inf, None
+    return Verdict(
+        answer=answer,
+        evidence=evidence,
+        message=message,
+        robot=robot,
+        cells=cells,
+        task=task,
+        method="complete",
+        seed=search.seed,
+        graph=deferred(lambda: graph_of(explorer)),
+        covered=explorer.covered,
+        causes=deferred(lambda: causes_of(explorer)),
+        components=tuple(np.flatnonzero(explorer.covers(root)) for root in explorer.roots()),
+        start=int(walk.cell[0]) if walk is not None else None,
+        witness=walk if feasible else None,
+        certificate=replayed.certificate if feasible and replayed is not None else None,
+        timing={
+            "load_s": loaded - began,
+            "search_s": searched - loaded,
+            "certify_s": certified - searched,
+            "total_s": certified - began,
+        },
+        n_edges=explorer.n_edges,
+        statistics={
+            "fk": int(explorer.work.count[0]),
+            "nodes": int(explorer.roadmap.counters[0]),
+            "motions": int(explorer.roadmap.counters[1]),
+            "boxes": explorer.boxes,
+            "rounds": explorer.rounds,
+        },
+    )
+
+
+def _answer(
+    explorer: Explorer, task: Task, replayed: Replay | None, in_time: bool
+) -> tuple[Answer, Evidence, str]:
+    """Answer, evidence and the sentences that say what was done."""
+    from feasibility.proof import Ruling
+
+    total = len(explorer.cells)
+    covered = int(explorer.covered.sum())
+    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    within = f"within {1e3 * tolerance:g} mm and {task.cone_deg:g} deg"
+    proved = sum(ruling is Ruling.PROVED for ruling in explorer.rulings.values())
+    if total == 0:
+        return Answer.FEASIBLE, Evidence.WITNESS, "There are no cells to cover."
+    if replayed is not None and replayed.accepted:
+        return (
+            Answer.FEASIBLE,
+            Evidence.WITNESS,
+            f"One continuous motion of {replayed.certificate.waypoints} waypoints visits every "
+            f"cell centre; Pinocchio's replay holds it {within}, between waypoints too.",
+        )
+    if replayed is not None:
+        return (
+            Answer.UNDECIDED,
+            Evidence.BUDGET,
+            f"A motion over every cell was found, but the independent replay refuses it: "
+            f"{replayed.refusal}.",
+        )
+    if proved:
+        return (
+            Answer.INFEASIBLE,
+            Evidence.PROOF,
+            f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {within} "
+            f"(reach bound and branch and bound, {explorer.boxes} boxes); the best single motion "
+            f"covers {covered} of {total}.",
+        )
+    if not in_time:
+        return (
+            Answer.UNDECIDED,
+            Evidence.BUDGET,
+            f"The time limit ran out; the best single motion so far covers {covered} of {total} "
+            f"cells.",
+        )
+    if not explorer.problem.rim > 0.0:
+        return (
+            Answer.UNDECIDED,
+            Evidence.BUDGET,
+            "A cone of 0 degrees leaves a motion no room between samples, so none can be "
+            "certified; allow a small angle.",
+        )
+    if not np.isfinite(explorer.problem.curvature):
+        return (
+            Answer.UNDECIDED,
+            Evidence.BUDGET,
+            "The offset surface folds: the standoff is as large as the surface's radius of "
+            "curvature, so no motion can be certified; use a smaller standoff.",
+        )
+    missed = int((~explorer.reached).sum())
+    what = (
+        f"{missed} cell{'s were' if missed > 1 else ' was'} never reached, without a proof"
+        if missed
+        else "every cell is reached, but by no single component"
+    )
+    return (
+        Answer.INFEASIBLE,
+        Evidence.EXHAUSTED,
+        f"The search ended without a covering motion {within}: {what}; the best covers {covered} "
+        f"of {total} cells ({explorer.roadmap.counters[0]} nodes, {explorer.rounds} rounds, seed "
+        f"{explorer.seed}).",
+    )
+
+
+def graph_of(explorer: Explorer) -> nx.Graph:
+    """Graph G of the best component: every cell, and one motion for each pair that has any.
+
+    Nodes carry `q` (n,), a configuration over the cell's centre, None for cells that the component
+    misses. Edges carry `motion` (k, n), from the smaller cell index to the larger.
+    """
+    import networkx as nx
+
+    from feasibility.complete import pair_edges
+    from feasibility.roadmap import NODES, root_of
+    from feasibility.walk import edge_motion
+
+    roadmap, best = explorer.roadmap, explorer.best
+    graph: nx.Graph = nx.Graph()
+    graph.add_nodes_from(range(len(explorer.cells)), q=None)
+    for x in range(roadmap.counters[NODES] - 1, -1, -1):
+        if root_of(roadmap, roadmap.component[x]) == best:
+            graph.nodes[int(roadmap.cell[x])]["q"] = roadmap.q[x].copy()
+    for (i, j), e in pair_edges(explorer).items():
+        motion = edge_motion(roadmap, e)
+        if roadmap.cell[roadmap.ends[e, 0]] != i:
+            motion = motion[::-1]
+        graph.add_edge(i, j, motion=motion)
+    return graph
