@@ -233,7 +233,8 @@ def close(value: Any, options: Sequence[str]) -> str:
     """The option that `value` is most like, quoted; empty where none is."""
     if not isinstance(value, str) or len(value) > 60:
         return ""
-    found = difflib.get_close_matches(value, options, n=1, cutoff=0.6)
+    same = [option for option in options if option.lower() == value.lower()]
+    found = same or difflib.get_close_matches(value, options, n=1, cutoff=0.6)
     return f'"{found[0]}"' if found else ""
 
 

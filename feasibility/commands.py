@@ -7,7 +7,6 @@ import json
 import os
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from feasibility.console import Bar, say, tell
@@ -30,11 +29,7 @@ def check(args: argparse.Namespace, began: float) -> int:
     loaded = time.perf_counter() - began
     with Bar() as bar:
         verdict = run(*setup, progress=bar.callback)
-    timing = dict(verdict.timing)
-    for key in ("load_s", "total_s"):
-        timing[key] = timing.get(key, 0.0) + loaded
-    verdict = replace(verdict, timing=timing)
-    say(_json(as_json(verdict)) if args.json else as_text(verdict, case))
+    say(_json(as_json(verdict, loaded)) if args.json else as_text(verdict, case, loaded))
     if args.save is not None:
         from feasibility.result import save_result
 

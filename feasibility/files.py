@@ -34,16 +34,18 @@ def read_regular(path: str | os.PathLike[str], cap: int, what: str) -> bytes:
         raise FileError(f"{name}: there is no such file; expected {what}") from error
     except (OSError, ValueError) as error:  # ValueError: a NUL byte in the name
         raise FileError(f"{name}: cannot be opened: {reason(error)}") from error
-    with open(handle, "rb") as stream:
-        status = os.fstat(handle)
-        if stat.S_ISDIR(status.st_mode):
+    try:
+        mode = os.fstat(handle).st_mode
+        if stat.S_ISDIR(mode):
             raise FileError(f"{name}: is a folder; expected {what}")
-        if not stat.S_ISREG(status.st_mode):
+        if not stat.S_ISREG(mode):
             raise FileError(f"{name}: is not a regular file; expected {what}")
-        try:
+        with open(handle, "rb", closefd=False) as stream:
             data = stream.read(cap + 1)
-        except OSError as error:
-            raise FileError(f"{name}: cannot be read: {reason(error)}") from error
+    except OSError as error:
+        raise FileError(f"{name}: cannot be read: {reason(error)}") from error
+    finally:
+        os.close(handle)
     if len(data) > cap:
         raise FileError(f"{name}: is larger than {size(cap)}, too large for {what}")
     return data

@@ -38,8 +38,13 @@ CAUSES = {
 }
 
 
-def as_json(verdict: Verdict) -> dict[str, Any]:
-    """The verdict as the object that `coverable check --json` prints."""
+def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
+    """The verdict as the object that `coverable check --json` prints.
+
+    Args:
+        verdict: of either method.
+        before_s: seconds of imports and files before the check began; they count as loading.
+    """
     return {
         "verdict": str(verdict.answer),
         "evidence": str(verdict.evidence),
@@ -56,10 +61,7 @@ def as_json(verdict: Verdict) -> dict[str, Any]:
             for cause in verdict.causes
         ],
         "certificate": _certificate(verdict),
-        "timing": {
-            key: _rounded(verdict.timing.get(key, 0.0))
-            for key in ("load_s", "search_s", "certify_s", "total_s")
-        },
+        "timing": {key: round(value, 6) for key, value in _seconds(verdict, before_s).items()},
         "robot": verdict.robot.name,
         "method": verdict.method,
         "seed": int(verdict.seed),
@@ -97,12 +99,7 @@ def _turning_margin(verdict: Verdict) -> float:
     return math.degrees(float(margins.min(initial=np.inf)))
 
 
-def _rounded(seconds: float) -> float:
-    """Seconds to the microsecond."""
-    return round(float(seconds), 6) if math.isfinite(seconds) else 0.0
-
-
-def as_text(verdict: Verdict, case: Case) -> str:
+def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     """The verdict for people: the answer first, what it rests on, why cells are missed."""
     head = SENTENCES[verdict.answer]
     if verdict.answer is Answer.INFEASIBLE and verdict.method == "greedy":
@@ -114,7 +111,7 @@ def as_text(verdict: Verdict, case: Case) -> str:
         ("evidence", f"{verdict.evidence}: {EVIDENCE[verdict.evidence]}"),
         ("found", verdict.message),
         ("certificate", _certificate_text(verdict)),
-        ("time", _time_text(verdict)),
+        ("time", _time_text(_seconds(verdict, before_s))),
     ]
     lines = [head, "", *(f"  {name:<12}{text}" for name, text in rows if text)]
     groups = list(_groups(verdict))
@@ -139,26 +136,26 @@ def _certificate_text(verdict: Verdict) -> str:
         + (f" (allowed {1e3 * allowed:.3g})" if allowed is not None else "")
     )
     parts.append(
-        f"tool axis within {found['max_angle_deg']:.3g} deg (allowed {verdict.task.cone_deg:g})"
+        f"tool axis within {found['max_angle_deg']:.4g} deg (allowed {verdict.task.cone_deg:g})"
     )
     if found["min_limit_margin_deg"] is not None:
         parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
     return "; ".join(parts)
 
 
-def _time_text(verdict: Verdict) -> str:
+def _time_text(seconds: dict[str, float]) -> str:
     """The timing in one line."""
-    timing = as_seconds(verdict)
     return (
-        f"{timing['total_s']:.2f} s (loading {timing['load_s']:.2f}, "
-        f"search {timing['search_s']:.3f}, certificate {timing['certify_s']:.3f})"
+        f"{seconds['total_s']:.2f} s (loading {seconds['load_s']:.2f}, "
+        f"search {seconds['search_s']:.3f}, certificate {seconds['certify_s']:.3f})"
     )
 
 
-def as_seconds(verdict: Verdict) -> dict[str, float]:
+def _seconds(verdict: Verdict, before_s: float) -> dict[str, float]:
     """The four times of a verdict, zero where one was not taken."""
     keys = ("load_s", "search_s", "certify_s", "total_s")
-    return {key: float(verdict.timing.get(key, 0.0)) for key in keys}
+    seconds = {key: float(verdict.timing.get(key, 0.0)) for key in keys}
+    return seconds | {key: seconds[key] + before_s for key in ("load_s", "total_s")}
 
 
 def _groups(verdict: Verdict) -> Iterator[str]:

@@ -212,6 +212,7 @@ def _check_robot(robot: Robot, fields: Fields, archive: Archive) -> None:
 def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verdict:
     """The verdict, every index and number checked."""
     count, n = len(cells), robot.n
+    graph = unpack_graph(archive, "graph", count, n)
     covered = np.zeros(count, dtype=bool)
     covered[unpack_indices(archive, "covered", count)] = True
     witness = None
@@ -231,7 +232,8 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
         task=_task(fields.table("task")),
         method=fields.text("method"),
         seed=int(fields.get("seed", int, "a whole number")),
-        graph=unpack_graph(archive, "graph", count, n),
+        graph=graph,
+        n_edges=graph.number_of_edges(),
         covered=covered,
         causes=_causes(fields, count),
         components=unpack_ragged(archive, "components", count),

@@ -1,0 +1,211 @@
+"""Case files that are wrong, with the key of a fault and words of its message."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+GOOD = """\
+[task]
+standoff = 0.005
+cone_deg = 45
+
+[surface]
+kind = "sphere"
+radius = 1.0
+u_deg = [10, 90]
+v_deg = [10, 180]
+cells = [9, 10]
+side = "inside"
+
+[robot]
+name = "puma560"
+limits = "set-1"
+"""
+
+
+class Bad(NamedTuple):
+    """One bad file."""
+
+    content: str | bytes
+    key: str
+    words: tuple[str, ...]
+
+
+def write(folder, content, name="case.toml"):
+    """The path of a new file with this content."""
+    path = folder / name
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return str(path)
+
+
+def changed(old, new, key, *words):
+    """The good case with one line changed."""
+    if GOOD.count(old) != 1:
+        raise ValueError(f"{old!r} is not once in the good case")
+    return Bad(GOOD.replace(old, new), key, words)
+
+
+def added(table, line, key, *words):
+    """The good case with one line more in a table."""
+    if table == "search":
+        return Bad(f"{GOOD}\n[search]\n{line}\n", key, words)
+    return changed(f"[{table}]\n", f"[{table}]\n{line}\n", key, *words)
+
+
+PLANE = GOOD.replace('kind = "sphere"\nradius = 1.0\nu_deg = [10, 90]\nv_deg = [10, 180]\n', "{}")
+MORE = "must be [low, high] in "
+
+BAD_CASES = {
+    # the file as a whole
+    "empty": Bad("", "robot", ("is missing", "[robot]")),
+    "not toml": Bad("robot: puma560\n", "", ("is not valid TOML", "line 1")),
+    "xml": Bad("<robot name='x'/>", "", ("is not valid TOML",)),
+    "unclosed string": changed('"inside"', '"inside', "", "is not valid TOML", "line 11"),
+    "key twice": added("task", "cone_deg = 4", "", "is not valid TOML"),
+    "binary": Bad(b"\x7fELF\x02\x01\x01\x00\xff\xfe" * 50, "", ("is not UTF-8 text",)),
+    "utf-16": Bad(GOOD.encode("utf-16"), "", ("is not UTF-8 text",)),
+    "NUL": Bad(GOOD + "\0", "", ("is not valid TOML",)),
+    "huge": Bad(GOOD + "#" * 300_000, "", ("is larger than 256 kB",)),
+    "nested too deeply": Bad("a = " + "[" * 20_000, "", ("is nested too deeply",)),
+    "digits without end": Bad("a = " + "9" * 20_000, "", ("is not valid TOML",)),
+    # tables
+    "table missing": Bad(GOOD.replace("[task]", "[tusk]"), "task", ("is missing", '"task"')),
+    "table is a number": Bad("task = 5\n" + GOOD[GOOD.index("[surface]") :], "task", ("table",)),
+    "table is an array": Bad(GOOD.replace("[robot]", "[[robot]]"), "robot", ("must be a table",)),
+    "unknown table": Bad(GOOD + "[serach]\nseed = 1\n", "serach", ('did you mean "search"?',)),
+    "odd key": added("task", '"a\\nb\\u001b" = 1', "task.'a\\nb\\x1b'", "is not known here"),
+    # robot
+    "no robot": changed('name = "puma560"\n', "", "robot.name", "is missing"),
+    "name and urdf": added("robot", 'urdf = "a.urdf"', "robot.name", "contradicts robot.urdf"),
+    "unknown robot": changed('"puma560"', '"puma561"', "robot", "'puma561'", "'puma560'"),
+    "path as a name": changed('"puma560"', '"arms/my.urdf"', "robot.name", "write urdf ="),
+    "empty name": changed('"puma560"', '" "', "robot.name", "must be the name of a robot"),
+    "name is a number": changed('"puma560"', "560", "robot.name", "got 560"),
+    "missing urdf": changed('name = "puma560"', 'urdf = "no.urdf"', "robot", "no.urdf"),
+    "unknown limit set": changed('"set-1"', '"set-9"', "robot", "'set-9'", "set-4"),
+    "limits twice": added(
+        "robot", "limits_deg = { joint4 = [-9, 9] }", "robot.limits", "contradicts robot.limits_deg"
+    ),
+    "limits as pairs": changed('"set-1"', "[[0, 1]]", "robot.limits", "the name of a limit set"),
+    "limits of too few joints": changed(
+        'limits = "set-1"', "limits_deg = [[-90, 90]]", "robot", "(6, 2)"
+    ),
+    "limits reversed": changed(
+        'limits = "set-1"',
+        "limits_deg = { joint4 = [90, -90] }",
+        "robot.limits_deg.joint4",
+        "the wrong way round",
+    ),
+    "limits empty": changed(
+        'limits = "set-1"', "limits_deg = { joint4 = [9, 9] }", "robot.limits_deg.joint4", "empty"
+    ),
+    "limits NaN": changed(
+        'limits = "set-1"', "limits_deg = [[-90, nan]]", "robot.limits_deg[0]", "two finite numbers"
+    ),
+    "limits infinite": changed(
+        'limits = "set-1"', "limits_deg = [[-inf, inf]]", "robot.limits_deg[0]", "finite"
+    ),
+    "limits are words": changed(
+        'limits = "set-1"', 'limits_deg = "wide"', "robot.limits_deg", "an array of [low, high]"
+    ),
+    "limits of an unknown joint": changed(
+        'limits = "set-1"', "limits_deg = { elbow = [-9, 9] }", "robot", "'elbow'", "joint1"
+    ),
+    "list and metres": changed(
+        'limits = "set-1"',
+        "limits_deg = [[-9, 9]]\nlimits_m = { a = [0, 1] }",
+        "robot.limits_m",
+        "contradicts the list",
+    ),
+    "degrees and metres": changed(
+        'limits = "set-1"',
+        "limits_deg = { a = [-9, 9] }\nlimits_m = { a = [0, 1] }",
+        "robot.limits_m.a",
+        "contradicts robot.limits_deg",
+    ),
+    "locked and limited": changed(
+        'limits = "set-1"',
+        "limits_deg = { joint6 = [-9, 9] }\nlock = { joint6 = 0.0 }",
+        "robot.lock.joint6",
+        "contradicts the limits",
+    ),
+    "lock is a word": added("robot", 'lock = { joint6 = "shut" }', "robot.lock.joint6", "'shut'"),
+    "lock is a list": added("robot", 'lock = ["joint6"]', "robot.lock", "a table of joints"),
+    "lock unknown": added("robot", "lock = { finger = 0.0 }", "robot", "'finger'"),
+    "unknown tool": added("robot", 'tool_frame = "tool0"', "robot", "no link 'tool0'"),
+    "axis is zero": added("robot", "approach_axis = [0, 0, 0]", "robot.approach_axis", "all zero"),
+    "axis is flat": added("robot", "approach_axis = [0, 1]", "robot.approach_axis", "three finite"),
+    "folders": added("robot", 'package_dirs = "meshes"', "robot.package_dirs", "an array of"),
+    # surface
+    "no kind": changed('kind = "sphere"\n', "", "surface.kind", "is missing", '"plane"'),
+    "misspelt kind": changed('"sphere"', '"shpere"', "surface.kind", 'did you mean "sphere"?'),
+    "kind is a list": changed('"sphere"', '["sphere"]', "surface.kind", "must be"),
+    "mesh": changed('"sphere"', '"mesh"', "surface.kind", "is not supported yet"),
+    "torus": changed('"sphere"', '"torus"', "surface.kind", "is not supported yet"),
+    "mesh key": added("surface", 'file = "part.stl"', "surface.file", "belongs to a mesh"),
+    "key of another kind": added("surface", "flare = 1.0", "surface.flare", "belongs to a hyper"),
+    "radius missing": changed("radius = 1.0\n", "", "surface.radius", "is missing", "metres"),
+    "radius zero": changed("radius = 1.0", "radius = 0", "surface.radius", "> 0"),
+    "radius true": changed("radius = 1.0", "radius = true", "surface.radius", "got true"),
+    "radius NaN": changed("radius = 1.0", "radius = nan", "surface.radius", "got nan"),
+    "radius infinite": changed("radius = 1.0", "radius = inf", "surface.radius", "got inf"),
+    "radius too large a whole number": changed(
+        "radius = 1.0", "radius = 0x" + "F" * 9000, "surface.radius", "thousands of digits"
+    ),
+    "radius is a date": changed("radius = 1.0", "radius = 2026-01-01", "surface.radius", "date"),
+    "range reversed": changed("[10, 90]", "[90, 10]", "surface.u_deg", "the wrong way round"),
+    "range empty": changed("[10, 90]", "[10, 10.0]", "surface.u_deg", "an empty range"),
+    "range of three": changed("[10, 90]", "[10, 20, 90]", "surface.u_deg", MORE + "degrees"),
+    "range beyond the pole": changed("[10, 90]", "[10, 190]", "surface", "u_deg must lie in 0"),
+    "more than a turn": changed("[10, 180]", "[0, 400]", "surface", "v_deg must span at most"),
+    "metres for degrees": changed("u_deg = [10, 90]", "u = [0, 1]", "surface.u", "write u_deg"),
+    "degrees for metres": Bad(
+        PLANE.format('kind = "plane"\nu_deg = [0, 90]\nv = [0, 1]\n'),
+        "surface.u_deg",
+        ("write u in metres",),
+    ),
+    "plane with a radius": Bad(
+        PLANE.format('kind = "plane"\nradius = 1.0\nu = [0, 1]\nv = [0, 1]\n'),
+        "surface.radius",
+        ("not to a plane",),
+    ),
+    "flare beyond reason": Bad(
+        PLANE.format(
+            'kind = "hyperboloid"\nradius = 1.0\nflare = 1e-9\nu_deg = [0, 90]\nv = [0, 1]\n'
+        ),
+        "surface",
+        ("radius / flare",),
+    ),
+    "side": changed('"inside"', '"in side"', "surface.side", 'did you mean "inside"?'),
+    "position": added("surface", "position = [0, 0]", "surface.position", "three finite numbers"),
+    "rotation": added("surface", 'rpy_deg = "up"', "surface.rpy_deg", "three finite numbers"),
+    "cells missing": changed("cells = [9, 10]\n", "", "surface.cells", "is missing"),
+    "cells as a count": changed("[9, 10]", "90", "surface.cells", "two whole numbers"),
+    "cells as floats": changed("[9, 10]", "[9.0, 10.0]", "surface.cells", "two whole numbers"),
+    "cells negative": changed("[9, 10]", "[-9, 10]", "surface.cells", "two whole numbers"),
+    "cells true": changed("[9, 10]", "[true, 10]", "surface.cells", "two whole numbers"),
+    "too many cells": changed("[9, 10]", "[9000, 10000]", "surface.cells", "coarser grid"),
+    "cells without end": changed(
+        "[9, 10]", f"[0, 0x{'F' * 9000}]", "surface.cells", "coarser grid"
+    ),
+    # task
+    "standoff missing": changed("standoff = 0.005\n", "", "task.standoff", "is missing"),
+    "standoff negative": changed("0.005", "-0.005", "task.standoff", ">= 0"),
+    "standoff is text": changed("0.005", '"5 mm"', "task.standoff", "got '5 mm'"),
+    "cone too wide": changed("= 45", "= 181", "task.cone_deg", "0 .. 180"),
+    "cone in radians": changed("cone_deg", "cone", "task.cone", 'did you mean "cone_deg"?'),
+    "tolerance zero": added("task", "tolerance = 0", "task.tolerance", "> 0"),
+    "fixed approach": added("task", "approach = [0, 0, -1]", "task.approach", "not supported yet"),
+    "roll": added("task", "roll_deg = [-15, 15]", "task.roll_deg", "is not supported yet"),
+    # search
+    "method": added("search", 'method = "compleat"', "search.method", 'did you mean "complete"?'),
+    "seed": added("search", "seed = -1", "search.seed", ">= 0"),
+    "seed beyond 64 bits": added("search", f"seed = {2**63}", "search.seed", "a whole number"),
+    "time limit": added("search", "time_limit = 0", "search.time_limit", "> 0"),
+    "time limit infinite": added("search", "time_limit = inf", "search.time_limit", "> 0"),
+    "step": added("search", "step_deg = 0", "search.step_deg", "0.0001 .. 30"),
+    "moves": added("search", "moves = 1", "search.moves", "must be"),
+    "starts": added("search", 'starts = "some"', "search.starts", '"all" or a whole number'),
+    "starts zero": added("search", "starts = 0", "search.starts", ">= 1"),
+    "cap": added("search", "cap = 1e5", "search.cap", "a whole number >= 1"),
+}
