@@ -40,6 +40,7 @@ from feasibility.roadmap import (
     empty_roadmap,
     grown,
     joined_pairs,
+    roomy,
     root_of,
     seed_cell,
     spread_out,
@@ -233,14 +234,15 @@ def _pivot(explorer: Explorer) -> bool:
     """Step 1; True when one component covers every cell."""
     nu, nv = explorer.cells.shape
     pivot = explorer.cells.index(nu // 2, nv // 2)
-    found = 0
-    for k in range(PIVOT_SEEDS):
-        explorer.tick("looking for configurations")
-        found += explorer.plant(pivot, explorer.guesses(1))
+    explorer.tick("looking for configurations")
+    guesses = explorer.guesses(PIVOT_SEEDS)
+    room = roomy(explorer.problem, explorer.work, pivot, guesses)
+    # The one with most room first: it is the least likely to get stuck.
+    for k in np.argsort(-room, kind="stable"):
+        if room[k] >= 0.0:
+            explorer.plant(pivot, guesses[k : k + 1])
         if explorer.complete:
             return True
-        if found == 0 and k >= PIVOT_SEEDS // 2:
-            break
     return False
 
 

@@ -175,9 +175,7 @@ def work_for(n: int) -> Work:
 @njit(cache=True, error_model="numpy")
 def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
     """Evaluate the arm at q into a slot, and its errors against `work.target`."""
-    frames(
-        problem.chain, q, work.origins[slot], work.axes[slot], work.point[slot], work.axis[slot]
-    )
+    frames(problem.chain, q, work.origins[slot], work.axes[slot], work.point[slot], work.axis[slot])
     work.count[0] += 1
     distance = 0.0
     chord = 0.0
@@ -350,7 +348,9 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
         chord = work.error[1, 1]
         goal = hard
         if it == 0:
-            goal = min(hard, max(COMFORT * problem.rim, (1.0 - 150.0 * slack) * before))
+            # Come in from the rim by a part of what the target's motion costs anyway.
+            inwards = max(0.5 * (chord - before), 150.0 * slack * before)
+            goal = min(hard, max(COMFORT * problem.rim, before - inwards))
         norm = _rows(problem, work, 1, goal)
         usable = norm > 1e-9
         work.blame[1] = -1
@@ -446,9 +446,7 @@ def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
     for k in range(3):
         length += (work.point[1, k] - work.point[0, k]) ** 2
     speed = np.sqrt(length) + 0.5 * total
-    position = peak(
-        work.error[0, 0], work.error[1, 0], problem.curvature * speed * speed + total
-    )
+    position = peak(work.error[0, 0], work.error[1, 0], problem.curvature * speed * speed + total)
     # The errors are against the targets of the two ends; the surface's own normal at the tool
     # point differs from the target's by at most kappa times the distance.
     cone = peak(
@@ -622,7 +620,6 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
         length += (end[k] - start[k]) ** 2
     size = np.sqrt(length) / problem.scale
     t, dt, written = 0.0, 1.0, 0
-    shrunk = 1.0
     for _ in range(MOST_STEPS):
         dt = min(dt, 1.0 - t)
         if 1.0 - t - dt < 0.1 * dt:
@@ -639,7 +636,7 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
         for j in range(n):
             work.trial[j] = q[j]
         position, cone = np.inf, np.inf
-        if correct(problem, work, work.trial, RIM_SLACK * shrunk, work.error[0, 1], 8):
+        if correct(problem, work, work.trial, RIM_SLACK * dt, work.error[0, 1], 8):
             # Slot 0's errors are against the old target; they were stored when it was accepted.
             position, cone = segment_holds(problem, work, q, work.trial)
         if position <= 1.0 and cone <= 1.0:
@@ -653,7 +650,6 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
             if t >= 1.0 - 1e-12:
                 return written
             accept(work)
-            shrunk = min(1.0, 1.6 * shrunk)
             dt *= min(2.0, 0.85 / np.sqrt(max(max(position, 0.1), 0.1)))
         else:
             if position < np.inf and position > 1.0:
@@ -663,7 +659,6 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
                 if position < np.inf:
                     work.blame[0] = CONE
             dt *= factor
-            shrunk *= factor
             if dt < SMALLEST_STEP:
                 return -1
     work.blame[0] = LONG

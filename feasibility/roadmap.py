@@ -299,6 +299,33 @@ def spread_out(problem, work, roadmap, indptr, indices, budget):  # type: ignore
 
 
 @njit(cache=True)
+def roomy(problem, work, cell, guesses):  # type: ignore[no-untyped-def]
+    """Put guesses (in place) onto the fibre over a cell, and say how much room each has.
+
+    Returns:
+        (k,) the share of its half range, or of the cone, that the tightest constraint leaves free:
+        1 in the middle of everything, 0 at a limit or at the rim, -1 where Newton failed.
+    """
+    room = np.full(guesses.shape[0], -1.0)
+    for g in range(guesses.shape[0]):
+        q = guesses[g]
+        for k in range(3):
+            work.target[0, k] = problem.points[cell, k]
+            work.target[1, k] = problem.approaches[cell, k]
+        place(problem, work, 1, q)
+        work.wish[:] = 0.0
+        if not correct(problem, work, q, 1e-6, np.inf, 60):
+            continue
+        settle(problem, work, problem.points[cell], problem.approaches[cell], q, 40)
+        room[g] = max(0.0, 1.0 - work.error[0, 1] / problem.rim)
+        for j in range(q.shape[0]):
+            half = 0.5 * (problem.upper[j] - problem.lower[j])
+            if half > 0.0 and half < np.inf:
+                room[g] = min(room[g], 1.0 - abs((q[j] - problem.lower[j]) / half - 1.0))
+    return room
+
+
+@njit(cache=True)
 def seed_cell(problem, work, roadmap, cell, guesses):  # type: ignore[no-untyped-def]
     """Newton from guesses to configurations over one cell's centre; new ones become components.
 
