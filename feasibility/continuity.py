@@ -19,7 +19,9 @@ from robots import Robot
 from robots.chain import Chain
 from surfaces import Cells
 
-BUDGET = 200_000  # J-cells between two looks at the clock: some 0.05 s, so that Ctrl-C is heard
+CAP = 20_000  # J-cells of one call at the step below, unless the search says otherwise
+CAP_STEP_DEG = 0.01
+BUDGET = 500_000  # neighbours between two looks at the clock: 0.2 s at most, so Ctrl-C is heard
 MOST_JCELLS = 20_000_000  # of one call, whatever its cap: about 1 GB
 FAR = 2**30  # offset that stands for "no limit": 100,000 degrees at the smallest step
 
@@ -45,6 +47,8 @@ class Continuity:
     jcells: NDArray[np.int32]
     """(k, n) offsets of the path from the J-cell it began at to the first in the target cell; no
     rows unless found."""
+    q: NDArray[np.float64]
+    """(k, n) their configurations, rad or m."""
     checked: int
     """J-cells evaluated."""
     fk: float
@@ -97,7 +101,8 @@ class JSpace:
         self._chain = Chain.checked(robot) if chain is None else chain
         self._chart = cells.chart
         self._points = task.targets(cells).points
-        self._cap = min(search.cap, MOST_JCELLS)
+        cap = search.cap or round(CAP * max(1.0, CAP_STEP_DEG / search.step_deg))
+        self._cap = min(cap, MOST_JCELLS)
         self._grid = Grid(
             origin=origin,
             step=size,
@@ -108,9 +113,19 @@ class JSpace:
             moves_all=search.moves == "all",
             height=float(cells.surface.side_sign) * task.standoff,
             tolerance=self.steps.tolerance - self.steps.sag,
-            cone_cosine=self.steps.cosine(task),
+            cone_cosine=self.steps.cone_cosine,
         )
         self._memory = _memory(robot.n, nodes=4096, stack=4096)
+
+    def load(self) -> None:
+        """Load the compiled kernels, or compile them, before anything is timed."""
+        here = np.zeros(len(self.start), dtype=np.int32)
+        self.cell_of(here)
+        target = np.zeros(3)
+        jcells.begin_search(self._chain, self._grid, here, target, self._memory)
+        jcells.extend_search(
+            self._chain, self._chart, self._grid, target, 0, 0, self._cap, self._memory
+        )
 
     def q(self, jcells: ArrayLike) -> NDArray[np.float64]:
         """Configurations (..., n) of J-cells given as offsets (..., n)."""
@@ -169,9 +184,42 @@ class JSpace:
         return Continuity(
             outcome=outcome,
             jcells=path,
-            checked=int(counters[jcells.CHECKED]),
+            q=self.q(path),
+            checked=int(counters[jcells.NODES]) - 1,
             fk=float(counters[jcells.PLACED]) / memory.nodes.shape[1],
         )
+
+
+def continuity(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    q: ArrayLike,
+    target_cell: int,
+    search: Search | None = None,
+) -> Continuity:
+    """Algorithm 1 once: is there a feasible path of J-cells from q into a neighbouring E-cell?
+
+    Args:
+        robot: the arm.
+        cells: the E-cells.
+        task: standoff, cone, tolerance.
+        q: (n,) feasible configuration, the origin of the J-cells, rad or m.
+        target_cell: flat index of ec_T.
+        search: step, moves, cap and time limit.
+
+    Raises:
+        ValueError: q is not a feasible configuration over one of the cells, or the target is no
+            cell.
+    """
+    space = JSpace(robot, cells, task, q, search)
+    here = np.zeros(robot.n, dtype=np.int32)
+    if not 0 <= target_cell < len(cells):
+        raise ValueError(f"target_cell must be 0 to {len(cells) - 1}, got {target_cell}")
+    if space.cell_of(here) < 0:
+        raise ValueError("q must satisfy limits, cone and tolerance over one of the cells")
+    limit = math.inf if search is None or search.time_limit is None else search.time_limit
+    return space.continuity(here, target_cell, time.perf_counter() + limit)
 
 
 def _last_offset(
@@ -187,7 +235,7 @@ def _last_offset(
 def _memory(n: int, nodes: int, stack: int) -> jcells.Memory:
     """Empty working memory for `nodes` J-cells of n joints and a stack of `stack` levels."""
     return jcells.Memory(
-        counters=np.zeros(6, dtype=np.int64),
+        counters=np.zeros(5, dtype=np.int64),
         table=np.zeros(4 * nodes, dtype=np.int64),
         nodes=np.empty((nodes, n), dtype=np.int32),
         stack_node=np.empty(stack, dtype=np.int64),

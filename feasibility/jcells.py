@@ -24,7 +24,7 @@ from feasibility.jgrid import (
 )
 
 RUNNING, FOUND, EXHAUSTED, CAPPED, FULL = 0, 1, 2, 3, 4  # what a call is doing: counters[STATE]
-STATE, DEPTH, NODES, CHECKED, PLACED, CALL = 0, 1, 2, 3, 4, 5  # places in `Memory.counters`
+STATE, DEPTH, NODES, PLACED, CALL = 0, 1, 2, 3, 4  # places in `Memory.counters`
 
 REFRESH = 256  # levels of the stack between full evaluations of the tool: keeps rounding below HAIR
 
@@ -33,7 +33,7 @@ class Memory(NamedTuple):
     """Working memory of one call; all that it takes to stop it and go on later."""
 
     counters: NDArray[np.int64]
-    """(6,) STATE, DEPTH, NODES, CHECKED, PLACED (joint frames computed), CALL (its number)."""
+    """(5,) STATE, DEPTH, NODES (the first, and those checked), PLACED (joint frames), CALL."""
     table: NDArray[np.int64]
     """(2^k,) open-addressing hash table over `nodes`: CALL << 32 | node."""
     nodes: NDArray[np.int32]
@@ -87,7 +87,7 @@ def begin_search(chain, grid, offsets, target, memory):  # type: ignore[no-untyp
     """Start a call of Algorithm 1 at the J-cell `offsets` (n,) towards the point `target` (3,)."""
     counters = memory.counters
     counters[STATE], counters[DEPTH], counters[NODES] = RUNNING, 0, 1
-    counters[CHECKED], counters[PLACED] = 0, offsets.shape[0]
+    counters[PLACED] = offsets.shape[0]
     counters[CALL] += 1
     memory.nodes[0] = offsets
     slot = _mixed(_key(offsets)) & (memory.table.shape[0] - 1)
@@ -131,7 +131,7 @@ def _inside(lowest, highest, offsets, delta):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
-    """Go on with a call of Algorithm 1 for at most `budget` more J-cells.
+    """Go on with a call of Algorithm 1 for at most `budget` more neighbours.
 
     Leaves counters[STATE] at FOUND (the stack and the last node are the path), EXHAUSTED (no
     unchecked neighbour is left), CAPPED (`cap` J-cells were checked), RUNNING (call again) or
@@ -143,7 +143,7 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
         grid: a `Grid`.
         target: (3,) p_T, m.
         target_cell: flat index of ec_T.
-        budget: J-cells to check before it comes back.
+        budget: neighbours to look at, checked before or not, before it comes back.
         cap: J-cells that the whole call may check.
         memory: a `Memory`, started by `begin_search`.
     """
@@ -157,14 +157,9 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
     n = nodes.shape[1]
     base, partial = np.empty((n, 12)), np.empty((n + 1, 6))
     offsets, delta, held = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
-    call, count, checked, depth = (
-        counters[CALL],
-        counters[NODES],
-        counters[CHECKED],
-        counters[DEPTH],
-    )
+    call, count, depth = counters[CALL], counters[NODES], counters[DEPTH]
     tool = partial[0]
-    stop = min(checked + budget, cap)
+    last = min(cap + 1, nodes.shape[0])
     placed = 0  # joints, from the base on, whose frames in `base` are those of the present J-cell
     state = EXHAUSTED
     while depth >= 0:
@@ -173,21 +168,21 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
         )
         key = _key(offsets)
         away = stack_tool[depth, 6]
-        number, deeper = stack_next[depth], False
+        number, deeper, nearer = stack_next[depth], False, away
         while not deeper and neighbour(number, moves_all, delta):
-            if checked >= stop:
-                state = CAPPED if checked >= cap else RUNNING
+            if count == last or depth + 1 == stack_node.shape[0]:
+                state = CAPPED if count > cap else FULL
                 break
-            if count == nodes.shape[0] or depth + 1 == stack_node.shape[0]:
-                state = FULL
+            if budget == 0:
+                state = RUNNING
                 break
+            budget -= 1
             number += 1
             if not _inside(lowest, highest, offsets, delta):
                 continue
             if not _first_visit(table, nodes, call, count, offsets, delta, key):
                 continue
             count += 1
-            checked += 1
             top = n - 1
             while delta[top] == 0:
                 top -= 1
@@ -202,15 +197,21 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
             if cell == target_cell:
                 state = FOUND
                 break
-            deeper = cell >= 0 and distance(tool, target) < away - HAIR
+            nearer = distance(tool, target)
+            deeper = cell >= 0 and nearer < away - HAIR
         stack_next[depth] = number
         if state != EXHAUSTED:
             break
         depth += 1 if deeper else -1
         if deeper:
-            _push(chain, grid, memory, depth, count - 1, partial[0], target)
-    counters[STATE], counters[DEPTH] = state, depth
-    counters[NODES], counters[CHECKED] = count, checked
+            stack_node[depth], stack_next[depth] = count - 1, 0
+            for k in range(6):
+                stack_tool[depth, k] = tool[k]
+            stack_tool[depth, 6] = nearer
+            if depth % REFRESH == 0:
+                place_tool(chain, grid, nodes[count - 1], stack_tool[depth, :6])
+                counters[PLACED] += n
+    counters[STATE], counters[DEPTH], counters[NODES] = state, depth, count
 
 
 @njit(cache=True, error_model="numpy")
@@ -231,18 +232,3 @@ def _expand(nodes, node, stack_tool, depth, offsets, held, partial):  # type: ig
     for k in range(6):
         partial[n, k] = stack_tool[depth, k]
     return shared
-
-
-@njit(cache=True, error_model="numpy")
-def _push(chain, grid, memory, depth, node, tool, target):  # type: ignore[no-untyped-def]
-    """Put a J-cell on the stack, with its tool (6,)."""
-    nodes, counters = memory.nodes, memory.counters
-    stack_node, stack_next, stack_tool = memory.stack_node, memory.stack_next, memory.stack_tool
-    stack_node[depth] = node
-    stack_next[depth] = 0
-    for k in range(6):
-        stack_tool[depth, k] = tool[k]
-    if depth % REFRESH == 0:
-        place_tool(chain, grid, nodes[node], stack_tool[depth, :6])
-        counters[PLACED] += nodes.shape[1]
-    stack_tool[depth, 6] = distance(stack_tool[depth], target)

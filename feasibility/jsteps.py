@@ -51,6 +51,15 @@ class Steps:
     turn: float
     """Room for |a - approach direction| between J-cells."""
 
+    cone_cosine: float
+    """Least cosine of the angle between axis and approach direction at a J-cell: -2 where any angle
+    will do, 2 where the cone leaves no room for a step."""
+
+    @property
+    def in_cone(self) -> bool:
+        """True when the cone has room for a step."""
+        return self.cone_cosine < 1.0
+
     @staticmethod
     def of(robot: Robot, surface: Surface, task: Task, search: Search) -> Steps:
         """The steps of a search."""
@@ -59,17 +68,11 @@ class Steps:
         size = np.where(robot.prismatic, step * reach, step)
         tolerance = TOLERANCE_STEPS * step * reach if task.tolerance is None else task.tolerance
         sag, turn = _room(robot, surface, task, size, tolerance, search.moves == "all")
-        return Steps(size, search.moves, tolerance, sag, turn)
-
-    def cosine(self, task: Task) -> float:
-        """Least cosine of the angle between axis and approach direction at a J-cell.
-
-        -2 where any angle will do, 2 where the cone leaves no room for a step.
-        """
+        chord = 2.0 * math.sin(0.5 * task.cone) - turn
+        cosine = 1.0 - 0.5 * chord * chord if chord > 0.0 else 2.0
         if task.cone_deg >= 180.0:
-            return -2.0
-        chord = 2.0 * math.sin(0.5 * task.cone) - self.turn
-        return 1.0 - 0.5 * chord * chord if chord >= 0.0 else 2.0
+            cosine = -2.0
+        return Steps(size, search.moves, tolerance, sag, turn, cosine)
 
 
 def _extent(robot: Robot) -> float:

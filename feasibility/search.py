@@ -28,8 +28,9 @@ class Search:
     """Greedy: change one joint a step (2 n neighbours), or any of them (3^n - 1)."""
     starts: int | Literal["all"] = "all"
     """Greedy: how many start configurations over the start cell to try, one per branch."""
-    cap: int = 400_000
-    """Greedy: J-cells that one call of Algorithm 1 may check before it stops as "capped"."""
+    cap: int | None = None
+    """Greedy: J-cells that one call of Algorithm 1 may check before it stops as "capped". None:
+    20,000, and for steps finer than 0.01 degrees as many times more as they are finer."""
 
     def __post_init__(self) -> None:
         """Refuse settings that describe no search."""
@@ -47,5 +48,5 @@ class Search:
             raise ValueError(f"moves must be 'single' or 'all', got {self.moves!r}")
         if self.starts != "all" and not (isinstance(self.starts, int) and self.starts >= 1):
             raise ValueError(f"starts must be 'all' or a whole number >= 1, got {self.starts!r}")
-        if self.cap < 1:
+        if self.cap is not None and self.cap < 1:
             raise ValueError(f"cap must be >= 1, got {self.cap}")

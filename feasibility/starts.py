@@ -23,6 +23,7 @@ from robots.kinematics import Kinematics
 
 ACCURACY = 1e-9  # [m], [1]: of a start's tool point and axis
 CLOSE = 1e-3  # [rad], [m]: configurations nearer than this are taken as one
+STALLED = 1e-7  # [rad], [m]: a Newton step this short, away from the fibre, leads nowhere
 LONGEST_STEP = 0.5  # [rad], [m]: of one joint, per Newton step
 STRIDE = 0.2  # [rad], [m]: of one joint, per step of a self-motion
 DRY_SEEDS = 40  # random configurations in a row that bring nothing new, before the search ends
@@ -91,6 +92,8 @@ class Fibre:
             gram = j @ j.T
             scale = damping * np.trace(gram) / len(gram) + 1e-15
             move = j.T @ np.linalg.solve(gram + scale * np.eye(len(gram)), residual)
+            if np.abs(move).max(initial=0.0) < STALLED:
+                return None
             trial = q.copy()
             trial[free] += move * min(1.0, LONGEST_STEP / max(np.abs(move).max(initial=0.0), 1e-12))
             trial = np.clip(trial, self._lower, self._upper)
@@ -148,6 +151,7 @@ def starts(
     approach: NDArray[np.float64],
     cone: float,
     seed: int = 0,
+    patience: int = DRY_SEEDS,
 ) -> Iterator[NDArray[np.float64]]:
     """Configurations (n,) over one target, one per distinct branch, as they are found.
 
@@ -157,21 +161,22 @@ def starts(
         approach: (3,) unit approach direction.
         cone: angle (rad) the tool axis may deviate from it.
         seed: of the random configurations.
+        patience: random configurations to try before the first is found.
     """
     fibre = Fibre(robot, point, approach, cone)
     for align in (True, False):
         rng = np.random.default_rng(seed)
         found: list[NDArray[np.float64]] = []
-        dry = 0
-        while dry < DRY_SEEDS and len(found) < MOST_STARTS:
-            dry += 1
+        left = patience
+        while left > 0 and len(found) < MOST_STARTS:
+            left -= 1
             q = fibre.project(random_configuration(robot, rng), align)
             if q is None:
                 continue
             q = fibre.settle(q, align)
             if not any(fibre.joined(q, other, align) for other in found):
                 found.append(q)
-                dry = 0
+                left = DRY_SEEDS
                 yield q
         if found:
             return

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from feasibility.continuity import JSpace, Outcome
 from surfaces import Cells
 
-Progress = Callable[[int, int], None]
-"""Called with (cells touched by the running tree, all cells)."""
+Progress = Callable[[int, int | None, str], None]
+"""Called with the cells that the running tree touches, the number of cells, and what is done."""
 
 
 @dataclass(slots=True)
@@ -84,7 +84,7 @@ def tree_search(
             continue
         waiting.append((entered, iter(cells.neighbours.of(entered).tolist())))
         if progress is not None:
-            progress(len(tree.jcell), len(cells))
+            progress(len(tree.jcell), len(cells), "greedy search")
     return tree
 
 
