@@ -147,7 +147,7 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
         cap: J-cells that the whole call may check.
         memory: a `Memory`, started by `begin_search`.
     """
-    # Fields are read before the first branch, and helpers get arrays: see surfaces.chart.cell_at.
+    # Arrays are read out of their tuples once, here: numba counts references each time it is done.
     rotations, translations, prismatic = chain.rotations, chain.translations, chain.prismatic
     origin, step, sine, cosine = grid.origin, grid.step, grid.sine, grid.cosine
     lowest, highest, moves_all = grid.lowest, grid.highest, grid.moves_all

@@ -112,7 +112,7 @@ def _turn(x, y, z, vx, vy, vz, sine, cosine):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy")
 def cell_of(chart, height, tolerance, cosine, tool):  # type: ignore[no-untyped-def]
     """E-cell of a tool point and axis (6,) that satisfy the task constraints; -1 where they do not.
 

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 PLANE, SPHERE, CYLINDER, HYPERBOLOID = 0, 1, 2, 3
 EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lies on it
@@ -19,29 +18,32 @@ _TURN = 2.0 * math.pi
 
 
 class Chart(NamedTuple):
-    """A patch of a surface, cut into cells; a plain tuple of numbers and arrays, as numba likes it.
+    """A patch of a surface, cut into cells; a plain tuple, as numba likes it.
+
+    It holds no arrays: numba counts references to an array whenever it is read out of a tuple,
+    and that took longer than the geometry.
 
     Built by `Surface.chart` and `Cells.chart`.
     """
 
     code: int
     """Which kind of surface: PLANE, SPHERE, ..."""
-    shape: NDArray[np.float64]
-    """(k,) m, lengths of the surface: radius; waist and flare."""
-    rotation: NDArray[np.float64]
-    """(3, 3) own frame in the root frame."""
-    position: NDArray[np.float64]
-    """(3,) m, origin of the own frame in the root frame."""
+    shape: tuple[float, ...]
+    """(2) m, lengths of the surface: radius; waist and flare; 0 where it has fewer."""
+    rotation: tuple[float, ...]
+    """(9) own frame in the root frame, row by row."""
+    position: tuple[float, ...]
+    """m, origin of the own frame in the root frame."""
     side_sign: float
     """-1.0 inside, +1.0 outside."""
-    low: NDArray[np.float64]
-    """(2,) rad or m, where the ranges of u and v begin."""
-    high: NDArray[np.float64]
-    """(2,) rad or m, where they end."""
-    closed: NDArray[np.bool_]
-    """(2,) True where the range is a full turn."""
-    cells: NDArray[np.int64]
-    """(2,) number of cells along u and v."""
+    low: tuple[float, float]
+    """rad or m, where the ranges of u and v begin."""
+    high: tuple[float, float]
+    """rad or m, where they end."""
+    closed: tuple[bool, bool]
+    """True where the range is a full turn."""
+    cells: tuple[int, int]
+    """Number of cells along u and v."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -143,9 +145,9 @@ def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
     dx = x - chart.position[0]
     dy = y - chart.position[1]
     dz = z - chart.position[2]
-    a = r[0, 0] * dx + r[1, 0] * dy + r[2, 0] * dz
-    b = r[0, 1] * dx + r[1, 1] * dy + r[2, 1] * dz
-    c = r[0, 2] * dx + r[1, 2] * dy + r[2, 2] * dz
+    a = r[0] * dx + r[3] * dy + r[6] * dz
+    b = r[1] * dx + r[4] * dy + r[7] * dz
+    c = r[2] * dx + r[5] * dy + r[8] * dz
     if chart.code == SPHERE:
         u, v, height, na, nb, nc = _sphere_foot(shape[0], a, b, c, low, high)
     elif chart.code == CYLINDER:
@@ -160,9 +162,9 @@ def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
         u,
         v,
         height,
-        r[0, 0] * na + r[0, 1] * nb + r[0, 2] * nc,
-        r[1, 0] * na + r[1, 1] * nb + r[1, 2] * nc,
-        r[2, 0] * na + r[2, 1] * nb + r[2, 2] * nc,
+        r[0] * na + r[1] * nb + r[2] * nc,
+        r[3] * na + r[4] * nb + r[5] * nc,
+        r[6] * na + r[7] * nb + r[8] * nc,
     )
 
 
@@ -180,8 +182,6 @@ def cell_at(chart, u, v):  # type: ignore[no-untyped-def]
     A closed parameter may be off by any number of turns. A border belongs to the cell of higher
     index, the outermost border to the last cell.
     """
-    # Fields are read before the first branch: numba counts references to the arrays of a tuple
-    # that is read after one, which took 60 times as long as the rest of this function.
     u0, u1, v0, v1 = chart.low[0], chart.high[0], chart.low[1], chart.high[1]
     u_closed, v_closed = chart.closed[0], chart.closed[1]
     rows, columns = chart.cells[0], chart.cells[1]

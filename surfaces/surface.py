@@ -171,14 +171,14 @@ class Surface(ABC):
 
         return Chart(
             code=self.code,
-            shape=np.array(self.shape, dtype=float),
-            rotation=np.array(self.rotation),  # writeable copies: read-only is another numba type
-            position=np.array(self.position),
+            shape=(*map(float, self.shape), 0.0, 0.0)[:2],
+            rotation=tuple(self.rotation.ravel().tolist()),
+            position=tuple(self.position.tolist()),
             side_sign=self.side_sign,
-            low=np.array([self.u_range[0], self.v_range[0]]),
-            high=np.array([self.u_range[1], self.v_range[1]]),
-            closed=np.array([self.u_closed, self.v_closed]),
-            cells=np.array([nu, nv], dtype=np.int64),
+            low=(float(self.u_range[0]), float(self.v_range[0])),
+            high=(float(self.u_range[1]), float(self.v_range[1])),
+            closed=(bool(self.u_closed), bool(self.v_closed)),
+            cells=(int(nu), int(nv)),
         )
 
     def cells(self, nu: int, nv: int) -> Cells:
