@@ -80,14 +80,12 @@ def greedy_check(
 ) -> Verdict:
     """The verdict of the paper's search: feasible when one tree T touches every cell.
 
-    To touch a cell is to enter it; its centre need not be visited, so there is no `witness`. Before
-    "feasible" is said, Pinocchio replays every path of T, J-cell by J-cell.
+    To touch a cell is to enter it; its centre need not be visited, so there is no `witness`.
+    Before "feasible" is said, Pinocchio replays every path of T.
 
     Args:
-        robot: the arm.
-        cells: the E-cells.
-        task: standoff, cone and tolerance (see `Steps.tolerance` where it has none).
-        search: step, moves, starts, cap, seed and time limit.
+        robot, cells: the arm, and the E-cells.
+        task, search: the task (see `Steps.tolerance` where it has none), and the settings.
         progress: called as progress(cells touched by the running tree, cells, text).
         start: (n,) the one start configuration to use, rad or m; without it, start configurations
             are searched over the middle cell, or the next that has some; one for each branch.
@@ -97,18 +95,18 @@ def greedy_check(
     """
     search = Search(method="greedy") if search is None else search
     called = time.perf_counter()
-    chain = Chain.checked(robot)
-    steps = Steps.of(robot, cells.surface, task, search)
+    chain, steps = Chain.checked(robot), Steps.of(robot, cells.surface, task, search)
     JSpace(robot, cells, task, np.zeros(robot.n), search, chain, steps).load()
     began = time.perf_counter()
     deadline = math.inf if search.time_limit is None else began + search.time_limit
     run = _Run()
-    for cell, q in _starts(robot, cells, task, search, deadline, start):
+    for q in _starts(robot, cells, task, search, deadline, start):
         space = JSpace(robot, cells, task, q, search, chain, steps)
         at = space.cell_of(np.zeros(robot.n, dtype=np.int32))
-        if start is not None and at < 0:
+        if at >= 0:
+            run.add(tree_search(space, cells, at, deadline, progress))
+        elif start is not None:
             raise ValueError("start must satisfy limits, cone and tolerance over one of the cells")
-        run.add(tree_search(space, cells, at if cell is None else cell, deadline, progress))
         if _touches_all(run, cells) or not run.complete:
             break
     touched_all = _touches_all(run, cells)
@@ -151,14 +149,14 @@ def _starts(
     search: Search,
     deadline: float,
     start: ArrayLike | None,
-) -> Iterator[tuple[int | None, NDArray[np.float64]]]:
-    """Start configurations, as many as the search asks for, each with its cell.
+) -> Iterator[NDArray[np.float64]]:
+    """Start configurations (n,), as many as the search asks for.
 
     The start cell is the one in the middle of the list (cell 45 of 90), from where this search
     touches more cells of the paper's cases than from the first; or the next to it with a start.
     """
     if start is not None:
-        yield None, np.array(start, dtype=float)
+        yield np.array(start, dtype=float)
         return
     points, approaches = task.targets(cells)
     middle = len(cells) // 2
@@ -167,7 +165,7 @@ def _starts(
         found = 0
         patience = DRY_SEEDS if cell == middle else FEW_SEEDS
         for q in starts(robot, points[cell], approaches[cell], task.cone, search.seed, patience):
-            yield cell, q
+            yield q
             found += 1
             if found == search.starts:
                 break

@@ -138,54 +138,42 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
     FULL (enlarge the memory, and call again).
 
     Args:
-        chain: a `Chain`.
-        chart: a `Chart`.
-        grid: a `Grid`.
-        target: (3,) p_T, m.
-        target_cell: flat index of ec_T.
-        budget: neighbours to look at, checked before or not, before it comes back.
-        cap: J-cells that the whole call may check.
+        chain, chart, grid: a `Chain`, a `Chart` and a `Grid`.
+        target, target_cell: (3,) p_T, m, and the flat index of ec_T.
+        budget, cap: neighbours to look at now, and J-cells that the whole call may check.
         memory: a `Memory`, started by `begin_search`.
     """
     # Arrays are read out of their tuples once, here: numba counts references each time it is done.
     rotations, translations, prismatic = chain.rotations, chain.translations, chain.prismatic
     origin, step, sine, cosine = grid.origin, grid.step, grid.sine, grid.cosine
-    lowest, highest, moves_all = grid.lowest, grid.highest, grid.moves_all
-    height, tolerance, cone_cosine = grid.height, grid.tolerance, grid.cone_cosine
+    lowest, highest, height = grid.lowest, grid.highest, grid.height
+    moves_all, tolerance, cone_cosine = grid.moves_all, grid.tolerance, grid.cone_cosine
     counters, table, nodes = memory.counters, memory.table, memory.nodes
     stack_node, stack_next, stack_tool = memory.stack_node, memory.stack_next, memory.stack_tool
     n = nodes.shape[1]
     base, partial = np.empty((n, 12)), np.empty((n + 1, 6))
     offsets, delta, held = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
     call, count, depth = counters[CALL], counters[NODES], counters[DEPTH]
-    tool = partial[0]
-    last = min(cap + 1, nodes.shape[0])
+    tool, last = partial[0], min(cap + 1, nodes.shape[0])
     placed = 0  # joints, from the base on, whose frames in `base` are those of the present J-cell
     state = EXHAUSTED
     while depth >= 0:
-        placed = min(
-            placed, _expand(nodes, stack_node[depth], stack_tool, depth, offsets, held, partial)
-        )
-        key = _key(offsets)
-        away = stack_tool[depth, 6]
+        shared = _expand(nodes, stack_node[depth], stack_tool[depth], offsets, held, partial)
+        placed = min(placed, shared)
+        key, away = _key(offsets), stack_tool[depth, 6]
         number, deeper, nearer = stack_next[depth], False, away
         while not deeper and neighbour(number, moves_all, delta):
-            if count == last or depth + 1 == stack_node.shape[0]:
-                state = CAPPED if count > cap else FULL
-                break
-            if budget == 0:
-                state = RUNNING
+            if count == last or depth + 1 == stack_node.shape[0] or budget == 0:
+                state = RUNNING if budget == 0 else (CAPPED if count > cap else FULL)
                 break
             budget -= 1
             number += 1
-            if not _inside(lowest, highest, offsets, delta):
-                continue
-            if not _first_visit(table, nodes, call, count, offsets, delta, key):
+            if not _inside(lowest, highest, offsets, delta) or not _first_visit(
+                table, nodes, call, count, offsets, delta, key
+            ):
                 continue
             count += 1
-            top = n - 1
-            while delta[top] == 0:
-                top -= 1
+            top = _last_move(delta)
             if top >= placed:
                 place_joints(
                     rotations, translations, prismatic, origin, step, offsets, placed, top, base
@@ -215,8 +203,17 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
 
 
 @njit(cache=True, error_model="numpy")
-def _expand(nodes, node, stack_tool, depth, offsets, held, partial):  # type: ignore[no-untyped-def]
-    """Make `node` the present J-cell.
+def _last_move(delta):  # type: ignore[no-untyped-def]
+    """The last joint that moves."""
+    top = delta.shape[0] - 1
+    while delta[top] == 0:
+        top -= 1
+    return top
+
+
+@njit(cache=True, error_model="numpy")
+def _expand(nodes, node, tool, offsets, held, partial):  # type: ignore[no-untyped-def]
+    """Make `node`, with its tool (7,), the present J-cell.
 
     Returns:
         How many joint frames, from the base on, it shares with the J-cell before it: a joint's own
@@ -230,5 +227,5 @@ def _expand(nodes, node, stack_tool, depth, offsets, held, partial):  # type: ig
         offsets[i] = nodes[node, i]
         held[i] = 2
     for k in range(6):
-        partial[n, k] = stack_tool[depth, k]
+        partial[n, k] = tool[k]
     return shared
