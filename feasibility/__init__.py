@@ -1,13 +1,13 @@
 """The question: can this arm cover this surface in one continuous motion?
 
-    >>> from robots import load_robot
-    >>> from surfaces import sphere
-    >>> from feasibility import Task, check
-    >>> puma = load_robot("puma560", limits="set-1")
-    >>> dome = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
-    >>> verdict = check(puma, dome.cells(9, 10), Task(standoff=0.005, cone_deg=45))
-    >>> verdict.feasible, verdict.n_covered, verdict.n_edges
-    (True, 90, 305)
+>>> from robots import load_robot
+>>> from surfaces import sphere
+>>> from feasibility import Task, check
+>>> puma = load_robot("puma560", limits="set-1")
+>>> dome = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
+>>> verdict = check(puma, dome.cells(9, 10), Task(standoff=0.005, cone_deg=45))
+>>> verdict.feasible, verdict.n_covered, verdict.n_edges
+(True, 90, 305)
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import the heavier names when they are first used, so that the command line starts at once."""
+    """Import the heavier names when they are first used, so that the command line starts fast."""
     if name not in _HOMES:
         raise AttributeError(f"module 'feasibility' has no attribute {name!r}")
     import importlib

@@ -9,14 +9,15 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from feasibility.case_faults import CaseError, Fault, close, printable, shown
+from feasibility.case_edits import as_read, make_absolute, override
+from feasibility.case_faults import CaseError, Fault, close, printable
 from feasibility.case_robot import RobotPart, read_robot
 from feasibility.case_surface import SurfacePart, read_surface
 from feasibility.case_task import read_search, read_task
 from feasibility.files import FileError, read_regular, shown_path
 from feasibility.search import Search
 from feasibility.task import Task
-from feasibility.toml_text import TomlError, parse_setting, parse_toml, toml_document
+from feasibility.toml_text import TomlError, parse_toml, toml_document
 
 if TYPE_CHECKING:
     from robots import Robot
@@ -116,7 +117,7 @@ class Case:
             tables = parse_toml(text)
         except TomlError as error:
             raise CaseError(name, [Fault("", str(error))]) from error
-        _make_absolute(tables, base_dir)
+        make_absolute(tables, base_dir)
         return _from_tables(tables, name, overrides)
 
     def with_overrides(self, overrides: Iterable[str]) -> Case:
@@ -126,7 +127,7 @@ class Case:
             CaseError: a setting, or the case with the settings, is wrong.
         """
         tables = {
-            title: {key: _as_read(value) for key, value in table.items()}
+            title: {key: as_read(value) for key, value in table.items()}
             for title, table in self.to_tables().items()
         }
         made = _from_tables(tables, self.name, overrides)
@@ -194,7 +195,7 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     """Apply overrides, then check everything."""
     faults: list[Fault] = []
     for setting in overrides:
-        _override(tables, setting, faults)
+        override(tables, setting, faults)
     for title in tables:
         if title not in TABLES:
             guess = close(title, TABLES)
@@ -232,53 +233,3 @@ def _robot_faults(part: RobotPart | None) -> list[Fault]:
     except RobotError as error:
         return [Fault("robot", str(error))]
     return []
-
-
-def _override(tables: Tables, setting: str, faults: list[Fault]) -> None:
-    """Replace, add or remove one key."""
-    label = f"--set {setting if setting.isprintable() and len(setting) <= 80 else shown(setting)}"
-    try:
-        path, value = parse_setting(setting)
-    except TomlError as error:
-        faults.append(Fault(label, str(error)))
-        return
-    *folders, key = path
-    if not folders:
-        faults.append(Fault(label, "needs a table and a key, such as task.cone_deg=10"))
-        return
-    table: Any = tables
-    for folder in folders:
-        table = table.setdefault(folder, {})
-        if not isinstance(table, dict):
-            faults.append(Fault(label, f"{folder} is not a table"))
-            return
-    if value is None:
-        table.pop(key, None)
-    else:
-        table[key] = value
-
-
-def _make_absolute(tables: Tables, base_dir: str | os.PathLike[str] | None) -> None:
-    """Make the paths of a case file independent of the working directory, where they are paths."""
-    robot = tables.get("robot")
-    if base_dir is None or not isinstance(robot, dict):
-        return
-
-    def absolute(value: Any) -> Any:
-        if not isinstance(value, str) or not value.strip():
-            return value
-        return os.path.join(base_dir, os.path.expanduser(value))
-
-    if "urdf" in robot:
-        robot["urdf"] = absolute(robot["urdf"])
-    if isinstance(robot.get("package_dirs"), list):
-        robot["package_dirs"] = [absolute(folder) for folder in robot["package_dirs"]]
-
-
-def _as_read(value: Any) -> Any:
-    """A value as the TOML parser would give it: lists and plain tables."""
-    if isinstance(value, Mapping):
-        return {key: _as_read(item) for key, item in value.items()}
-    if isinstance(value, tuple):
-        return [_as_read(item) for item in value]
-    return value

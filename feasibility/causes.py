@@ -15,30 +15,24 @@ reaches is disconnected: the detail says what that component covers and what sto
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from feasibility.complete import Explorer
-from feasibility.continuation import (
-    CONE,
-    LIMIT,
-    LONG,
-    SINGULAR,
-    Problem,
-    connect,
-    correct,
-    place,
-)
+from feasibility.fibre import connect
+from feasibility.kernels import kernel
+from feasibility.newton import correct
+from feasibility.problem import CONE, LIMIT, LONG, SINGULAR, Problem, place
 from feasibility.proof import Ruling
 from feasibility.roadmap import NODES, root_of
 from feasibility.verdict import Cause, CauseKind
 from robots import Robot
+from robots.chain import jacobians
 
 STARTS = 16  # Newton starts of each relaxed question
 ENOUGH = 5  # solutions among which the least violation is looked for
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _solve(problem, work, cell, guesses, solutions):  # type: ignore[no-untyped-def]
     """Fill `solutions` with configurations of a relaxed problem over one cell; returns how many."""
     found = 0
@@ -58,7 +52,7 @@ def _solve(problem, work, cell, guesses, solutions):  # type: ignore[no-untyped-
     return found
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def]
     """Smallest distance of the tool point from the target, by damped descent from guesses."""
     n = guesses.shape[1]
@@ -73,21 +67,17 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
         place(problem, work, 1, q)
         error = work.error[1, 0]
         for _ in range(80):
+            jacobians(
+                problem.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
+                work.point_rows, work.axis_rows,
+            )  # fmt: skip
             for j in range(n):
-                zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
-                x = work.point[1, 0] - work.origins[1, j, 0]
-                y = work.point[1, 1] - work.origins[1, j, 1]
-                z = work.point[1, 2] - work.origins[1, j, 2]
-                if problem.chain.prismatic[j]:
-                    cx, cy, cz = zx, zy, zz
-                else:
-                    cx, cy, cz = zy * z - zz * y, zz * x - zx * z, zx * y - zy * x
-                pull = (
-                    cx * (work.target[0, 0] - work.point[1, 0])
-                    + cy * (work.target[0, 1] - work.point[1, 1])
-                    + cz * (work.target[0, 2] - work.point[1, 2])
-                )
-                step[j] = pull / (cx * cx + cy * cy + cz * cz + damping) / n
+                pull, size = 0.0, 0.0
+                for k in range(3):
+                    row = work.point_rows[k, j]
+                    pull += row * (work.target[0, k] - work.point[1, k])
+                    size += row * row
+                step[j] = pull / (size + damping) / n
             for j in range(n):
                 step[j] += q[j]
                 step[j] = min(max(step[j], problem.lower[j]), problem.upper[j])
@@ -108,7 +98,7 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
     return best
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _head_for(problem, work, cell, q, goal, ways):  # type: ignore[no-untyped-def]
     """Self-motion of a relaxed problem towards a goal, as far as it goes (q in place)."""
     connect(problem, work, problem.points[cell], problem.approaches[cell], q, goal, ways, 0, 60)

@@ -2,7 +2,7 @@
 
 It shares no code with the search. It knows Pinocchio's frame placements and joint Jacobians, the
 surface's definition (`point`, `normal`), and the bound between samples; it sees only the walk, not
-how it was found. The bound is derived in `feasibility.continuation`; here it is evaluated again
+how it was found. The bound is derived in `feasibility.segment`; here it is evaluated again
 from Pinocchio's Jacobian: the column of joint j moved to the tool point has the length r_j (the
 lever arm), and the length of its turn of the axis is s_j.
 """
@@ -66,7 +66,10 @@ def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
 
 
 def second_derivatives(
-    steps: NDArray[np.float64], prismatic: NDArray[np.bool_], levers: NDArray[np.float64], cap: float
+    steps: NDArray[np.float64],
+    prismatic: NDArray[np.bool_],
+    levers: NDArray[np.float64],
+    cap: float,
 ) -> NDArray[np.float64]:
     """Bound D of |p''| (or Da of |a''|) along straight segments.
 
@@ -163,9 +166,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     position = _peak(error, bounds.curvature * speed**2 + bend)
     # The normal used at a waypoint is the one at its foot, so it is exact there.
     worst = _peak(chord, turn + bounds.bend * speed**2 + bounds.curvature * bend)
-    margin = float(
-        np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf)
-    )
+    margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
         waypoints=len(walk.q),
         max_position_error=float(position),

@@ -42,7 +42,7 @@ def check(
     Example:
         >>> from robots import load_robot
         >>> from surfaces import plane
-        >>> patch = plane(width=(0.4, 0.6), length=(-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+        >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> verdict = check(load_robot("ur5"), patch.cells(3, 3), Task(standoff=0.02, cone_deg=30))
         >>> verdict.feasible, verdict.n_covered
         (True, 9)
@@ -74,7 +74,9 @@ def _complete_check(
         warm_up()
     loaded = time.monotonic()
     deadline = np.inf if search.time_limit is None else began + search.time_limit
-    explorer = Explorer(robot, cells, problem_of(robot, cells, task), search.seed, deadline, progress)
+    explorer = Explorer(
+        robot, cells, problem_of(robot, cells, task), search.seed, deadline, progress
+    )
     in_time = True
     try:
         explore(explorer)
@@ -115,7 +117,7 @@ def _complete_check(
         },
         n_edges=explorer.n_edges,
         statistics={
-            "fk": int(explorer.work.count[0]),
+            "fk": int(explorer.work.counts[0]),
             "nodes": int(explorer.roadmap.counters[0]),
             "motions": int(explorer.roadmap.counters[1]),
             "boxes": explorer.boxes,

@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from feasibility.console import Bar, say, tell
+from feasibility.console import Bar, interruptible, say, tell
 from feasibility.files import FileError, check_writable, shown_path, write_whole
 
 STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
@@ -18,17 +18,19 @@ BAD_INPUT = 2
 
 def check(args: argparse.Namespace, began: float) -> int:
     """`coverable check CASE`: run the search, say the verdict, write what was asked for."""
-    from feasibility.case import load_case
+    with interruptible() as settle:
+        from feasibility.case import load_case
 
-    case = load_case(args.case, args.settings)
-    _check_outputs({"--save": args.save, "--html": args.html, "--witness": args.witness})
-    setup = case.build()
-    from feasibility.checking import check as run
-    from feasibility.report import as_json, as_text, witness_csv
+        case = load_case(args.case, args.settings)
+        _check_outputs({"--save": args.save, "--html": args.html, "--witness": args.witness})
+        setup = case.build()
+        from feasibility.checking import check as run
+        from feasibility.report import as_json, as_text, witness_csv
 
-    loaded = time.perf_counter() - began
-    with Bar() as bar:
-        verdict = run(*setup, progress=bar.callback)
+        loaded = time.perf_counter() - began
+        with Bar() as bar:
+            verdict = run(*setup, progress=bar.callback)
+        settle()
     say(_json(as_json(verdict, loaded)) if args.json else as_text(verdict, case, loaded))
     if args.save is not None:
         from feasibility.result import save_result

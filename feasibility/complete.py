@@ -23,7 +23,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.continuation import Problem, Work, problem_of, work_for
+from feasibility.fibre import roomy
+from feasibility.growth import close_pairs, seed_cell, spread_out, stir
+from feasibility.problem import Problem, Work, problem_of, work_for
 from feasibility.proof import Boxes, Ruling, root_box, rule
 from feasibility.roadmap import (
     BEST,
@@ -36,15 +38,10 @@ from feasibility.roadmap import (
     NODES,
     TAIL,
     Roadmap,
-    close_pairs,
     empty_roadmap,
     grown,
     joined_pairs,
-    roomy,
     root_of,
-    seed_cell,
-    spread_out,
-    stir,
 )
 from robots import Robot
 from surfaces import Cells
@@ -65,7 +62,7 @@ NEWTON_STARTS = 25
 Progress = Callable[[int, int | None, str], None]
 
 
-class OutOfTime(Exception):  # noqa: N818 - a signal within the search, not a fault
+class OutOfTime(Exception):
     """The time limit has run out."""
 
 
@@ -97,14 +94,16 @@ class Explorer:
         self.rng = np.random.default_rng(self.seed)
         lower, upper = np.array(self.robot.lower), np.array(self.robot.upper)
         wide = ~(upper - lower <= 2.0 * np.pi) & ~self.robot.prismatic
-        middle = np.where(np.isfinite(lower + upper), 0.5 * (lower + upper), 0.0)
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        middle = 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0))
         # A joint of more than a full turn is seeded over one turn: other windings are reached by
         # motion, or not at all.
-        self.low = np.where(wide, middle - np.pi, lower)
+        self.low: NDArray[np.float64] = np.where(wide, middle - np.pi, lower)
         self.high = np.where(wide, middle + np.pi, upper)
-        span = self.problem.scale
-        self.low = np.maximum(self.low, -span * 4.0)
-        self.high = np.minimum(self.high, span * 4.0) if self.robot.prismatic.any() else self.high
+        # A rail without ends is seeded as far as the cells and the arm reach.
+        far = self.problem.scale + np.abs(self.problem.points).max(initial=0.0)
+        self.low = np.where(self.robot.prismatic, np.maximum(self.low, -far), self.low)
+        self.high = np.where(self.robot.prismatic, np.minimum(self.high, far), self.high)
         self.indptr, self.indices = self.cells.neighbours
         self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
 
@@ -207,11 +206,11 @@ class Explorer:
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds is planted."""
-        ruling, looked = Ruling.OPEN, int(boxes.count[1])
-        while ruling is Ruling.OPEN and boxes.count[1] < most:
+        ruling, looked = Ruling.OPEN, int(boxes.counts[1])
+        while ruling is Ruling.OPEN and boxes.counts[1] < most:
             ruling, q = rule(self.problem, self.work, cell, boxes, min(most, BUDGET))
             self.tick("proving cells out of reach")
-        self.boxes += int(boxes.count[1]) - looked
+        self.boxes += int(boxes.counts[1]) - looked
         self.rulings[cell] = ruling
         if ruling is Ruling.REACHED:
             self.plant(cell, np.clip(q, self.problem.lower, self.problem.upper)[None])
@@ -252,16 +251,16 @@ def _unreached(explorer: Explorer) -> None:
         explorer.problem.points - explorer.robot.model.jointPlacements[1].translation, axis=1
     )
     beyond = distance > explorer.robot.reach + explorer.problem.tolerance
-    for cell in np.flatnonzero(beyond):
-        explorer.rulings[int(cell)] = Ruling.PROVED
+    for cell in np.flatnonzero(beyond).tolist():
+        explorer.rulings[cell] = Ruling.PROVED
     open_boxes: dict[int, Boxes] = {}
-    for cell in np.flatnonzero(~explorer.reached & ~beyond):
+    for cell in np.flatnonzero(~explorer.reached & ~beyond).tolist():
         if explorer.reached[cell]:
             continue  # reached from a cell ruled on before it
         boxes = root_box(explorer.problem)
         if explorer.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
             if explorer.plant(cell, explorer.guesses(NEWTON_STARTS)) == 0:
-                open_boxes[int(cell)] = boxes
+                open_boxes[cell] = boxes
         elif explorer.rulings[cell] is Ruling.UNKNOWN:
             explorer.plant(cell, explorer.guesses(NEWTON_STARTS))
     for cell, boxes in open_boxes.items():

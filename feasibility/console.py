@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import io
 import os
+import signal
 import sys
+import threading
 import time
-from types import TracebackType
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType, TracebackType
 from typing import Any, TextIO
 
 PAUSE = 0.05  # [s] between two updates of the progress bar
@@ -59,6 +63,36 @@ def _discard(stream: TextIO) -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, descriptor)
     os.close(nowhere)
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], None]]:
+    """Remember a Ctrl-C that Python loses.
+
+    A KeyboardInterrupt raised while the interpreter runs one of its own callbacks (it does so
+    during imports) is printed and dropped. Call what this context yields before an answer is given:
+    it raises KeyboardInterrupt if there has been one.
+    """
+    seen = False
+
+    def note(number: int, frame: FrameType | None) -> None:
+        nonlocal seen
+        seen = True
+        signal.default_int_handler(number, frame)
+
+    def settle() -> None:
+        if seen:
+            raise KeyboardInterrupt
+
+    default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    if not default or threading.current_thread() is not threading.main_thread():
+        yield settle  # someone else decides what Ctrl-C does
+        return
+    signal.signal(signal.SIGINT, note)
+    try:
+        yield settle
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class Bar:

@@ -7,7 +7,7 @@ at most
     sum_j r_j h_j                          from p(c)                (first order)
     D / 2 = 1/2 sum_j r_j h_j (h_j + 2 sum_{i<j} h_i)   from p(c) + J d    (second order)
 
-and likewise for the axis, with sines s_j in place of r_j (see `feasibility.continuation` for D). A
+and likewise for the axis, with sines s_j in place of r_j (see `feasibility.segment` for D). A
 box is discarded when the target is further than that, less the tolerance; or when, seen along one
 of a few directions, no d in the box can bring p(c) + J d close enough. Along a direction every
 joint's interval can also be cut down to what the others leave open; thin boxes follow, which is
@@ -23,10 +23,11 @@ from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from feasibility.continuation import Problem, Work, place
+from feasibility.kernels import kernel
+from feasibility.problem import Problem, Work, place
+from robots.chain import jacobians
 
 THINNEST = 1e-6  # [rad], [m]: a box with no wider joint that moves the tool is left undecided
 STACK = 4096  # boxes that may wait
@@ -65,7 +66,7 @@ class Boxes(NamedTuple):
     """(STACK, n)"""
     high: NDArray[np.float64]
     """(STACK, n)"""
-    count: NDArray[np.int64]
+    counts: NDArray[np.int64]
     """(2,) boxes waiting; boxes looked at so far."""
 
 
@@ -76,11 +77,11 @@ def root_box(problem: Problem) -> Boxes:
     turns = ~problem.chain.prismatic & (high - low >= 2.0 * np.pi)
     low[turns], high[turns] = -np.pi, np.pi
     boxes = Boxes(np.empty((STACK, n)), np.empty((STACK, n)), np.zeros(2, dtype=np.int64))
-    boxes.low[0], boxes.high[0], boxes.count[0] = low, high, 1
+    boxes.low[0], boxes.high[0], boxes.counts[0] = low, high, 1
     return boxes
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _cut(rows, gap, radius, low, high, direction):  # type: ignore[no-untyped-def]
     """Cut the box to d with |direction . (rows d - gap)| <= radius; False when nothing is left."""
     n = low.shape[0]
@@ -120,7 +121,7 @@ def _cut(rows, gap, radius, low, high, direction):  # type: ignore[no-untyped-de
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _reach_of_box(problem, work, half, longest, lever, sine):  # type: ignore[no-untyped-def]
     """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2)."""
     n = half.shape[0]
@@ -156,31 +157,92 @@ def _reach_of_box(problem, work, half, longest, lever, sine):  # type: ignore[no
     return first, second, first_axis, second_axis
 
 
-@njit(cache=True, error_model="numpy")
-def _jacobian_rows(problem, work):  # type: ignore[no-untyped-def]
-    """Fill `point_rows` and `axis_rows` at slot 1."""
-    for j in range(work.step.shape[0]):
-        zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
+@kernel
+def _static_levers(problem, longest):  # type: ignore[no-untyped-def]
+    """The longest lever that each joint can ever have: the links behind it, stretched out."""
+    total = 0.0
+    for j in range(longest.shape[0] - 1, -1, -1):
+        link = problem.chain.translations[j + 1]
+        total += np.sqrt(link[0] ** 2 + link[1] ** 2 + link[2] ** 2)
+        longest[j] = total
         if problem.chain.prismatic[j]:
-            work.point_rows[0, j] = zx
-            work.point_rows[1, j] = zy
-            work.point_rows[2, j] = zz
-            for k in range(3):
-                work.axis_rows[k, j] = 0.0
-            continue
-        x = work.point[1, 0] - work.origins[1, j, 0]
-        y = work.point[1, 1] - work.origins[1, j, 1]
-        z = work.point[1, 2] - work.origins[1, j, 2]
-        work.point_rows[0, j] = zy * z - zz * y
-        work.point_rows[1, j] = zz * x - zx * z
-        work.point_rows[2, j] = zx * y - zy * x
-        x, y, z = work.axis[1, 0], work.axis[1, 1], work.axis[1, 2]
-        work.axis_rows[0, j] = zy * z - zz * y
-        work.axis_rows[1, j] = zz * x - zx * z
-        work.axis_rows[2, j] = zx * y - zy * x
+            total += max(abs(problem.lower[j]), abs(problem.upper[j]))
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
+def _cut_all(rows, gap, distance, radius, low, high, directions):  # type: ignore[no-untyped-def]
+    """Cut the box along the gap and along every direction; False when nothing is left."""
+    if not _cut(rows, gap, radius, low, high, gap / max(distance, 1e-12)):
+        return False
+    for k in range(directions.shape[0]):
+        if not _cut(rows, gap, radius, low, high, directions[k]):
+            return False
+    return True
+
+
+@kernel
+def _shrink(problem, work, low, high, longest, lever, sine, directions):  # type: ignore[no-untyped-def]
+    """Cut one box (in place) to what may still hold a solution.
+
+    Returns:
+        1 when nothing is left, 2 when its centre (slot 1) is a solution, 0 otherwise; and whether
+        the tool point, rather than the axis, is nearer to ruling it out.
+    """
+    n = low.shape[0]
+    q, half = np.empty(n), np.empty(n)
+    gap, tilt = np.empty(3), np.empty(3)
+    by_point = True
+    for _ in range(3):
+        for j in range(n):
+            q[j] = 0.5 * (low[j] + high[j])
+            half[j] = 0.5 * (high[j] - low[j])
+        place(problem, work, 1, q)
+        distance, chord = work.error[1, 0], work.error[1, 1]
+        if distance <= problem.tolerance and chord <= problem.rim:
+            return 2, by_point
+        first, second, first_axis, second_axis = _reach_of_box(
+            problem, work, half, longest, lever, sine
+        )
+        near = problem.tolerance + min(first, second) + ROUNDING
+        narrow = problem.rim + min(first_axis, second_axis) + ROUNDING
+        by_point = distance / near > chord / narrow
+        if (
+            distance > problem.tolerance + first + ROUNDING
+            or chord > problem.rim + first_axis + ROUNDING
+        ):
+            return 1, by_point
+        # The second order is of use only where it beats the first.
+        if not (second < first or second_axis < first_axis):
+            break
+        jacobians(
+            problem.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
+            work.point_rows, work.axis_rows,
+        )  # fmt: skip
+        for k in range(3):
+            gap[k] = work.target[0, k] - work.point[1, k]
+            tilt[k] = work.target[1, k] - work.axis[1, k]
+        for j in range(n):
+            low[j] -= q[j]
+            high[j] -= q[j]
+        alive = True
+        if second < first:
+            alive = _cut_all(work.point_rows, gap, distance, near, low, high, directions)
+        if alive and second_axis < first_axis:
+            alive = _cut_all(work.axis_rows, tilt, chord, narrow, low, high, directions)
+        if not alive:
+            return 1, by_point
+        left = 1.0
+        for j in range(n):
+            if half[j] > 0.0:
+                left *= max((high[j] - low[j]) / (2.0 * half[j]), 1e-3)
+            low[j] += q[j]
+            high[j] += q[j]
+        if left > 0.3:
+            break  # cutting again would gain little
+    return 0, by_point
+
+
+@kernel
 def branch_and_bound(problem, work, target, approach, boxes, most, directions, found):  # type: ignore[no-untyped-def]
     """Look at up to `most` boxes; see `Ruling` for what comes back.
 
@@ -195,108 +257,47 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
         found: (n,) receives the configuration when the ruling is REACHED.
     """
     n = found.shape[0]
-    q, half = np.empty(n), np.empty(n)
     low, high = np.empty(n), np.empty(n)
-    lever, sine = np.empty(n), np.empty(n)
-    gap, tilt = np.empty(3), np.empty(3)
-    longest = np.empty(n)  # static levers: the links behind a joint, stretched out
-    total = 0.0
-    for j in range(n - 1, -1, -1):
-        for k in range(3):
-            gap[k] = problem.chain.translations[j + 1, k]
-        total += np.sqrt(gap[0] ** 2 + gap[1] ** 2 + gap[2] ** 2)
-        longest[j] = total
-        if problem.chain.prismatic[j]:
-            total += max(abs(problem.lower[j]), abs(problem.upper[j]))
+    lever, sine, longest = np.empty(n), np.empty(n), np.empty(n)
+    _static_levers(problem, longest)
     for k in range(3):
         work.target[0, k] = target[k]
         work.target[1, k] = approach[k]
     for _ in range(most):
-        if boxes.count[0] == 0:
+        if boxes.counts[0] == 0:
             return 1
-        boxes.count[0] -= 1
-        boxes.count[1] += 1
-        top = boxes.count[0]
+        boxes.counts[0] -= 1
+        boxes.counts[1] += 1
+        top = boxes.counts[0]
         low[:] = boxes.low[top]
         high[:] = boxes.high[top]
-        alive = True
-        for turn in range(3):
-            volume = 1.0
-            for j in range(n):
-                q[j] = 0.5 * (low[j] + high[j])
-                half[j] = 0.5 * (high[j] - low[j])
-            place(problem, work, 1, q)
-            if work.error[1, 0] <= problem.tolerance and work.error[1, 1] <= problem.rim:
-                found[:] = q
-                return 2
-            first, second, first_axis, second_axis = _reach_of_box(
-                problem, work, half, longest, lever, sine
-            )
-            if (
-                work.error[1, 0] > first + problem.tolerance + ROUNDING
-                or work.error[1, 1] > first_axis + problem.rim + ROUNDING
-            ):
-                alive = False
-                break
-            near = problem.tolerance + second + ROUNDING
-            narrow = problem.rim + second_axis + ROUNDING
-            _jacobian_rows(problem, work)
-            for k in range(3):
-                gap[k] = work.target[0, k] - work.point[1, k]
-                tilt[k] = work.target[1, k] - work.axis[1, k]
-            for j in range(n):
-                low[j] -= q[j]
-                high[j] -= q[j]
-            distance = max(work.error[1, 0], 1e-12)
-            chord = max(work.error[1, 1], 1e-12)
-            # The second order is of use only where it beats the first.
-            if second < first:
-                alive = _cut(work.point_rows, gap, near, low, high, gap / distance)
-                for k in range(directions.shape[0]):
-                    if not alive:
-                        break
-                    alive = _cut(work.point_rows, gap, near, low, high, directions[k])
-            if alive and second_axis < first_axis:
-                alive = _cut(work.axis_rows, tilt, narrow, low, high, tilt / chord)
-                for k in range(directions.shape[0]):
-                    if not alive:
-                        break
-                    alive = _cut(work.axis_rows, tilt, narrow, low, high, directions[k])
-            if not alive:
-                break
-            for j in range(n):
-                low[j] += q[j]
-                high[j] += q[j]
-                if half[j] > 0.0:
-                    volume *= max((high[j] - low[j]) / (2.0 * half[j]), 1e-3)
-            if volume > 0.3:
-                break
-        if not alive:
+        code, by_point = _shrink(problem, work, low, high, longest, lever, sine, directions)
+        if code == 2:
+            found[:] = 0.5 * (low + high)
+            return 2
+        if code == 1:
             continue
         # Split the joint that moves most what is nearest to ruling the box out.
-        position = work.error[1, 0] / (problem.tolerance + min(first, second))
-        cone = work.error[1, 1] / (problem.rim + min(first_axis, second_axis))
-        by_point = 1.0 if position > cone else 0.05
-        by_axis = 1.0 if cone >= position else 0.05
+        for_point, for_axis = (1.0, 0.05) if by_point else (0.05, 1.0)
         worst, largest = -1, 0.0
         for j in range(n):
             width = high[j] - low[j]
             if width > THINNEST:
-                move = (by_point * lever[j] / problem.scale + by_axis * sine[j]) * width
+                move = (for_point * lever[j] / problem.scale + for_axis * sine[j]) * width
                 if move > largest:
                     worst, largest = j, move
-        if worst < 0 or boxes.count[0] + 2 > boxes.low.shape[0]:
+        if worst < 0 or boxes.counts[0] + 2 > boxes.low.shape[0]:
             return 3
         middle = 0.5 * (low[worst] + high[worst])
         for side in range(2):
-            top = boxes.count[0]
+            top = boxes.counts[0]
             boxes.low[top] = low
             boxes.high[top] = high
             if side == 0:
                 boxes.high[top, worst] = middle
             else:
                 boxes.low[top, worst] = middle
-            boxes.count[0] += 1
+            boxes.counts[0] += 1
     return 0
 
 
@@ -310,6 +311,13 @@ def rule(
     """
     found = np.empty(len(problem.lower))
     code = branch_and_bound(
-        problem, work, problem.points[cell], problem.approaches[cell], boxes, most, _DIRECTIONS, found
+        problem,
+        work,
+        problem.points[cell],
+        problem.approaches[cell],
+        boxes,
+        most,
+        _DIRECTIONS,
+        found,
     )
     return Ruling(code), found

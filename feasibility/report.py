@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import textwrap
 from collections.abc import Iterator
 from typing import Any
 
@@ -15,6 +16,7 @@ from feasibility.result import plain
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 from feasibility.version import version
 
+WIDTH = 100  # columns
 DETAILS = 3  # cells of one group whose details are told
 
 SENTENCES = {
@@ -113,7 +115,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("certificate", _certificate_text(verdict)),
         ("time", _time_text(_seconds(verdict, before_s))),
     ]
-    lines = [head, "", *(f"  {name:<12}{text}" for name, text in rows if text)]
+    lines = [head, "", *(_row(name, text) for name, text in rows if text)]
     groups = list(_groups(verdict))
     if groups:
         lines += ["", "Not covered:", *groups]
@@ -121,6 +123,19 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     if hints:
         lines += ["", "To try next:", *(f"  {hint}" for hint in hints)]
     return "\n".join(lines)
+
+
+def _row(name: str, text: str) -> str:
+    """A named line; the rest of a long one is indented below."""
+    indent = " " * 14
+    return textwrap.fill(
+        text,
+        WIDTH,
+        initial_indent=f"  {name:<12}",
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _certificate_text(verdict: Verdict) -> str:

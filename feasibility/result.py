@@ -22,6 +22,7 @@ from feasibility.case_faults import shown
 from feasibility.files import FileError
 from feasibility.result_fields import Fields
 from feasibility.result_graph import pack_graph, ragged, unpack_graph, unpack_ragged
+from feasibility.result_robot import check_robot, probes
 from feasibility.task import Task
 from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
 from feasibility.version import version
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
 FORMAT = "coverable-result"
 FORMAT_VERSION = 1
-CLOSE = 1e-9  # [m], [1]: tool point and axis of the same arm
 
 
 class ResultError(ValueError):
@@ -128,36 +128,13 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         written = fields.text("version")
         case = _case(fields.table("case"), archive)
         setup = case.build()
-        _check_robot(setup.robot, fields.table("robot"), archive)
+        check_robot(setup.robot, fields.table("robot"), archive)
         verdict = _verdict(fields, archive, setup.robot, setup.cells)
     except CaseError as error:
         raise ResultError(f"{os.fspath(path)!r}: its case cannot be used: {error}") from error
     except ArchiveError as error:
         raise ResultError(str(error)) from error
     return Result(case, verdict, written)
-
-
-def probes(robot: Robot) -> NDArray[np.float64]:
-    """(n + 4, 6) numbers that tell one arm from another: limits, tool points and axes.
-
-    The limits fill the first n rows (2 of 6 columns, infinite ones as 0 with a flag beside them);
-    tool points and axes at four configurations the rest.
-    """
-    from robots.kinematics import Kinematics
-
-    kinematics = Kinematics(robot)
-    n = robot.n
-    low, high = np.clip(robot.lower, -3.0, 3.0), np.clip(robot.upper, -3.0, 3.0)
-    limits = np.zeros((n, 6))
-    for column, bound in enumerate((robot.lower, robot.upper)):
-        limits[:, column] = np.where(np.isfinite(bound), bound, 0.0)
-        limits[:, 2 + column] = np.isfinite(bound)
-    rows = []
-    for k in range(4):
-        share = np.modf(0.17 + 0.23 * k + 0.31 * np.arange(n))[0]
-        point, axis = kinematics.tool(low + share * (high - low))
-        rows.append(np.concatenate([point, axis]))
-    return np.vstack([limits, rows])
 
 
 def plain(value: Any) -> Any:
@@ -194,19 +171,6 @@ def _case(fields: Fields, archive: Archive) -> Case:
     name = fields.text("name")
     case = Case.from_toml(fields.text("toml"), name=f"{archive.name}: case {shown(name)}")
     return replace(case, name=name, description=fields.text("description"))
-
-
-def _check_robot(robot: Robot, fields: Fields, archive: Archive) -> None:
-    """Refuse a robot that is no longer the one that the result was found for."""
-    same = fields.get("joints", list, "an array") == list(robot.joint_names)
-    if same and fields.text("tool_frame") == robot.tool_frame:
-        stored = archive.array("probes", np.float64, (robot.n + 4, 6))
-        same = bool(np.abs(stored - probes(robot)).max() <= CLOSE)
-    if not same:
-        raise archive.error(
-            f"was found for another {robot.name!r} than the one that is loaded now (its joints, "
-            "limits or geometry have changed); run the check again"
-        )
 
 
 def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verdict:

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from surfaces import Cells
 
-
 DEFAULT_TOLERANCE = 1e-3  # [m]
 
 
@@ -56,7 +55,9 @@ class Task:
         if self.tolerance is not None and not (
             math.isfinite(self.tolerance) and self.tolerance > 0.0
         ):
-            raise ValueError(f"tolerance must be a finite number > 0 (metres), got {self.tolerance}")
+            raise ValueError(
+                f"tolerance must be a finite number > 0 (metres), got {self.tolerance}"
+            )
 
     @property
     def cone(self) -> float:

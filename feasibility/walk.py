@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from feasibility.kernels import kernel
 from feasibility.roadmap import EDGES, NODES, Roadmap, root_of
 from feasibility.verdict import Walk
 
 
-@njit(cache=True)
+@kernel
 def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
     """CSR lists of (node, edge + 1, negative when walked backwards) for one component."""
     nodes = roadmap.counters[NODES]
@@ -39,7 +39,7 @@ def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
     return inside, indptr, links
 
 
-@njit(cache=True)
+@kernel
 def _route(roadmap, component):  # type: ignore[no-untyped-def]
     """Signed edges of a walk that visits every cell of a component, and the node it starts at.
 
@@ -131,7 +131,7 @@ def _route(roadmap, component):  # type: ignore[no-untyped-def]
     return start, route[:length]
 
 
-@njit(cache=True)
+@kernel
 def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
     """Waypoints and cell marks of a route."""
     total = 1

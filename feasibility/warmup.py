@@ -7,7 +7,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-NOTICE = "compiling the search kernels (first run only, about 10 s) ..."
+NOTICE = "compiling the search kernels (first run only, up to a minute) ..."
 PATIENCE = 1.5  # [s]: loading them from the cache takes less
 
 
@@ -39,6 +39,7 @@ def warm_up() -> None:
 
     What it does is thrown away; afterwards timings tell of the search, not of the compiler.
     """
+    from feasibility.causes import diagnose
     from feasibility.certificate import replay
     from feasibility.complete import Explorer, close, explore, problem_of
     from feasibility.proof import root_box
@@ -58,6 +59,7 @@ def warm_up() -> None:
     close(explorer)
     explorer.stir(0)
     explorer.rule(0, root_box(explorer.problem), 1)
+    diagnose(explorer, 0)
     replay(robot, cells, task, covering_walk(explorer.roadmap, explorer.best), explorer.covered)
     _warm = True
 

@@ -1,0 +1,96 @@
+"""The bound between samples: does a straight segment in joint space obey the constraints?
+
+On q(s) = q0 + s d, s in [0, 1], let r_j be the largest distance of the tool point from axis j. Then
+
+    |p''| <= D = sum_j r_j |d_j| (|d_j| + 2 sum_{i<j, revolute} |d_i|)
+
+for revolute j; a prismatic j adds 2 |d_j| sum_{i<j, revolute} |d_i|. (Differentiate
+p' = sum_j d_j z_j x (p - o_j): joint j turns its own term, every earlier revolute joint turns it
+once more, and the mixed term appears twice.) The distance to axis j changes only with the joints
+behind it, so r_j <= max(r_j(0), r_j(1)) + 1/2 sum_{k>j} r_k |d_k|. The same with the sine
+s_j = |z_j x a| in place of r_j bounds |a''| <= Da.
+
+A vector function whose second derivative is at most M stays within s (1 - s) M / 2 of its chord, so
+its norm is at most (1 - s) c0 + s c1 + s (1 - s) M / 2: see `peak`. With L = |p1 - p0| the tool
+point moves at |p'| <= V = L + D/2. Let h be the signed distance from the surface; its gradient is
+the unit normal m, |Dm| <= kappa and |D^2 m| <= beta (`Surface.bounds`). So
+
+    |h(p(s)) - h*|  <= peak of both ends with M = kappa V^2 + D
+    |a - b|(s)      <= peak of both ends with M = Da + beta V^2 + kappa D,   b = -+ m(p(s))
+
+and |a - b| = 2 sin(angle / 2) compares with the cone exactly. Limits are convex: the ends decide.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feasibility.kernels import kernel
+
+
+@kernel
+def spread(problem, work, q0, q1):  # type: ignore[no-untyped-def]
+    """D and Da of the module's bound for the segment from q0 (slot 0) to q1 (slot 1)."""
+    n = q0.shape[0]
+    behind = 0.0  # how far the tool point moves by the joints behind j
+    behind_axis = 0.0
+    before = 0.0  # total turn of the revolute joints before j
+    for j in range(n):
+        if not problem.chain.prismatic[j]:
+            before += abs(q1[j] - q0[j])
+    total, total_axis = 0.0, 0.0
+    for j in range(n - 1, -1, -1):
+        d = abs(q1[j] - q0[j])
+        if problem.chain.prismatic[j]:
+            total += 2.0 * d * before
+            behind += d
+            continue
+        before -= d
+        r, s = 0.0, 0.0
+        for slot in range(2):
+            zx, zy, zz = work.axes[slot, j, 0], work.axes[slot, j, 1], work.axes[slot, j, 2]
+            x = work.point[slot, 0] - work.origins[slot, j, 0]
+            y = work.point[slot, 1] - work.origins[slot, j, 1]
+            z = work.point[slot, 2] - work.origins[slot, j, 2]
+            r = max(r, (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
+            x, y, z = work.axis[slot, 0], work.axis[slot, 1], work.axis[slot, 2]
+            s = max(s, (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
+        r = np.sqrt(r) + 0.5 * behind
+        s = min(np.sqrt(s) + 0.5 * behind_axis, 1.0)
+        total += r * d * (d + 2.0 * before)
+        total_axis += s * d * (d + 2.0 * before)
+        behind += r * d
+        behind_axis += s * d
+    return total, total_axis
+
+
+@kernel
+def peak(a, b, most):  # type: ignore[no-untyped-def]
+    """Largest value of (1 - s) a + s b + s (1 - s) most / 2 over s in [0, 1]."""
+    slope = abs(b - a)
+    if 2.0 * slope >= most:
+        return max(a, b)
+    return 0.5 * (a + b) + most / 8.0 + slope * slope / (2.0 * most)
+
+
+@kernel
+def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
+    """Do point and cone hold on the whole straight segment from q0 (slot 0) to q1 (slot 1)?
+
+    Returns the position bound over the tolerance and the cone bound over the rim: both must be
+    at most 1. NaN compares false, so it never certifies.
+    """
+    total, total_axis = spread(problem, work, q0, q1)
+    length = 0.0
+    for k in range(3):
+        length += (work.point[1, k] - work.point[0, k]) ** 2
+    speed = np.sqrt(length) + 0.5 * total
+    position = peak(work.error[0, 0], work.error[1, 0], problem.curvature * speed * speed + total)
+    # The errors are against the targets of the two ends; the surface's own normal at the tool
+    # point differs from the target's by at most kappa times the distance.
+    cone = peak(
+        work.error[0, 1] + problem.curvature * work.error[0, 0],
+        work.error[1, 1] + problem.curvature * work.error[1, 0],
+        total_axis + problem.bend * speed * speed + problem.curvature * total,
+    )
+    return position / problem.tolerance, cone / problem.rim
