@@ -47,7 +47,7 @@ ifneq ($(NOTEBOOKS),)
 endif
 
 bench: .venv/installed
-	$(BIN)/python -m pytest -q -s tests/benchmarks
+	$(BIN)/python tests/benchmarks/run.py
 
 clean:
 	rm -rf out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

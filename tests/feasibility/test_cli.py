@@ -1,5 +1,6 @@
 """The command line: exit statuses, one message on stderr, and nothing but answers on stdout."""
 
+import contextlib
 import csv
 import errno
 import io
@@ -231,6 +232,18 @@ def test_an_interrupted_search_is_status_130(ask, monkeypatch, plate):
 
     monkeypatch.setattr(feasibility.checking, "check", interrupted)
     assert ask("check", plate) == (130, "", "coverable: interrupted\n")
+
+
+def test_an_interrupt_that_python_drops_is_not_lost(ask, monkeypatch, plate):
+    def dropped(*_, **__):
+        with contextlib.suppress(KeyboardInterrupt):  # as in a callback of the interpreter
+            signal.raise_signal(signal.SIGINT)
+        return small_verdict("plate")
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(feasibility.checking, "check", dropped)
+    assert ask("check", plate) == (130, "", "coverable: interrupted\n")
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_ctrl_c_ends_a_running_search(tmp_path):
