@@ -104,37 +104,32 @@ def _head_for(problem, work, cell, q, goal, ways):  # type: ignore[no-untyped-de
     connect(problem, work, problem.points[cell], problem.approaches[cell], q, goal, ways, 0, 60)
 
 
-def _excess(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) how far each joint lies past its limits, at the most favourable winding."""
-    turn = np.where(robot.prismatic, 0.0, 2.0 * np.pi)
-    past = []
-    for k in (-1.0, 0.0, 1.0):
-        value = q + k * turn
-        past.append(np.maximum(np.maximum(robot.lower - value, value - robot.upper), 0.0))
-    return np.min(past, axis=0)
-
-
 def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """q with each turning joint at the winding nearest to its limits."""
-    turn = np.where(robot.prismatic, 0.0, 2.0 * np.pi)
-    middle = np.where(np.isfinite(robot.lower + robot.upper), 0.5 * (robot.lower + robot.upper), q)
-    return q - turn * np.round((q - middle) / (2.0 * np.pi))
+    """q with each turning joint at the winding that passes its limits least."""
+    best, least = q, np.full(robot.n, np.inf)
+    for k in (-1.0, 0.0, 1.0):
+        value = q + np.where(robot.prismatic, 0.0, 2.0 * np.pi * k)
+        past = np.abs(value - np.clip(value, robot.lower, robot.upper))
+        best = np.where(past < least, value, best)
+        least = np.minimum(past, least)
+    return best
 
 
-def _smallest_excess(
+def _nearest_to_limits(
     explorer: Explorer, relaxed: Problem, cell: int, solutions: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(n,) excess of the solution that passes its limits least."""
+    """(n,) the configuration over a cell that passes the limits least, among what is found."""
     robot = explorer.robot
     ways = np.empty((64, robot.n))
-    best = np.full(robot.n, np.inf)
+    best, least = solutions[0], np.inf
     for q in solutions:
         here = _wrapped(robot, q)
         goal = np.clip(here, robot.lower, robot.upper)
         _head_for(relaxed, explorer.work, cell, here, goal, ways)
-        excess = _excess(robot, here)
-        if excess.sum() < best.sum():
-            best = excess
+        here = _wrapped(robot, here)
+        past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
+        if past < least:
+            best, least = here, past
     return best
 
 
@@ -157,18 +152,18 @@ def _smallest_angle(explorer: Explorer, relaxed: Problem, cell: int) -> float:
     return high
 
 
-def _joint(robot: Robot, excess: NDArray[np.float64]) -> str:
-    """The joints that pass their limits, in words."""
+def _past_limits(robot: Robot, q: NDArray[np.float64]) -> str:
+    """Which joints of q pass their limits, and how far, in words; empty when none does."""
+    limit = np.clip(q, robot.lower, robot.upper)
     parts = []
-    for j in np.argsort(-excess):
-        if excess[j] > 1e-6:
-            unit = (
-                f"{1e3 * excess[j]:.0f} mm"
-                if robot.prismatic[j]
-                else f"{np.degrees(excess[j]):.1f} deg"
+    for j in np.argsort(-np.abs(q - limit)):
+        if abs(q[j] - limit[j]) > 1e-6:
+            scale, unit = (1e3, "mm") if robot.prismatic[j] else (np.degrees(1.0), "deg")
+            parts.append(
+                f"{robot.joint_names[j]} would need {scale * q[j]:.1f} {unit}; "
+                f"it stops at {scale * limit[j]:.1f} {unit}"
             )
-            parts.append(f"{robot.joint_names[j]} by {unit}")
-    return " and ".join(parts) + " would have to pass the limits" if parts else "no single joint"
+    return ", and ".join(parts)
 
 
 def diagnose(explorer: Explorer, cell: int) -> Cause:
@@ -203,23 +198,21 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
             f"the first joint, the arm reaches at most {robot.reach:.3f} m",
         )  # fmt: skip
     found = _solve(unlimited, work, cell, guesses, solutions)
-    past = _smallest_excess(explorer, unlimited, cell, solutions[:found]) if found else None
+    past = ""
+    if found:
+        past = _past_limits(robot, _nearest_to_limits(explorer, unlimited, cell, solutions[:found]))
     if _solve(slack_cone, work, cell, guesses, _one(explorer)):
         angle = np.degrees(_smallest_angle(explorer, slack_cone, cell))
         alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.rim, 1.0)))
         detail = f"the tool tilts at least {angle:.1f} deg there, the cone allows {alpha:g} deg"
-        if past is not None and np.isfinite(past).all() and past.sum() > 1e-6:
-            detail += f"; or {_joint(robot, past)}"
+        if past:
+            detail += f"; or {past}"
         return Cause(cell, CauseKind.ORIENTATION, proved, detail)
-    if past is None:
+    if not past:
         found = _solve(anything, work, cell, guesses, solutions)
-        past = _smallest_excess(explorer, anything, cell, solutions[:found])
-        return Cause(
-            cell, CauseKind.JOINT_LIMITS, proved,
-            f"for the tool point alone {_joint(robot, past)}; inside the cone nothing was found "
-            "even without limits",
-        )  # fmt: skip
-    return Cause(cell, CauseKind.JOINT_LIMITS, proved, _joint(robot, past))
+        past = _past_limits(robot, _nearest_to_limits(explorer, anything, cell, solutions[:found]))
+        past = f"for the tool point alone {past}; inside the cone nothing was found at all"
+    return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
 
 
 def disconnected(explorer: Explorer, cell: int) -> Cause:

@@ -29,7 +29,13 @@ def check(args: argparse.Namespace, began: float) -> int:
 
         loaded = time.perf_counter() - began
         with Bar() as bar:
-            verdict = run(*setup, progress=bar.callback)
+
+            def report(done: int, total: int | None, text: str) -> None:
+                settle()  # stop even if Python has dropped the Ctrl-C
+                if bar.callback is not None:
+                    bar(done, total, text)
+
+            verdict = run(*setup, progress=report)
         settle()
     say(_json(as_json(verdict, loaded)) if args.json else as_text(verdict, case, loaded))
     if args.save is not None:

@@ -22,7 +22,8 @@ from feasibility.search import Search
 from feasibility.starts import DRY_SEEDS, starts
 from feasibility.task import Task
 from feasibility.treesearch import Progress, Tree, tree_search
-from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
+from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, deferred
+from feasibility.warmup import compiling_notice
 from robots import Robot
 from robots.chain import Chain
 from surfaces import Cells
@@ -96,7 +97,8 @@ def greedy_check(
     search = Search(method="greedy") if search is None else search
     called = time.perf_counter()
     chain, steps = Chain.checked(robot), Steps.of(robot, cells.surface, task, search)
-    JSpace(robot, cells, task, np.zeros(robot.n), search, chain, steps).load()
+    with compiling_notice():
+        JSpace(robot, cells, task, np.zeros(robot.n), search, chain, steps).load()
     began = time.perf_counter()
     deadline = math.inf if search.time_limit is None else began + search.time_limit
     run = _Run()
@@ -124,11 +126,11 @@ def greedy_check(
         task=task,
         method="greedy",
         seed=search.seed,
-        graph=_graph(cells, run.best),
+        graph=deferred(lambda: _graph(cells, run.best)),
         covered=_touched(cells, run.best),
         causes=_causes(robot, cells, task, steps, run),
         components=() if run.best is None else (np.array(sorted(run.best.jcell), dtype=np.int64),),
-        tree=_tree(run.best),
+        tree=deferred(lambda: _tree(run.best)),
         start=None if run.best is None else run.best.start,
         certificate=replayed.certificate if replayed is not None else None,
         timing={

@@ -122,7 +122,7 @@ class Verdict:
     """One for each cell that is not covered, in order of index."""
     components: tuple[NDArray[np.int64], ...] = ()
     """Cells of each connected component found, the best first."""
-    tree: nx.DiGraph | None = None
+    tree: nx.DiGraph | None = field(default_factory=lambda: None)
     """Tree T of the paper's search; None for other methods."""
     start: int | None = None
     """Flat index of the cell where the search (or the witness) starts."""

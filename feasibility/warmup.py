@@ -35,10 +35,13 @@ def compiling_notice(patience: float = PATIENCE, notice: str = NOTICE) -> Iterat
 
 
 def warm_up() -> None:
-    """Load (or compile) the kernels of the complete search, by a search over one small cell.
+    """Load (or compile) the kernels of the complete search, by a search over two small cells.
 
     What it does is thrown away; afterwards timings tell of the search, not of the compiler.
     """
+    global _warm
+    if _warm:
+        return
     from feasibility.causes import diagnose
     from feasibility.certificate import replay
     from feasibility.complete import Explorer, close, explore, problem_of
@@ -48,9 +51,6 @@ def warm_up() -> None:
     from robots import load_robot
     from surfaces import plane
 
-    global _warm
-    if _warm:
-        return
     robot = load_robot("puma560")
     cells = plane(width=(0.7, 0.72), length=(0.1, 0.12), side="outside").cells(1, 2)
     task = Task(standoff=0.01, cone_deg=60)
