@@ -24,6 +24,8 @@ def check(args: argparse.Namespace, began: float) -> int:
         case = load_case(args.case, args.settings)
         _check_outputs({"--save": args.save, "--html": args.html, "--witness": args.witness})
         setup = case.build()
+        for note in setup.robot.notes:
+            tell(f"note: {setup.robot.name}: {note}")
         from feasibility.checking import check as run
         from feasibility.report import as_json, as_text, witness_csv
 

@@ -76,6 +76,7 @@ def robot_from_urdf(
         urdf=os.path.abspath(checked.path),
         package_dirs=checked.package_dirs,
         locked=locked,
+        notes=checked.warnings,
     )
     return robot if limits is None else robot.with_limits(limits)
 

@@ -55,6 +55,8 @@ class Robot:
     """Folders that `package://` mesh names are looked up in."""
     locked: Mapping[str, float] = field(default_factory=dict)
     """Every moving joint of the URDF that is not free here, with the value it is held at."""
+    notes: tuple[str, ...] = ()
+    """What reading the URDF had to assume or leave out; worth showing to whoever wrote it."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays, and check that they fit together."""
@@ -115,7 +117,7 @@ class Robot:
             (
                 self.name, self.model, self.tool_frame, self.approach_axis, self.joint_names,
                 self.joint_kinds, self.lower, self.upper, dict(self.limit_sets), self.urdf,
-                self.package_dirs, dict(self.locked),
+                self.package_dirs, dict(self.locked), self.notes,
             ),
         )  # fmt: skip
 

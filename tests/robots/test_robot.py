@@ -158,3 +158,11 @@ def test_reach_of_many_slides_in_a_row_is_still_a_bound(tmp_path):
 
 def test_repr_says_which_arm_it_is(puma):
     assert repr(puma) == "Robot('puma560', 6 joints, tool 'link6')"
+
+
+def test_notes_come_from_the_urdf_and_survive_pickling():
+    kinova = load_robot("kinova")
+    assert len(kinova.notes) == 3
+    assert all("continuous" in note for note in kinova.notes)
+    assert pickle.loads(pickle.dumps(kinova)).notes == kinova.notes
+    assert load_robot("puma560").notes == ()
