@@ -3,7 +3,7 @@
     python docs/pictures.py            # all of them
     python docs/pictures.py paper-4a   # one
 
-Each picture is two files beside this one: NAME.html, the view itself, and NAME.png.
+Each is written beside this file as NAME.png; `--keep FOLDER` keeps the page that was photographed.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from feasibility import Search, Task, check
+from feasibility import Task, check
 from feasibility.viewer import View, view
 from robots import load_robot
 from surfaces import sphere
 
 HERE = Path(__file__).parent
 SIZE = (900, 650)  # [pixel]
+NO_CONTROLS = "<style>.dg { display: none }</style>"  # meshcat's panel of controls
 LARGEST = 200_000  # [byte] of a PNG
 
 
 def paper_4a() -> View:
-    """The paper's first case: a PUMA 560 inside a dome, limits set 1, by its own search."""
+    """The paper's first case: a PUMA 560 inside a dome, limits set 1, and the covering motion."""
     dome = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
     verdict = check(
         load_robot("puma560", limits="set-1"),
         dome.cells(9, 10),
         Task(standoff=0.005, cone_deg=45),
-        Search(method="greedy"),
     )
-    return view(verdict, "paper/4a", play=False, at=0.6)
+    return view(verdict, "paper/4a", play=False, at=0.62)
 
 
 PICTURES: dict[str, Callable[[], View]] = {"paper-4a": paper_4a}
@@ -81,12 +81,17 @@ def main() -> None:
     """Make the pictures that are asked for."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}")
-    names = parser.parse_args().names or list(PICTURES)
-    for name in names:
-        if name not in PICTURES:
-            parser.error(f"there is no picture {name!r}; there are {', '.join(PICTURES)}")
-        page = PICTURES[name]().save_html(HERE / f"{name}.html")
-        photograph(page, HERE / f"{name}.png")
+    parser.add_argument("--keep", metavar="FOLDER", help="where to leave the pages")
+    args = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(args.keep or scratch)
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in args.names or PICTURES:
+            if name not in PICTURES:
+                parser.error(f"there is no picture {name!r}; there are {', '.join(PICTURES)}")
+            page = PICTURES[name]().save_html(folder / f"{name}.html")
+            page.write_text(page.read_text(encoding="utf-8") + NO_CONTROLS, encoding="utf-8")
+            photograph(page, HERE / f"{name}.png")
 
 
 if __name__ == "__main__":
