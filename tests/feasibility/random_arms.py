@@ -1,0 +1,182 @@
+"""Random arms, surfaces and straight joint segments, and dense sampling by Pinocchio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from arm_urdfs import FREE, arm, joint
+from numpy.typing import NDArray
+
+from robots import Robot
+from robots.kinematics import Kinematics
+from robots.reduce import robot_from_urdf
+from robots.urdf import check_urdf_text
+from surfaces import Surface, cylinder, hyperboloid, plane, sphere
+
+Floats = NDArray[np.float64]
+RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
+
+
+def robot_of(joints: list[str], approach_axis: tuple[float, ...] = (0.0, 0.0, 1.0)) -> Robot:
+    """The arm of joints written by `arm_urdfs.joint`."""
+    return robot_from_urdf(
+        check_urdf_text(arm(joints)), name="test_arm", approach_axis=approach_axis
+    )
+
+
+def random_arm(rng: np.random.Generator, least: int = 3, most: int = 8) -> Robot:
+    """A serial chain of `least` to `most` free joints.
+
+    Joints of every kind anywhere, axes along z, along a coordinate axis or anywhere, neighbouring
+    axes parallel or at right angles half of the time (singularities), a third of the links of no
+    length, and a tool that is offset or not.
+    """
+    n = int(rng.integers(least, most + 1))
+    square = rng.random() < 0.5
+    joints = []
+    for i in range(1, n + 1):
+        kind = str(rng.choice(["revolute", "continuous", "prismatic"], p=[0.6, 0.15, 0.25]))
+        lower = float(rng.uniform(-4.0, 1.0))
+        joints.append(
+            joint(
+                i,
+                kind,
+                np.zeros(3) if rng.random() < 0.33 else rng.uniform(-0.5, 0.5, 3),
+                rng.choice(RIGHT_ANGLES, 3) if square else rng.uniform(-np.pi, np.pi, 3),
+                (0, 0, 1) if square else rng.normal(size=3),
+                FREE if kind == "continuous" else (lower, lower + float(rng.uniform(1.0, 7.0))),
+            )
+        )
+    offset = np.zeros(3) if rng.random() < 0.3 else rng.uniform(-0.2, 0.2, 3)
+    joints.append(joint(n + 1, "fixed", offset))
+    along = (0.0, 0.0, 1.0) if square else tuple(rng.normal(size=3))
+    return robot_of(joints, along)
+
+
+def planar_arm(links: int = 3, limits: tuple[float, float] = (-2.8, 2.8)) -> Robot:
+    """Parallel axes along z, links of 0.3 m along x; the tool axis is x, in the plane."""
+    joints = [
+        joint(i, xyz=(0.3 if i > 1 else 0.0, 0.0, 0.0), limits=limits) for i in range(1, links + 1)
+    ]
+    return robot_of([*joints, joint(links + 1, "fixed", (0.3, 0.0, 0.0))], (1.0, 0.0, 0.0))
+
+
+def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
+    """A library arm that rides on a rail along y."""
+    from xml.etree import ElementTree
+
+    from robots import load_robot
+
+    carried = load_robot(base)
+    tree = ElementTree.fromstring(carried.urdf)
+    children = {element.find("child").get("link") for element in tree.findall("joint")}
+    root = next(name for link in tree.findall("link") if (name := link.get("name")) not in children)
+    ElementTree.SubElement(tree, "link", name="ground")
+    rail = ElementTree.SubElement(tree, "joint", name="rail", type="prismatic")
+    ElementTree.SubElement(rail, "parent", link="ground")
+    ElementTree.SubElement(rail, "child", link=root)
+    ElementTree.SubElement(rail, "axis", xyz="0 1 0")
+    low, high = map(repr, stroke)
+    ElementTree.SubElement(rail, "limit", lower=low, upper=high, effort="1", velocity="1")
+    return robot_from_urdf(
+        check_urdf_text(ElementTree.tostring(tree, encoding="unicode")),
+        name=f"{base} on a rail",
+        tool_frame=carried.tool_frame,
+        approach_axis=carried.approach_axis,
+    )
+
+
+def finite_limits(robot: Robot, far: float = 2.0 * np.pi) -> tuple[Floats, Floats]:
+    """Lower and upper limits (n,), with `far` where there are none."""
+    return (
+        np.where(np.isfinite(robot.lower), robot.lower, -far),
+        np.where(np.isfinite(robot.upper), robot.upper, far),
+    )
+
+
+def random_configuration(robot: Robot, rng: np.random.Generator) -> Floats:
+    """A configuration inside the limits; in a third of the cases with joints at round values.
+
+    Round values are 0 and right angles, where arms are singular, and the limits themselves.
+    """
+    low, high = finite_limits(robot)
+    q = rng.uniform(low, high)
+    if rng.random() < 0.33:
+        values = np.stack([np.clip(rng.choice(RIGHT_ANGLES, robot.n), low, high), low, high, q])
+        q = values[rng.choice(4, robot.n, p=[0.4, 0.1, 0.1, 0.4]), np.arange(robot.n)]
+    return np.ascontiguousarray(q)
+
+
+def tools(robot: Robot, q: Floats) -> tuple[Floats, Floats]:
+    """Tool points and approach axes (k, 3) of configurations (k, n), by Pinocchio."""
+    kinematics = Kinematics(robot)
+    pairs = [kinematics.tool(row) for row in q]
+    return np.array([p for p, _ in pairs]), np.array([a for _, a in pairs])
+
+
+def between(q0: Floats, q1: Floats, samples: int) -> tuple[Floats, Floats]:
+    """Shares s (samples + 1,) from 0 to 1, and the configurations of a straight segment there."""
+    s = np.linspace(0.0, 1.0, samples + 1)
+    return s, q0 + s[:, None] * (q1 - q0)
+
+
+def random_turn(rng: np.random.Generator) -> Floats:
+    """A random rotation (3, 3)."""
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    q *= np.sign(np.diag(r))
+    return q if np.linalg.det(q) > 0.0 else -q
+
+
+def turn_onto(start: Floats, end: Floats, rng: np.random.Generator) -> Floats:
+    """A random rotation (3, 3) that brings one unit vector onto another."""
+
+    def frame(z: Floats) -> Floats:
+        x = np.cross(z, rng.normal(size=3))
+        x /= np.linalg.norm(x)
+        return np.column_stack([x, np.cross(z, x), z])
+
+    return frame(end) @ frame(start).T
+
+
+def tilted(axis: Floats, angle: float, rng: np.random.Generator) -> Floats:
+    """A unit vector at an angle (rad) from a unit vector, in a random direction."""
+    across = np.cross(axis, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    return np.cos(angle) * axis + np.sin(angle) * across
+
+
+def random_surface(rng: np.random.Generator, kind: str) -> Surface:
+    """A large patch of one kind, lengths of 0.2 to 1 m, either side, in its own frame."""
+    side = str(rng.choice(["inside", "outside"]))
+    size = float(rng.uniform(0.2, 1.0))
+    if kind == "sphere":
+        return sphere(size, (0, 180), (-180, 180), side=side)
+    if kind == "cylinder":
+        return cylinder(size, (-180, 180), (-5, 5), side=side)
+    if kind == "hyperboloid":
+        flare = float(rng.uniform(0.3, 1.0))
+        return hyperboloid(size, flare, (-180, 180), (-0.6, 0.6), side=side)
+    return plane((-5, 5), (-5, 5), side=side)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Deviation:
+    """How far a motion strays from the target surface and from the approach direction."""
+
+    distance: Floats
+    """(k,) m."""
+    chord: Floats
+    """(k,) |a - b|."""
+    on_patch: NDArray[np.bool_]
+    """(k,) whether the foot lies on the patch."""
+
+
+def deviation(surface: Surface, standoff: float, points: Floats, axes: Floats) -> Deviation:
+    """Distance from the target surface, and |a - b|, at tool points and axes (k, 3)."""
+    foot = surface.closest(points)
+    return Deviation(
+        np.abs(foot.height - surface.side_sign * standoff),
+        np.linalg.norm(axes + surface.side_sign * foot.normal, axis=1),
+        foot.inside,
+    )

@@ -1,0 +1,221 @@
+"""The bound between samples, against dense sampling by Pinocchio, on random arms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from random_arms import (
+    between,
+    deviation,
+    planar_arm,
+    random_arm,
+    random_configuration,
+    random_surface,
+    tilted,
+    tools,
+    turn_onto,
+)
+
+from feasibility import Task
+from feasibility.newton import correct
+from feasibility.problem import aim, place, problem_of, work_for
+from feasibility.segment import peak, segment_holds, spread
+from surfaces import plane
+
+ROUNDING = 1e-12
+
+
+def far_plane():
+    """A surface for those who only want to know how the tool moves."""
+    return plane((-1, 1), (-1, 1)).cells(1, 1)
+
+
+def put(problem, work, slot, q, point):
+    """Evaluate q in a slot, against the target nearest to a point."""
+    aim(problem, work, point, point, 0.0)
+    place(problem, work, slot, q)
+
+
+def random_segments(rng, arms, per_arm):
+    """(robot, q0, q1), with steps of 1e-4 to 3 rad in all joints or in a few."""
+    for _ in range(arms):
+        robot = random_arm(rng)
+        for _ in range(per_arm):
+            q0 = random_configuration(robot, rng)
+            step = rng.normal(size=robot.n) * 10.0 ** rng.uniform(-4.0, 0.5)
+            if rng.random() < 0.5:
+                step *= rng.random(robot.n) < 0.4
+            yield robot, q0, q0 + step
+
+
+def test_second_derivatives_bound_the_sag_of_every_segment():
+    """2,400 segments of 80 arms: the tool point and the axis stay as near their chords as D says.
+
+    The bound is not loose either: some segment uses all of it, and half of them 15 per cent.
+    """
+    rng = np.random.default_rng(1)
+    used, used_axis = [], []
+    previous = None
+    for robot, q0, q1 in random_segments(rng, 80, 30):
+        if robot is not previous:
+            problem, work = problem_of(robot, far_plane(), Task(0.0, 30)), work_for(robot.n)
+            previous = robot
+        place(problem, work, 0, q0)
+        place(problem, work, 1, q1)
+        bends = spread(problem, work, q0, q1)
+        s, q = between(q0, q1, 32)
+        for values, bend, ratios in zip(tools(robot, q), bends, (used, used_axis), strict=True):
+            chord = (1.0 - s[:, None]) * values[0] + s[:, None] * values[-1]
+            sag = np.linalg.norm(values - chord, axis=1)
+            allowed = 0.5 * bend * s * (1.0 - s)
+            assert (sag <= allowed * (1.0 + 1e-9) + ROUNDING).all(), (robot.urdf, q0, q1)
+            if bend > 1e-6:
+                ratios.append((sag[1:-1] / allowed[1:-1]).max())
+    assert max(used) > 0.99 and max(used_axis) > 0.99
+    assert np.median(used) > 0.15 and np.median(used_axis) > 0.15
+
+
+def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
+    """Folded, stretched, folded again: the lever of the first joint peaks halfway.
+
+    Ends: the second joint at -+bend, so that the tool is as near to the first axis at both.
+    """
+    robot = planar_arm(2, (-3.1, 3.1))
+    problem, work = problem_of(robot, far_plane(), Task(0.0, 30)), work_for(2)
+    worst = 0.0
+    for bend in np.linspace(0.05, 3.1, 60):
+        for turn in (0.01, 0.1, 1.0, 3.0):
+            for q0, q1 in (
+                (np.array([0.0, -bend]), np.array([turn, bend])),
+                (np.array([turn, -bend]), np.array([0.0, bend])),
+            ):
+                place(problem, work, 0, q0)
+                place(problem, work, 1, q1)
+                bound, _ = spread(problem, work, q0, q1)
+                s, q = between(q0, q1, 200)
+                points, _ = tools(robot, q)
+                chord = (1.0 - s[:, None]) * points[0] + s[:, None] * points[-1]
+                sag = np.linalg.norm(points - chord, axis=1)
+                assert (sag <= 0.5 * bound * s * (1.0 - s) + ROUNDING).all()
+                worst = max(worst, (2.0 * sag[1:-1] / (bound * s * (1.0 - s))[1:-1]).max())
+    assert worst > 0.7
+
+
+def test_peak_is_the_largest_value():
+    """Against 2,001 points of the parabola, for 2,000 random ones; exactly at its corner cases."""
+    rng = np.random.default_rng(2)
+    s = np.linspace(0.0, 1.0, 2001)
+    for _ in range(2000):
+        a, b = rng.uniform(0.0, 1.0, 2)
+        most = 10.0 ** rng.uniform(-3.0, 2.0)
+        sampled = ((1.0 - s) * a + s * b + 0.5 * most * s * (1.0 - s)).max()
+        assert sampled <= peak(a, b, most) * (1.0 + 1e-12)
+        assert peak(a, b, most) <= sampled + 0.5 * most * 2.6e-7
+    assert peak(0.3, 0.3, 0.0) == 0.3
+    assert peak(0.0, 0.5, 1.0) == 0.5
+    assert peak(0.2, 0.2, 8.0) == pytest.approx(1.2, rel=1e-15)
+    assert peak(0.1, 0.2, np.inf) == np.inf
+    for hole in range(3):
+        values = [0.1, 0.2, 0.3]
+        values[hole] = np.nan
+        assert np.isnan(peak(*values))
+
+
+def surface_segment(rng, robot, kind):
+    """A segment that starts and ends close to a random target surface, axis inside the cone.
+
+    Returns problem, work, task, cells, q0, q1 (slots 0 and 1 hold both ends), or None where Newton
+    does not bring the second end onto the surface.
+    """
+    cone_deg = float(rng.choice([2.0, 20.0, 60.0, 120.0, 179.0, 180.0]))
+    tolerance = 10.0 ** rng.uniform(-4.5, -2.0)
+    task = Task(float(rng.choice([0.0, 0.01, 0.05])), cone_deg, tolerance)
+    surface = random_surface(rng, kind)
+    u, v = (rng.uniform(*span) * 0.9 for span in (surface.u_range, surface.v_range))
+    sign = surface.side_sign
+    normal = surface.normal(u, v)
+    target = surface.point(u, v) + sign * task.standoff * normal
+    q0 = random_configuration(robot, rng)
+    (point,), (axis,) = tools(robot, q0[None])
+    approach = tilted(axis, rng.uniform(0.0, min(task.cone, 3.1)), rng)
+    turn = turn_onto(-sign * normal, approach, rng)
+    stray = rng.normal(size=3)
+    stray *= rng.choice([0.0, 0.02, 0.7]) * tolerance / np.linalg.norm(stray)
+    cells = surface.moved(turn, point + stray - turn @ target).cells(1, 1)
+    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, -0.3)
+    (away,), _ = tools(robot, q1[None])
+    if rng.random() < 0.8:
+        put(problem, work, 1, q1, away)
+        work.wish[:] = 0.0
+        if not correct(problem, work, q1, 1e-6, np.inf, 60):
+            return None
+        # Against the target that it was put on, as the search does.
+    else:
+        put(problem, work, 1, q1, away)
+    aim(problem, work, point, point, 0.0)
+    place(problem, work, 0, q0)
+    return problem, work, task, cells, q0, q1
+
+
+@pytest.mark.parametrize("kind", ["sphere", "cylinder", "hyperboloid", "plane"])
+def test_a_segment_that_is_said_to_hold_holds_everywhere(kind):
+    """700 segments at either side of 35 random surfaces in any pose, 40 samples each.
+
+    Whatever `segment_holds` lets pass stays within tolerance and cone at every sample, and within
+    the share that it states. It lets a fair part pass, and some use at least half of what it
+    states beyond the errors of their ends.
+    """
+    rng = np.random.default_rng(["sphere", "cylinder", "hyperboloid", "plane"].index(kind))
+    passed, tried = 0, 0
+    worst_point, worst_cone = 0.0, 0.0
+    for _ in range(35):
+        robot = random_arm(rng)
+        for _ in range(20):
+            made = surface_segment(rng, robot, kind)
+            if made is None:
+                continue
+            problem, work, task, cells, q0, q1 = made
+            position, cone = segment_holds(problem, work, q0, q1)
+            tried += 1
+            if not (position <= 1.0 and cone <= 1.0):
+                continue
+            passed += 1
+            _, q = between(q0, q1, 40)
+            found = deviation(cells.surface, task.standoff, *tools(robot, q))
+            assert found.distance.max() <= position * task.tolerance + ROUNDING
+            assert found.distance.max() <= task.tolerance
+            angle = 2.0 * np.arcsin(np.minimum(0.5 * found.chord, 1.0))
+            assert angle.max() <= task.cone + 1e-9
+            if task.cone_deg < 180.0:
+                assert found.chord.max() <= cone * problem.rim + ROUNDING
+                ends = max(found.chord[0], found.chord[-1])
+                grown = cone * problem.rim - ends
+                if grown > 1e-4:
+                    worst_cone = max(worst_cone, (found.chord.max() - ends) / grown)
+            ends = max(found.distance[0], found.distance[-1])
+            grown = position * task.tolerance - ends
+            if grown > 1e-7:
+                worst_point = max(worst_point, (found.distance.max() - ends) / grown)
+    assert tried > 400 and passed > 80
+    assert worst_point > 0.5, (worst_point, worst_cone, passed)
+
+
+def test_nothing_that_is_not_a_number_passes():
+    """NaN or infinity in a joint, or a surface that folds, never certifies a segment."""
+    robot = planar_arm(3)
+    problem, work = problem_of(robot, far_plane(), Task(0.0, 180, 1.0)), work_for(3)
+    q = np.array([0.1, 0.2, 0.3])
+    place(problem, work, 0, q)
+    place(problem, work, 1, q)
+    position, cone = segment_holds(problem, work, q, q)
+    assert position < np.inf and cone == 0.0
+    for bad in (np.nan, np.inf):
+        wrong = np.array([0.1, bad, 0.3])
+        place(problem, work, 1, wrong)
+        position, cone = segment_holds(problem, work, q, wrong)
+        assert not (position <= 1.0 and cone <= 1.0)
+    place(problem, work, 1, q)
+    folded = problem._replace(curvature=np.inf, bend=np.inf)
+    position, cone = segment_holds(folded, work, q, q + 1e-9)
+    assert not (position <= 1.0 and cone <= 1.0)
