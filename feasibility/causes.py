@@ -17,18 +17,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.complete import Explorer
+from feasibility.complete import Explorer, evenly
 from feasibility.fibre import connect
 from feasibility.kernels import kernel
 from feasibility.newton import correct
 from feasibility.problem import CONE, LIMIT, LONG, SINGULAR, Problem, place
 from feasibility.proof import Ruling
-from feasibility.roadmap import NODES, root_of
+from feasibility.roadmap import root_of
 from feasibility.verdict import Cause, CauseKind
 from robots import Robot
 from robots.chain import jacobians
 
 STARTS = 16  # Newton starts of each relaxed question
+MOST_EXAMINED = 400  # cells that are examined one by one
 ENOUGH = 5  # solutions among which the least violation is looked for
 
 
@@ -218,8 +219,11 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
 def disconnected(explorer: Explorer, cell: int) -> Cause:
     """Why the best component misses a cell that another one covers."""
     roadmap, robot = explorer.roadmap, explorer.robot
-    sizes = {int(root_of(roadmap, roadmap.component[x])): 0 for x in _nodes_over(explorer, cell)}
-    other = max(sizes, key=lambda root: int(roadmap.size[root]))
+    roots, node = set[int](), int(roadmap.first_node[cell])
+    while node >= 0:
+        roots.add(int(root_of(roadmap, roadmap.component[node])))
+        node = int(roadmap.following[node])
+    other = max(roots, key=lambda root: int(roadmap.size[root]))
     code, joint = (int(v) for v in roadmap.blocked[cell])
     reason = {
         LIMIT: f"{robot.joint_names[joint]} at its limit" if joint >= 0 else "a joint at its limit",
@@ -237,22 +241,30 @@ def disconnected(explorer: Explorer, cell: int) -> Cause:
     return Cause(cell, CauseKind.DISCONNECTED, False, detail)
 
 
-def _nodes_over(explorer: Explorer, cell: int) -> list[int]:
-    """Nodes of the roadmap over one cell."""
-    nodes = np.arange(explorer.roadmap.counters[NODES])
-    return [int(x) for x in nodes[explorer.roadmap.cell[: len(nodes)] == cell]]
-
-
 def causes_of(explorer: Explorer) -> tuple[Cause, ...]:
     """One cause for each cell that the best component misses, in order of index.
+
+    On fine grids `MOST_EXAMINED` cells, spread evenly, are examined one by one; the others are
+    given the cause of the nearest of them, not proved, and say so.
 
     Raises:
         OutOfTime: the deadline passed.
     """
-    causes = []
-    reached = explorer.reached
-    for cell in np.flatnonzero(~explorer.covered):
+    reached, points = explorer.reached, explorer.problem.points
+    missed = np.flatnonzero(~explorer.covered)
+    causes: dict[int, Cause] = {}
+    for cell in missed[reached[missed]].tolist():
+        causes[cell] = disconnected(explorer, cell)
+    lost = missed[~reached[missed]]
+    examined = evenly(lost)[:MOST_EXAMINED]
+    for cell in examined.tolist():
         explorer.tick("finding causes")
-        find = disconnected if reached[cell] else diagnose
-        causes.append(find(explorer, int(cell)))
-    return tuple(causes)
+        causes[cell] = diagnose(explorer, cell)
+    for cell in lost.tolist():
+        if cell not in causes:
+            near = int(examined[np.argmin(np.linalg.norm(points[examined] - points[cell], axis=1))])
+            proved = explorer.rulings.get(cell) is Ruling.PROVED
+            index = list(explorer.cells.unravel(near))
+            detail = f"like {index}, the nearest cell examined: {causes[near].detail}"
+            causes[cell] = Cause(cell, causes[near].kind, proved, detail)
+    return tuple(causes[cell] for cell in missed.tolist())

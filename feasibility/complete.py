@@ -57,6 +57,7 @@ FIRST_BOXES = 1000  # boxes for each cell that nothing has reached
 MORE_BOXES = 20_000  # boxes once Newton has failed there too
 DEEP_BOXES = 2_000_000  # boxes for the few cells that are looked at until one is proved
 DEEP_CELLS = 3
+MOST_RULED = 500  # cells ruled on in a row without reaching any; on a fine grid the rest are alike
 NEWTON_STARTS = 25
 
 Progress = Callable[[int, int | None, str], None]
@@ -254,9 +255,14 @@ def _unreached(explorer: Explorer) -> None:
     for cell in np.flatnonzero(beyond).tolist():
         explorer.rulings[cell] = Ruling.PROVED
     open_boxes: dict[int, Boxes] = {}
-    for cell in np.flatnonzero(~explorer.reached & ~beyond).tolist():
+    fruitless = 0
+    for cell in evenly(np.flatnonzero(~explorer.reached & ~beyond)).tolist():
         if explorer.reached[cell]:
+            fruitless = 0
             continue  # reached from a cell ruled on before it
+        fruitless += 1
+        if fruitless > MOST_RULED:
+            break
         boxes = root_box(explorer.problem)
         if explorer.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
             if explorer.plant(cell, explorer.guesses(NEWTON_STARTS)) == 0:
@@ -273,6 +279,12 @@ def _unreached(explorer: Explorer) -> None:
     for cell in sorted(left, key=lambda c: -distance[c])[:DEEP_CELLS]:
         if explorer.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
             return
+
+
+def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The same cells in an order whose every beginning is spread over all of them."""
+    golden = 0.5 * (np.sqrt(5.0) - 1.0)
+    return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]
 
 
 def _rounds(explorer: Explorer) -> None:

@@ -30,7 +30,7 @@ from feasibility.problem import Problem, Work, place
 from robots.chain import jacobians
 
 THINNEST = 1e-6  # [rad], [m]: a box with no wider joint that moves the tool is left undecided
-STACK = 4096  # boxes that may wait
+STACK = 512  # boxes that may wait; depth first, so their number grows with the depth only
 ROUNDING = 1e-12  # [m], [1]: what double arithmetic may get wrong in a cut
 _DIRECTIONS = np.array(
     [
