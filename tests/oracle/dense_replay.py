@@ -18,7 +18,6 @@ from surfaces import Cells, Surface
 Floats = NDArray[np.float64]
 PER_SEGMENT = 20
 SAME = 1e-9  # [m], [rad]: rounding between two computations of one number
-EDGE = 1e-6  # [rad], [m]: how far beyond the patch a foot may lie
 
 
 def tools(robot: Robot, q: Floats) -> tuple[Floats, Floats]:
@@ -88,16 +87,16 @@ def placed(surface: Surface, task: Task, u: Floats, v: Floats) -> tuple[Floats, 
     return target, -sign * normal @ surface.rotation.T
 
 
-def _on_patch(surface: Surface, u: Floats, v: Floats) -> bool:
-    """Do parameters lie in the patch's ranges, where an angle may be given any turn?"""
+def onto_patch(surface: Surface, u: Floats, v: Floats) -> tuple[Floats, Floats]:
+    """Parameters brought into the patch's ranges; an angle first to the turn nearest to them."""
+    found = []
     ranges = (surface.u_range, surface.v_range)
     for value, (low, high), unit in zip((u, v), ranges, surface.units, strict=True):
-        away = np.abs(value - 0.5 * (low + high))
         if unit == "rad":
-            away = np.abs((value - 0.5 * (low + high) + np.pi) % (2.0 * np.pi) - np.pi)
-        if not (away <= 0.5 * (high - low) + EDGE).all():
-            return False
-    return True
+            middle = 0.5 * (low + high)
+            value = middle + (value - middle + np.pi) % (2.0 * np.pi) - np.pi
+        found.append(np.clip(value, low, high))
+    return found[0], found[1]
 
 
 def angles(a: Floats, b: Floats) -> Floats:
@@ -127,12 +126,10 @@ def assert_motion(verdict: Verdict, q: Floats) -> None:
     part = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
     dense = (q[:-1, None] * (1.0 - part) + q[1:, None] * part).reshape(-1, robot.n)
     points, axes = tools(robot, np.concatenate([dense, q[-1:]]))
-    u, v = feet(surface, points)
+    u, v = onto_patch(surface, *feet(surface, points))
     target, approach = placed(surface, task, u, v)
-    # The target surface over the foot: what the tool point strays from it is all along the normal.
     assert np.linalg.norm(points - target, axis=1).max() <= tolerance + SAME
     assert angles(axes, approach).max() <= task.cone + SAME
-    assert _on_patch(surface, u, v)
 
 
 def assert_witness(verdict: Verdict) -> None:

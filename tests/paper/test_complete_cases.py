@@ -4,17 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 from functools import cache
-from pathlib import Path
 
 import networkx as nx
 import numpy as np
 import pytest
-from paper_cases import PAPER_CASES
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "oracle"))
 from dense_replay import assert_motion, assert_over, assert_witness
+from paper_cases import PAPER_CASES
 
 from feasibility import Search, check
 from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
