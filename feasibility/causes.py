@@ -224,20 +224,20 @@ def disconnected(explorer: Explorer, cell: int) -> Cause:
         roots.add(int(root_of(roadmap, roadmap.component[node])))
         node = int(roadmap.following[node])
     other = max(roots, key=lambda root: int(roadmap.size[root]))
-    code, joint = (int(v) for v in roadmap.blocked[cell])
+    code, joint, stopped = (int(v) for v in roadmap.blocked[cell])
+    name = robot.joint_names[joint]
     reason = {
-        LIMIT: f"{robot.joint_names[joint]} at its limit" if joint >= 0 else "a joint at its limit",
-        CONE: "the rim of the cone",
-        SINGULAR: "a singular configuration",
-        LONG: "a motion of too many steps",
+        LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
+        CONE: "the tool axis is stopped at the rim of the cone",
+        SINGULAR: "the arm is stopped at a singularity",
+        LONG: "the motion takes too many steps",
     }.get(code)
-    border = [int(k) for k in explorer.cells.neighbours.of(cell) if explorer.covered[k]]
     detail = (
-        f"reached in another component, which covers {int(roadmap.size[other])} of "
+        f"reached by another motion only, which covers {int(roadmap.size[other])} of "
         f"{len(explorer.cells)} cells"
     )
-    if border and reason:
-        detail += f"; from its neighbours {reason} stops the motion"
+    if reason and stopped >= 0 and root_of(roadmap, stopped) == explorer.best:
+        detail += f"; on the way there from the covered cells {reason}"
     return Cause(cell, CauseKind.DISCONNECTED, False, detail)
 
 

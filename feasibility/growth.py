@@ -120,8 +120,11 @@ def spread_out(problem, work, roadmap, indptr, indices, budget):  # type: ignore
                 return FULL
             count[CURSOR] += 1
             if rows < 0:
-                roadmap.blocked[target, 0] = work.blame[0]
-                roadmap.blocked[target, 1] = work.blame[1]
+                last = roadmap.blocked[target, 2]
+                if last < 0 or roadmap.size[own] >= roadmap.size[root_of(roadmap, last)]:
+                    roadmap.blocked[target, 0] = work.blame[0]
+                    roadmap.blocked[target, 1] = work.blame[1]
+                    roadmap.blocked[target, 2] = own
                 continue
             node, more = join(problem, work, roadmap, target, q, own, rows, MOST_FAILURES)
             if more == -2:

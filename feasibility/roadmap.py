@@ -58,7 +58,8 @@ class Roadmap(NamedTuple):
     failures: NDArray[np.int64]
     """(components, components) failed connections between two root components."""
     blocked: NDArray[np.int64]
-    """(N, 2) why the last motion into each cell stopped: a code of `problem`, and a joint."""
+    """(N, 3) why a motion into each cell stopped: a code of `problem`, a joint, and the component
+    that it came from (the largest that was stopped there); -1 where none was."""
     counters: NDArray[np.int64]
     """(8,) see NODES ... BEST."""
 
@@ -82,7 +83,7 @@ def empty_roadmap(cells: int, n: int) -> Roadmap:
         cover=np.zeros((components, cells), dtype=np.uint8),
         size=np.zeros(components, dtype=np.int64),
         failures=np.zeros((components, components), dtype=np.int64),
-        blocked=np.zeros((cells, 2), dtype=np.int64),
+        blocked=np.full((cells, 3), -1, dtype=np.int64),
         counters=np.zeros(8, dtype=np.int64),
     )
 
