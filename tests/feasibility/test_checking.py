@@ -1,0 +1,249 @@
+"""`check` itself: what a verdict promises, its repeatability, its budgets and its interruption."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+
+import networkx as nx
+import numpy as np
+import pytest
+from dense_replay import assert_motion, assert_over, assert_witness, centre_targets
+from oracle_build import built
+from oracle_cases import Problem
+from random_cases import draw, draw_ur5
+
+from feasibility import Search, Task, check
+from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
+from robots import load_robot
+from surfaces import Cells, cylinder, plane, sphere
+
+DRAWN = [("puma560", number) for number in range(24)] + [("ur5", number) for number in range(12)]
+
+
+def drawn(arm: str, number: int) -> Problem:
+    rng = np.random.default_rng([7, number])
+    return draw(rng) if arm == "puma560" else draw_ur5(rng)
+
+
+@cache
+def verdict_of(arm: str, number: int) -> Verdict:
+    return check(*built(drawn(arm, number), load_robot(arm)))
+
+
+# what a verdict promises
+
+
+@pytest.mark.parametrize(("arm", "number"), DRAWN)
+def test_the_verdict_fits_together(arm: str, number: int) -> None:
+    verdict = verdict_of(arm, number)
+    total = len(verdict.cells)
+    covered = set(np.flatnonzero(verdict.covered).tolist())
+    missed = [cause.cell for cause in verdict.causes]
+    assert missed == sorted(set(range(total)) - covered)
+    assert verdict.n_covered == len(covered)
+
+    assert verdict.feasible == (len(covered) == total) == (verdict.witness is not None)
+    assert (verdict.certificate is not None) == verdict.feasible
+    evidence = {
+        Answer.FEASIBLE: {Evidence.WITNESS},
+        Answer.INFEASIBLE: {Evidence.PROOF, Evidence.EXHAUSTED},
+        Answer.UNDECIDED: {Evidence.BUDGET},
+    }
+    assert verdict.evidence in evidence[verdict.answer]
+    proved = any(cause.proved for cause in verdict.causes)
+    assert proved == (verdict.evidence is Evidence.PROOF)
+
+    components = [set(component.tolist()) for component in verdict.components]
+    sizes = [len(component) for component in components]
+    assert sizes == sorted(sizes, reverse=True)
+    assert (components[0] if components else set()) == covered
+    reached = set().union(*components)
+    apart = {c.cell for c in verdict.causes if c.kind is CauseKind.DISCONNECTED}
+    assert apart == reached - covered
+    assert all(cause.detail for cause in verdict.causes)
+
+
+@pytest.mark.parametrize(("arm", "number"), DRAWN)
+def test_the_graph_is_one_component_of_motions_that_hold(arm: str, number: int) -> None:
+    verdict = verdict_of(arm, number)
+    graph, covered = verdict.graph, np.flatnonzero(verdict.covered)
+    assert list(graph) == list(range(len(verdict.cells)))
+    assert verdict.n_edges == graph.number_of_edges()
+    pairs = {tuple(pair) for pair in verdict.cells.pairs.tolist()}
+    assert {(min(e), max(e)) for e in graph.edges} <= pairs
+    held = [k for k, q in graph.nodes(data="q") if q is not None]
+    assert held == covered.tolist()
+    if len(covered):
+        assert nx.is_connected(graph.subgraph(held))
+        assert_over(verdict, covered, np.array([graph.nodes[k]["q"] for k in held]))
+    for a, b, motion in graph.edges(data="motion"):
+        assert_over(verdict, np.array([min(a, b), max(a, b)]), motion[[0, -1]])
+        assert_motion(verdict, motion)
+    if verdict.feasible:
+        assert_witness(verdict)
+
+
+@pytest.mark.parametrize(("arm", "number"), DRAWN)
+def test_the_certificate_bounds_what_the_witness_does(arm: str, number: int) -> None:
+    verdict = verdict_of(arm, number)
+    if verdict.witness is None or verdict.certificate is None:
+        assert not verdict.feasible
+        return
+    q, certificate, robot = verdict.witness.q, verdict.certificate, verdict.robot
+    assert certificate.waypoints == len(q)
+    assert certificate.max_position_error <= 1e-3
+    assert certificate.max_angle <= verdict.task.cone
+    margin = np.minimum(q - robot.lower, robot.upper - q).min()
+    assert certificate.min_limit_margin == pytest.approx(margin, abs=1e-12)
+    assert margin >= 0.0
+
+
+def test_random_cases_are_of_every_kind() -> None:
+    """What is checked above says something only if both answers and all evidence occur."""
+    seen = {(verdict_of(*case).answer, verdict_of(*case).evidence) for case in DRAWN}
+    assert (Answer.FEASIBLE, Evidence.WITNESS) in seen
+    assert (Answer.INFEASIBLE, Evidence.PROOF) in seen
+    assert len({len(verdict_of(*case).components) for case in DRAWN}) > 2
+
+
+# the same question has the same answer
+
+
+def same(one: Verdict, other: Verdict) -> None:
+    """Equal to the last bit."""
+    assert (one.answer, one.evidence, one.message) == (other.answer, other.evidence, other.message)
+    np.testing.assert_array_equal(one.covered, other.covered)
+    assert (one.witness is None) == (other.witness is None)
+    if one.witness is not None and other.witness is not None:
+        np.testing.assert_array_equal(one.witness.q, other.witness.q)
+        np.testing.assert_array_equal(one.witness.cell, other.witness.cell)
+    assert one.statistics == other.statistics
+    assert one.causes == other.causes
+
+
+@pytest.mark.parametrize(("arm", "number"), DRAWN[::3])
+def test_a_seed_fixes_the_verdict_and_the_motion(arm: str, number: int) -> None:
+    same(verdict_of(arm, number), check(*built(drawn(arm, number), load_robot(arm))))
+
+
+def test_threads_do_not_disturb_each_other() -> None:
+    def ask(case: tuple[str, int]) -> Verdict:
+        return check(*built(drawn(*case), load_robot(case[0])))
+
+    cases = DRAWN[:4] + DRAWN[-4:]
+    with ThreadPoolExecutor(4) as pool:
+        for case, verdict in zip(cases, pool.map(ask, cases), strict=True):
+            same(verdict_of(*case), verdict)
+
+
+PRINT_WITNESS = """
+import hashlib
+from feasibility import Task, check
+from robots import load_robot
+from surfaces import plane
+patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+walk = check(load_robot("ur5"), patch.cells(3, 4), Task(standoff=0.02, cone_deg=30)).witness
+print(hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest())
+"""
+
+
+def test_another_process_finds_the_same_motion() -> None:
+    patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+    walk = check(load_robot("ur5"), patch.cells(3, 4), Task(standoff=0.02, cone_deg=30)).witness
+    assert walk is not None
+    here = hashlib.sha256(walk.q.tobytes() + walk.cell.tobytes()).hexdigest()
+    other = subprocess.run(
+        [sys.executable, "-c", PRINT_WITNESS],
+        env={**os.environ, "PYTHONHASHSEED": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=120,
+    )
+    assert other.stdout.strip() == here
+
+
+@pytest.mark.parametrize(("arm", "number"), DRAWN[::2])
+def test_the_seed_does_not_decide(arm: str, number: int) -> None:
+    first = verdict_of(arm, number)
+    for seed in (1, 2):
+        verdict = check(*built(drawn(arm, number), load_robot(arm)), Search(seed=seed))
+        assert verdict.answer is first.answer
+        assert verdict.n_covered == first.n_covered
+
+
+PUMA = load_robot("puma560", limits="set-2")
+TASK = Task(standoff=0.005, cone_deg=25)
+ONE_PATCH = {
+    "as it is": (sphere(1.0, (20, 80), (-30, 150)).cells(5, 7), False, False),
+    "turned about z": (
+        sphere(1.0, (20, 80), (-120, 60), rpy_deg=(0, 0, 90)).cells(5, 7),
+        False,
+        False,
+    ),
+    "upside down": (
+        sphere(1.0, (100, 160), (-150, 30), rpy_deg=(180, 0, 0)).cells(5, 7),
+        True,
+        True,
+    ),
+    "back to front": (
+        sphere(1.0, (100, 160), (30, 210), rpy_deg=(0, 180, 0)).cells(5, 7),
+        True,
+        True,
+    ),
+}
+
+
+@cache
+def on_one_patch(name: str, limits: str) -> Verdict:
+    cells, _, _ = ONE_PATCH[name]
+    return check(PUMA.with_limits(limits), cells, TASK)
+
+
+def aligned(name: str, limits: str) -> np.ndarray:
+    """Covered cells (5, 7) in the order of the first description."""
+    _, flip_u, flip_v = ONE_PATCH[name]
+    grid = on_one_patch(name, limits).covered.reshape(5, 7)
+    return grid[:: -1 if flip_u else 1, :: -1 if flip_v else 1]
+
+
+@pytest.mark.parametrize("limits", ["set-1", "set-2", "set-3", "set-4"])
+@pytest.mark.parametrize("name", list(ONE_PATCH)[1:])
+def test_the_order_of_cells_does_not_decide(name: str, limits: str) -> None:
+    """One patch, parametrised in four ways."""
+    cells, flip_u, flip_v = ONE_PATCH[name]
+    order = np.arange(35).reshape(5, 7)[:: -1 if flip_u else 1, :: -1 if flip_v else 1].ravel()
+    original = ONE_PATCH["as it is"][0]
+    np.testing.assert_allclose(cells.centres[order], original.centres, atol=1e-12)
+    one, other = on_one_patch("as it is", limits), on_one_patch(name, limits)
+    assert (one.answer, one.evidence) == (other.answer, other.evidence)
+    np.testing.assert_array_equal(aligned("as it is", limits), aligned(name, limits))
+    assert one.n_edges == other.n_edges
+
+
+# budgets and interruption
+
+HARD = Problem(
+    kind="hyperboloid",
+    size=(0.6, 0.5),
+    u=(-150.0, 150.0),
+    v=(-0.5, 0.6),
+    position=(0.2, 0.1, 0.0),
+    rpy_deg=(20.0, 30.0, 10.0),
+    side="inside",
+    cells=(90, 60),
+    standoff=0.01,
+    cone_deg=12.0,
+    limits_deg=((-175.0, 175.0),) * 3 + ((-120.0, 120.0),) * 3,
+)
+
+
+def hard() -> tuple:
+    return built(HARD, load_robot("puma560"))
