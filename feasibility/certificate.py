@@ -42,7 +42,7 @@ def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
     """Ask Pinocchio for tool points, axes and lever arms at q (m, n)."""
     kinematics = Kinematics(robot)
     model, data = robot.model, robot.model.createData()
-    frame = model.getFrameId(robot.tool_frame)
+    frame = robot.tool_frame_id
     placement = data.oMf[frame]
     translation, rotation = placement.translation, placement.rotation  # live views
     m = len(q)
@@ -53,7 +53,8 @@ def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
     for k in range(m):
         configuration = q[k] if plain else kinematics.configuration(q[k])
         # Columns are the joints' twists at the root's origin: (velocity there, angular velocity).
-        columns[k] = pin.computeJointJacobians(model, data, configuration)
+        # Pinocchio flattens a single column.
+        columns[k] = pin.computeJointJacobians(model, data, configuration).reshape(6, -1)
         pin.updateFramePlacement(model, data, frame)
         points[k] = translation
         rotations[k] = rotation
@@ -115,6 +116,20 @@ def _peak(ends: NDArray[np.float64], most: NDArray[np.float64]) -> float:
     return float(np.max(along, initial=np.max(ends, initial=0.0)))
 
 
+def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
+    """What makes a walk no motion of this arm over these cells; empty when nothing does."""
+    if walk.q.ndim != 2 or walk.q.shape[1] != robot.n or walk.cell.shape != walk.q.shape[:1]:
+        return (
+            f"waypoints of shape {walk.q.shape} and cells of shape {walk.cell.shape} are no "
+            f"motion of {robot.n} joints"
+        )
+    if not np.isfinite(walk.q).all():
+        return "a joint value is not finite"
+    if ((walk.cell < -1) | (walk.cell >= len(cells))).any():
+        return f"a waypoint is marked with a cell that is not one of the {len(cells)}"
+    return ""
+
+
 @dataclass(frozen=True, slots=True)
 class Replay:
     """The outcome of a replay."""
@@ -142,6 +157,9 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     Returns:
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
     """
+    fault = _malformed(robot, cells, walk)
+    if fault:
+        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
     surface = cells.surface
@@ -164,7 +182,11 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0)
     speed = np.linalg.norm(np.diff(poses.points, axis=0), axis=1) + 0.5 * bend
     position = _peak(error, bounds.curvature * speed**2 + bend)
-    # The normal used at a waypoint is the one at its foot, so it is exact there.
+    # The normal used at a waypoint is the one at its foot, so it is exact there; but off the
+    # patch it is the border's, from which the normal at the tool point differs by this much.
+    off = (u != foot.u) | (v != foot.v)
+    if off.any():
+        chord[off] += bounds.curvature * error[off]
     worst = _peak(chord, turn + bounds.bend * speed**2 + bounds.curvature * bend)
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
@@ -182,8 +204,6 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     visited = np.zeros(len(cells), dtype=bool)
     visited[marked] = True
     refusals = []
-    if not np.isfinite(walk.q).all():
-        refusals.append("a joint value is not finite")
     if not margin >= 0.0:
         refusals.append(f"a joint passes its limit by {-margin:.3g}")
     if not position <= tolerance:

@@ -85,7 +85,8 @@ def _complete_check(
     replayed: Replay | None = None
     if explorer.complete and len(cells):
         walk = covering_walk(explorer.roadmap, explorer.best)
-        replayed = replay(robot, cells, task, walk, explorer.covered)
+        # Every cell, whatever the search believes that it covers.
+        replayed = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool))
     certified = time.monotonic()
     answer, evidence, message = _answer(explorer, task, replayed, in_time)
     feasible = answer is Answer.FEASIBLE
