@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.continuation import track
-from feasibility.fibre import connect, settle
-from feasibility.kernels import kernel
-from feasibility.newton import correct
-from feasibility.problem import place
+from feasibility.fibre import SETTLE_STEPS, connect, settle
+from feasibility.kernels import kernel, put
+from feasibility.newton import LANDING_STEPS, land
+from feasibility.problem import Problem, Work
 from feasibility.roadmap import (
     BUDGET,
     COMPONENTS,
@@ -21,15 +22,19 @@ from feasibility.roadmap import (
     NODES,
     TAIL,
     WAYS,
+    Roadmap,
     add_edge,
     add_node,
     root_of,
     unite,
 )
 
-MOST_FAILURES = 12  # failed connections after which a pair of components is left alone
+MOST_FAILURES = np.int64(12)  # failed connections after which a pair of components is left alone
 MOST_RIVALS = 6  # other components that an arrival tries to join, the nearest first
-CONNECT_STEPS = 60  # steps of one self-motion
+CONNECT_STEPS = np.int64(60)  # steps of one self-motion
+AIM_STEPS = np.int64(30)  # Newton steps that put a random point onto the fibre
+NOBODY, NONE = np.int64(-1), np.int64(0)
+FREE = np.bool_(False)  # a track without a goal
 
 
 @kernel
@@ -62,14 +67,16 @@ def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-u
     Returns:
         (node, rows written), or (-1, 0); (-1, -2) when `ways` is full.
     """
-    tried = np.full(MOST_RIVALS, -1, dtype=np.int64)
-    here = np.empty_like(q)
+    tried = np.empty(MOST_RIVALS, dtype=np.int64)
+    here = np.empty(q.shape[0])
+    for k in range(MOST_RIVALS):
+        tried[k] = -1
     for k in range(MOST_RIVALS):
         node = _rival(roadmap, cell, q, own, tried, most)
         if node < 0:
             break
         tried[k] = root_of(roadmap, roadmap.component[node])
-        here[:] = q
+        put(here, q)
         written, reached = connect(
             problem, work, problem.points[cell], problem.approaches[cell], here, roadmap.q[node],
             roadmap.ways, roadmap.counters[WAYS] + rows, CONNECT_STEPS,
@@ -111,9 +118,9 @@ def spread_out(problem, work, roadmap, indptr, indices, budget):  # type: ignore
             if roadmap.cover[own, target]:
                 count[CURSOR] += 1
                 continue
-            q[:] = roadmap.q[x]
+            put(q, roadmap.q[x])
             rows = track(
-                problem, work, problem.points[cell], problem.points[target], q, q, False,
+                problem, work, problem.points[cell], problem.points[target], q, q, FREE,
                 roadmap.ways, count[WAYS],
             )  # fmt: skip
             if rows == -2:
@@ -143,8 +150,9 @@ def spread_out(problem, work, roadmap, indptr, indices, budget):  # type: ignore
     return DONE
 
 
-@kernel
-def seed_cell(problem, work, roadmap, cell, guesses):  # type: ignore[no-untyped-def]
+def seed_cell(
+    problem: Problem, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
+) -> tuple[int, int]:
     """Newton from guesses to configurations over one cell's centre; new ones become components.
 
     Args:
@@ -158,29 +166,22 @@ def seed_cell(problem, work, roadmap, cell, guesses):  # type: ignore[no-untyped
         (configurations found, new components made).
     """
     count = roadmap.counters
+    target, approach = problem.points[cell], problem.approaches[cell]
     found, made = 0, 0
-    q = np.empty(guesses.shape[1])
-    for g in range(guesses.shape[0]):
-        if count[COMPONENTS] >= roadmap.parent.shape[0]:
+    for guess in guesses:
+        if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
             break
-        if count[NODES] + 2 > roadmap.cell.shape[0] or count[EDGES] + 2 > len(roadmap.ends):
+        if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
             break
-        if count[TAIL] + 2 > roadmap.queue.shape[0]:
-            break
-        q[:] = guesses[g]
-        for k in range(3):
-            work.target[0, k] = problem.points[cell, k]
-            work.target[1, k] = problem.approaches[cell, k]
-        place(problem, work, 1, q)
-        work.wish[:] = 0.0
-        if not correct(problem, work, q, 1e-6, np.inf, 60):
+        q = guess.copy()
+        if not land(problem, work, cell, q, LANDING_STEPS):
             continue
         found += 1
-        settle(problem, work, problem.points[cell], problem.approaches[cell], q, 40)
+        settle(problem, work, target, approach, q, SETTLE_STEPS)
         node, _ = join(problem, work, roadmap, cell, q, -1, 0, 0)
         if node >= 0:
             continue
-        component = count[COMPONENTS]
+        component = int(count[COMPONENTS])
         count[COMPONENTS] += 1
         add_node(problem, work, roadmap, cell, q, component)
         made += 1
@@ -213,7 +214,8 @@ def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untype
     tried = np.empty(MOST_RIVALS, dtype=np.int64)
     aimed = np.empty(guesses.shape[1])
     for g in range(guesses.shape[0]):
-        tried[:] = -1
+        for k in range(MOST_RIVALS):
+            tried[k] = -1
         for k in range(MOST_RIVALS):
             if count[NODES] + 2 > roadmap.cell.shape[0] or count[EDGES] + 3 > len(roadmap.ends):
                 return FULL, g, merged
@@ -221,20 +223,15 @@ def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untype
                 return FULL, g, merged
             if k == 0:
                 # Aim at a point of the fibre: a random guess, put onto it.
-                aimed[:] = guesses[g]
-                for i in range(3):
-                    work.target[0, i] = problem.points[cell, i]
-                    work.target[1, i] = problem.approaches[cell, i]
-                place(problem, work, 1, aimed)
-                work.wish[:] = 0.0
-                if not correct(problem, work, aimed, 1e-6, np.inf, 30):
+                put(aimed, guesses[g])
+                if not land(problem, work, cell, aimed, AIM_STEPS):
                     break
-            node = _rival(roadmap, cell, aimed, -1, tried, 0)
+            node = _rival(roadmap, cell, aimed, NOBODY, tried, NONE)
             if node < 0:
                 break
             own = root_of(roadmap, roadmap.component[node])
             tried[k] = own
-            q[:] = roadmap.q[node]
+            put(q, roadmap.q[node])
             rows, _ = connect(
                 problem, work, problem.points[cell], problem.approaches[cell], q, aimed,
                 roadmap.ways, count[WAYS], CONNECT_STEPS,
@@ -245,7 +242,7 @@ def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untype
                 continue
             new = add_node(problem, work, roadmap, cell, q, own)
             add_edge(roadmap, node, new, rows)
-            rival, more = join(problem, work, roadmap, cell, q, own, 0, most)
+            rival, more = join(problem, work, roadmap, cell, q, own, NONE, most)
             if more == -2:
                 return FULL, g, merged
             if rival >= 0:
@@ -302,7 +299,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                 for attempt in range(4):
                     a, b = (best_x, best_y) if attempt % 2 == 0 else (best_y, best_x)
                     i, j = roadmap.cell[a], roadmap.cell[b]
-                    q[:] = roadmap.q[a]
+                    put(q, roadmap.q[a])
                     rows = track(
                         problem, work, problem.points[i], problem.points[j], q, roadmap.q[b],
                         attempt < 2, roadmap.ways, count[WAYS],
