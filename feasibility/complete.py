@@ -49,7 +49,7 @@ from surfaces import Cells
 BUDGET = 20_000  # evaluations of the arm between two looks at the clock
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
-DRY_ROUNDS = 10  # rounds without gain after which the search is exhausted
+DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
 MOST_ROUNDS = 200
 GUESSES = 4  # of one stir
 PATIENCE = 60  # failed connections of two components that stirring allows
