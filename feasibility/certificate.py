@@ -181,13 +181,14 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     bend = second_derivatives(steps, robot.prismatic, poses.levers, np.inf)
     turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0)
     speed = np.linalg.norm(np.diff(poses.points, axis=0), axis=1) + 0.5 * bend
-    position = _peak(error, bounds.curvature * speed**2 + bend)
     # The normal used at a waypoint is the one at its foot, so it is exact there; but off the
     # patch it is the border's, from which the normal at the tool point differs by this much.
     off = (u != foot.u) | (v != foot.v)
     if off.any():
         chord[off] += bounds.curvature * error[off]
-    worst = _peak(chord, turn + bounds.bend * speed**2 + bounds.curvature * bend)
+    with np.errstate(invalid="ignore"):  # where the surface folds: inf * 0 is NaN, and refused
+        position = _peak(error, bounds.curvature * speed**2 + bend)
+        worst = _peak(chord, turn + bounds.bend * speed**2 + bounds.curvature * bend)
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
         waypoints=len(walk.q),

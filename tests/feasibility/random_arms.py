@@ -69,7 +69,10 @@ def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
     from robots import load_robot
 
     carried = load_robot(base)
-    tree = ElementTree.fromstring(carried.urdf)
+    tree = ElementTree.parse(carried.urdf or "").getroot()
+    for link in tree.findall("link"):
+        for part in link.findall("visual") + link.findall("collision"):
+            link.remove(part)
     children = {element.find("child").get("link") for element in tree.findall("joint")}
     root = next(name for link in tree.findall("link") if (name := link.get("name")) not in children)
     ElementTree.SubElement(tree, "link", name="ground")
