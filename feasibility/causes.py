@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 
 from feasibility.complete import Explorer, evenly
 from feasibility.fibre import connect
-from feasibility.kernels import kernel
-from feasibility.newton import correct
-from feasibility.problem import CONE, LIMIT, LONG, SINGULAR, Problem, place
+from feasibility.growth import CONNECT_STEPS
+from feasibility.kernels import kernel, put
+from feasibility.newton import LANDING_STEPS, land
+from feasibility.problem import CONE, LIMIT, LONG, NEXT, SINGULAR, Problem, Work, look_at, place
 from feasibility.proof import Ruling
 from feasibility.roadmap import root_of
 from feasibility.verdict import Cause, CauseKind
@@ -33,22 +34,17 @@ MOST_EXAMINED = 400  # cells that are examined one by one
 ENOUGH = 5  # solutions among which the least violation is looked for
 
 
-@kernel
-def _solve(problem, work, cell, guesses, solutions):  # type: ignore[no-untyped-def]
+def _solve(
+    problem: Problem, work: Work, cell: int, guesses: NDArray[np.float64],
+    solutions: NDArray[np.float64],
+) -> int:  # fmt: skip
     """Fill `solutions` with configurations of a relaxed problem over one cell; returns how many."""
     found = 0
-    q = np.empty(guesses.shape[1])
-    for g in range(guesses.shape[0]):
-        for k in range(3):
-            work.target[0, k] = problem.points[cell, k]
-            work.target[1, k] = problem.approaches[cell, k]
-        q[:] = guesses[g]
-        place(problem, work, 1, q)
-        work.wish[:] = 0.0
-        if correct(problem, work, q, 1e-6, np.inf, 60):
-            solutions[found] = q
+    for guess in guesses:
+        solutions[found] = guess
+        if land(problem, work, cell, solutions[found], LANDING_STEPS):
             found += 1
-            if found == solutions.shape[0]:
+            if found == len(solutions):
                 break
     return found
 
@@ -59,13 +55,11 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
     n = guesses.shape[1]
     best = np.inf
     q, step = np.empty(n), np.empty(n)
-    for k in range(3):
-        work.target[0, k] = problem.points[cell, k]
-        work.target[1, k] = problem.approaches[cell, k]
+    look_at(work, problem.points[cell], problem.approaches[cell])
     for g in range(guesses.shape[0]):
-        q[:] = guesses[g]
+        put(q, guesses[g])
         damping = 0.1
-        place(problem, work, 1, q)
+        place(problem, work, NEXT, q)
         error = work.error[1, 0]
         for _ in range(80):
             jacobians(
@@ -82,27 +76,21 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
             for j in range(n):
                 step[j] += q[j]
                 step[j] = min(max(step[j], problem.lower[j]), problem.upper[j])
-            place(problem, work, 1, step)
+            place(problem, work, NEXT, step)
             if work.error[1, 0] < error:
                 gain = error - work.error[1, 0]
                 error = work.error[1, 0]
-                q[:] = step
+                put(q, step)
                 damping *= 0.5
                 if gain < 1e-5 * problem.scale:
                     break
             else:
                 damping = 4.0 * damping + 1e-3
-                place(problem, work, 1, q)
+                place(problem, work, NEXT, q)
                 if damping > 1e3:
                     break
         best = min(best, error)
     return best
-
-
-@kernel
-def _head_for(problem, work, cell, q, goal, ways):  # type: ignore[no-untyped-def]
-    """Self-motion of a relaxed problem towards a goal, as far as it goes (q in place)."""
-    connect(problem, work, problem.points[cell], problem.approaches[cell], q, goal, ways, 0, 60)
 
 
 def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -122,11 +110,12 @@ def _nearest_to_limits(
     """(n,) the configuration over a cell that passes the limits least, among what is found."""
     robot = explorer.robot
     ways = np.empty((64, robot.n))
+    target, approach = relaxed.points[cell], relaxed.approaches[cell]
     best, least = solutions[0], np.inf
     for q in solutions:
         here = _wrapped(robot, q)
         goal = np.clip(here, robot.lower, robot.upper)
-        _head_for(relaxed, explorer.work, cell, here, goal, ways)
+        connect(relaxed, explorer.work, target, approach, here, goal, ways, 0, CONNECT_STEPS)
         here = _wrapped(robot, here)
         past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
         if past < least:

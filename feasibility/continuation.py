@@ -13,11 +13,12 @@ import numpy as np
 from feasibility.fibre import RIM_SLACK, wish_for_room
 from feasibility.kernels import kernel
 from feasibility.newton import correct, linearise
-from feasibility.problem import CONE, LONG, SINGULAR, accept, aim, copy_slot, place
+from feasibility.problem import CONE, HERE, LONG, NEXT, SINGULAR, accept, aim, copy_slot, place
 from feasibility.segment import segment_holds
 
 SMALLEST_STEP = 2.0**-7  # [1] share of the way between two centres below which a track gives up
 MOST_STEPS = 400  # accepted steps of one motion
+NEWTON_STEPS = np.int64(8)  # of one step
 
 
 @kernel
@@ -41,7 +42,7 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
     """
     n = q.shape[0]
     aim(problem, work, start, end, 0.0)
-    place(problem, work, 0, q)
+    place(problem, work, HERE, q)
     if not (work.error[0, 0] <= problem.tolerance and work.error[0, 1] <= problem.rim):
         work.blame[0] = SINGULAR
         return -1
@@ -61,12 +62,12 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
             for j in range(n):
                 work.wish[j] = share * (goal[j] - q[j])
         else:
-            linearise(problem, work, 1, problem.rim)
+            linearise(problem, work, NEXT, problem.rim)
             wish_for_room(problem, work, q, 2.0 * size * dt)
         for j in range(n):
             work.trial[j] = q[j]
         position, cone = np.inf, np.inf
-        if correct(problem, work, work.trial, RIM_SLACK * dt, work.error[0, 1], 8):
+        if correct(problem, work, work.trial, RIM_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
             # Slot 0's errors are against the old target; they were stored when it was accepted.
             position, cone = segment_holds(problem, work, q, work.trial)
         if position <= 1.0 and cone <= 1.0:

@@ -8,13 +8,16 @@ Over one target the tool point stands still, the axis stays inside the cone, and
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.kernels import kernel
-from feasibility.newton import correct, linearise
-from feasibility.problem import accept, copy_slot, place
+from feasibility.newton import LANDING_STEPS, correct, land, linearise
+from feasibility.problem import HERE, NEXT, Problem, Work, accept, copy_slot, look_at, place
 from feasibility.segment import segment_holds
 
 RIM_SLACK = 1e-3  # [1] share of the cone kept free by a full step; it shrinks with the step
+NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
+SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
 @kernel
@@ -73,10 +76,8 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
         one is `goal`.
     """
     n = q.shape[0]
-    for k in range(3):
-        work.target[0, k] = target[k]
-        work.target[1, k] = approach[k]
-    place(problem, work, 0, q)
+    look_at(work, target, approach)
+    place(problem, work, HERE, q)
     size, written = 0.3, 0
     left = 0.0
     for j in range(n):
@@ -87,7 +88,7 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
         if left <= size:
             for j in range(n):
                 work.trial[j] = goal[j]
-            place(problem, work, 1, work.trial)
+            place(problem, work, NEXT, work.trial)
             position, cone = segment_holds(problem, work, q, work.trial)
             if position <= 1.0 and cone <= 1.0:
                 if first + written >= ways.shape[0]:
@@ -104,7 +105,7 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
         position, cone = np.inf, np.inf
         remaining, moved = np.inf, 0.0
         slack = 0.25 * RIM_SLACK * min(1.0, size / 0.1)
-        if correct(problem, work, work.trial, slack, np.inf, 6):
+        if correct(problem, work, work.trial, slack, np.inf, NEWTON_STEPS):
             position, cone = segment_holds(problem, work, q, work.trial)
             remaining = 0.0
             for j in range(n):
@@ -136,18 +137,16 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
 def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped-def]
     """Self-motion over one target that makes room: away from limits and the rim (q in place)."""
     n = q.shape[0]
-    for k in range(3):
-        work.target[0, k] = target[k]
-        work.target[1, k] = approach[k]
-    place(problem, work, 0, q)
+    look_at(work, target, approach)
+    place(problem, work, HERE, q)
     size = 0.3
     for _ in range(most):
         copy_slot(work)
-        linearise(problem, work, 1, problem.rim)
+        linearise(problem, work, NEXT, problem.rim)
         wish_for_room(problem, work, q, size)
         for j in range(n):
             work.trial[j] = q[j]
-        good = correct(problem, work, work.trial, RIM_SLACK, np.inf, 6)
+        good = correct(problem, work, work.trial, RIM_SLACK, np.inf, NEWTON_STEPS)
         if good:
             position, cone = segment_holds(problem, work, q, work.trial)
             good = position <= 1.0 and cone <= 1.0
@@ -165,28 +164,24 @@ def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped
                 return
 
 
-@kernel
-def roomy(problem, work, cell, guesses):  # type: ignore[no-untyped-def]
+def roomy(
+    problem: Problem, work: Work, cell: int, guesses: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """Put guesses (in place) onto the fibre over a cell, and say how much room each has.
 
     Returns:
         (k,) the share of its half range, or of the cone, that the tightest constraint leaves free:
         1 in the middle of everything, 0 at a limit or at the rim, -1 where Newton failed.
     """
-    room = np.full(guesses.shape[0], -1.0)
-    for g in range(guesses.shape[0]):
-        q = guesses[g]
-        for k in range(3):
-            work.target[0, k] = problem.points[cell, k]
-            work.target[1, k] = problem.approaches[cell, k]
-        place(problem, work, 1, q)
-        work.wish[:] = 0.0
-        if not correct(problem, work, q, 1e-6, np.inf, 60):
+    half = 0.5 * (problem.upper - problem.lower)
+    ranged = (half > 0.0) & (half < np.inf)
+    room = np.full(len(guesses), -1.0)
+    for g, q in enumerate(guesses):
+        if not land(problem, work, cell, q, LANDING_STEPS):
             continue
-        settle(problem, work, problem.points[cell], problem.approaches[cell], q, 40)
-        room[g] = max(0.0, 1.0 - work.error[0, 1] / problem.rim)
-        for j in range(q.shape[0]):
-            half = 0.5 * (problem.upper[j] - problem.lower[j])
-            if half > 0.0 and half < np.inf:
-                room[g] = min(room[g], 1.0 - abs((q[j] - problem.lower[j]) / half - 1.0))
+        settle(problem, work, problem.points[cell], problem.approaches[cell], q, SETTLE_STEPS)
+        off_middle = np.abs((q - problem.lower)[ranged] / half[ranged] - 1.0)
+        room[g] = min(
+            max(0.0, 1.0 - work.error[0, 1] / problem.rim), (1.0 - off_middle).min(initial=np.inf)
+        )
     return room

@@ -2,6 +2,11 @@
 
 `numpy` errors: a division by zero gives inf or NaN, which no comparison in the search accepts,
 where an exception would end it.
+
+numba compiles a kernel once for each set of argument types, and a whole number or a truth value
+that is written into a call is a type of its own: `correct(..., 6)` and `correct(..., 8)` are two
+kernels. Constants that kernels hand to each other are therefore `np.int64(6)` or `np.bool_(True)`,
+which are plain values; so that every kernel is compiled once.
 """
 
 from __future__ import annotations
@@ -9,3 +14,10 @@ from __future__ import annotations
 from numba import njit
 
 kernel = njit(cache=True, error_model="numpy")
+
+
+@kernel
+def put(target, source):  # type: ignore[no-untyped-def]
+    """Copy numbers into an array of the same length; numba's `target[:] = source` is far longer."""
+    for j in range(target.shape[0]):
+        target[j] = source[j]

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.kernels import kernel
-from feasibility.problem import CONE, LIMIT, SINGULAR, place
+from feasibility.problem import CONE, LIMIT, NEXT, SINGULAR, look_at, place
 from robots.chain import jacobians
 
 COMFORT = 0.7  # [1] share of the cone that a step keeps to where it can
 LARGEST_STEP = 0.35  # [rad] or [m], largest change of one joint in one Newton step
+POINT, POINT_AND_CONE = np.int64(3), np.int64(4)  # rows of a step
+LANDING_SLACK = 1e-6  # [1] share of the cone that a landing keeps free
+LANDING_STEPS = np.int64(60)
 
 
 @kernel
@@ -147,11 +150,11 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
             # Come in from the rim by a part of what the target's motion costs anyway.
             inwards = max(0.5 * (chord - before), 150.0 * slack * before)
             goal = min(hard, max(COMFORT * problem.rim, before - inwards))
-        norm = linearise(problem, work, 1, goal)
+        norm = linearise(problem, work, NEXT, goal)
         usable = norm > 1e-9
         work.blame[1] = -1
         cone = chord > goal and usable
-        done = least_step(problem, work, q, 4 if cone else 3)
+        done = least_step(problem, work, q, POINT_AND_CONE if cone else POINT)
         if done and not cone and usable and chord > 0.3 * goal:
             # Would the step leave the cone? Then do it again along the rim.
             predicted = 0.0
@@ -162,10 +165,10 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
                 predicted += change * change
             if np.sqrt(predicted) > goal:
                 cone = True
-                done = least_step(problem, work, q, 4)
+                done = least_step(problem, work, q, POINT_AND_CONE)
         if not done and cone and goal < hard:
             work.rhs[3] = hard - chord
-            done = least_step(problem, work, q, 4)
+            done = least_step(problem, work, q, POINT_AND_CONE)
         if not done:
             work.blame[0] = LIMIT if work.blame[1] >= 0 else (CONE if cone else SINGULAR)
             return False
@@ -176,10 +179,20 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
         for j in range(n):
             q[j] = min(max(q[j] + shrink * work.step[j], problem.lower[j]), problem.upper[j])
             work.wish[j] = 0.0
-        place(problem, work, 1, q)
+        place(problem, work, NEXT, q)
         error = work.error[1, 0] / problem.scale + max(work.error[1, 1] - inner, 0.0)
         work.blame[0] = LIMIT if work.blame[1] >= 0 else (CONE if cone else SINGULAR)
         if not error < np.inf or (it > 2 and error > 2.0 * last and most < 20):
             return False
         last = error
     return work.error[1, 0] <= problem.near and work.error[1, 1] <= inner
+
+
+@kernel
+def land(problem, work, cell, q, most):  # type: ignore[no-untyped-def]
+    """Newton from a guess q (in place) onto the fibre over a cell's centre; True when it lands."""
+    look_at(work, problem.points[cell], problem.approaches[cell])
+    place(problem, work, NEXT, q)
+    for j in range(q.shape[0]):
+        work.wish[j] = 0.0
+    return correct(problem, work, q, LANDING_SLACK, np.inf, most)

@@ -20,6 +20,8 @@ NEWTON_RIM = 2e-4  # [1] share of the cone that it costs, by way of the surface'
 # Why a motion stopped: the constraint that left no room.
 NOTHING, LIMIT, CONE, SINGULAR, LONG = 0, 1, 2, 3, 4
 
+HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
+
 
 class Problem(NamedTuple):
     """Everything the compiled search reads: arm, surface and task as plain arrays."""
@@ -149,6 +151,14 @@ def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
         chord += (work.axis[slot, k] - work.target[1, k]) ** 2
     work.error[slot, 0] = np.sqrt(distance)
     work.error[slot, 1] = np.sqrt(chord)
+
+
+@kernel
+def look_at(work, target, approach):  # type: ignore[no-untyped-def]
+    """Set `work.target`."""
+    for k in range(3):
+        work.target[0, k] = target[k]
+        work.target[1, k] = approach[k]
 
 
 @kernel

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.kernels import kernel
-from feasibility.problem import Problem, Work, place
+from feasibility.kernels import kernel, put
+from feasibility.problem import NEXT, Problem, Work, look_at, place
 from robots.chain import jacobians
 
 THINNEST = 1e-6  # [rad], [m]: a box with no wider joint that moves the tool is left undecided
@@ -172,7 +172,10 @@ def _static_levers(problem, longest):  # type: ignore[no-untyped-def]
 @kernel
 def _cut_all(rows, gap, distance, radius, low, high, directions):  # type: ignore[no-untyped-def]
     """Cut the box along the gap and along every direction; False when nothing is left."""
-    if not _cut(rows, gap, radius, low, high, gap / max(distance, 1e-12)):
+    along = np.empty(3)
+    for k in range(3):
+        along[k] = gap[k] / max(distance, 1e-12)
+    if not _cut(rows, gap, radius, low, high, along):
         return False
     for k in range(directions.shape[0]):
         if not _cut(rows, gap, radius, low, high, directions[k]):
@@ -196,7 +199,7 @@ def _shrink(problem, work, low, high, longest, lever, sine, directions):  # type
         for j in range(n):
             q[j] = 0.5 * (low[j] + high[j])
             half[j] = 0.5 * (high[j] - low[j])
-        place(problem, work, 1, q)
+        place(problem, work, NEXT, q)
         distance, chord = work.error[1, 0], work.error[1, 1]
         if distance <= problem.tolerance and chord <= problem.rim:
             return 2, by_point
@@ -260,20 +263,19 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
     low, high = np.empty(n), np.empty(n)
     lever, sine, longest = np.empty(n), np.empty(n), np.empty(n)
     _static_levers(problem, longest)
-    for k in range(3):
-        work.target[0, k] = target[k]
-        work.target[1, k] = approach[k]
+    look_at(work, target, approach)
     for _ in range(most):
         if boxes.counts[0] == 0:
             return 1
         boxes.counts[0] -= 1
         boxes.counts[1] += 1
         top = boxes.counts[0]
-        low[:] = boxes.low[top]
-        high[:] = boxes.high[top]
+        put(low, boxes.low[top])
+        put(high, boxes.high[top])
         code, by_point = _shrink(problem, work, low, high, longest, lever, sine, directions)
         if code == 2:
-            found[:] = 0.5 * (low + high)
+            for j in range(n):
+                found[j] = 0.5 * (low[j] + high[j])
             return 2
         if code == 1:
             continue
@@ -291,8 +293,8 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
         middle = 0.5 * (low[worst] + high[worst])
         for side in range(2):
             top = boxes.counts[0]
-            boxes.low[top] = low
-            boxes.high[top] = high
+            put(boxes.low[top], low)
+            put(boxes.high[top], high)
             if side == 0:
                 boxes.high[top, worst] = middle
             else:

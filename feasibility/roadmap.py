@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from feasibility.fibre import effects
 from feasibility.kernels import kernel
-from feasibility.problem import place
+from feasibility.problem import NEXT, place
 
 NODES, EDGES, WAYS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
 """Places in `Roadmap.counters`."""
@@ -160,8 +160,8 @@ def add_node(problem, work, roadmap, cell, q, component):  # type: ignore[no-unt
     roadmap.cell[node] = cell
     for j in range(q.shape[0]):
         roadmap.q[node, j] = q[j]
-    place(problem, work, 1, q)
-    effects(problem, work, 1, roadmap.effect[node])
+    place(problem, work, NEXT, q)
+    effects(problem, work, NEXT, roadmap.effect[node])
     roadmap.component[node] = component
     roadmap.following[node] = roadmap.first_node[cell]
     roadmap.first_node[cell] = node
@@ -193,7 +193,7 @@ def add_edge(roadmap, x, y, rows):  # type: ignore[no-untyped-def]
 def joined_pairs(roadmap, pairs, component, state):  # type: ignore[no-untyped-def]
     """Mark the pairs of cells that an edge of the component joins already (state = 1)."""
     for e in range(roadmap.counters[EDGES]):
-        x, y = roadmap.ends[e]
+        x, y = roadmap.ends[e, 0], roadmap.ends[e, 1]
         if root_of(roadmap, roadmap.component[x]) != component:
             continue
         i, j = roadmap.cell[x], roadmap.cell[y]

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.kernels import kernel
+from feasibility.kernels import kernel, put
 from feasibility.roadmap import EDGES, NODES, Roadmap, root_of
 from feasibility.verdict import Walk
+
+ZERO, NONE = np.int64(0), np.int64(-1)
 
 
 @kernel
@@ -15,20 +17,21 @@ def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
     """CSR lists of (node, edge + 1, negative when walked backwards) for one component."""
     nodes = roadmap.counters[NODES]
     edges = roadmap.counters[EDGES]
-    inside = np.zeros(nodes, dtype=np.bool_)
+    inside = np.empty(nodes, dtype=np.bool_)
     for x in range(nodes):
         inside[x] = root_of(roadmap, roadmap.component[x]) == component
-    indptr = np.zeros(nodes + 1, dtype=np.int64)
+    indptr = _filled(nodes + 1, ZERO)
     for e in range(edges):
         if inside[roadmap.ends[e, 0]]:
             indptr[roadmap.ends[e, 0] + 1] += 1
             indptr[roadmap.ends[e, 1] + 1] += 1
     for x in range(nodes):
         indptr[x + 1] += indptr[x]
-    fill = indptr[:-1].copy()
+    fill = np.empty(nodes, dtype=np.int64)
+    put(fill, indptr)
     links = np.empty((indptr[nodes], 2), dtype=np.int64)
     for e in range(edges):
-        x, y = roadmap.ends[e]
+        x, y = roadmap.ends[e, 0], roadmap.ends[e, 1]
         if inside[x]:
             links[fill[x], 0] = y
             links[fill[x], 1] = e + 1
@@ -37,6 +40,24 @@ def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
             links[fill[y], 1] = -(e + 1)
             fill[y] += 1
     return inside, indptr, links
+
+
+@kernel
+def _filled(size, value):  # type: ignore[no-untyped-def]
+    """(size,) whole numbers, all the same."""
+    result = np.empty(size, dtype=np.int64)
+    for k in range(size):
+        result[k] = value
+    return result
+
+
+@kernel
+def _longer(route):  # type: ignore[no-untyped-def]
+    """The same route with twice the room."""
+    result = np.empty(2 * route.shape[0], dtype=np.int64)
+    for k in range(route.shape[0]):
+        result[k] = route[k]
+    return result
 
 
 @kernel
@@ -49,9 +70,10 @@ def _route(roadmap, component):  # type: ignore[no-untyped-def]
     """
     inside, indptr, links = _adjacency(roadmap, component)
     nodes = inside.shape[0]
-    seen = np.zeros(roadmap.first_node.shape[0], dtype=np.bool_)
+    seen = np.empty(roadmap.first_node.shape[0], dtype=np.bool_)
     remaining = 0
     for k in range(seen.shape[0]):
+        seen[k] = False
         if roadmap.cover[component, k]:
             remaining += 1
     # Start where there is least room: at a node of smallest degree.
@@ -61,8 +83,8 @@ def _route(roadmap, component):  # type: ignore[no-untyped-def]
             start, fewest = x, indptr[x + 1] - indptr[x]
     route = np.empty(4 * nodes + 16, dtype=np.int64)
     length = 0
-    came = np.full(nodes, -1, dtype=np.int64)
-    stamp = np.zeros(nodes, dtype=np.int64)
+    came = _filled(nodes, NONE)
+    stamp = _filled(nodes, ZERO)
     queue = np.empty(nodes, dtype=np.int64)
     here, turn = start, 0
     seen[roadmap.cell[here]] = True
@@ -83,7 +105,7 @@ def _route(roadmap, component):  # type: ignore[no-untyped-def]
             path_first = length
             length += 1
             if length >= route.shape[0]:
-                route = np.concatenate((route, np.empty_like(route)))
+                route = _longer(route)
             route[path_first] = links[best_link, 1]
             here = best
         else:
@@ -116,7 +138,7 @@ def _route(roadmap, component):  # type: ignore[no-untyped-def]
                 e = abs(links[k, 1]) - 1
                 x = roadmap.ends[e, 0] if links[k, 1] > 0 else roadmap.ends[e, 1]
             while length + steps >= route.shape[0]:
-                route = np.concatenate((route, np.empty_like(route)))
+                route = _longer(route)
             x = found
             for i in range(steps):
                 k = came[x]
@@ -139,21 +161,22 @@ def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
         total += roadmap.way[abs(route[k]) - 1, 1]
     n = roadmap.q.shape[1]
     q = np.empty((total, n))
-    cell = np.full(total, -1, dtype=np.int64)
-    q[0] = roadmap.q[start]
+    cell = _filled(total, NONE)
+    put(q[0], roadmap.q[start])
     cell[0] = roadmap.cell[start]
     row = 1
     for k in range(route.shape[0]):
         e = abs(route[k]) - 1
-        first, rows = roadmap.way[e]
+        first, rows = roadmap.way[e, 0], roadmap.way[e, 1]
         if route[k] > 0:
-            q[row : row + rows] = roadmap.ways[first : first + rows]
+            for i in range(rows):
+                put(q[row + i], roadmap.ways[first + i])
             node = roadmap.ends[e, 1]
         else:
             for i in range(rows - 1):
-                q[row + i] = roadmap.ways[first + rows - 2 - i]
+                put(q[row + i], roadmap.ways[first + rows - 2 - i])
             node = roadmap.ends[e, 0]
-            q[row + rows - 1] = roadmap.q[node]
+            put(q[row + rows - 1], roadmap.q[node])
         row += rows
         cell[row - 1] = roadmap.cell[node]
     return q, cell
