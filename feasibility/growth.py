@@ -127,8 +127,8 @@ def spread_out(problem, work, roadmap, indptr, indices, budget):  # type: ignore
                 return FULL
             count[CURSOR] += 1
             if rows < 0:
-                last = roadmap.blocked[target, 2]
-                if last < 0 or roadmap.size[own] >= roadmap.size[root_of(roadmap, last)]:
+                former = roadmap.blocked[target, 2]
+                if former < 0 or roadmap.size[own] >= roadmap.size[root_of(roadmap, former)]:
                     roadmap.blocked[target, 0] = work.blame[0]
                     roadmap.blocked[target, 1] = work.blame[1]
                     roadmap.blocked[target, 2] = own
