@@ -14,6 +14,7 @@ import pytest
 from feasibility import Search, check
 from feasibility.case import Case, builtin_cases
 from feasibility.cli import main
+from feasibility.complete import DRY_ROUNDS
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
@@ -77,6 +78,10 @@ def test_commands_and_links_exist(page: str) -> None:
     assert made <= set(targets)
     for path in re.findall(r"\.venv/bin/python (?:-m pytest (?:\S+ )*)?([a-z]\S*/\S+?)[ `]", text):
         assert (ROOT / path).exists(), path
+
+
+def test_exhausted_means_what_the_readme_says() -> None:
+    assert f"{DRY_ROUNDS} rounds of new random configurations" in README
 
 
 def table_of_cases() -> dict[str, dict[str, str]]:
