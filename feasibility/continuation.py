@@ -13,7 +13,18 @@ import numpy as np
 from feasibility.fibre import RIM_SLACK, wish_for_room
 from feasibility.kernels import kernel
 from feasibility.newton import correct, linearise
-from feasibility.problem import CONE, HERE, LONG, NEXT, SINGULAR, accept, aim, copy_slot, place
+from feasibility.problem import (
+    CONE,
+    HERE,
+    LONG,
+    NEXT,
+    SINGULAR,
+    accept,
+    aim,
+    copy_slot,
+    place,
+    set_course,
+)
 from feasibility.segment import segment_holds
 
 SMALLEST_STEP = 2.0**-7  # [1] share of the way between two centres below which a track gives up
@@ -41,6 +52,7 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
         and -2 when `ways` is full.
     """
     n = q.shape[0]
+    set_course(problem, work, start, end)
     aim(problem, work, start, end, 0.0)
     place(problem, work, HERE, q)
     if not (work.error[0, 0] <= problem.tolerance and work.error[0, 1] <= problem.rim):

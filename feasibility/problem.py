@@ -12,7 +12,7 @@ from feasibility.task import DEFAULT_TOLERANCE, Task
 from robots import Robot
 from robots.chain import Chain, frames
 from surfaces import Cells
-from surfaces.chart import Chart, foot
+from surfaces.chart import EDGE, SPHERE, Chart, foot, spot
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
 NEWTON_RIM = 2e-4  # [1] share of the cone that it costs, by way of the surface's curvature
@@ -111,6 +111,9 @@ class Work(NamedTuple):
     """(n,)"""
     target: NDArray[np.float64]
     """(2, 3) target point and approach direction."""
+    course: NDArray[np.float64]
+    """(5,) parameters u, v where a motion begins, how much they change, and 1.0 where it is the
+    straight line's foot that is followed instead, over a pole."""
     counts: NDArray[np.int64]
     """(1,) forward kinematics evaluated."""
     blame: NDArray[np.int64]
@@ -134,6 +137,7 @@ def work_for(n: int) -> Work:
         held=np.zeros(n, dtype=np.bool_),
         trial=np.zeros(n),
         target=np.zeros((2, 3)),
+        course=np.zeros(5),
         counts=np.zeros(1, dtype=np.int64),
         blame=np.zeros(2, dtype=np.int64),
     )
@@ -176,13 +180,46 @@ def accept(work):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def set_course(problem, work, start, end):  # type: ignore[no-untyped-def]
+    """Lay the line from target point `start` to `end` that `aim` follows: see `Work.course`.
+
+    It is straight in the surface's parameters, so that it stays on a patch which the straight line
+    through space would leave: the rim of a dome, the far side of a pipe. A closed parameter runs
+    the shorter way round. Only over a pole the straight line is the one that stays.
+    """
+    chart = problem.chart
+    u0, v0, _, _, _, _ = foot(chart, start[0], start[1], start[2])
+    u1, v1, _, _, _, _ = foot(chart, end[0], end[1], end[2])
+    du, dv = u1 - u0, v1 - v0
+    if chart.closed[0]:
+        du -= 2.0 * np.pi * np.round(du / (2.0 * np.pi))
+    if chart.closed[1]:
+        dv -= 2.0 * np.pi * np.round(dv / (2.0 * np.pi))
+    work.course[0], work.course[1], work.course[2], work.course[3] = u0, v0, du, dv
+    over_a_pole = False
+    if chart.code == SPHERE and chart.closed[1] and abs(dv) > 0.5 * np.pi:
+        # The cap through both places is on the patch if its pole is, and is convex if small.
+        if u0 + u1 < np.pi - EDGE:
+            over_a_pole = chart.low[0] <= EDGE
+        elif u0 + u1 > np.pi + EDGE:
+            over_a_pole = chart.high[0] >= np.pi - EDGE
+    work.course[4] = 1.0 if over_a_pole else 0.0
+
+
+@kernel
 def aim(problem, work, start, end, t):  # type: ignore[no-untyped-def]
-    """Set `work.target` to the point of the target surface nearest to the chord at t in [0, 1]."""
-    x = (1.0 - t) * start[0] + t * end[0]
-    y = (1.0 - t) * start[1] + t * end[1]
-    z = (1.0 - t) * start[2] + t * end[2]
-    _, _, height, nx, ny, nz = foot(problem.chart, x, y, z)
-    off = problem.height - height
+    """Set `work.target` to the place on the course that `set_course` has laid, at t in [0, 1]."""
+    if work.course[4] > 0.0:
+        x = (1.0 - t) * start[0] + t * end[0]
+        y = (1.0 - t) * start[1] + t * end[1]
+        z = (1.0 - t) * start[2] + t * end[2]
+        _, _, height, nx, ny, nz = foot(problem.chart, x, y, z)
+        off = problem.height - height
+    else:
+        u = work.course[0] + t * work.course[2]
+        v = work.course[1] + t * work.course[3]
+        x, y, z, nx, ny, nz = spot(problem.chart, u, v)
+        off = problem.height
     work.target[0, 0] = x + off * nx
     work.target[0, 1] = y + off * ny
     work.target[0, 2] = z + off * nz

@@ -169,6 +169,44 @@ def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
+def spot(chart, u, v):  # type: ignore[no-untyped-def]
+    """The point of the surface at parameters u, v (rad or m), and the normal there.
+
+    Returns:
+        (x, y, z, nx, ny, nz): the point (m) and the outward unit normal, in the root frame.
+    """
+    r, shape, position = chart.rotation, chart.shape, chart.position
+    if chart.code == SPHERE:
+        s = math.sin(u)
+        na, nb, nc = s * math.cos(v), s * math.sin(v), math.cos(u)
+        a, b, c = shape[0] * na, shape[0] * nb, shape[0] * nc
+    elif chart.code == CYLINDER:
+        na, nb, nc = math.cos(u), math.sin(u), 0.0
+        a, b, c = shape[0] * na, shape[0] * nb, v
+    elif chart.code == HYPERBOLOID:
+        slope = shape[0] / shape[1]
+        radius = math.sqrt(shape[0] * shape[0] + slope * slope * v * v)
+        rise = slope * slope * v / radius
+        length = math.sqrt(1.0 + rise * rise)
+        na, nb, nc = math.cos(u) / length, math.sin(u) / length, -rise / length
+        a, b, c = radius * math.cos(u), radius * math.sin(u), v
+    elif chart.code == PLANE:
+        na, nb, nc = 0.0, 0.0, 1.0
+        a, b, c = u, v, 0.0
+    else:
+        na, nb, nc = math.nan, math.nan, math.nan
+        a, b, c = math.nan, math.nan, math.nan
+    return (
+        position[0] + r[0] * a + r[1] * b + r[2] * c,
+        position[1] + r[3] * a + r[4] * b + r[5] * c,
+        position[2] + r[6] * a + r[7] * b + r[8] * c,
+        r[0] * na + r[1] * nb + r[2] * nc,
+        r[3] * na + r[4] * nb + r[5] * nc,
+        r[6] * na + r[7] * nb + r[8] * nc,
+    )
+
+
+@njit(cache=True, error_model="numpy")
 def on_patch(chart, u, v):  # type: ignore[no-untyped-def]
     """True where u and v (rad or m, wrapped as `foot` returns them) lie in the patch's ranges."""
     u0, u1, v0, v1 = chart.low[0], chart.high[0], chart.low[1], chart.high[1]

@@ -14,7 +14,7 @@ from functools import cache
 import networkx as nx
 import numpy as np
 import pytest
-from dense_replay import assert_motion, assert_over, assert_witness, centre_targets
+from dense_replay import assert_motion, assert_over, assert_witness
 from oracle_build import built
 from oracle_cases import Problem
 from random_cases import draw, draw_ur5
@@ -22,7 +22,7 @@ from random_cases import draw, draw_ur5
 from feasibility import Search, Task, check
 from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
 from robots import load_robot
-from surfaces import Cells, cylinder, plane, sphere
+from surfaces import plane, sphere
 
 DRAWN = [("puma560", number) for number in range(24)] + [("ur5", number) for number in range(12)]
 
@@ -230,20 +230,129 @@ def test_the_order_of_cells_does_not_decide(name: str, limits: str) -> None:
 
 # budgets and interruption
 
+LIMITS = (-180.0, 180.0)
 HARD = Problem(
     kind="hyperboloid",
-    size=(0.6, 0.5),
-    u=(-150.0, 150.0),
-    v=(-0.5, 0.6),
-    position=(0.2, 0.1, 0.0),
-    rpy_deg=(20.0, 30.0, 10.0),
-    side="inside",
-    cells=(90, 60),
-    standoff=0.01,
-    cone_deg=12.0,
-    limits_deg=((-175.0, 175.0),) * 3 + ((-120.0, 120.0),) * 3,
+    size=(0.22, 0.48),
+    u=(-91.0, 134.0),
+    v=(-0.39, 0.376),
+    position=(-0.4, -0.69, -0.466),
+    rpy_deg=(-45.7, 111.4, -144.1),
+    side="outside",
+    cells=(240, 200),
+    standoff=0.0,
+    cone_deg=20.7,
+    limits_deg=(LIMITS, LIMITS, LIMITS, (-140.6, 65.3), (-180.0, 123.7), LIMITS),
 )
+"""All of it is reached, in several components that nothing joins; far too many cells for 1 s."""
 
 
-def hard() -> tuple:
-    return built(HARD, load_robot("puma560"))
+def test_a_time_limit_is_honoured() -> None:
+    setup = built(HARD, load_robot("puma560"))
+    verdict_of(*DRAWN[0])  # loads the kernels
+    began = time.monotonic()
+    verdict = check(*setup, Search(time_limit=1.0))
+    assert time.monotonic() - began <= 1.5
+    assert (verdict.answer, verdict.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert "time limit" in verdict.message
+    assert (verdict.witness, verdict.certificate) == (None, None)
+    # What was found until then stands.
+    assert 0 < verdict.n_covered < len(verdict.cells)
+    covered = np.flatnonzero(verdict.covered)[::97]
+    graph = verdict.graph
+    assert_over(verdict, covered, np.array([graph.nodes[int(k)]["q"] for k in covered]))
+
+
+@pytest.mark.parametrize("time_limit", [1e-9, 1e-4, 1e-2, 5e-2])
+def test_hardly_any_time_gives_undecided_and_no_error(time_limit: float) -> None:
+    setup = built(HARD, load_robot("puma560"))
+    verdict_of(*DRAWN[0])  # loads the kernels
+    began = time.monotonic()
+    verdict = check(*setup, Search(time_limit=time_limit))
+    assert time.monotonic() - began <= 0.5 + time_limit
+    assert (verdict.answer, verdict.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert len(verdict.graph) == len(verdict.cells)
+    for component in verdict.components:
+        assert len(component) > 0
+
+
+def test_a_time_limit_that_is_not_reached_changes_nothing() -> None:
+    for case in DRAWN[:3]:
+        setup = built(drawn(*case), load_robot(case[0]))
+        same(verdict_of(*case), check(*setup, Search(time_limit=600.0)))
+
+
+def test_an_interrupt_in_the_progress_report_gets_through_at_once() -> None:
+    calls = 0
+
+    def interrupt(done: int, total: int | None, text: str) -> None:
+        nonlocal calls
+        calls += 1
+        assert 0 <= done <= (len(setup[1]) if total is None else total)
+        assert text
+        if calls == 4:
+            raise KeyboardInterrupt
+
+    setup = built(HARD, load_robot("puma560"))
+    with pytest.raises(KeyboardInterrupt):
+        check(*setup, progress=interrupt)
+    assert calls == 4
+
+
+def test_reporting_progress_changes_nothing() -> None:
+    told: list[tuple[int, int | None]] = []
+    for case in DRAWN[:6]:
+        setup = built(drawn(*case), load_robot(case[0]))
+        verdict = check(*setup, progress=lambda done, total, text: told.append((done, total)))
+        same(verdict_of(*case), verdict)
+    assert told
+
+
+HARD_CASE = """
+robot = { name = "puma560", limits_deg = [
+    [-180, 180], [-180, 180], [-180, 180], [-140.6, 65.3], [-180, 123.7], [-180, 180]] }
+surface.kind = "hyperboloid"
+surface.radius = 0.22
+surface.flare = 0.48
+surface.u_deg = [-91, 134]
+surface.v = [-0.39, 0.376]
+surface.position = [-0.4, -0.69, -0.466]
+surface.rpy_deg = [-45.7, 111.4, -144.1]
+surface.side = "outside"
+surface.cells = [400, 300]
+task = { standoff = 0, cone_deg = 20.7 }
+"""
+TELL_WHEN_SEARCHING = """
+import sys
+import feasibility.checking as checking
+from feasibility.cli import main
+check = checking.check
+def told(*setup, **settings):
+    print("searching", flush=True)
+    return check(*setup, **settings)
+checking.check = told
+sys.exit(main(["check", sys.argv[1]]))
+"""
+
+
+def test_ctrl_c_ends_a_hard_search_soon(tmp_path) -> None:
+    case = tmp_path / "hard.toml"
+    case.write_text(HARD_CASE)
+    child = subprocess.Popen(
+        [sys.executable, "-c", TELL_WHEN_SEARCHING, str(case)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert child.stdout is not None
+    assert child.stdout.readline() == "searching\n"
+    time.sleep(2.0)  # the search itself is under way, its kernels are loaded
+    assert child.poll() is None
+    sent = time.monotonic()
+    child.send_signal(signal.SIGINT)
+    out, err = child.communicate(timeout=60)
+    assert time.monotonic() - sent <= 2.0
+    assert (child.returncode, out) == (130, "")
+    # Before it there may be a word about kernels that had to be compiled.
+    assert err.endswith("coverable: interrupted\n")
+    assert "Traceback" not in err
