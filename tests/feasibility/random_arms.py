@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from arm_urdfs import FREE, arm, joint
 from numpy.typing import NDArray
 
-from robots import Robot
+from feasibility import Task
+from robots import Robot, load_robot
 from robots.kinematics import Kinematics
 from robots.reduce import robot_from_urdf
 from robots.urdf import check_urdf_text
-from surfaces import Surface, cylinder, hyperboloid, plane, sphere
+from surfaces import Cells, Surface, cylinder, hyperboloid, plane, sphere
 
 Floats = NDArray[np.float64]
 RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)
@@ -65,8 +67,6 @@ def planar_arm(links: int = 3, limits: tuple[float, float] = (-2.8, 2.8)) -> Rob
 def rail_arm(base: str, stroke: tuple[float, float] = (-0.5, 0.8)) -> Robot:
     """A library arm that rides on a rail along y."""
     from xml.etree import ElementTree
-
-    from robots import load_robot
 
     carried = load_robot(base)
     tree = ElementTree.parse(carried.urdf or "").getroot()
@@ -163,6 +163,13 @@ def random_surface(rng: np.random.Generator, kind: str) -> Surface:
     return plane((-5, 5), (-5, 5), side=side)
 
 
+def target_near(surface: Surface, standoff: float, point: Floats) -> tuple[Floats, Floats]:
+    """Target point and approach direction of the target surface that are nearest to a point."""
+    foot = surface.closest(point)
+    sign = surface.side_sign
+    return point + (sign * standoff - foot.height) * foot.normal, -sign * foot.normal
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Deviation:
     """How far a motion strays from the target surface and from the approach direction."""
@@ -183,3 +190,41 @@ def deviation(surface: Surface, standoff: float, points: Floats, axes: Floats) -
         np.linalg.norm(axes + surface.side_sign * foot.normal, axis=1),
         foot.inside,
     )
+
+
+PUMA = {"name_or_path": "puma560", "limits": "set-1"}
+QUESTIONS = {
+    "puma, dome": lambda: (
+        load_robot(**PUMA),
+        sphere(1.0, (30, 70), (40, 100)).cells(4, 5),
+        Task(0.005, 45),
+    ),
+    "puma, tube": lambda: (
+        load_robot(**PUMA),
+        cylinder(1.0, (20, 60), (0.0, 0.4)).cells(3, 3),
+        Task(0.005, 100),
+    ),
+    "ur5, plate": lambda: (
+        load_robot("ur5"),
+        plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside").cells(3, 4),
+        Task(0.02, 30, 5e-4),
+    ),
+    "panda, saddle": lambda: (
+        load_robot("panda"),
+        hyperboloid(
+            0.3, 0.5, (160, 200), (-0.1, 0.1), position=(0.8, 0, 0.4), side="outside"
+        ).cells(3, 3),
+        Task(0.02, 50),
+    ),
+    "ur5 on a rail": lambda: (
+        rail_arm("ur5"),
+        plane((0.4, 0.6), (-0.4, 0.4), position=(0, 0, 0.3), side="outside").cells(2, 5),
+        Task(0.02, 30),
+    ),
+}
+
+
+@cache
+def question(name: str) -> tuple[Robot, Cells, Task]:
+    """Robot, cells and task of a small feasible question."""
+    return QUESTIONS[name]()

@@ -12,56 +12,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from arm_urdfs import joint
-from random_arms import between, deviation, planar_arm, rail_arm, robot_of, tools
+from random_arms import QUESTIONS, between, deviation, planar_arm, question, robot_of, tools
 
 import feasibility
 from feasibility import Task, check
 from feasibility.certificate import replay
 from feasibility.verdict import Walk
-from robots import load_robot
-from surfaces import cylinder, hyperboloid, plane, sphere
+from surfaces import cylinder, plane, sphere
 
-PUMA = {"name_or_path": "puma560", "limits": "set-1"}
-QUESTIONS = {
-    "puma, dome": lambda: (
-        load_robot(**PUMA),
-        sphere(1.0, (30, 70), (40, 100)).cells(4, 5),
-        Task(0.005, 45),
-    ),
-    "puma, tube": lambda: (
-        load_robot(**PUMA),
-        cylinder(1.0, (20, 60), (0.0, 0.4)).cells(3, 3),
-        Task(0.005, 100),
-    ),
-    "ur5, plate": lambda: (
-        load_robot("ur5"),
-        plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside").cells(3, 4),
-        Task(0.02, 30, 5e-4),
-    ),
-    "panda, saddle": lambda: (
-        load_robot("panda"),
-        hyperboloid(
-            0.3, 0.5, (160, 200), (-0.1, 0.1), position=(0.8, 0, 0.4), side="outside"
-        ).cells(3, 3),
-        Task(0.02, 50),
-    ),
-    "ur5 on a rail": lambda: (
-        rail_arm("ur5"),
-        plane((0.4, 0.6), (-0.4, 0.4), position=(0, 0, 0.3), side="outside").cells(2, 5),
-        Task(0.02, 30),
-    ),
-}
 SIMPLE = ("puma, tube", "ur5, plate")
 SEARCH = (
     "kernels", "problem", "newton", "segment", "fibre", "continuation", "roadmap", "growth",
     "walk", "proof", "causes", "complete", "checking", "jcells",
 )  # fmt: skip
-
-
-@cache
-def question(name):
-    """Robot, cells and task."""
-    return QUESTIONS[name]()
 
 
 @cache

@@ -13,6 +13,7 @@ from random_arms import (
     random_configuration,
     random_surface,
     robot_of,
+    target_near,
     tilted,
     tools,
     turn_onto,
@@ -20,7 +21,7 @@ from random_arms import (
 
 from feasibility import Task
 from feasibility.newton import correct
-from feasibility.problem import aim, place, problem_of, work_for
+from feasibility.problem import look_at, place, problem_of, work_for
 from feasibility.segment import peak, segment_holds, spread
 from surfaces import cylinder, plane, sphere
 
@@ -35,9 +36,9 @@ def far_plane():
     return plane((-1, 1), (-1, 1)).cells(1, 1)
 
 
-def put(problem, work, slot, q, point):
-    """Evaluate q in a slot, against the target nearest to a point."""
-    aim(problem, work, point, point, 0.0)
+def put(problem, work, slot, q, target):
+    """Evaluate q in a slot, against a target point and approach direction."""
+    look_at(work, *target)
     place(problem, work, slot, q)
 
 
@@ -148,12 +149,12 @@ def surface_segment(rng, robot, kind, task, share, strays, longest, onto):
     problem, work = problem_of(robot, cells, task), work_for(robot.n)
     q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, longest)
     (away,), _ = tools(robot, q1[None])
-    put(problem, work, 1, q1, away)
+    put(problem, work, 1, q1, target_near(cells.surface, task.standoff, away))
     if onto:
         work.wish[:] = 0.0
         if not correct(problem, work, q1, 1e-6, np.inf, 60):
             return None
-    put(problem, work, 0, q0, point)
+    put(problem, work, 0, q0, target_near(cells.surface, task.standoff, point))
     return problem, work, cells, q0, q1
 
 
@@ -240,8 +241,8 @@ def test_a_normal_that_bulges_away_from_a_fixed_axis(surface, half):
     problem = problem_of(gantry, cells, Task(0.0, 179.0, 0.1))
     work = work_for(3)
     q0, q1 = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (-half, half))
-    put(problem, work, 0, q0, q0)
-    put(problem, work, 1, q1, q1)
+    put(problem, work, 0, q0, target_near(surface, 0.0, q0))
+    put(problem, work, 1, q1, target_near(surface, 0.0, q1))
     position, cone = segment_holds(problem, work, q0, q1)
     assert position * 0.1 >= 1.0 - np.cos(half)
     assert position * 0.1 <= 1.2 * (1.0 - np.cos(half))
