@@ -2,8 +2,10 @@
 
 import numpy as np
 import pinocchio as pin
+import puma_motion
 import puma_oracle
 import pytest
+import ur5_oracle
 from oracle_build import built
 from oracle_cases import Answer, Problem, net, patch
 from random_cases import TABLE_1, read
@@ -28,7 +30,8 @@ PAPER = {
     "5e": (HYPERBOLOID, (1.095, 0.0, 0.0), 10, 1, 90),
     "5f": (HYPERBOLOID, (1.15, 0.0, 0.0), 20, 1, 90),
 }
-STORED = read("puma_cases.json")
+STORED = read("puma560")
+STORED_UR5 = read("ur5")
 AGAIN = np.random.default_rng(5).choice(len(STORED), 10, replace=False)
 
 
@@ -42,6 +45,11 @@ def paper_case(name: str) -> Problem:
 @pytest.fixture(scope="module")
 def puma():
     return load_robot("puma560", limits="set-1")
+
+
+@pytest.fixture(scope="module")
+def ur5():
+    return load_robot("ur5")
 
 
 @pytest.mark.parametrize("on", ["patch", "net"])
@@ -94,6 +102,41 @@ def test_points_without_slack_are_out_of_reach(puma):
     assert (left.min(axis=0) < 0.01).all()  # the bound is met, not merely kept
 
 
+def test_every_ur5_configuration_is_found_from_its_tool_and_two_wrist_angles(ur5):
+    rng = np.random.default_rng(4)
+    data = ur5.model.createData()
+    seen = 0
+    for q in rng.uniform(-np.pi, np.pi, (600, 6)):
+        pin.framesForwardKinematics(ur5.model, data, q)
+        placed = data.oMf[ur5.tool_frame_id]
+        if np.hypot(*placed.translation[:2]) < ur5_oracle.CLEARANCE:
+            continue
+        seen += 1
+        psi, c5, s5 = q[1] + q[2] + q[3], np.cos(q[4]), np.sin(q[4])
+        outward = np.array([np.cos(q[0]), np.sin(q[0]), 0.0])
+        along = np.array([-np.sin(q[0]), np.cos(q[0]), 0.0])
+        np.testing.assert_allclose(
+            placed.rotation[:, 2],
+            s5 * np.cos(psi) * outward + c5 * along - s5 * np.sin(psi) * np.array([0.0, 0.0, 1.0]),
+            atol=1e-9,
+        )
+        off = np.empty((2, 2, 4))
+        for s, e in np.ndindex(2, 2):
+            sign = 1.0 - 2.0 * s, 1.0 - 2.0 * e
+            ur5_oracle.arm(*placed.translation, *sign, q[4], psi, off[s, e])
+        off = (off - q[:4] + np.pi) % (2 * np.pi) - np.pi
+        assert np.abs(off).max(axis=-1).min() < 1e-6
+    assert seen > 300
+
+
+def test_the_ur5_oracle_refuses_what_it_cannot_judge():
+    problem, _ = STORED_UR5[0]
+    plain = problem.plain() | {"kind": "plane", "size": (), "u": (-0.1, 0.1), "v": (-0.1, 0.1)}
+    plain |= {"position": CENTRED, "rpy_deg": CENTRED}
+    with pytest.raises(ValueError, match="first axis"):
+        ur5_oracle.solve(Problem.read(plain))
+
+
 @pytest.mark.parametrize("cone", [3.0, 20.0, 60.0, 90.0, 130.0])
 def test_the_wrists_intervals_are_the_wrists_mask(cone):
     rng = np.random.default_rng(3)
@@ -142,3 +185,38 @@ def test_stored_answers_are_the_oracles(number):
     wider = puma_oracle.solve(problem.varied(cone=1.2, limits_deg=5.0))
     assert wider.covered >= said.covered
     assert wider.reachable >= said.reachable
+
+
+@pytest.mark.parametrize("number", [0, -1])
+def test_stored_ur5_answers_are_the_oracles(number):
+    problem, said = STORED_UR5[number]
+    assert ur5_oracle.solve(problem, "net") == said
+
+
+def test_stored_cases_are_of_every_sort():
+    assert len(STORED_UR5) >= 30
+    feasible = sum(said.feasible for _, said in STORED)
+    apart = sum(
+        said.reachable == np.prod(problem.cells) and not said.feasible for problem, said in STORED
+    )
+    assert len(STORED) >= 200
+    assert min(feasible, apart, len(STORED) - feasible - apart) >= len(STORED) // 4
+    assert {problem.kind for problem, _ in STORED} == {
+        "sphere", "cylinder", "hyperboloid", "plane",
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("number", range(4, len(STORED), 20))
+def test_what_the_oracle_joins_is_joined_by_a_motion(number):
+    problem, said = STORED[number]
+    motions = puma_motion.spanning(problem.varied(cone=0.99, limits_deg=-0.25), fine=70)
+    assert len(motions) == said.covered
+    starts = [motion.q[0] for motion in motions.values()]
+    assert np.ptp(starts, axis=0).max() < 1e-9
+    for cell, motion in motions.items():
+        kept = puma_motion.measure(problem, motion)
+        assert kept.cone >= 0.0
+        assert kept.limits >= 0.0
+        assert kept.jump < 0.1
+        centre = net(problem, 1).uv[cell]
+        np.testing.assert_allclose(motion.uv[-1], centre, atol=1e-12)

@@ -138,9 +138,7 @@ def _join_rows(parent: NDArray[np.int32], one: Floats, base: int, two: Floats, o
 
 
 @njit(cache=True)
-def _components(
-    spans: Floats, arm: Ints, links: Ints, first: Ints
-) -> tuple[NDArray[np.int32], int]:
+def _components(spans: Floats, arm: Ints, links: Ints) -> tuple[NDArray[np.int32], int]:
     """Union-find over every (arm node, row, interval); see `components`."""
     _, rows, slots, _ = spans.shape
     size = rows * slots
@@ -201,8 +199,27 @@ def _pieces(problem: Problem, turn_deg: float) -> Ints:
     return np.ceil(fastest / np.radians(turn_deg)).astype(int)
 
 
-def components(problem: Problem, domain: Domain, folds: Ints, row_step: float) -> tuple[Ints, Ints]:
-    """Every (cell, component) that occurs, as two arrays, with repetitions."""
+class Fibres(NamedTuple):
+    """Every arm branch over every sample, with what its wrist may do."""
+
+    sample: Ints
+    """(A,) sample of each arm node."""
+    branch: Ints
+    """(A,) row of `BRANCHES`."""
+    theta: Floats
+    """(A, 3) theta1 to theta3, unwrapped, inside the limits."""
+    arm: Ints
+    """(A,) row of `spans`; nodes that differ in whole turns share one."""
+    links: Ints
+    """(L, 2) pairs of arm nodes that a continuous motion of theta1 to theta3 joins."""
+    rows: Floats
+    """(R,) theta5."""
+    spans: Floats
+    """(P, R, slots, 2) allowed theta4."""
+
+
+def fibres(problem: Problem, domain: Domain, folds: Ints, row_step: float) -> Fibres:
+    """Set up the graph; `folds` are samples where two branches meet."""
     limits = problem.limits
     points, approaches = problem.targets(*domain.uv.T)
     theta = limits[:3, 0] + (arms(points) - limits[:3, 0]) % TAU
@@ -217,7 +234,6 @@ def components(problem: Problem, domain: Domain, folds: Ints, row_step: float) -
     arm_at = np.full(usable.shape[:2], -1)
     arm_sample, arm_branch = np.nonzero(usable.any(axis=2))
     arm_at[arm_sample, arm_branch] = np.arange(len(arm_sample))
-    arm = arm_at[sample, branch]
     seen = in_link3(theta[arm_sample, arm_branch], approaches[arm_sample])
 
     # Neighbouring samples: the same branch, and the turn that keeps every joint continuous.
@@ -233,14 +249,27 @@ def components(problem: Problem, domain: Domain, folds: Ints, row_step: float) -
     rows = _rows(limits[4], row_step)
     slots = int(np.ceil((limits[3, 1] - limits[3, 0]) / TAU - 1e-12)) + 1
     spans = _intervals(seen, rows, np.cos(np.radians(problem.cone_deg)), *limits[3], slots)
-    parent, size = _components(spans, arm, np.concatenate(links), sample)
+    return Fibres(
+        sample,
+        branch,
+        real[sample, branch, turn],
+        arm_at[sample, branch],
+        np.concatenate(links),
+        rows,
+        spans,
+    )
 
+
+def components(found: Fibres, domain: Domain) -> tuple[Ints, Ints]:
+    """Every (cell, component) that occurs, as two arrays, with repetitions."""
+    parent, size = _components(found.spans, found.arm, found.links)
     cell_of = np.full(len(domain.uv), -1)
     cell_of[domain.centres] = np.arange(len(domain.centres))
-    over = np.flatnonzero(cell_of[sample] >= 0)
-    live = (spans[..., 0] <= spans[..., 1]).reshape(len(spans), size)[arm[over]]
+    over = np.flatnonzero(cell_of[found.sample] >= 0)
+    live = found.spans[..., 0] <= found.spans[..., 1]
+    live = live.reshape(len(live), size)[found.arm[over]]
     which, at = np.nonzero(live)
-    return cell_of[sample[over]][which], parent[over[which] * size + at].astype(np.int64)
+    return cell_of[found.sample[over]][which], parent[over[which] * size + at].astype(np.int64)
 
 
 def _rows(limits: Floats, step: float) -> Floats:
@@ -260,17 +289,24 @@ def solve(problem: Problem, on: str = "patch", resolution: Resolution = STANDARD
         resolution: how finely to look.
     """
     n_cells = problem.cells[0] * problem.cells[1]
-    limits = problem.limits
-    if (limits[:, 0] > limits[:, 1]).any():
+    if (problem.limits[:, 0] > problem.limits[:, 1]).any():
         return Answer(n_cells == 0, 0, 0)
-    step = np.radians(np.clip(problem.cone_deg / resolution.rows, 0.4, 2.5))
+    domain, folds = domain_of(problem, on, resolution)
+    found = fibres(problem, domain, folds, row_step(problem, resolution))
+    return answer(n_cells, *components(found, domain))
+
+
+def row_step(problem: Problem, resolution: Resolution) -> float:
+    """rad between theta5 rows."""
+    return float(np.radians(np.clip(problem.cone_deg / resolution.rows, 0.4, 2.5)))
+
+
+def domain_of(problem: Problem, on: str, resolution: Resolution) -> tuple[Domain, Ints]:
+    """The samples of a problem, and which of them are points where two branches meet."""
     pieces = _pieces(problem, min(resolution.turn_deg, problem.cone_deg / 3.0))
-    if on == "patch":
-        across = np.quantile(pieces, 0.9) if len(pieces) else 3
-        across = int(min(across, np.sqrt(resolution.samples / n_cells)))
-        domain = patch(problem, max((across - 1) // 2 * 2 + 1, 3))
-        domain, folds = _fold_samples(problem, domain)
-    else:
-        domain = net(problem, np.clip(pieces, 6, 120))
-        folds = np.empty(0, dtype=np.int64)
-    return answer(n_cells, *components(problem, domain, folds, float(step)))
+    if on == "net":
+        return net(problem, np.clip(pieces, 6, 120)), np.empty(0, dtype=np.int64)
+    across = np.quantile(pieces, 0.9) if len(pieces) else 3
+    across = int(min(across, np.sqrt(resolution.samples / len(net(problem, 1).centres))))
+    domain = patch(problem, max((across - 1) // 2 * 2 + 1, 3))
+    return _fold_samples(problem, domain)

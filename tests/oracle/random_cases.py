@@ -11,14 +11,15 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import puma_oracle
-from oracle_cases import Answer, Problem
+import ur5_oracle
+from oracle_cases import Answer, Problem, patch
 from puma_oracle import Resolution
 
 HERE = Path(__file__).parent
@@ -34,6 +35,7 @@ SHIFTS = (
     / np.sqrt(3.0)
     * np.array([(0, 0, 0), (1, 1, 1), (1, -1, -1), (-1, 1, -1), (-1, -1, 1)])
 )
+MOST_STEPS = 6
 FEASIBLE, UNREACHABLE, DISCONNECTED = "feasible", "unreachable", "disconnected"
 
 
@@ -51,9 +53,14 @@ def _moved(problem: Problem, shift: np.ndarray) -> Problem:
     return Problem.read(plain)
 
 
-def variants(problem: Problem) -> Iterator[tuple[Problem, str, Resolution]]:
+def puma_first(problem: Problem) -> Answer:
+    """A quick answer, to sort by."""
+    return puma_oracle.solve(problem, "net", Resolution(rows=5.0, turn_deg=5.0))
+
+
+def puma_variants(problem: Problem) -> Iterator[tuple[Problem, str, Resolution]]:
     """What a sure case must answer alike, the likeliest to differ first."""
-    fine = Resolution(rows=12.0, turn_deg=2.0)
+    fine = Resolution(rows=12.0, turn_deg=2.0, samples=3000)
     coarse = Resolution(rows=5.0, turn_deg=5.0)
     tight = problem.varied(cone=0.98, limits_deg=-0.5)
     wide = problem.varied(cone=1.02, limits_deg=0.5)
@@ -70,9 +77,9 @@ def variants(problem: Problem) -> Iterator[tuple[Problem, str, Resolution]]:
         yield wide.varied(standoff=sign * TOLERANCE), "patch", Resolution()
 
 
-def sure(problem: Problem, first: Answer) -> bool:
+def puma_sure(problem: Problem, first: Answer) -> bool:
     """Whether every variant gives the first answer."""
-    return all(puma_oracle.solve(p, on, how) == first for p, on, how in variants(problem))
+    return all(puma_oracle.solve(p, on, how) == first for p, on, how in puma_variants(problem))
 
 
 def _round(values: Any) -> Any:
@@ -133,33 +140,110 @@ def draw(rng: np.random.Generator) -> Problem:
     return Problem.read(plain)
 
 
-def collect(
-    seed: int,
-    wanted: dict[str, int],
-    drawn: Callable[[np.random.Generator], Problem],
-    solve: Callable[[Problem], Answer],
-    is_sure: Callable[[Problem, Answer], bool],
-) -> list[dict[str, Any]]:
-    """Draw until there are enough sure cases of each sort; the list that JSON holds."""
-    rng = np.random.default_rng(seed)
-    count = dict.fromkeys(wanted, 0)
-    kept, tried, started = [], 0, time.monotonic()
-    while any(count[sort] < wanted[sort] for sort in wanted):
-        problem = drawn(rng)
+def draw_ur5(rng: np.random.Generator) -> Problem:
+    """A random small patch for the UR5, clear of its first axis; half turns, or a little else."""
+    made = draw_surface(rng, tuple(rng.uniform(0.15, 0.6, 2)))
+    direction = rng.normal(size=3)
+    place = direction / np.linalg.norm(direction) * rng.uniform(0.35, 0.85) + (0.0, 0.0, 0.09)
+    limits = np.tile((-180.0, 180.0), (6, 1))
+    if rng.random() < 0.5:
+        limits[:5, 0], limits[:5, 1] = -rng.uniform(60, 180, 5), rng.uniform(60, 180, 5)
+    elif rng.random() < 0.4:
+        limits[3:] = (-360.0, 360.0)
+    problem = Problem(
+        **made,
+        position=(0.0, 0.0, 0.0),
+        rpy_deg=_round(rng.uniform(-180, 180, 3)),
+        cells=(int(rng.integers(3, 5)), int(rng.integers(3, 6))),
+        standoff=round(float(rng.uniform(0, 0.02)), 4),
+        cone_deg=round(float(np.exp(rng.uniform(np.log(18), np.log(70)))), 2),
+        limits_deg=tuple(_round(pair) for pair in limits),
+    )
+    middle = problem.targets(*np.array([r.mean() for r in problem.ranges])[:, None])[0][0]
+    plain = problem.plain()
+    plain["position"] = _round(place - middle)
+    problem = Problem.read(plain)
+    points, _ = problem.targets(*patch(problem, 9).uv.T)
+    near = np.hypot(points[:, 0], points[:, 1]).min() < ur5_oracle.CLEARANCE + 0.03
+    return draw_ur5(rng) if near else problem
+
+
+def ur5_first(problem: Problem) -> Answer:
+    """A quick answer, to sort by."""
+    return ur5_oracle.solve(problem, "net", ur5_oracle.Resolution(steps=5.0, pieces=4))
+
+
+def ur5_sure(problem: Problem, first: Answer) -> bool:
+    """As `puma_sure`, with wider margins, because psi is sampled and the reach enters the mask."""
+    tight = problem.varied(cone=0.94, limits_deg=-2.0)
+    wide = problem.varied(cone=1.06, limits_deg=2.0)
+    usual, fine = ur5_oracle.Resolution(), ur5_oracle.Resolution(steps=12.0, pieces=9, refine=5)
+    asked = [(tight, "net", usual), (wide, "patch", usual), (problem, "patch", fine)]
+    for shift in 3.0 * SHIFTS[1:]:
+        asked += [(_moved(tight, shift), "net", usual), (_moved(wide, shift), "patch", usual)]
+    return all(ur5_oracle.solve(p, on, how) == first for p, on, how in asked)
+
+
+def tightened(rng: np.random.Generator, problem: Problem, least: float = 3.0) -> Problem:
+    """The problem with a narrower cone, or with narrower limits of one joint."""
+    plain = problem.plain()
+    if rng.random() < 0.5:
+        plain["cone_deg"] = round(max(problem.cone_deg * rng.uniform(0.3, 0.8), least), 2)
+    else:
+        limits, joint = [list(pair) for pair in problem.limits_deg], rng.integers(5)
+        end = rng.integers(2)
+        limits[joint][end] = round(limits[joint][end] * float(rng.uniform(0.3, 0.8)), 4)
+        plain["limits_deg"] = limits
+    return Problem.read(plain)
+
+
+class Drawing(NamedTuple):
+    """How the cases of one arm are drawn."""
+
+    draw: Callable[[np.random.Generator], Problem]
+    first: Callable[[Problem], Answer]
+    is_sure: Callable[[Problem, Answer], bool]
+    least_cone_deg: float
+    """Where tightening the cone ends."""
+
+
+ARMS = {
+    "puma560": Drawing(draw, puma_first, puma_sure, 3.0),
+    "ur5": Drawing(draw_ur5, ur5_first, ur5_sure, 15.0),
+}
+JOBS = [
+    # arm, sort, seed, cases wanted, problems drawn at most
+    ("puma560", DISCONNECTED, 22, 90, 4000),
+    ("puma560", FEASIBLE, 20, 90, 4000),
+    ("puma560", UNREACHABLE, 21, 90, 4000),
+    ("ur5", DISCONNECTED, 25, 14, 400),
+    ("ur5", FEASIBLE, 23, 16, 400),
+    ("ur5", UNREACHABLE, 24, 14, 400),
+]
+
+
+def collect(arm: str, sort: str, seed: int, wanted: int, most: int) -> int:
+    """Draw until there are enough sure cases of one sort, and write them; returns how many."""
+    how, rng = ARMS[arm], np.random.default_rng(seed)
+    kept: list[dict[str, Any]] = []
+    for _ in range(most):
+        problem = how.draw(rng)
         cells = problem.cells[0] * problem.cells[1]
-        found = solve(problem)
-        sort = kind_of(found, cells)
-        tried += 1
-        if tried % 200 == 0:
-            sys.stderr.write(f"{tried} drawn, {count}, {time.monotonic() - started:.0f} s\n")
+        found = how.first(problem)
+        # Few random problems fall apart with every cell in reach; those that are feasible often do
+        # when they are tightened step by step.
+        steps = MOST_STEPS if sort == DISCONNECTED else 0
+        while found.feasible and steps > 0:
+            problem, steps = tightened(rng, problem, how.least_cone_deg), steps - 1
+            found = how.first(problem)
         # Patches of which nothing can be reached say little; a few are enough.
-        if count[sort] >= wanted[sort] or (found.reachable == 0 and rng.random() < 0.9):
-            continue
-        if not is_sure(problem, found):
-            continue
-        count[sort] += 1
-        kept.append({"sort": sort, **problem.plain(), **found._asdict()})
-    return kept
+        dull = found.reachable == 0 and rng.random() < 0.9
+        if kind_of(found, cells) == sort and not dull and how.is_sure(problem, found):
+            kept.append({**problem.plain(), **found._asdict()})
+            write(HERE / f"{arm}_{sort}.json", kept)
+        if len(kept) == wanted:
+            break
+    return len(kept)
 
 
 def write(path: Path, cases: list[dict[str, Any]]) -> None:
@@ -168,23 +252,25 @@ def write(path: Path, cases: list[dict[str, Any]]) -> None:
     path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
 
 
-def read(name: str) -> list[tuple[Problem, Answer]]:
-    """The stored cases of one file, such as 'puma_cases.json'."""
+def read(arm: str) -> list[tuple[Problem, Answer]]:
+    """The stored cases of an arm, sort by sort."""
     found = []
-    for case in json.loads((HERE / name).read_text(encoding="utf-8")):
-        case.pop("sort")
-        said = Answer(*(case.pop(field) for field in Answer._fields))
-        found.append((Problem.read(case), said))
+    for sort in (FEASIBLE, UNREACHABLE, DISCONNECTED):
+        for case in json.loads((HERE / f"{arm}_{sort}.json").read_text(encoding="utf-8")):
+            said = Answer(*(case.pop(field) for field in Answer._fields))
+            found.append((Problem.read(case), said))
     return found
 
 
 def main() -> None:
-    """Draw everything again."""
+    """Draw everything again, or the files whose names are given."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--each", type=int, default=100, help="PUMA cases of each sort")
-    each = parser.parse_args().each
-    wanted = dict.fromkeys((FEASIBLE, UNREACHABLE, DISCONNECTED), each)
-    write(HERE / "puma_cases.json", collect(20, wanted, draw, puma_oracle.solve, sure))
+    parser.add_argument("files", nargs="*", help="such as ur5_feasible; default: all")
+    asked = parser.parse_args().files
+    jobs = [job for job in JOBS if not asked or f"{job[0]}_{job[1]}" in asked]
+    with ProcessPoolExecutor() as pool:
+        for job, count in zip(jobs, pool.map(collect, *zip(*jobs, strict=True)), strict=True):
+            sys.stderr.write(f"{job[0]}_{job[1]}: {count} cases\n")
 
 
 if __name__ == "__main__":
