@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "paper")]
+sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "paper"), str(HERE.parent / "oracle")]
 
 
 def table(rows: Sequence[Mapping[str, object]]) -> str:

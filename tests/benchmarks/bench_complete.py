@@ -1,0 +1,188 @@
+"""The complete search: the paper's cases, fine grids, exhausted cases, the whole process."""
+
+from __future__ import annotations
+
+import json
+import os
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from oracle_build import built
+from oracle_cases import Problem
+from paper_cases import PAPER_CASES
+
+from feasibility import check
+from feasibility.verdict import Evidence, Verdict
+from robots import load_robot
+
+ROOT = Path(__file__).resolve().parents[2]
+DISCONNECTED = ROOT / "tests" / "oracle" / "puma560_disconnected.json"
+GRID = """
+import json, resource, sys, time
+sys.path[:0] = sys.argv[3:]
+from paper_cases import PAPER_CASES
+from feasibility import check
+case = PAPER_CASES["4a"]
+robot, task, surface = case.robot(), case.task(), case.cells().surface
+check(robot, case.cells(), task)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+began = time.perf_counter()
+verdict = check(robot, surface.cells(int(sys.argv[1]), int(sys.argv[2])), task)
+taken = time.perf_counter() - began
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(json.dumps([taken, str(verdict.answer), verdict.n_covered, verdict.n_edges,
+                  verdict.statistics["fk"], peak]))
+"""
+
+
+def pinocchio_fk_us(calls: int = 20_000) -> float:
+    """Microseconds of one call of Pinocchio's FK with the tool frame, from Python; best of 5."""
+    model = PAPER_CASES["4a"].robot().model
+    data, q = model.createData(), pin.neutral(model)
+    frame = model.nframes - 1
+    best = np.inf
+    for _ in range(5):
+        began = time.perf_counter()
+        for _ in range(calls):
+            pin.forwardKinematics(model, data, q)
+            pin.updateFramePlacement(model, data, frame)
+        best = min(best, (time.perf_counter() - began) / calls)
+    return 1e6 * best
+
+
+def median_ms(ask: Callable[[], Any], repeats: int) -> tuple[float, Any]:
+    """Median time of a call, and what the last one returned; the first one is not counted."""
+    answer = ask()
+    times = []
+    for _ in range(repeats):
+        began = time.perf_counter()
+        answer = ask()
+        times.append(1e3 * (time.perf_counter() - began))
+    return statistics.median(times), answer
+
+
+def row(what: str, ms: float, fk_us: float, target: str, **more: object) -> dict[str, object]:
+    """One row of the table."""
+    return {
+        "what": what,
+        "verdict": more.get("verdict", ""),
+        "cells": more.get("cells", ""),
+        "edges": more.get("edges", ""),
+        "FK": more.get("fk", ""),
+        "median ms": ms,
+        "in Pinocchio FK": round(1e3 * ms / fk_us),
+        "causes ms": more.get("causes", ""),
+        "us an edge": more.get("per_edge", ""),
+        "peak MB": more.get("peak", ""),
+        "target": target,
+    }
+
+
+def of_verdict(verdict: Verdict) -> dict[str, object]:
+    """The columns that a verdict fills."""
+    return {
+        "verdict": f"{verdict.answer} ({verdict.evidence})",
+        "cells": f"{verdict.n_covered} of {len(verdict.cells)}",
+        "edges": verdict.n_edges,
+        "fk": verdict.statistics["fk"],
+    }
+
+
+def causes_ms(verdict: Verdict) -> float:
+    """Time to find the causes, which are made when they are first read."""
+    began = time.perf_counter()
+    _ = verdict.causes
+    return 1e3 * (time.perf_counter() - began)
+
+
+def paper_rows(fk_us: float, repeats: int) -> list[dict[str, object]]:
+    """The twelve published cases."""
+    table = []
+    for name, case in PAPER_CASES.items():
+        setup = case.robot(), case.cells(), case.task()
+        ms, verdict = median_ms(lambda setup=setup: check(*setup), repeats)
+        target = "20 ms" if name == "4a" else "30 ms" if name in ("4d", "4f") else "60 ms"
+        causes = causes_ms(verdict) if verdict.evidence is Evidence.PROOF else ""
+        table.append(row(name, ms, fk_us, target, **of_verdict(verdict), causes=causes))
+    return table
+
+
+def exhausted_rows(fk_us: float, wanted: int = 5) -> list[dict[str, object]]:
+    """Stored problems cut into 90 cells: every cell is reached, by no single component."""
+    arm, table = load_robot("puma560"), []
+    for stored in json.loads(DISCONNECTED.read_text()):
+        plain = {key: stored[key] for key in Problem.__dataclass_fields__}
+        setup = built(replace(Problem.read(plain), cells=(9, 10)), arm)
+        if check(*setup).evidence is not Evidence.EXHAUSTED:
+            continue
+        ms, verdict = median_ms(lambda setup=setup: check(*setup), 3)
+        if sum(len(c) for c in verdict.components) and not _all_reached(verdict):
+            continue
+        what = f"exhausted {len(table) + 1}: {verdict.cells.surface.kind}"
+        table.append(row(what, ms, fk_us, "", **of_verdict(verdict), causes=causes_ms(verdict)))
+        if len(table) == wanted:
+            break
+    middle = statistics.median(float(str(r["median ms"])) for r in table)
+    table.append(row("exhausted, median of these", middle, fk_us, "1000 ms"))
+    return table
+
+
+def _all_reached(verdict: Verdict) -> bool:
+    """Does every cell lie in some component?"""
+    reached = np.concatenate(verdict.components)
+    return len(np.unique(reached)) == len(verdict.cells)
+
+
+def grid_rows(fk_us: float) -> list[dict[str, object]]:
+    """The sphere of 4a in finer and finer cells, each in a process of its own."""
+    table = []
+    for nu, nv, target in ((9, 10, ""), (45, 50, "250 ms"), (300, 300, "10 s, 1500 MB")):
+        folders = [str(ROOT), str(ROOT / "tests" / "paper")]
+        done = subprocess.run(
+            [sys.executable, "-c", GRID, str(nu), str(nv), *folders],
+            capture_output=True, text=True, check=True,
+        )  # fmt: skip
+        taken, answer, covered, edges, fk, peak = json.loads(done.stdout)
+        table.append(
+            row(
+                f"sphere {nu} x {nv}", 1e3 * taken, fk_us, target, verdict=answer,
+                cells=f"{covered} of {nu * nv}", edges=edges, fk=fk,
+                per_edge=1e6 * taken / edges, peak=peak / 1024,
+            )
+        )  # fmt: skip
+    return table
+
+
+def process_row(fk_us: float, repeats: int) -> dict[str, object]:
+    """`coverable check paper/4a` as a whole process."""
+    command = [sys.executable, "-m", "feasibility.cli", "check", "paper/4a"]
+
+    def ask() -> None:
+        subprocess.run(command, cwd=ROOT, env={**os.environ}, check=True, capture_output=True)
+
+    ms, _ = median_ms(ask, repeats)
+    return row("process: check paper/4a", ms, fk_us, "1800 ms")
+
+
+def rows(repeats: int = 9) -> tuple[str, list[dict[str, object]]]:
+    """One row for each thing that a target is set for."""
+    fk_us = pinocchio_fk_us()
+    table = [
+        *paper_rows(fk_us, repeats),
+        *exhausted_rows(fk_us),
+        *grid_rows(fk_us),
+        process_row(fk_us, 5),
+    ]
+    title = (
+        f"Complete search, kernels loaded, median of {repeats} with the witness replayed. One "
+        f"Pinocchio FK call from Python: {fk_us:.2f} us."
+    )
+    return title, table
