@@ -205,6 +205,14 @@ class Explorer:
         owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
         return np.unique(owners[inside[owners] & ~inside[self.indices]])
 
+    def wound(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) the same placement of the arm, joints brought inside their limits by full turns."""
+        lower, upper = self.problem.lower, self.problem.upper
+        turn = np.where(self.robot.prismatic, 0.0, 2.0 * np.pi)
+        q = q + turn * np.ceil(np.maximum(lower - q, 0.0) / (2.0 * np.pi))
+        q = q - turn * np.ceil(np.maximum(q - upper, 0.0) / (2.0 * np.pi))
+        return np.clip(q, lower, upper)  # rounding
+
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds is planted."""
         ruling, looked = Ruling.OPEN, int(boxes.counts[1])
@@ -213,8 +221,10 @@ class Explorer:
             self.tick("proving cells out of reach")
         self.boxes += int(boxes.counts[1]) - looked
         self.rulings[cell] = ruling
-        if ruling is Ruling.REACHED:
-            self.plant(cell, np.clip(q, self.problem.lower, self.problem.upper)[None])
+        # A box that is left undecided mostly straddles the tolerance: Newton starts well from it.
+        # (A slide without ends has boxes without a middle.)
+        if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and np.isfinite(q).all():
+            self.plant(cell, self.wound(q)[None])
         return ruling
 
 

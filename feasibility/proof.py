@@ -257,7 +257,8 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
         boxes: the `Boxes` that wait; start from `root_box`.
         most: boxes to look at before coming back with OPEN.
         directions: (m, 3) unit directions for the cuts.
-        found: (n,) receives the configuration when the ruling is REACHED.
+        found: (n,) receives the configuration when the ruling is REACHED, and the one that could
+            not be ruled out when it is UNKNOWN.
     """
     n = found.shape[0]
     low, high = np.empty(n), np.empty(n)
@@ -289,6 +290,8 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
                 if move > largest:
                     worst, largest = j, move
         if worst < 0 or boxes.counts[0] + 2 > boxes.low.shape[0]:
+            for j in range(n):
+                found[j] = 0.5 * (low[j] + high[j])
             return 3
         middle = 0.5 * (low[worst] + high[worst])
         for side in range(2):
@@ -309,7 +312,8 @@ def rule(
     """Look at up to `most` more boxes for one cell.
 
     Returns:
-        The ruling, and a configuration (n,) that covers the cell when it is REACHED.
+        The ruling, and a configuration (n,) that covers the cell when it is REACHED, or comes
+        within a hair of it when it is UNKNOWN.
     """
     found = np.empty(len(problem.lower))
     code = branch_and_bound(

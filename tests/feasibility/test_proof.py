@@ -20,6 +20,7 @@ from random_arms import (
 )
 
 from feasibility import Task
+from feasibility.complete import Explorer
 from feasibility.fibre import roomy
 from feasibility.problem import problem_of, work_for
 from feasibility.proof import Ruling, root_box, rule
@@ -216,6 +217,26 @@ def test_limits_are_real_intervals_and_full_turns_are_not_cut(limits, inside, ou
             said = ruling(robot, one_target(target, np.array([0.0, 0.0, 1.0]), rng), task)[0]
             at_limit = expected is Ruling.REACHED and said is Ruling.UNKNOWN
             assert said is expected or at_limit, (np.degrees(angle), said)
+
+
+@pytest.mark.parametrize("limits", [(10, 371), (190, 560), (-350, 20), (1000, 1400)])
+def test_what_branch_and_bound_finds_is_planted_at_its_winding(limits):
+    """It searches one turn about zero; the limits may lie elsewhere. The seed must not be lost."""
+    rng = np.random.default_rng(11)
+    robot = robot_of(
+        [
+            joint(1, limits=tuple(np.radians(limits).tolist())),
+            joint(2, xyz=(0.3, 0, 0), limits=(-1.5, 1.5)),
+            joint(3, "fixed", (0.3, 0, 0)),
+        ]
+    )
+    for angle in np.radians([-170.0, -90.0, -10.0, 5.0, 95.0, 175.0]):
+        target = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
+        cells = one_target(target, np.array([0.0, 0.0, 1.0]), rng)
+        explorer = Explorer(robot, cells, problem_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
+        said = explorer.rule(0, root_box(explorer.problem), BOXES)
+        assert said in (Ruling.REACHED, Ruling.UNKNOWN)
+        assert explorer.reached[0]
 
 
 def test_a_continuous_joint_turns_all_the_way():
