@@ -21,13 +21,14 @@ from feasibility.complete import Explorer, evenly
 from feasibility.fibre import connect
 from feasibility.growth import CONNECT_STEPS
 from feasibility.kernels import kernel, put
-from feasibility.newton import LANDING_STEPS, land
+from feasibility.newton import LANDING_STEPS, cholesky_solve, land
 from feasibility.problem import CONE, LIMIT, LONG, NEXT, SINGULAR, Problem, Work, look_at, place
 from feasibility.proof import Ruling
 from feasibility.roadmap import root_of
 from feasibility.verdict import Cause, CauseKind
 from robots import Robot
 from robots.chain import jacobians
+from robots.kinematics import Kinematics
 
 STARTS = 16  # Newton starts of each relaxed question
 MOST_EXAMINED = 400  # cells that are examined one by one
@@ -55,6 +56,7 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
     n = guesses.shape[1]
     best = np.inf
     q, step = np.empty(n), np.empty(n)
+    square, pull = np.empty((4, 4)), np.empty(4)
     look_at(work, problem.points[cell], problem.approaches[cell])
     for g in range(guesses.shape[0]):
         put(q, guesses[g])
@@ -66,15 +68,23 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
                 problem.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
                 work.point_rows, work.axis_rows,
             )  # fmt: skip
+            trace = 0.0
+            for i in range(3):
+                pull[i] = work.target[0, i] - work.point[1, i]
+                for k in range(i + 1):
+                    total = 0.0
+                    for j in range(n):
+                        total += work.point_rows[i, j] * work.point_rows[k, j]
+                    square[i, k] = total
+                trace += square[i, i]
+            for i in range(3):
+                square[i, i] += damping * trace + 1e-12
+            if not cholesky_solve(square, pull, 3):
+                break
             for j in range(n):
-                pull, size = 0.0, 0.0
+                step[j] = q[j]
                 for k in range(3):
-                    row = work.point_rows[k, j]
-                    pull += row * (work.target[0, k] - work.point[1, k])
-                    size += row * row
-                step[j] = pull / (size + damping) / n
-            for j in range(n):
-                step[j] += q[j]
+                    step[j] += work.point_rows[k, j] * pull[k]
                 step[j] = min(max(step[j], problem.lower[j]), problem.upper[j])
             place(problem, work, NEXT, step)
             if work.error[1, 0] < error:
@@ -82,7 +92,7 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
                 error = work.error[1, 0]
                 put(q, step)
                 damping *= 0.5
-                if gain < 1e-5 * problem.scale:
+                if gain < 1e-7 * problem.scale:
                     break
             else:
                 damping = 4.0 * damping + 1e-3
@@ -130,8 +140,12 @@ def _one(explorer: Explorer) -> NDArray[np.float64]:
 
 def _smallest_angle(explorer: Explorer, relaxed: Problem, cell: int) -> float:
     """Smallest angle (rad) between tool axis and approach direction with the point reached."""
-    low, high = 0.0, np.pi
-    # Bisect on the cone: is there a configuration inside it?
+    kinematics, approach = Kinematics(explorer.robot), relaxed.approaches[cell]
+    found = np.empty((STARTS, explorer.robot.n))
+    count = _solve(relaxed, explorer.work, cell, explorer.guesses(2 * STARTS), found)
+    chords = [float(np.linalg.norm(kinematics.tool(q)[1] - approach)) for q in found[:count]]
+    low, high = 0.0, 2.0 * np.arcsin(min(0.5 * min(chords, default=2.0), 1.0))
+    # Bisect on the cone: is there a configuration inside a narrower one?
     for _ in range(9):
         middle = 0.5 * (low + high)
         narrowed = relaxed._replace(rim=2.0 * np.sin(0.5 * middle))
@@ -201,7 +215,11 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
     if not past:
         found = _solve(anything, work, cell, guesses, solutions)
         past = _past_limits(robot, _nearest_to_limits(explorer, anything, cell, solutions[:found]))
-        past = f"for the tool point alone {past}; inside the cone nothing was found at all"
+        past = (
+            f"for the tool point alone {past}; inside the cone nothing was found at all"
+            if past
+            else "the target lies past the limits by no more than the tolerance"
+        )
     return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
 
 

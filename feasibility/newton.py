@@ -16,7 +16,7 @@ LANDING_STEPS = np.int64(60)
 
 
 @kernel
-def _cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
+def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
     """Solve the m x m symmetric a y = b in place; False when a is not positive definite."""
     for i in range(m):
         for j in range(i + 1):
@@ -70,7 +70,7 @@ def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
             return False
         for i in range(m):
             a[i, i] += 1e-9 * trace  # damping: at a singularity the step stays finite
-        if not _cholesky_solve(a, y, m):
+        if not cholesky_solve(a, y, m):
             return False
         worst, furthest = -1, 1e-14
         for j in range(n):
