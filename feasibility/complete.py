@@ -101,10 +101,12 @@ class Explorer:
         # motion, or not at all.
         self.low: NDArray[np.float64] = np.where(wide, middle - np.pi, lower)
         self.high = np.where(wide, middle + np.pi, upper)
-        # A rail without ends is seeded as far as the cells and the arm reach.
-        far = self.problem.scale + np.abs(self.problem.points).max(initial=0.0)
-        self.low = np.where(self.robot.prismatic, np.maximum(self.low, -far), self.low)
-        self.high = np.where(self.robot.prismatic, np.minimum(self.high, far), self.high)
+        # A slide is seeded as far as the cells, the arm and its other slides reach.
+        ends = np.where(bounded & self.robot.prismatic, np.maximum(abs(lower), abs(upper)), 0.0)
+        far = self.problem.scale + np.abs(self.problem.points).sum(axis=1).max(initial=0.0)
+        far = far + ends.sum() - ends
+        self.low = np.where(self.robot.prismatic, np.clip(-far, lower, upper), self.low)
+        self.high = np.where(self.robot.prismatic, np.clip(far, lower, upper), self.high)
         self.indptr, self.indices = self.cells.neighbours
         self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
 

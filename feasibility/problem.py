@@ -76,7 +76,8 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
         near=float(near),
         curvature=float(bounds.curvature),
         bend=float(bounds.bend),
-        scale=float(np.linalg.norm(chain.translations, axis=1).sum()),
+        # A gantry may have no links at all: its strokes are as good as any length then.
+        scale=float(np.linalg.norm(chain.translations, axis=1).sum()) or 1.0,
     )
 
 

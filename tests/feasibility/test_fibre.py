@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from random_arms import QUESTIONS, finite_limits, question, tools
+from arm_urdfs import FREE, joint
+from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
 
+from feasibility import Task, check
 from feasibility.certificate import replay
+from feasibility.complete import Explorer
 from feasibility.fibre import connect, roomy, settle
 from feasibility.problem import problem_of, work_for
 from feasibility.verdict import Walk
+from surfaces import plane
 
 
 @pytest.fixture(params=QUESTIONS)
@@ -100,3 +104,27 @@ def test_settling_stays_on_the_fibre_and_gains_room(over_a_cell):
         assert not refusal(robot, cells, task, q[None], cell)
         assert (q >= robot.lower).all()
         assert (q <= robot.upper).all()
+
+
+@pytest.mark.parametrize(
+    ("stroke", "tool", "feasible"),
+    [
+        ((-3.9, -2.5), -3.0, True),
+        ((-3.9, -2.5), 1.0, False),
+        ((50.0, 60.0), 55.0, True),
+        ((-np.inf, -2.5), -7.0, True),
+        ((2.0, np.inf), 8.0, True),
+        (FREE, 8.0, True),
+    ],
+)
+def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
+    """Guesses stay inside the limits, wherever these are; what is out of reach is so by proof."""
+    robot = robot_of([joint(1, "prismatic", axis=(1, 0, 0), limits=(-1, 1)), joint(2)])
+    robot = robot.with_limits({"j1": stroke})
+    cells = plane((tool - 0.1, tool + 0.1), (-1e-4, 1e-4), side="outside").cells(3, 1)
+    guesses = Explorer(robot, cells, problem_of(robot, cells, Task(0.0, 180)), 0).guesses(50)
+    assert (guesses >= robot.lower).all()
+    assert (guesses <= robot.upper).all()
+    verdict = check(robot, cells, Task(0.0, 180))
+    assert verdict.feasible is feasible
+    assert verdict.evidence == ("witness" if feasible else "proof")
