@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from feasibility.fibre import roomy
 from feasibility.growth import close_pairs, seed_cell, spread_out, stir
+from feasibility.meeting import NARROWEST, WIDEST, meet, nearest_pairs
 from feasibility.problem import Problem, Work, problem_of, work_for
 from feasibility.proof import Boxes, Ruling, root_box, rule
 from feasibility.roadmap import (
@@ -37,6 +38,7 @@ from feasibility.roadmap import (
     HEAD,
     NODES,
     TAIL,
+    WAYS,
     Roadmap,
     empty_roadmap,
     grown,
@@ -46,12 +48,14 @@ from feasibility.roadmap import (
 from robots import Robot
 from surfaces import Cells
 
-BUDGET = 20_000  # evaluations of the arm between two looks at the clock
+BUDGET = 8_000  # evaluations of the arm between two looks at the clock
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
 DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
 MOST_ROUNDS = 200
 GUESSES = 4  # of one stir
+SEEDS = 6  # guesses at a missed cell, each round
+MEETINGS = 6  # pairs of nodes that one round tries to join between two centres
 PATIENCE = 60  # failed connections of two components that stirring allows
 FIRST_BOXES = 1000  # boxes for each cell that nothing has reached
 MORE_BOXES = 20_000  # boxes once Newton has failed there too
@@ -84,6 +88,8 @@ class Explorer:
     """What branch and bound said of the cells that it was asked about."""
     boxes: int = 0
     rounds: int = 0
+    met: dict[tuple[int, int], int] = field(default_factory=dict)
+    """How often two nodes were tried for a meeting."""
     pairs: NDArray[np.int64] = field(init=False)
     """(M + 1,) state of each neighbouring pair, see `close_pairs`."""
 
@@ -200,6 +206,29 @@ class Explorer:
                 break
             self.roadmap = grown(self.roadmap)
         self.spread()
+
+    def meet(self, one: int, other: int) -> None:
+        """Try to join two components between cell centres, where they come nearest first."""
+        tries = 0
+        nodes = nearest_pairs(self.roadmap, self.cells.pairs, one, other)
+        for x, y in nodes[: 2 * MEETINGS * (1 + self.rounds)].tolist():
+            if self.met.get((x, y), 0) > self.rounds // 4:
+                continue
+            self.met[x, y] = self.met.get((x, y), 0) + 1
+            share = float(self.rng.uniform(NARROWEST, WIDEST))
+            if meet(self.problem, self.work, self.room, x, y, share):
+                self.spread()
+                return
+            tries += 1
+            if tries == MEETINGS:
+                return
+
+    def room(self, rows: int) -> Roadmap:
+        """The roadmap, grown until an edge and so many rows of `ways` fit."""
+        self.roadmap = grown(self.roadmap)
+        while self.roadmap.counters[WAYS] + rows > len(self.roadmap.ways):
+            self.roadmap = grown(self.roadmap)
+        return self.roadmap
 
     def border(self, component: int) -> NDArray[np.int64]:
         """Cells of a component that have a neighbour which it does not cover."""
@@ -325,7 +354,7 @@ def _round(explorer: Explorer, top: list[int]) -> None:
     rng = explorer.rng
     missed = np.flatnonzero(~explorer.covered & explorer.reached)
     if len(missed):
-        explorer.plant(int(rng.choice(missed)), explorer.guesses(2))
+        explorer.plant(int(rng.choice(missed)), explorer.guesses(SEEDS))
     for component in top:
         if explorer.complete:
             return
@@ -336,14 +365,16 @@ def _round(explorer: Explorer, top: list[int]) -> None:
     for a in range(len(top)):
         for b in range(a):
             one, other = (int(root_of(explorer.roadmap, top[k])) for k in (a, b))
-            shared = np.flatnonzero(explorer.covers(one) & explorer.covers(other))
-            # Meeting places of every pair would cost too much: a few a round will do.
-            if one == other or len(shared) == 0 or rng.random() > 0.3:
+            # Every pair every round would cost too much where there are many.
+            if one == other or (len(top) > 3 and rng.random() > 0.3):
                 continue
+            explorer.tick("joining components where they meet")
+            explorer.meet(one, other)
+            shared = np.flatnonzero(explorer.covers(one) & explorer.covers(other))
             if explorer.complete:
                 return
-            explorer.tick("stirring where components meet")
-            explorer.stir(int(rng.choice(shared)))
+            if len(shared):
+                explorer.stir(int(rng.choice(shared)))
 
 
 def close(explorer: Explorer) -> None:

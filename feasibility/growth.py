@@ -259,7 +259,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
     Args:
         problem: the `Problem`.
         work: the `Work`.
-        roadmap: the `Roadmap`.
+        roadmap: the `Roadmap`; an edge that ends nowhere near a node makes a new one.
         pairs: (M, 2) neighbouring cells.
         state: (M + 1,) 1 where the pair has an edge, 2 where none was found; the last entry is
             the next pair to look at. Filled here.
@@ -272,13 +272,16 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
     count = roadmap.counters
     stop = work.counts[0] + budget
     q = np.empty(roadmap.q.shape[1])
+    arrival = np.empty(roadmap.q.shape[1])
     m = pairs.shape[0]
     while state[m] < m:
         k = state[m]
         if state[k] == 0:
             if work.counts[0] > stop:
                 return BUDGET
-            if count[EDGES] + 2 > len(roadmap.ends):
+            if count[EDGES] + 2 > len(roadmap.ends) or count[NODES] + 2 > len(roadmap.cell):
+                return FULL
+            if count[TAIL] + 2 > len(roadmap.queue):
                 return FULL
             best_x, best_y, nearest = -1, -1, np.inf
             x = roadmap.first_node[pairs[k, 0]]
@@ -309,6 +312,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                         return FULL
                     if rows < 0:
                         continue
+                    put(arrival, q)
                     more, reached = connect(
                         problem, work, problem.points[j], problem.approaches[j], q, roadmap.q[b],
                         roadmap.ways, count[WAYS] + rows, CONNECT_STEPS,
@@ -320,5 +324,10 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                         add_edge(roadmap, a, b, rows + more)
                         state[k] = 1
                         break
+                    if attempt == 3:
+                        # The motion leads there all the same, to a configuration of its own.
+                        new = add_node(problem, work, roadmap, j, arrival, component)
+                        add_edge(roadmap, a, new, rows)
+                        state[k] = 1
         state[m] += 1
     return DONE

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 NOTICE = "compiling the search kernels (first run only, up to a minute) ..."
-PATIENCE = 1.5  # [s]: loading them from the cache takes less
+PATIENCE = 3.0  # [s]: loading them from the cache takes less
 
 
 @contextmanager
