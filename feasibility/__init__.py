@@ -19,11 +19,15 @@ from feasibility.search import Search
 if TYPE_CHECKING:
     from feasibility.checking import check
     from feasibility.task import Task
-    from feasibility.verdict import Verdict
+    from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 
-__all__ = ["Search", "Task", "Verdict", "check"]
+__all__ = ["Answer", "Cause", "CauseKind", "Evidence", "Search", "Task", "Verdict", "check"]
 
 _HOMES = {
+    "Answer": "feasibility.verdict",
+    "Cause": "feasibility.verdict",
+    "CauseKind": "feasibility.verdict",
+    "Evidence": "feasibility.verdict",
     "Task": "feasibility.task",
     "Verdict": "feasibility.verdict",
     "check": "feasibility.checking",

@@ -22,7 +22,18 @@ from feasibility.fibre import connect
 from feasibility.growth import CONNECT_STEPS
 from feasibility.kernels import kernel, put
 from feasibility.newton import LANDING_STEPS, cholesky_solve, land
-from feasibility.problem import CONE, LIMIT, LONG, NEXT, SINGULAR, Problem, Work, look_at, place
+from feasibility.problem import (
+    CONE,
+    LIMIT,
+    LONG,
+    NEWTON,
+    NEXT,
+    SINGULAR,
+    Problem,
+    Work,
+    look_at,
+    place,
+)
 from feasibility.proof import Ruling
 from feasibility.roadmap import root_of
 from feasibility.verdict import Cause, CauseKind
@@ -181,6 +192,9 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
         The cause; proved where branch and bound or the reach bound ruled the cell out.
     """
     problem, robot, work = explorer.problem, explorer.robot, explorer.work
+    folded = not np.isfinite(problem.curvature)
+    if folded:  # one configuration can be asked for all the same
+        problem = problem._replace(curvature=0.0, near=NEWTON * problem.tolerance)
     proved = explorer.rulings.get(cell) is Ruling.PROVED
     n = robot.n
     solutions = np.empty((ENOUGH, n))
@@ -191,16 +205,27 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
     slack_cone = problem._replace(rim=np.inf)
     anything = unlimited._replace(rim=np.inf)
     guesses = explorer.guesses(STARTS)
-
+    if not problem.rim > 0.0 and not proved:
+        detail = "a cone of 0 degrees leaves no room that a motion could be certified in"
+        return Cause(cell, CauseKind.ORIENTATION, False, detail)
+    if folded and _solve(problem, work, cell, guesses, _one(explorer)):
+        detail = "reached, but the offset surface folds, so no motion there can be certified"
+        return Cause(cell, CauseKind.DISCONNECTED, False, detail)
     if not _solve(anything, work, cell, guesses, _one(explorer)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
         origin = robot.model.jointPlacements[1].translation
         away = float(np.linalg.norm(problem.points[cell] - origin))
-        return Cause(
-            cell, CauseKind.OUT_OF_REACH, proved,
+        reach = robot.reach
+        detail = (
             f"the tool point stays {1e3 * distance:.0f} mm short; the target is {away:.3f} m from "
-            f"the first joint, the arm reaches at most {robot.reach:.3f} m",
-        )  # fmt: skip
+            f"the first joint, "
+        )
+        detail += (
+            f"the arm reaches at most {reach:.3f} m"
+            if away > reach
+            else f"inside its outer reach of {reach:.3f} m but where the arm cannot fold itself to"
+        )
+        return Cause(cell, CauseKind.OUT_OF_REACH, proved, detail)
     found = _solve(unlimited, work, cell, guesses, solutions)
     past = ""
     if found:

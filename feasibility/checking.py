@@ -34,10 +34,15 @@ def check(
         cells: the surface, cut into E-cells.
         task: standoff, cone and tolerance.
         search: method and settings; the complete search by default.
-        progress: called as progress(done, total, text) now and then.
+        progress: called as progress(done, total, text) some times a second: cells covered by the
+            best motion so far, all cells, and what is going on. What it raises ends the search.
 
     Returns:
-        The verdict. An infeasible surface is a result, not an error.
+        The verdict. An infeasible surface is a result, not an error. The first call on a machine
+        compiles the kernels, which takes a while and says so on stderr.
+
+    Raises:
+        RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
         >>> from robots import load_robot

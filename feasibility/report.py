@@ -22,14 +22,14 @@ DETAILS = 3  # cells of one group whose details are told
 SENTENCES = {
     Answer.FEASIBLE: "feasible: one continuous motion covers the whole surface.",
     Answer.INFEASIBLE: "infeasible: no single continuous motion covers the whole surface.",
-    Answer.UNDECIDED: "undecided: the search was stopped before it could tell.",
+    Answer.UNDECIDED: "undecided: neither a covering motion nor its impossibility was established.",
 }
 GREEDY_NO = "infeasible: not found by the greedy search, which cannot rule a motion out."
 EVIDENCE = {
     Evidence.WITNESS: "a motion that an independent replay accepted, between its waypoints too",
     Evidence.PROOF: "a bound shows that at least one cell cannot be covered",
     Evidence.EXHAUSTED: "the search ran to its end at the stated resolution",
-    Evidence.BUDGET: "the budget ran out",
+    Evidence.BUDGET: "the search was stopped, or what it found could not be certified",
 }
 CAUSES = {
     CauseKind.OUT_OF_REACH: "out of reach",
@@ -194,7 +194,9 @@ def _hints(verdict: Verdict) -> list[str]:
         walk = ["--witness walk.csv writes the motion"] if verdict.witness is not None else []
         return [*walk, "--html view.html shows it"]
     hints = []
-    if verdict.answer is Answer.UNDECIDED:
+    if not verdict.task.cone_deg > 0.0:
+        hints.append("--set task.cone_deg=1 leaves a motion some room")
+    elif verdict.answer is Answer.UNDECIDED:
         hints.append("--set search.time_limit=... gives the search more time")
     elif verdict.method == "greedy":
         hints.append("--set search.method=complete searches all postures of the arm")
@@ -204,7 +206,7 @@ def _hints(verdict: Verdict) -> list[str]:
         hints.append("--set 'surface.position=[x, y, z]' moves the surface nearer to the arm")
     if CauseKind.JOINT_LIMITS in kinds:
         hints.append("--set robot.limits=... tries other joint limits (`coverable robots`)")
-    if CauseKind.ORIENTATION in kinds:
+    if CauseKind.ORIENTATION in kinds and verdict.task.cone_deg > 0.0:
         hints.append(f"--set task.cone_deg=... opens the cone ({verdict.task.cone_deg:g} now)")
     if CauseKind.DISCONNECTED in kinds:
         hints.append("a narrower surface.u_deg or v_deg leaves out what needs a second motion")

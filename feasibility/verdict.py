@@ -115,18 +115,21 @@ class Verdict:
     graph: nx.Graph
     """Graph G. Nodes: every flat cell index, with `q` (n,) or None where the best component does
     not reach it. Edges: pairs of cells that a motion joins, with `motion` (k, n) from the smaller
-    index to the larger."""
+    index to the larger. Made when first read."""
     covered: NDArray[np.bool_]
     """(N,) cells that the best single component visits."""
     causes: tuple[Cause, ...] = field(default_factory=tuple)
-    """One for each cell that is not covered, in order of index."""
+    """One for each cell that is not covered, in order of index; found when first read."""
     components: tuple[NDArray[np.int64], ...] = ()
-    """Cells of each connected component found, the best first."""
+    """Cells of each connected component found, the best first; the greedy search keeps its best
+    tree only."""
     tree: nx.DiGraph | None = field(default_factory=lambda: None)
     """Tree T of the paper's search; None for other methods."""
     start: int | None = None
-    """Flat index of the cell where the search (or the witness) starts."""
+    """Flat index of the cell where the tree (greedy) or the witness (complete) starts."""
     witness: Walk | None = None
+    """The covering motion; None unless feasible, and for the greedy search, whose tree enters
+    cells without visiting their centres (its `certificate` is of the tree's motions)."""
     certificate: Certificate | None = None
     timing: Mapping[str, float] = field(default_factory=dict)
     """Seconds: load_s, search_s, certify_s, total_s."""
