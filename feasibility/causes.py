@@ -233,7 +233,7 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
     if _solve(slack_cone, work, cell, guesses, _one(explorer)):
         angle = np.degrees(_smallest_angle(explorer, slack_cone, cell))
         alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.rim, 1.0)))
-        detail = f"the tool tilts at least {angle:.1f} deg there, the cone allows {alpha:g} deg"
+        detail = f"the tool tilts {angle:.1f} deg there at best, the cone allows {alpha:g} deg"
         if past:
             detail += f"; or {past}"
         return Cause(cell, CauseKind.ORIENTATION, proved, detail)

@@ -65,7 +65,7 @@ def test_orientation_says_the_smallest_angle_that_could_be_had() -> None:
     assert kinds(verdict) == {CauseKind.ORIENTATION}
     points, approaches = verdict.task.targets(verdict.cells)
     for cause in verdict.causes:
-        said = number(r"at least ([0-9.]+) deg", cause.detail)
+        said = number(r"tilts ([0-9.]+) deg", cause.detail)
         best = smallest_angle(points[cause.cell], approaches[cause.cell])
         assert best - 0.1 <= said <= best + 1.5  # found by bisection, from random starts
         assert said > 20.0
