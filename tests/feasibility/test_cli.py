@@ -412,7 +412,7 @@ def test_help_and_version_answer_on_stdout(ask):
 
 def test_the_installed_command_is_this_one():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-    assert project["scripts"] == {"coverable": f"{cli.__name__}:{cli.main.__name__}"}
+    assert project["scripts"] == {"coverable": f"{cli.__name__}:{cli.run.__name__}"}
 
 
 class Terminal(io.StringIO):
