@@ -36,7 +36,7 @@ def read_off(stream: BinaryIO, size: int) -> RawMesh:
             f"announces {vertex_count} vertices and {face_count} faces, which {size} bytes cannot "
             "hold; it was cut short"
         )
-    numbers, corners, sides = array("d"), array("q"), array("q")
+    numbers, corners, sides, triangles = array("d"), array("q"), array("q"), 0
     for k in range(vertex_count):
         words = lines.next(f"vertex {k} of {vertex_count}")
         if len(words) < 3:
@@ -50,6 +50,8 @@ def read_off(stream: BinaryIO, size: int) -> RawMesh:
                 f"should be a face: a count of 3 .. {MOST_SIDES} corners and as many indices, "
                 f"got {shown(b' '.join(words))}"
             )
+        triangles += count - 2
+        refuse_large(triangles)
         sides.append(count)
         corners.extend([lines.whole(word) for word in words[1 : 1 + count]])
     vertices = np.array(numbers).reshape(-1, 3)

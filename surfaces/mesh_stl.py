@@ -1,4 +1,4 @@
-"""STL, binary and text: triangles one by one, each with its own corners."""
+"""STL, binary and text: triangles one by one, each with corners of its own."""
 
 from __future__ import annotations
 
@@ -78,9 +78,18 @@ def _read_text(stream: BinaryIO) -> RawMesh:
 
 
 def _soup(corners: Floats, normals: Floats) -> RawMesh:
-    """Triangles without common corners; the order of the corners says which side is outside."""
-    vertices = corners.astype(float)
-    faces = np.arange(len(vertices), dtype=np.int64).reshape(-1, 3)
+    """Single triangles; equal corners become one vertex, for an STL has no other way to say so.
+
+    The order of the corners says which side is outside, whatever the stored normals say.
+    """
+    vertices = corners.astype(float) + 0.0  # -0.0 is 0.0
+    order = np.lexsort(vertices.T)
+    fresh = np.ones(len(vertices), bool)
+    fresh[1:] = (vertices[order[1:]] != vertices[order[:-1]]).any(axis=1)
+    number = np.empty(len(vertices), np.int64)
+    number[order] = np.cumsum(fresh) - 1
+    faces = number.reshape(-1, 3)
+    vertices = vertices[order[fresh]]
     with np.errstate(all="ignore"):  # numbers that are not finite are refused later
         along = np.einsum("fi,fi->f", doubled_areas(vertices, faces), normals)
     against = int((along < 0.0).sum())
