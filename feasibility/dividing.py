@@ -1,0 +1,159 @@
+"""How a surface is divided: `divide` gathers components, shares the cells out, and walks them."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from feasibility.division import Division, Plan
+from feasibility.search import Search
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.complete import Explorer, Progress
+
+
+def divide(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    search: Search | None = None,
+    progress: Progress | None = None,
+) -> Division:
+    """Divide a surface into the fewest patches that one continuous motion each covers.
+
+    Every cell that some motion covers is in exactly one patch; the others are left out, each with
+    its cause. "Fewest" is proved for the components that the search found; that there are no
+    larger ones is as certain as the search is exhaustive.
+
+    Args:
+        robot: the arm, with its limits.
+        cells: the surface, cut into E-cells.
+        task: standoff, cone and tolerance.
+        search: settings of the complete search; where its time limit strikes, the patches are the
+            fewest known.
+        progress: called as progress(done, total, text) some times a second.
+
+    Raises:
+        ValueError: the search is the greedy one, which keeps a single tree of motions.
+        RobotError: the arm is no serial chain of one-dof joints.
+
+    Example:
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+        >>> division = divide(load_robot("ur5"), patch.cells(3, 3), Task(0.02, cone_deg=30))
+        >>> len(division.patches), division.optimal, division.whole
+        (1, True, True)
+    """
+    search = Search() if search is None else search
+    if search.method != "complete":
+        raise ValueError(
+            f"a division needs search.method 'complete', got {search.method!r}: the greedy search "
+            "keeps one tree of motions, not all components"
+        )
+    from feasibility.warmup import compiling_notice, warm_up
+
+    called = time.monotonic()
+    with compiling_notice():
+        from feasibility.causes import causes_of, diagnose
+        from feasibility.complete import Explorer, OutOfTime, explore, problem_of
+        from feasibility.gathering import gather
+        from feasibility.plans import plans
+
+        warm_up()
+    began = time.monotonic()
+    deadline = np.inf if search.time_limit is None else began + search.time_limit
+    problem = problem_of(robot, cells, task)
+    explorer = Explorer(robot, cells, problem, search.seed, deadline, progress)
+    ended = True
+    try:
+        explore(explorer)
+        gather(explorer)
+    except OutOfTime:
+        ended = False
+    explorer.deadline = np.inf
+    searched = time.monotonic()
+    blocked = _no_room(explorer) if len(cells) else ""
+    nothing = Plan((), (), 0)
+    fewest, connected = (nothing, nothing) if blocked else plans(explorer, task)
+    known = {cause.cell: cause for cause in causes_of(explorer)}
+    missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0).tolist()
+    causes = tuple(known.get(cell) or diagnose(explorer, cell) for cell in missing)
+    done = time.monotonic()
+    return Division(
+        robot=robot,
+        cells=cells,
+        task=task,
+        seed=search.seed,
+        fewest=fewest,
+        connected=connected,
+        left_out=causes,
+        ended=ended and not blocked,
+        message=blocked or _message(fewest, connected, len(causes), len(cells), ended),
+        timing={
+            "load_s": began - called,
+            "search_s": searched - began,
+            "divide_s": done - searched,
+            "total_s": done - called,
+        },
+        statistics={
+            "fk": int(explorer.work.counts[0]),
+            "nodes": int(explorer.roadmap.counters[0]),
+            "components": len(explorer.roots()),
+            "boxes": explorer.boxes,
+            "rounds": explorer.rounds,
+        },
+    )
+
+
+def _no_room(explorer: Explorer) -> str:
+    """Why no motion at all can be certified; empty where one can."""
+    if not explorer.problem.rim > 0.0:
+        return (
+            "A cone of 0 degrees leaves a motion no room between samples, so none can be "
+            "certified; allow a small angle."
+        )
+    if not np.isfinite(explorer.problem.curvature):
+        return (
+            "The offset surface folds: the standoff is as large as the surface's radius of "
+            "curvature, so no motion can be certified; use a smaller standoff."
+        )
+    return ""
+
+
+def _message(fewest: Plan, connected: Plan, left_out: int, total: int, ended: bool) -> str:
+    """One or two sentences: what was found, and on what it rests."""
+    refused = [p.refusal for p in (*fewest.patches, *connected.patches) if not p.accepted]
+    if refused:
+        return (
+            f"{len(refused)} patch{'es have' if len(refused) > 1 else ' has'} a walk that the "
+            f"independent replay refuses: {refused[0]}."
+        )
+    covered = total - left_out
+    number = len(fewest.patches)
+    if total == 0:
+        return "There are no cells to cover."
+    if number == 0:
+        return (
+            "No motion covers any cell."
+            if ended
+            else "The time limit ran out before any cell was covered."
+        )
+    what = f"{number} continuous motion{'s' if number > 1 else ''}"
+    proof = (
+        "" if number == 1 else "; no fewer of the components found would do"
+        if fewest.optimal else f"; at least {fewest.bound} of the components found are needed"
+    )  # fmt: skip
+    sentence = f"{what} cover{'' if number > 1 else 's'} {covered} of {total} cells{proof}."
+    if connected is not fewest:
+        most = len(connected.patches)
+        least = "" if connected.optimal else f" (at least {connected.bound})"
+        sentence += f" Patches that are each connected on the surface: {most}{least}."
+    if not ended:
+        sentence += " The time limit ran out: these are the fewest known."
+    return sentence
