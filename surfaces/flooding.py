@@ -1,0 +1,279 @@
+"""Compiled loops that cut a graph of faces into cells: seeds far apart, and floods from them.
+
+Distances are rounded to whole numbers before they are compared, and equal ones are told apart by
+their index. So the cells of a regular mesh, where many distances are the same, do not hang on the
+last digit: a turned mesh gets the same cells.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+kernel = njit(cache=True, error_model="numpy")
+
+DETOUR = 1.35
+"""Over flat ground, steps from face to face are at most about this much longer than the straight
+line. Where they are longer still, the straight line leaves the surface."""
+_FINE = 749_371.0  # units of a rounded distance in one length; odd, so that no fraction is a tie
+_BITS = np.int64(22)  # of a face's index, in a heap's entries; MOST_FACES fits
+_MASK = np.int64((1 << 22) - 1)
+_SHIFT = 16.0  # added to distances, which offsets can make negative
+
+
+@kernel
+def units(distance):  # type: ignore[no-untyped-def]
+    """A distance (in lengths of a cell) as a whole number."""
+    return np.int64(math.floor(distance * _FINE + 0.347))
+
+
+def whole_steps(step: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Lengths (in cells) as whole numbers > 0, as `far_seeds` takes them."""
+    return np.maximum(np.floor(step * _FINE + 0.347).astype(np.int64), 1)
+
+
+@kernel
+def push(heap, size, entry):  # type: ignore[no-untyped-def]
+    """Put an entry on a binary heap of `size` entries, least first."""
+    k = size
+    while k > 0:
+        above = (k - 1) >> 1
+        if heap[above] <= entry:
+            break
+        heap[k] = heap[above]
+        k = above
+    heap[k] = entry
+    return size + 1
+
+
+@kernel
+def pop(heap, size):  # type: ignore[no-untyped-def]
+    """Take the least entry; returns it and the new size."""
+    least = heap[0]
+    size -= 1
+    entry = heap[size]
+    k = 0
+    while True:
+        below = 2 * k + 1
+        if below >= size:
+            break
+        if below + 1 < size and heap[below + 1] < heap[below]:
+            below += 1
+        if heap[below] >= entry:
+            break
+        heap[k] = heap[below]
+        k = below
+    heap[k] = entry
+    return least, size
+
+
+@kernel
+def _relax(across, step, source, distance, heap):  # type: ignore[no-untyped-def]
+    """Lower `distance` (whole numbers) to those from `source` where these are less."""
+    size = 0
+    distance[source] = 0
+    size = push(heap, size, np.int64(source))
+    while size > 0:
+        entry, size = pop(heap, size)
+        face, far = entry & _MASK, entry >> _BITS
+        if far > distance[face]:
+            continue
+        for k in range(3):
+            other = across[face, k]
+            if other >= 0 and far + step[face, k] < distance[other]:
+                distance[other] = far + step[face, k]
+                size = push(heap, size, (distance[other] << _BITS) | other)
+
+
+@kernel
+def far_seeds(across, step, piece, quota):  # type: ignore[no-untyped-def]
+    """Seeds as far from each other as one after the other can be chosen.
+
+    Args:
+        across: (F, 3) faces across the edges, or -1.
+        step: (F, 3) whole numbers, the lengths of these steps.
+        piece: (F,) connected piece of each face.
+        quota: (P,) seeds of each piece, >= 1.
+
+    Returns:
+        (N,) faces, those of piece 0 first, N the sum of `quota`.
+    """
+    count = across.shape[0]
+    distance = np.full(count, np.int64(1) << 40)
+    heap = np.empty(3 * count + 1, dtype=np.int64)
+    seeds = np.empty(quota.sum(), dtype=np.int64)
+    begin = np.zeros(quota.shape[0] + 1, dtype=np.int64)
+    for p in range(quota.shape[0]):
+        begin[p + 1] = begin[p] + quota[p]
+    # The first seed of a piece: the farthest face from its first one.
+    started = np.zeros(quota.shape[0], dtype=np.bool_)
+    for face in range(count):
+        if not started[piece[face]]:
+            started[piece[face]] = True
+            _relax(across, step, face, distance, heap)
+    taken = np.zeros(quota.shape[0], dtype=np.int64)
+    best = np.full(quota.shape[0], np.int64(-1))
+    for face in range(count):
+        p = piece[face]
+        if best[p] < 0 or distance[face] > distance[best[p]]:
+            best[p] = face
+    distance[:] = np.int64(1) << 40
+    for p in range(quota.shape[0]):
+        _relax(across, step, best[p], distance, heap)
+        seeds[begin[p]] = best[p]
+        taken[p] = 1
+    # Distances only fall, so the top of the heap is the farthest face once its entry is current.
+    # The most faces are near the last seed; their entries wait in the heap until they come up.
+    queue = np.empty(count, dtype=np.int64)
+    size = 0
+    for face in range(count):
+        size = push(queue, size, -((distance[face] << _BITS) | (_MASK - face)))
+    while size > 0:
+        entry, size = pop(queue, size)
+        far, face = (-entry) >> _BITS, _MASK - ((-entry) & _MASK)
+        p = piece[face]
+        if taken[p] == quota[p] or distance[face] == 0:
+            continue
+        if distance[face] < far:
+            size = push(queue, size, -((distance[face] << _BITS) | (_MASK - face)))
+            continue
+        _relax(across, step, face, distance, heap)
+        seeds[begin[p] + taken[p]] = face
+        taken[p] += 1
+    return seeds
+
+
+@kernel
+def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignore[no-untyped-def]
+    """Every face gets the label of the seed that reaches it first; lengths in cells.
+
+    A face goes to the seed with the least straight distance from its anchor, less its offset;
+    where the way over the surface is much longer than straight, that way counts. A label spreads
+    from face to face only, so each cell is connected.
+
+    Args:
+        across: (F, 3) faces across the edges, or -1.
+        step: (F, 3) lengths of these steps.
+        centre: (F, 3) the faces' centres.
+        seeds: (N,) faces, all different, at least one in each connected piece.
+        anchors: (N, 3) points that distances are measured from.
+        offsets: (N,) head starts, between -8 and 8.
+        labels: (F,) int64, written.
+    """
+    count = across.shape[0]
+    heap = np.empty(3 * count + seeds.shape[0] + 1, dtype=np.int64)
+    best = np.full(count, np.int64(1) << 60)
+    walked = np.zeros(count)
+    done = np.zeros(count, dtype=np.bool_)
+    size = 0
+    for n in range(seeds.shape[0]):  # first of all: a seed belongs to its own cell
+        best[seeds[n]] = 0
+        labels[seeds[n]] = n
+        size = push(heap, size, np.int64(seeds[n]))
+    while size > 0:
+        entry, size = pop(heap, size)
+        face = entry & _MASK
+        if done[face]:
+            continue
+        done[face] = True
+        n = labels[face]
+        for k in range(3):
+            other = across[face, k]
+            if other < 0 or done[other]:
+                continue
+            dx = centre[other, 0] - anchors[n, 0]
+            dy = centre[other, 1] - anchors[n, 1]
+            dz = centre[other, 2] - anchors[n, 2]
+            way = walked[face] + step[face, k]
+            far = max(math.sqrt(dx * dx + dy * dy + dz * dz), way / DETOUR)
+            key = units(far - offsets[n] + _SHIFT)
+            if key < best[other]:
+                best[other] = key
+                walked[other] = way
+                labels[other] = n
+                size = push(heap, size, (key << _BITS) | other)
+
+
+@kernel
+def recentre(centre, normal, area, labels, seeds, anchors, areas):  # type: ignore[no-untyped-def]
+    """Move each seed to the face nearest to its cell's centroid, and its anchor to the centroid.
+
+    Args:
+        centre: (F, 3) the faces' centres.
+        normal: (F, 3) unit normals.
+        area: (F,) areas.
+        labels: (F,) cell of each face.
+        seeds: (N,) written.
+        anchors: (N, 3) written: the centroid, put onto the plane of the seed.
+        areas: (N,) written: the cells' areas.
+    """
+    anchors[:] = 0.0
+    areas[:] = 0.0
+    for face in range(labels.shape[0]):
+        n = labels[face]
+        areas[n] += area[face]
+        for k in range(3):
+            anchors[n, k] += area[face] * centre[face, k]
+    for n in range(seeds.shape[0]):
+        for k in range(3):
+            anchors[n, k] /= areas[n]
+    best = np.full(seeds.shape[0], np.int64(1) << 60)
+    for face in range(labels.shape[0]):
+        n = labels[face]
+        dx = centre[face, 0] - anchors[n, 0]
+        dy = centre[face, 1] - anchors[n, 1]
+        dz = centre[face, 2] - anchors[n, 2]
+        key = units(math.sqrt(dx * dx + dy * dy + dz * dz))
+        if key < best[n]:
+            best[n] = key
+            seeds[n] = face
+    for n in range(seeds.shape[0]):
+        face = seeds[n]
+        height = 0.0
+        for k in range(3):
+            height += (centre[face, k] - anchors[n, k]) * normal[face, k]
+        for k in range(3):
+            anchors[n, k] += height * normal[face, k]
+
+
+@kernel
+def smooth(across, edge, labels):  # type: ignore[no-untyped-def]
+    """Give away teeth: faces on a border that are held by one edge only, and a short one.
+
+    Such a face can leave without tearing its cell. It goes to the neighbour it shares the longest
+    border with, so that all borders together get shorter with each move; hence it ends.
+
+    Args:
+        across: (F, 3) faces across the edges, or -1.
+        edge: (F, 3) whole numbers, the lengths of the edges.
+        labels: (F,) cell of each face, changed.
+    """
+    moved = True
+    while moved:
+        moved = False
+        for face in range(labels.shape[0]):
+            own, held, holder = labels[face], 0, np.int64(0)
+            for k in range(3):
+                other = across[face, k]
+                if other >= 0 and labels[other] == own:
+                    held += 1
+                    holder = edge[face, k]
+            if held != 1:
+                continue
+            most, to = holder, np.int64(-1)
+            for k in range(3):
+                other = across[face, k]
+                if other < 0 or labels[other] == own:
+                    continue
+                shared = np.int64(0)
+                for m in range(3):
+                    if across[face, m] >= 0 and labels[across[face, m]] == labels[other]:
+                        shared += edge[face, m]
+                if shared > most:
+                    most, to = shared, labels[other]
+            if to >= 0:
+                labels[face] = to
+                moved = True
