@@ -11,7 +11,8 @@ from surfaces.surface import SurfaceError
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-11  # of a rectangle's area: a rule and its refinement differ by no more
+TOLERANCE = 1e-11  # of a piece's area: a rule and its refinement differ by no more
+_ROUNDING = 1e-15  # of the whole rectangle's, likewise
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _MOST_HALVINGS = 14
 _MOST_PIECES = 200_000  # rectangles held at a time
@@ -30,8 +31,9 @@ def rectangle_areas(
     """The integral of `element` over u0..u1 by v0..v1, for many rectangles; relative 1e-10.
 
     A rectangle is cut at the breaks it crosses. A piece is done when the rule of 8 x 8 nodes and
-    the same rule on its four quarters differ by `TOLERANCE` of the whole rectangle's value; the
-    quarters' sum is taken, which is better by several digits.
+    the same rule on its four quarters differ by `TOLERANCE` of its area; the quarters' sum is
+    taken, which is better by several digits. Areas are positive, so the errors add up to no more
+    than that share of the whole.
 
     Args:
         element: (u, v) of one shape -> area element |du x dv|, of that shape.
@@ -96,7 +98,7 @@ def _integrated(
         fine = _ruled(element, quarters.reshape(-1, 4)).reshape(-1, 4)
         better = fine.sum(axis=1)
         whole = done + np.bincount(owner, better, count)
-        settled = np.abs(better - coarse) <= TOLERANCE * whole[owner]
+        settled = np.abs(better - coarse) <= TOLERANCE * better + _ROUNDING * whole[owner]
         done += np.bincount(owner[settled], better[settled], count)
         rough = ~settled
         pieces, coarse = quarters[rough].reshape(-1, 4), fine[rough].reshape(-1)
