@@ -114,10 +114,13 @@ def test_no_point_of_the_whole_surface_is_nearer_than_the_foot(shape):
     placed = shape.point(foot.u, foot.v)
     distance = np.linalg.norm(points - placed, axis=1)
     expected = np.array([least_distance(shape, p, *whole_ranges(shape)) for p in points])
-    if shape.kind == "cone":  # no slope leads to the apex
+    assert (distance <= expected + 1e-12).all()
+    plain = np.ones(30, dtype=bool)
+    if shape.kind == "cone":  # at the apex a descent by differences sticks
         apex = shape.point(0.0, -shape.radius / shape.slope)
-        expected = np.minimum(expected, np.linalg.norm(points - apex, axis=1))
-    assert np.abs(distance - expected).max() < 1e-9 * size
+        plain = np.linalg.norm(placed - apex, axis=1) > 0.05 * size
+    assert plain.sum() > 20
+    assert np.abs(distance - expected)[plain].max() < 1e-9 * size
     ordinary = np.abs(np.abs(foot.height) - distance) < 1e-12  # not the apex of a cone
     assert ordinary.sum() > 15
     assert ordinary.all() or shape.kind == "cone"
