@@ -53,7 +53,12 @@ _STARTS = {
     b"{": "JSON (glTF as text?); export it as one .glb",
     b"%PDF": "a PDF",
 }
-_OWN_STARTS = {b"glTF": ".glb", b"ply": ".ply", b"OFF": ".off", b"COFF": ".off"}
+# With what follows the word, for a binary STL may begin with any text.
+_OWN_STARTS = {
+    b"glTF\2\0\0\0": ".glb",
+    **dict.fromkeys((b"ply\n", b"ply\r"), ".ply"),
+    **dict.fromkeys((b"OFF\n", b"OFF\r"), ".off"),
+}
 
 
 def read_mesh(
@@ -103,10 +108,11 @@ def _read(path: str | os.PathLike[str]) -> RawMesh:
     except (OSError, ValueError) as error:  # ValueError: a NUL byte in the name
         why = getattr(error, "strerror", None) or str(error)
         raise SurfaceError(f"cannot be opened: {why.lower()}") from error
+    status = os.fstat(handle)
+    if not stat.S_ISREG(status.st_mode):
+        os.close(handle)
+        raise SurfaceError(f"is not a regular file; expected a mesh as {FORMATS}")
     with open(handle, "rb") as stream:
-        status = os.fstat(handle)
-        if not stat.S_ISREG(status.st_mode):
-            raise SurfaceError(f"is not a regular file; expected a mesh as {FORMATS}")
         if status.st_size > LARGEST_FILE:
             raise SurfaceError(
                 f"has {status.st_size:,} bytes, more than the {LARGEST_FILE:,} that are read; "
@@ -137,11 +143,8 @@ def _check_start(head: bytes, suffix: str) -> None:
             f"{FORMATS} is expected; export the surface in one of these"
         )
     for start, own in _OWN_STARTS.items():
-        # A binary STL may begin with any text, so it is told by a line's end after the word.
-        word = head[: len(start) + 1]
-        plain = own == ".glb" or word[-1:] in (b"\r", b"\n", b" ")
-        if head.startswith(start) and plain and suffix != own and b"\0" not in head[4:]:
-            raise SurfaceError(f"is a {own[1:].upper()} by its first bytes; name it {own}")
+        if head.startswith(start) and suffix != own:
+            raise SurfaceError(f"is {own[1:].upper()} by its first bytes; name it {own}")
 
 
 def _with_likely_unit(mesh: TriangleMesh) -> TriangleMesh:

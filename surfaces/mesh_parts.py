@@ -1,4 +1,4 @@
-"""Parts of a mesh: what lies in a box, on one side of a plane, faces that look up, or named ones."""
+"""Parts of a mesh: in a box, beyond a plane, faces that look one way, or faces by number."""
 
 from __future__ import annotations
 

@@ -129,6 +129,7 @@ def _checked(elements: tuple[Element, ...], order: str, left: int) -> tuple[Elem
             refuse_large(0, element.count)
         elif element.count > MOST_VERTICES:
             raise SurfaceError(f"its header announces {element.count:,} of '{element.name}'")
+    for element in elements:
         # Text needs a digit and a space or the line's end for each number.
         row = element.least_row if order else 2 * len(element.properties)
         if element.count * row > left + 2:

@@ -8,7 +8,7 @@ from typing import BinaryIO
 import numpy as np
 
 from surfaces.mesh_raw import RawMesh, no_triangles, refuse_large
-from surfaces.mesh_text import Lines, shown
+from surfaces.mesh_text import BYTE_ORDER_MARK, Lines, shown
 from surfaces.surface import SurfaceError
 from surfaces.triangles import Floats, doubled_areas
 
@@ -31,7 +31,7 @@ def read_stl(stream: BinaryIO, size: int) -> RawMesh:
             raise no_triangles()
         data = np.frombuffer(stream.read(count * _FACET.itemsize), _FACET)
         return _soup(data["corners"].reshape(-1, 3), data["normal"])
-    if head.lstrip()[:5].lower() == b"solid" and 0 not in head:
+    if head.removeprefix(BYTE_ORDER_MARK).lstrip()[:5].lower() == b"solid" and 0 not in head:
         stream.seek(0)
         return _read_text(stream)
     if len(head) < _HEADER:

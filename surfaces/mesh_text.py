@@ -9,6 +9,7 @@ from typing import BinaryIO
 from surfaces.surface import SurfaceError
 
 LONGEST_LINE = 65536  # bytes
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # which some editors put at the start of a text
 
 
 class Lines:
@@ -27,6 +28,8 @@ class Lines:
             self.number += 1
             if len(line) > LONGEST_LINE:
                 raise self.error(f"is longer than {LONGEST_LINE} bytes; this is not a mesh as text")
+            if self.number == 1:
+                line = line.removeprefix(BYTE_ORDER_MARK)
             if self.comment and self.comment in line:
                 line = line[: line.index(self.comment)]
             words = line.split()
