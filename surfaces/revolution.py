@@ -14,7 +14,7 @@ from surfaces.checks import Checks
 from surfaces.profile import Profile
 from surfaces.smooth import EDGE, LocalFeet, SmoothPatch, azimuth
 from surfaces.surface import Side
-from surfaces.tables import table
+from surfaces.tables import metres
 
 Array = NDArray[np.float64]
 
@@ -120,7 +120,7 @@ def revolution(
     """
     check = Checks("revolution")
     expected = f"points (r, z) in metres, 2 to {MOST_POINTS} of them"
-    points = table("profile", profile, (None, 2), expected, 2 * MOST_POINTS, check.faults)
+    points = metres("profile", profile, (None, 2), expected, 2 * MOST_POINTS, check.faults)
     curve = Profile(np.array([[1.0, 0.0], [1.0, 1.0]]) if points is None else points)
     if len(curve.points) < 2:
         check.faults.append(f"profile must hold {expected}, got {len(curve.points)}")

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 
 from surfaces.checks import LARGEST_RATIO
 from surfaces.spline_map import SplineMap
-from surfaces.tables import table
+from surfaces.tables import metres, table
 
 Array = NDArray[np.float64]
 
 MOST_POINTS = 40_000  # control points
 MOST_DEGREE = 9
-LARGEST_COORDINATE = 1e6  # [m]
 _LEAST = 1e-6  # of the extent, and of a right angle's sine
 _KNOT_GAP = 1e-9  # of the range
 _KINK = 1e-6  # [rad]
@@ -27,14 +26,7 @@ _MOST_SAMPLES = 1000  # along each parameter, if that leaves two for each span
 def checked_points(points: Any, faults: list[str]) -> Array | None:
     """The control net (m, n, 3), or None after a fault."""
     expected = "rows of points (x, y, z) in metres, such as 4 x 4 x 3"
-    net = table("points", points, (None, None, 3), expected, 3 * MOST_POINTS, faults)
-    if net is not None and net.size and np.abs(net).max() > LARGEST_COORDINATE:
-        faults.append(
-            f"points must lie within {LARGEST_COORDINATE:g} metres of the origin, "
-            f"got {np.abs(net).max():g}; give them in metres"
-        )
-        return None
-    return net
+    return metres("points", points, (None, None, 3), expected, 3 * MOST_POINTS, faults)
 
 
 def checked_degree(degree: Any, shape: tuple[int, ...], faults: list[str]) -> tuple[int, int]:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 Shape = tuple[int | None, ...]
 
+LARGEST_COORDINATE = 1e6  # [m]
+
 
 def real(value: Any) -> float:
     """The value as a float, or NaN if it is not a real number."""
@@ -53,6 +55,20 @@ def table(
         )
         return None
     return array
+
+
+def metres(
+    name: str, value: Any, shape: Shape, expected: str, cap: int, faults: list[str]
+) -> NDArray[np.float64] | None:
+    """A table of coordinates (m), none of them so large that its cube would be lost."""
+    found = table(name, value, shape, expected, cap, faults)
+    if found is not None and found.size and np.abs(found).max() > LARGEST_COORDINATE:
+        faults.append(
+            f"{name} must lie within {LARGEST_COORDINATE:g} metres of the origin, "
+            f"got {np.abs(found).max():g}; give it in metres"
+        )
+        return None
+    return found
 
 
 def _shape(name: str, value: Any, depth: int, cap: int) -> tuple[int, ...]:
