@@ -1,0 +1,268 @@
+"""Questions about one case that cost less than a verdict, asked again and again by `explain`.
+
+- `follow`: is every cell's fibre still there, when configurations from a case nearby are put back
+  onto it? (A few evaluations a cell; a hint, not an answer.)
+- `rule`: is one cell proved uncoverable, or what covers it?
+- `attempt`: a search that starts from known configurations and stops at a number of evaluations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certificate import replay
+from feasibility.complete import explore
+from feasibility.explorer import Explorer, OutOfTime
+from feasibility.kernels import kernel
+from feasibility.newton import land
+from feasibility.problem import Problem, problem_of, work_for
+from feasibility.proof import Ruling, root_box, rule
+from feasibility.quantities import Kind, Quantity, Setup
+from feasibility.roadmap import NODES
+from feasibility.verdict import Answer, Evidence, Walk
+from feasibility.walk import covering_walk
+
+FOLLOW_STEPS = np.int64(15)  # Newton steps that put a neighbour's configuration onto the fibre
+PLANTS = 2  # missed cells that an attempt starts from, besides the first
+NO_CELL = -1
+
+
+@kernel
+def follow_all(problem, work, order, q):  # type: ignore[no-untyped-def]
+    """Newton onto the fibre over each cell of `order` from its row of q (N, n), in place.
+
+    Returns:
+        How many cells of `order` were landed on before the first failure.
+    """
+    for k in range(order.shape[0]):
+        row = q[order[k]]
+        for j in range(row.shape[0]):
+            row[j] = min(max(row[j], problem.lower[j]), problem.upper[j])
+        if not land(problem, work, order[k], row, FOLLOW_STEPS):
+            return k
+    return order.shape[0]
+
+
+@dataclass
+class Rationed(Explorer):
+    """An exploration that stops after a number of evaluations of the arm, whatever the clock."""
+
+    most: float = np.inf
+
+    def tick(self, text: str) -> None:
+        """Stop when the ration is used up.
+
+        Raises:
+            OutOfTime: it is, or the deadline has passed.
+        """
+        Explorer.tick(self, text)
+        if self.work.counts[0] > self.most:
+            raise OutOfTime
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trial:
+    """What an attempt came to."""
+
+    answer: Answer
+    evidence: Evidence
+    detail: str
+    q: NDArray[np.float64]
+    """(N, n) a configuration of the best component over each cell; NaN where it has none."""
+    walk: Walk | None
+    """The covering motion that the replay accepted; None unless feasible."""
+    angle: float = np.inf
+    """rad, bound of the replay on its angle between tool axis and approach direction."""
+
+    @property
+    def feasible(self) -> bool:
+        """True with a covering motion that the replay accepted."""
+        return self.answer is Answer.FEASIBLE
+
+
+class Prober:
+    """Asks about one case and those nearby, and counts what that costs."""
+
+    def __init__(
+        self, setup: Setup, seed: int, deadline: float, tick: Callable[[], None] | None = None
+    ) -> None:
+        """Prepare the case as it stands; `tick` is called before each piece of work."""
+        self.setup = setup
+        self.seed = seed
+        self.deadline = deadline
+        self.problem = problem_of(*setup)
+        self.work = work_for(setup.robot.n)
+        self.spent_before = 0
+        self.tick = tick or (lambda: None)
+        self.suspects: list[int] = []
+        """Cells that were hard to cover so far, the latest first."""
+
+    @property
+    def spent(self) -> int:
+        """Evaluations of the arm so far; a box of a proof counts as one."""
+        return self.spent_before + int(self.work.counts[0])
+
+    def problem_at(self, quantity: Quantity, k: int) -> Problem:
+        """The problem with a quantity k steps from where it stands, as `follow` and `rule` need it.
+
+        Only the cell centres are right, not the ways between them, where a surface is shifted.
+        """
+        if quantity.kind in (Kind.CONE, Kind.STANDOFF):
+            return problem_of(*quantity.applied(self.setup, k))
+        if quantity.kind is Kind.SHIFT:
+            shift = quantity.value(k) * np.array(quantity.axis)
+            return self.problem._replace(points=self.problem.points + shift)
+        robot = quantity.applied(self.setup, k).robot
+        return self.problem._replace(lower=np.array(robot.lower), upper=np.array(robot.upper))
+
+    def suspect(self, cell: int) -> None:
+        """Look at this cell first from now on."""
+        if cell in self.suspects:
+            self.suspects.remove(cell)
+        self.suspects.insert(0, cell)
+
+    def follow(self, problem: Problem, q: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
+        """Put configurations of a case nearby onto the fibres of this one.
+
+        Args:
+            problem: see `problem_at`.
+            q: (N, n) a configuration over each cell, in the case nearby.
+
+        Returns:
+            The first cell where that failed, or `NO_CELL`; and the configurations (N, n), which
+            are over their cells as far as the failure.
+        """
+        self.tick()
+        found = q.copy()
+        first = np.array(self.suspects, dtype=np.int64)
+        rest = np.setdiff1d(np.arange(len(q)), first)
+        order = np.concatenate([first, rest])
+        landed = int(follow_all(problem, self.work, order, found))
+        if landed == len(order):
+            return NO_CELL, found
+        self.suspect(int(order[landed]))
+        return int(order[landed]), found
+
+    def rule(
+        self, problem: Problem, cell: int, boxes: int
+    ) -> tuple[Ruling, NDArray[np.float64] | None]:
+        """Branch and bound on one cell with so many boxes.
+
+        Returns:
+            The ruling; and, unless it is PROVED or OPEN, a configuration (n,) that Newton put onto
+            the cell's fibre, None where it could not.
+        """
+        self.tick()
+        ruling, q = rule(problem, self.work, cell, root_box(problem), boxes)
+        if ruling is Ruling.PROVED:
+            self.suspect(cell)
+            return ruling, None
+        if ruling is Ruling.OPEN or not np.isfinite(q).all():
+            return ruling, None
+        row = np.full((len(problem.points), len(q)), np.nan)
+        row[cell] = _wound(problem, q)
+        landed = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
+        return ruling, row[cell] if landed else None
+
+    def attempt(
+        self,
+        setup: Setup,
+        seeds: NDArray[np.float64],
+        most: float,
+        deep: bool,
+        needed: NDArray[np.bool_] | None = None,
+    ) -> Trial:
+        """Search for a covering motion, from known configurations first.
+
+        Args:
+            setup: the case.
+            seeds: (N, n) configurations to start from, one for each cell; NaN where there is none.
+            most: evaluations of the arm after which the search is stopped.
+            deep: go on with the whole search where the seeds do not lead to a covering motion.
+            needed: (N,) cells that are to be covered; all by default.
+
+        Returns:
+            What it came to: feasible with a replayed witness; infeasible where the whole search
+            ended in time; undecided otherwise.
+        """
+        self.tick()
+        robot, cells, task = setup
+        needed = np.ones(len(cells), dtype=bool) if needed is None else needed
+        explorer = Rationed(
+            robot, cells, problem_of(*setup), self.seed, deadline=self.deadline, most=most
+        )
+        ended = False
+        try:
+            self._plant(explorer, seeds)
+            if deep and not explorer.complete:
+                explore(explorer)
+                ended = True
+        except OutOfTime:
+            pass
+        finally:
+            self.spent_before += int(explorer.work.counts[0])
+        q = configurations(explorer)
+        if needed.any() and explorer.covered[needed].all():
+            walk = covering_walk(explorer.roadmap, explorer.best)
+            replayed = replay(robot, cells, task, walk, needed)
+            if replayed.accepted:
+                detail = f"one motion of {len(walk.q)} waypoints, replayed"
+                angle = replayed.certificate.max_angle
+                return Trial(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk, angle)
+            detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
+            return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+        proved = [k for k, ruling in explorer.rulings.items() if ruling is Ruling.PROVED]
+        if proved:
+            self.suspect(proved[0])
+            detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
+            return Trial(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
+        best = f"the best motion covers {int(explorer.covered.sum())} of {len(cells)} cells"
+        if ended and explorer.problem.rim > 0.0 and not folds(setup):
+            detail = f"the search ended without a covering motion; {best}"
+            return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
+        detail = f"not found with {int(explorer.work.counts[0])} evaluations of the arm; {best}"
+        return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+
+    def _plant(self, explorer: Explorer, seeds: NDArray[np.float64]) -> None:
+        """Plant seeds until one component covers every cell, hard cells first."""
+        known = np.asarray(np.isfinite(seeds).all(axis=1))
+        first = [cell for cell in self.suspects if known[cell]][:1]
+        for cell in first or np.flatnonzero(known)[:1].tolist():
+            explorer.plant(cell, np.clip(seeds[[cell]], explorer.low, explorer.high))
+        for _ in range(PLANTS):
+            missed = np.flatnonzero(known & ~explorer.covered)
+            if explorer.complete or not len(missed):
+                return
+            cell = int(missed[len(missed) // 2])
+            known[cell] = False
+            explorer.plant(cell, seeds[[cell]])
+
+
+def _wound(problem: Problem, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) joints brought inside their limits by full turns."""
+    turn = np.where(problem.chain.prismatic, 0.0, 2.0 * np.pi)
+    q = q + turn * np.ceil(np.maximum(problem.lower - q, 0.0) / (2.0 * np.pi))
+    return q - turn * np.ceil(np.maximum(q - problem.upper, 0.0) / (2.0 * np.pi))
+
+
+def configurations(explorer: Explorer) -> NDArray[np.float64]:
+    """(N, n) a configuration of the best component over each cell; NaN where it has none."""
+    roadmap = explorer.roadmap
+    q = np.full((len(explorer.cells), explorer.robot.n), np.nan)
+    nodes = np.arange(roadmap.counters[NODES])[::-1]  # the first one over a cell is written last
+    root = roadmap.component[nodes]
+    while not np.array_equal(roadmap.parent[root], root):
+        root = roadmap.parent[root]
+    mine = nodes[np.equal(root, explorer.best)]
+    q[roadmap.cell[mine]] = roadmap.q[mine]
+    return q
+
+
+def folds(setup: Setup) -> bool:
+    """Does the offset surface fold somewhere, so that no motion can be certified there?"""
+    surface, task = setup.cells.surface, setup.task
+    return not np.isfinite(surface.bounds(surface.side_sign * task.standoff).curvature)

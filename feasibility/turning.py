@@ -1,0 +1,265 @@
+"""Where the verdict turns along one quantity: few dear questions, led by many cheap ones.
+
+From a value with a covering motion towards one without: the motion's configurations are put back
+onto the fibres, value by value (`Prober.follow`), which tells how far this motion can go and which
+cell is the first to fail. A short search at that value confirms it. Past it that cell is asked for
+a proof; what the proof finds instead is a configuration of another branch, which may go further.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.probing import NO_CELL, Prober, Trial
+from feasibility.proof import Ruling
+from feasibility.quantities import Kind, Quantity
+from feasibility.thresholds import Finding, Span, Threshold, last_true
+from feasibility.verdict import Answer, Evidence
+
+PROOF_BOXES = 3000  # for one cell
+HINT_BOXES = 1500  # for one cell, where a configuration is as welcome as a proof
+BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is looked for
+LOOKED_AT = 3  # cells asked for a proof before a search is made
+SCAN = 20  # values looked at on the way to the end of a quantity that is not monotone
+OVERDRAFT = 2  # verdicts' worth of evaluations past `stop` for halving a wide bracket
+SHORT = 2  # verdicts' worth of evaluations that a search from known configurations may take
+
+
+class Side(NamedTuple):
+    """A number of steps, and what was found there."""
+
+    k: int
+    trial: Trial
+
+
+class Edge(NamedTuple):
+    """Where following a motion, and short searches, have led."""
+
+    good: Side
+    bad: int
+    """Steps at which no motion was found; a neighbour of `good`, or the far end."""
+    failed: int
+    """The cell that could not be followed to there; `NO_CELL` where a search failed."""
+    other: Finding | None
+    """What the search found there; None without one."""
+
+
+@dataclass
+class Turning:
+    """The search for one threshold."""
+
+    prober: Prober
+    quantity: Quantity
+    verdict_cost: int
+    """Evaluations that one verdict of the case takes."""
+    stop: int
+    """Evaluations (of the prober) at which no further search is begun, except to end with one."""
+
+    # -- a case that is feasible as it stands ----------------------------------------------------
+
+    def tighten(self, here: Trial) -> Threshold:
+        """How far the quantity can go before the case is no longer feasible."""
+        good, other = self._outwards(Side(0, here))
+        return Threshold(self.quantity, self._finding(good), other)
+
+    def _outwards(self, here: Side) -> tuple[Side, Finding | None]:
+        """The last feasible side on the way to the end; and what was found past it, if anything."""
+        end = self.quantity.last
+        if self.quantity.monotone:
+            cell, q = self.prober.follow(self.prober.problem_at(self.quantity, end), here.trial.q)
+            if cell == NO_CELL:
+                trial = self._search(end, q)
+                if trial.feasible:
+                    return Side(end, trial), None
+                return self._narrow(here, end, self._finding(Side(end, trial)))
+        return self._narrow(here, end + 1)
+
+    # -- a case that is not ----------------------------------------------------------------------
+
+    def widen(self, here: Finding, seeds: NDArray[np.float64]) -> Threshold:
+        """How far the quantity has to go for the case to become feasible.
+
+        Args:
+            here: the verdict as the case stands.
+            seeds: (N, n) configurations of its best component; NaN where it has none.
+        """
+        last = self.quantity.last
+        count = 1 if self.quantity.monotone else min(SCAN, last)
+        values = [max(1, round(last * (i + 1) / count)) for i in range(count)]
+        known, before, looked = here, 0, 0
+        for k in values:
+            if looked and self.prober.spent >= self.stop:
+                break
+            looked += 1
+            found = self._look(k, seeds)
+            if isinstance(found, Finding):
+                known, before = found, k
+                continue
+            entry = Side(k, found)
+            good, other = self._narrow(entry, before)
+            span = None
+            if self.quantity.kind is Kind.STANDOFF:
+                last_good, beyond = self._outwards(entry)
+                span = Span(self._finding(last_good), beyond)
+            return Threshold(self.quantity, self._finding(good), other or known, span)
+        tried = "" if self.quantity.monotone else f"{looked} of {count} values tried"
+        return Threshold(self.quantity, None, known, None, tried)
+
+    def _look(self, k: int, seeds: NDArray[np.float64]) -> Trial | Finding:
+        """Is it feasible at k steps? A trial if so, or what speaks against it."""
+        problem = self.prober.problem_at(self.quantity, k)
+        missed = np.flatnonzero(~np.isfinite(seeds).all(axis=1))
+        spread = missed[np.linspace(0, len(missed) - 1, min(LOOKED_AT, len(missed))).astype(int)]
+        hard = [cell for cell in self.prober.suspects if cell in missed]
+        seeds = seeds.copy()
+        for cell in list(dict.fromkeys([*hard, *spread.tolist()]))[:LOOKED_AT]:
+            ruling, q = self.prober.rule(problem, cell, HINT_BOXES)
+            if ruling is Ruling.PROVED:
+                return self._proof(k, cell)
+            if q is not None:
+                seeds[cell] = q
+        trial = self._search(k, seeds, deep=self.quantity.monotone)
+        return trial if trial.feasible else self._finding(Side(k, trial))
+
+    # -- between the two -------------------------------------------------------------------------
+
+    def _narrow(
+        self, good: Side, far: int, there: Finding | None = None
+    ) -> tuple[Side, Finding | None]:
+        """From a feasible value towards one that is not, until they are neighbours or nearly so.
+
+        Args:
+            good: a feasible side.
+            far: steps where it is not feasible, or one past the end.
+            there: what a search found at `far`, although the motion can be followed to it.
+
+        Returns:
+            The last feasible side, and what was found on the other one, `there` if that is `far`.
+        """
+        while True:
+            edge = self._follow(good, far, there)
+            if edge.bad == far and abs(far - edge.good.k) == 1:
+                return edge.good, there
+            beyond = self._beyond(edge, far)
+            if isinstance(beyond, Finding):
+                return edge.good, beyond
+            good = beyond
+            if abs(far - good.k) == 1:
+                return good, there
+
+    def _follow(self, good: Side, far: int, there: Finding | None) -> Edge:
+        """As far as the motion can be followed, and a short search agrees."""
+        way = 1 if far > good.k else -1
+        bad, failed, other, trusted = far, NO_CELL, there, there is None
+        good = self._slid(good, bad)
+        while abs(bad - good.k) > 1:
+            if not trusted and self.prober.spent >= self.stop + OVERDRAFT * self.verdict_cost:
+                break
+            if trusted:
+                k, q, cell = self._reach(good, bad)
+                if k == good.k:
+                    bad, failed, other = k + way, cell, None
+                    break
+            else:
+                k = (good.k + bad) // 2
+                cell, q = self.prober.follow(self.prober.problem_at(self.quantity, k), good.trial.q)
+                if cell != NO_CELL:
+                    bad, failed, other = k, cell, None
+                    continue
+            trial = self._search(k, q)
+            if trial.feasible:
+                good = self._slid(Side(k, trial), bad)
+            else:
+                bad, failed, other, trusted = k, NO_CELL, self._finding(Side(k, trial)), False
+        return Edge(good, bad, failed, other)
+
+    def _reach(self, good: Side, bad: int) -> tuple[int, NDArray[np.float64], int]:
+        """How far the configurations of a motion can be followed.
+
+        Returns:
+            The last number of steps; the configurations there (N, n); the cell that fails at the
+            next, `NO_CELL` if that is `bad`.
+        """
+        known, failures = {good.k: good.trial.q}, dict[int, int]()
+
+        def holds(k: int) -> bool:
+            nearest = min(known, key=lambda other: abs(other - k))
+            problem = self.prober.problem_at(self.quantity, k)
+            cell, q = self.prober.follow(problem, known[nearest])
+            if cell == NO_CELL:
+                known[k] = q
+            else:
+                failures[k] = cell
+            return cell == NO_CELL
+
+        gallop = not self.quantity.monotone
+        k = last_true(holds, good.k, bad, gallop)
+        return k, known[k], failures.get(k + (1 if bad > k else -1), NO_CELL)
+
+    def _slid(self, good: Side, bad: int) -> Side:
+        """As far as the motion itself, as it is, keeps to the limit or to the cone."""
+        walk, joint, value = good.trial.walk, self.quantity.joint, self.quantity.value
+        if walk is None or not self.quantity.monotone:
+            return good
+        if self.quantity.kind is Kind.CONE:
+            angle = good.trial.angle
+            k = last_true(lambda k: value(k) > angle, good.k, bad)
+        elif self.quantity.kind is Kind.LOWER:
+            least = float(walk.q[:, joint].min())
+            k = last_true(lambda k: value(k) <= least, good.k, bad)
+        else:
+            most = float(walk.q[:, joint].max())
+            k = last_true(lambda k: value(k) >= most, good.k, bad)
+        return Side(min(k, self.quantity.last), good.trial)
+
+    def _beyond(self, edge: Edge, far: int) -> Side | Finding:
+        """Past the last feasible value: a proof, or a motion after all, or nothing found."""
+        good, way = edge.good, 1 if far > edge.good.k else -1
+        seeds, k = good.trial.q.copy(), edge.bad
+        if edge.failed != NO_CELL:
+            proof, q = self._proof_beyond(edge, far)
+            if proof is not None:
+                return proof
+            k = good.k + way
+            if q is not None:  # another branch reaches this cell
+                seeds[edge.failed] = q
+        if edge.other is not None and self.prober.spent >= self.stop:
+            return edge.other
+        trial = self._search(k, seeds, deep=self.prober.spent < self.stop)
+        return Side(k, trial) if trial.feasible else self._finding(Side(k, trial))
+
+    def _proof_beyond(
+        self, edge: Edge, far: int
+    ) -> tuple[Finding | None, NDArray[np.float64] | None]:
+        """A proof of the cell that failed, as near as one is found; or what covers that cell."""
+        way = 1 if far > edge.good.k else -1
+        proof, q = None, None
+        for steps in (s for s in BEYOND if (far - edge.good.k) * way > s):
+            k = edge.good.k + way * steps
+            problem = self.prober.problem_at(self.quantity, k)
+            ruling, q = self.prober.rule(problem, edge.failed, PROOF_BOXES)
+            if ruling is not Ruling.PROVED:
+                break
+            proof = self._proof(k, edge.failed)
+        return proof, q
+
+    def _search(self, k: int, seeds: NDArray[np.float64], deep: bool = False) -> Trial:
+        """Search at k steps: from the seeds alone, or deeper, with half of what is left."""
+        left = self.stop - self.prober.spent
+        most = max(left // 2, self.verdict_cost) if deep else SHORT * self.verdict_cost
+        return self.prober.attempt(self.quantity.applied(self.prober.setup, k), seeds, most, deep)
+
+    def _finding(self, side: Side) -> Finding:
+        """A side, as it is told."""
+        value, trial = self.quantity.value(side.k), side.trial
+        return Finding(value, trial.answer, trial.evidence, trial.detail)
+
+    def _proof(self, k: int, cell: int) -> Finding:
+        """A cell that is proved uncoverable at k steps."""
+        value, name = self.quantity.value(k), list(self.prober.setup.cells.unravel(cell))
+        detail = f"cell {name} is proved uncoverable"
+        return Finding(value, Answer.INFEASIBLE, Evidence.PROOF, detail, cell)
