@@ -17,17 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.face_graph import FaceGraph, face_graph
-from surfaces.flooding import far_seeds, flood, recentre, smooth, whole_steps
+from surfaces.flooding import far_seeds, flood, recentre, smooth, units, whole_steps
 from surfaces.subdivide import Subdivision, subdivide
 from surfaces.surface import SurfaceError
 
 FACES_PER_CELL = 80
 MOST_CELLS = 20_000
-_ROUNDS = 24  # of Lloyd's iteration, at most
-_EVEN = 0.04  # std / mean of the areas, over which it goes on
-_LEAST_ROUNDS = 10
+_RIM = 0.6  # cells: how far outside the border counts as a seed
+_MOVING = 10  # rounds in which seeds move
+_EVENING = 6  # rounds after that, at most, in which head starts alone even out the areas
+_EVEN = 0.03  # std / mean of the areas that is good enough
 _GAIN = 0.5  # share of a missing area that one round makes up for
-_MOST_OFFSET = 2.0  # head starts, in lengths of a cell
+_JAGGED = 1.4  # borders run along edges, about this much longer than straight
+_PIN = 1e-3  # keeps the head starts of a separate piece from drifting
+_MOST_OFFSET = 3.0  # head starts, in lengths of a cell
+_MOST_STEP = 0.2  # between neighbours in one round
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -106,18 +110,20 @@ def cluster_faces(
     quota = _shares(graph, count)
     # From here on, lengths are in cells: the side of a square of a cell's mean area is 1.
     unit = math.sqrt(graph.area.sum() / count)
-    step, centre, area = graph.step / unit, graph.centre / unit, graph.area / unit**2
+    step, edge = graph.step / unit, graph.edge / unit
+    centre, area = graph.centre / unit, graph.area / unit**2
     piece_area = np.bincount(graph.piece, weights=area)
     target = np.repeat(piece_area / quota, quota)
-    seeds = far_seeds(graph.across, whole_steps(step), graph.piece, quota)
-    labels = _lloyd(graph, step, centre, area, target, seeds)
-    smooth(graph.across, whole_steps(graph.edge / unit), labels)
+    seeds = far_seeds(graph.across, whole_steps(step), graph.piece, quota, units(_RIM))
+    labels = _lloyd(graph, step, edge, centre, area, target, seeds)
+    smooth(graph.across, whole_steps(edge), labels)
     return labels
 
 
 def _lloyd(
     graph: FaceGraph,
     step: NDArray[np.float64],
+    edge: NDArray[np.float64],
     centre: NDArray[np.float64],
     area: NDArray[np.float64],
     target: NDArray[np.float64],
@@ -127,19 +133,47 @@ def _lloyd(
     labels = np.empty(len(area), dtype=np.int64)
     best, least = labels, math.inf
     anchors, offsets, areas = centre[seeds], np.zeros(len(seeds)), np.empty(len(seeds))
-    for done in range(_ROUNDS):
+    for done in range(_MOVING + _EVENING):
         flood(graph.across, step, centre, seeds, anchors, offsets, labels)
-        recentre(centre, graph.normal, area, labels, seeds, anchors, areas)
-        share = areas / target
+        if done < _MOVING:
+            recentre(centre, graph.normal, area, labels, seeds, anchors)
+        share = np.bincount(labels, weights=area, minlength=len(seeds)) / target
         uneven = float(share.std())
-        if uneven < least or done < _LEAST_ROUNDS:
+        if done >= _MOVING - 1 and uneven < least:
             best, least = labels.copy(), uneven
-        if uneven <= _EVEN and done + 1 >= _LEAST_ROUNDS:
-            break
-        # A border moves half as far as the head start; around a cell it is about 4 long.
-        offsets += _GAIN * np.sqrt(target) * (1.0 - share) / 2.0
+            if uneven <= _EVEN:
+                break
+        missing = target * (1.0 - share)
+        if done < _MOVING - 1:  # a border moves half as far, and around a cell it is about 4 long
+            offsets += _GAIN * missing / np.sqrt(target) / 2.0
+        else:
+            offsets += _head_starts(graph.across, edge, labels, missing)
         offsets = np.clip(offsets - offsets.mean(), -_MOST_OFFSET, _MOST_OFFSET)
     return best
+
+
+def _head_starts(
+    across: NDArray[np.int64],
+    edge: NDArray[np.float64],
+    labels: NDArray[np.int64],
+    missing: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(N,) head starts that would give each cell the area it misses: one step of Newton's method.
+
+    A border of length s moves by half the difference of its two head starts h, so a cell gains
+    the sum of s (h - h') / 2 over its neighbours: a Laplace equation on the graph of cells.
+    """
+    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse.linalg import spsolve
+
+    face, k = np.nonzero((across >= 0) & (labels[across] != labels[:, None]))
+    count = len(missing)
+    ends = (labels[face], labels[across[face, k]])
+    border = coo_array((edge[face, k] / _JAGGED / 2.0, ends), shape=(count, count)).tocsr()
+    laplace = diags_array(border.sum(axis=1) + _PIN) - border
+    change = np.atleast_1d(spsolve(laplace.tocsc(), missing))
+    steepest = np.max(abs(change[ends[0]] - change[ends[1]]), initial=0.0)
+    return change * min(_GAIN, _MOST_STEP / max(steepest, _MOST_STEP))
 
 
 def _shares(graph: FaceGraph, count: int) -> NDArray[np.int64]:

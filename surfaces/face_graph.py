@@ -42,7 +42,8 @@ def face_graph(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceG
     Raises:
         SurfaceError: three faces meet at an edge, or two that run along it in the same direction.
     """
-    across = faces_across(faces, len(vertices))
+    partner = edge_partners(faces, len(vertices))
+    across = np.where(partner >= 0, partner // 3, NONE)
     corners = vertices[faces]
     centre = corners.mean(axis=1)
     double = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -53,21 +54,19 @@ def face_graph(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceG
     middles = (corners + following) / 2.0
     half = np.linalg.norm(middles - centre[:, None], axis=2)
     # The edge is the same seen from either side, so each side adds its own half.
-    neighbour = np.where(across >= 0, across, 0)
-    back = np.argmax(across[neighbour] == np.arange(len(faces))[:, None, None], axis=2)
-    step = np.where(across >= 0, half + half[neighbour, back], 0.0)
+    step = np.where(across >= 0, half + half.ravel()[partner], 0.0)
     return FaceGraph(across, step, edge, centre, normal, length / 2.0, pieces(across))
 
 
-def faces_across(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
-    """(F, 3) the face on the other side of each edge (vertex k to vertex k + 1), -1 at a border.
+def edge_partners(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]:
+    """(F, 3) the same edge on its other side, as 3 * face + edge; -1 at the border of the mesh.
 
     Raises:
         SurfaceError: three faces meet at an edge, or two that run along it in the same direction.
     """
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     key = np.minimum(start, end) * np.int64(n_vertices) + np.maximum(start, end)
-    order = np.argsort(key, kind="stable")
+    order = np.argsort(key)
     ordered = key[order]
     same = ordered[1:] == ordered[:-1]
     first, second = order[:-1][same], order[1:][same]
@@ -77,9 +76,9 @@ def faces_across(faces: NDArray[np.int64], n_vertices: int) -> NDArray[np.int64]
             "the mesh is not an oriented surface: an edge has more than two faces, or two that "
             "turn opposite ways; clean it first"
         )
-    across = np.full(len(key), NONE, dtype=np.int64)
-    across[first], across[second] = second // 3, first // 3
-    return across.reshape(-1, 3)
+    partner = np.full(len(key), NONE, dtype=np.int64)
+    partner[first], partner[second] = second, first
+    return partner.reshape(-1, 3)
 
 
 def pieces(across: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -21,7 +21,10 @@ line. Where they are longer still, the straight line leaves the surface."""
 _FINE = 749_371.0  # units of a rounded distance in one length; odd, so that no fraction is a tie
 _BITS = np.int64(22)  # of a face's index, in a heap's entries; MOST_FACES fits
 _MASK = np.int64((1 << 22) - 1)
-_SHIFT = 16.0  # added to distances, which offsets can make negative
+_FAR = np.int64(1 << 40)
+_SHIFT = 4.0  # added to distances, which offsets can make negative
+_WIDTH = np.int64(13)  # bits of a bucket: 1/91 of a cell, less than a face
+_BUCKETS = np.int64(91 * 64)  # what is farther than 60 cells waits in the last one
 
 
 @kernel
@@ -71,11 +74,8 @@ def pop(heap, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _relax(across, step, source, distance, heap):  # type: ignore[no-untyped-def]
-    """Lower `distance` (whole numbers) to those from `source` where these are less."""
-    size = 0
-    distance[source] = 0
-    size = push(heap, size, np.int64(source))
+def _settle(across, step, distance, heap, size):  # type: ignore[no-untyped-def]
+    """Lower distances (whole numbers) to those over the faces on the heap, where these are less."""
     while size > 0:
         entry, size = pop(heap, size)
         face, far = entry & _MASK, entry >> _BITS
@@ -89,60 +89,51 @@ def _relax(across, step, source, distance, heap):  # type: ignore[no-untyped-def
 
 
 @kernel
-def far_seeds(across, step, piece, quota):  # type: ignore[no-untyped-def]
+def far_seeds(across, step, piece, quota, rim):  # type: ignore[no-untyped-def]
     """Seeds as far from each other as one after the other can be chosen.
 
     Args:
         across: (F, 3) faces across the edges, or -1.
         step: (F, 3) whole numbers, the lengths of these steps.
         piece: (F,) connected piece of each face.
-        quota: (P,) seeds of each piece, >= 1.
+        quota: (P,) seeds of each piece, from 1 to its number of faces.
+        rim: whole number: the border of the mesh counts as a seed this far outside. So seeds keep
+            half as far from it as from each other, and are as dense there as elsewhere.
 
     Returns:
         (N,) faces, those of piece 0 first, N the sum of `quota`.
     """
     count = across.shape[0]
-    distance = np.full(count, np.int64(1) << 40)
-    heap = np.empty(3 * count + 1, dtype=np.int64)
+    distance = np.full(count, _FAR)
+    heap = np.empty(4 * count, dtype=np.int64)
+    size = 0
+    for face in range(count):
+        if across[face].min() < 0:
+            distance[face] = rim
+            size = push(heap, size, (rim << _BITS) | face)
+    _settle(across, step, distance, heap, size)
     seeds = np.empty(quota.sum(), dtype=np.int64)
-    begin = np.zeros(quota.shape[0] + 1, dtype=np.int64)
-    for p in range(quota.shape[0]):
-        begin[p + 1] = begin[p] + quota[p]
-    # The first seed of a piece: the farthest face from its first one.
-    started = np.zeros(quota.shape[0], dtype=np.bool_)
-    for face in range(count):
-        if not started[piece[face]]:
-            started[piece[face]] = True
-            _relax(across, step, face, distance, heap)
-    taken = np.zeros(quota.shape[0], dtype=np.int64)
-    best = np.full(quota.shape[0], np.int64(-1))
-    for face in range(count):
-        p = piece[face]
-        if best[p] < 0 or distance[face] > distance[best[p]]:
-            best[p] = face
-    distance[:] = np.int64(1) << 40
-    for p in range(quota.shape[0]):
-        _relax(across, step, best[p], distance, heap)
-        seeds[begin[p]] = best[p]
-        taken[p] = 1
-    # Distances only fall, so the top of the heap is the farthest face once its entry is current.
-    # The most faces are near the last seed; their entries wait in the heap until they come up.
+    end = np.cumsum(quota)
+    # Distances only fall, so the top of the queue is the farthest face once its entry is current.
     queue = np.empty(count, dtype=np.int64)
     size = 0
     for face in range(count):
         size = push(queue, size, -((distance[face] << _BITS) | (_MASK - face)))
+    missing = quota.copy()
     while size > 0:
         entry, size = pop(queue, size)
         far, face = (-entry) >> _BITS, _MASK - ((-entry) & _MASK)
         p = piece[face]
-        if taken[p] == quota[p] or distance[face] == 0:
+        if missing[p] == 0 or distance[face] == 0:
             continue
         if distance[face] < far:
             size = push(queue, size, -((distance[face] << _BITS) | (_MASK - face)))
             continue
-        _relax(across, step, face, distance, heap)
-        seeds[begin[p] + taken[p]] = face
-        taken[p] += 1
+        distance[face] = 0
+        heap[0] = face
+        _settle(across, step, distance, heap, 1)
+        seeds[end[p] - missing[p]] = face
+        missing[p] -= 1
     return seeds
 
 
@@ -152,7 +143,7 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
 
     A face goes to the seed with the least straight distance from its anchor, less its offset;
     where the way over the surface is much longer than straight, that way counts. A label spreads
-    from face to face only, so each cell is connected.
+    from face to face only, so each cell is connected. Faces wait in buckets by distance.
 
     Args:
         across: (F, 3) faces across the edges, or -1.
@@ -160,11 +151,13 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
         centre: (F, 3) the faces' centres.
         seeds: (N,) faces, all different, at least one in each connected piece.
         anchors: (N, 3) points that distances are measured from.
-        offsets: (N,) head starts, between -8 and 8.
+        offsets: (N,) head starts, at most 4.
         labels: (F,) int64, written.
     """
     count = across.shape[0]
-    heap = np.empty(3 * count + seeds.shape[0] + 1, dtype=np.int64)
+    first = np.full(_BUCKETS, np.int64(-1))  # of the entries in each bucket
+    following = np.empty(3 * count + seeds.shape[0], dtype=np.int64)
+    waiting = np.empty(3 * count + seeds.shape[0], dtype=np.int64)
     best = np.full(count, np.int64(1) << 60)
     walked = np.zeros(count)
     done = np.zeros(count, dtype=np.bool_)
@@ -172,10 +165,16 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
     for n in range(seeds.shape[0]):  # first of all: a seed belongs to its own cell
         best[seeds[n]] = 0
         labels[seeds[n]] = n
-        size = push(heap, size, np.int64(seeds[n]))
-    while size > 0:
-        entry, size = pop(heap, size)
-        face = entry & _MASK
+        waiting[size], following[size], first[0] = seeds[n], first[0], size
+        size += 1
+    bucket = 0
+    while bucket < _BUCKETS:
+        entry = first[bucket]
+        if entry < 0:
+            bucket += 1
+            continue
+        first[bucket] = following[entry]
+        face = waiting[entry]
         if done[face]:
             continue
         done[face] = True
@@ -189,16 +188,18 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
             dz = centre[other, 2] - anchors[n, 2]
             way = walked[face] + step[face, k]
             far = max(math.sqrt(dx * dx + dy * dy + dz * dz), way / DETOUR)
-            key = units(far - offsets[n] + _SHIFT)
+            key = units(max(far - offsets[n] + _SHIFT, 0.0))
             if key < best[other]:
                 best[other] = key
                 walked[other] = way
                 labels[other] = n
-                size = push(heap, size, (key << _BITS) | other)
+                place = max(min(key >> _WIDTH, _BUCKETS - 1), bucket)
+                waiting[size], following[size], first[place] = other, first[place], size
+                size += 1
 
 
 @kernel
-def recentre(centre, normal, area, labels, seeds, anchors, areas):  # type: ignore[no-untyped-def]
+def recentre(centre, normal, area, labels, seeds, anchors):  # type: ignore[no-untyped-def]
     """Move each seed to the face nearest to its cell's centroid, and its anchor to the centroid.
 
     Args:
@@ -208,10 +209,9 @@ def recentre(centre, normal, area, labels, seeds, anchors, areas):  # type: igno
         labels: (F,) cell of each face.
         seeds: (N,) written.
         anchors: (N, 3) written: the centroid, put onto the plane of the seed.
-        areas: (N,) written: the cells' areas.
     """
     anchors[:] = 0.0
-    areas[:] = 0.0
+    areas = np.zeros(seeds.shape[0])
     for face in range(labels.shape[0]):
         n = labels[face]
         areas[n] += area[face]

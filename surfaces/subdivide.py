@@ -126,12 +126,12 @@ def _next_split(
     count = np.ceil(edges.length / math.sqrt(LONGEST * most)).astype(np.int64).clip(1)
     if count.sum() > MOST_FACES:
         raise _too_many()
-    wide = (count[edges.of_face] > 1).all(axis=1)
+    wide: NDArray[np.bool_] = np.all(count[edges.of_face] > 1, axis=1)
     if wide.any():
         return halve(faces, edges, wide, len(vertices))
     if (count > 1).any():
         return cut_across(vertices, faces, edges, count)
-    large = _area(vertices, faces) > most
+    large: NDArray[np.bool_] = _area(vertices, faces) > most
     return halve(faces, edges, large, len(vertices)) if large.any() else None
 
 
