@@ -178,12 +178,22 @@ def _answer(
             "A cone of 0 degrees leaves a motion no room between samples, so none can be "
             "certified; allow a small angle.",
         )
-    if not np.isfinite(explorer.problem.curvature):
+    folded = np.isinf(explorer.problem.bends).any(axis=1)
+    if folded.any():
         return (
             Answer.UNDECIDED,
             Evidence.BUDGET,
-            "The offset surface folds: the standoff is as large as the surface's radius of "
-            "curvature, so no motion can be certified; use a smaller standoff.",
+            "The offset surface folds: the standoff reaches the surface's radius of curvature on "
+            "its hollow side, so no motion can be certified there; use a smaller standoff.",
+        )
+    if not (explorer.problem.leash > 0.0 and explorer.problem.inner_rim > 0.0):
+        strays = explorer.cells.courses.strays.max(axis=0)
+        return (
+            Answer.UNDECIDED,
+            Evidence.BUDGET,
+            f"The surface is rougher than the task allows: it is known to {1e3 * strays[0]:.3g} mm "
+            f"and {np.degrees(strays[1]):.3g} deg only; use a finer or smoother mesh, a larger "
+            "tolerance or a wider cone.",
         )
     missed = int((~explorer.reached).sum())
     what = (
