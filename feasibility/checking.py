@@ -43,6 +43,7 @@ def check(
 
     Raises:
         RobotError: the arm is no serial chain of one-dof joints.
+        SurfaceError: the greedy search does not know this kind of surface.
 
     Example:
         >>> from robots import load_robot
@@ -55,8 +56,9 @@ def check(
     search = Search() if search is None else search
     if search.method == "greedy":
         from feasibility.greedy import greedy_check
+        from surfaces.grid import charted_grid
 
-        return greedy_check(robot, cells, task, search, progress)
+        return greedy_check(robot, charted_grid(cells), task, search, progress)
     return _complete_check(robot, cells, task, search, progress)
 
 

@@ -12,8 +12,8 @@ s_j = |z_j x a| in place of r_j bounds |a''| <= Da.
 
 A vector function whose second derivative is at most M stays within s (1 - s) M / 2 of its chord, so
 its norm is at most (1 - s) c0 + s c1 + s (1 - s) M / 2: see `peak`. Meanwhile the target moves
-along its course, a piecewise cubic with |T''| <= Tp and |b''| <= Tb (`work.bend`, zero where it stands
-still). So, with p - T and a - b as the vector functions,
+along its course, a piecewise cubic with |T''| <= Tp and |b''| <= Tb (`work.bend`, zero where it
+stands still). So, with p - T and a - b as the vector functions,
 
     |p - T|(s)  <= peak of both ends with M = D + Tp
     |a - b|(s)  <= peak of both ends with M = Da + Tb

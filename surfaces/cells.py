@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from surfaces.neighbours import Neighbours
 from surfaces.surface import Surface
@@ -17,6 +17,30 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from surfaces.courses import Courses
+
+
+class Triangles(NamedTuple):
+    """Triangles to draw."""
+
+    vertices: NDArray[np.float64]
+    """(V, 3) m, in the root frame."""
+    faces: NDArray[np.int64]
+    """(F, 3)"""
+    normals: NDArray[np.float64]
+    """(V, 3) outward unit normals."""
+
+
+class Unrolled(NamedTuple):
+    """Cells on a flat picture, x to the right and y down."""
+
+    centres: NDArray[np.float64]
+    """(N, 2)"""
+    outlines: tuple[NDArray[np.float64], ...]
+    """N closed polylines (k, 2)."""
+    labels: tuple[str, str]
+    """Names of x and y with their units."""
+    turns: tuple[float, float]
+    """How much of x and y is once around, inf where the surface does not close."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -82,6 +106,37 @@ class Cells(ABC):
         graph.add_nodes_from(range(len(self)))
         graph.add_edges_from(self.pairs.tolist())
         return graph
+
+    @abstractmethod
+    def locate(self, points: ArrayLike) -> NDArray[np.int64]:
+        """(k,) the cell that the surface's point nearest to each of `points` (k, 3) m lies in.
+
+        -1 where that point is not on any cell.
+        """
+
+    @abstractmethod
+    def borders(self, samples: int = 8) -> NDArray[np.float64]:
+        """(k, 2, 3) m, ends of short straight lines that draw the borders of all cells.
+
+        Args:
+            samples: straight pieces along each side of a cell where sides are bent, >= 1.
+        """
+
+    @abstractmethod
+    def triangles(
+        self, which: NDArray[np.int64], samples: int = 8, inset: float = 0.0
+    ) -> Triangles:
+        """Triangles that fill some cells, smooth where the surface bends.
+
+        Args:
+            which: (k,) flat indices.
+            samples: pieces along each side of a cell where sides are bent.
+            inset: share of its width that a cell is drawn smaller by.
+        """
+
+    @abstractmethod
+    def unrolled(self) -> Unrolled:
+        """The cells laid flat, for pictures on paper."""
 
     @abstractmethod
     def unravel(self, k: int) -> tuple[int, ...]:
