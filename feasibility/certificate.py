@@ -173,9 +173,11 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     position = np.max(
         _peaks(beside.error, bend) + beside.strays[:, 0], initial=np.max(beside.error, initial=0.0)
     )
-    worst = np.max(
-        _peaks(beside.chord, turn) + beside.strays[:, 1], initial=np.max(beside.chord, initial=0.0)
-    )
+    # At the tool point's own foot the normal is another than at its target.
+    chord = beside.chord + beside.turning * beside.error
+    with np.errstate(invalid="ignore"):  # a fold: inf * 0 is NaN, and refused
+        turn = turn + beside.turning * bend
+    worst = np.max(_peaks(chord, turn) + beside.strays[:, 1], initial=np.max(chord, initial=0.0))
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
         waypoints=len(walk.q),
@@ -196,6 +198,11 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
             f"the tool axis tilts {np.degrees(certificate.max_angle):.4f} deg, "
             f"more than {task.cone_deg:g} deg"
         )
+    at = walk.cell >= 0
+    if not (position <= tolerance and worst <= rim + CLOSE_TO_ZERO) and (
+        (beside.error[at] > tolerance).any() or (beside.chord[at] > rim).any()
+    ):
+        refusals.append("a marked waypoint is not at its cell's centre target")
     if not visited[needed].all():
         refusals.append(f"{int((needed & ~visited).sum())} cells are never visited")
     return Replay(certificate, "; ".join(refusals))

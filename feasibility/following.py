@@ -7,7 +7,7 @@ nearest to the tool point. Any places would do for a proof; these show the least
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,8 @@ class Following:
     segment, by the segment's own parameter in 0..1."""
     strays: Array
     """(m - 1, 2) how far target point and approach direction are from the surface's own."""
+    turning: float
+    """1/m, how fast the approach direction turns along the target surface, at most."""
     fault: str
     """What makes the walk no motion along courses; empty when nothing does."""
 
@@ -54,8 +56,8 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         axes: (m, 3) its approach axes.
     """
     m = len(points)
-    nothing = Following(np.zeros(m), np.zeros(m), np.zeros((max(m - 1, 0), 2)),
-                        np.zeros((max(m - 1, 0), 2)), "")  # fmt: skip
+    segments = np.zeros((max(m - 1, 0), 2))
+    nothing = Following(np.zeros(m), np.zeros(m), segments, segments, 0.0, "")
     if m == 0:
         return nothing
     marks = np.flatnonzero(walk.cell >= 0)
@@ -103,13 +105,14 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         chord=np.linalg.norm(axes - approach, axis=1),
         bends=bends,
         strays=strays,
+        turning=ways.turning,
         fault=fault,
     )
 
 
 def _faulty(following: Following, fault: str) -> Following:
     """The same with a fault."""
-    return Following(following.error, following.chord, following.bends, following.strays, fault)
+    return replace(following, fault=fault)
 
 
 def _courses(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:

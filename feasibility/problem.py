@@ -15,7 +15,7 @@ from robots.chain import Chain, frames
 from surfaces import Cells
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
-NEWTON_RIM = 2e-4  # [1] share of the cone that it costs, by way of the turning of the normal
+NEWTON_RIM = 1e-4  # [1] share of the cone that it costs, by way of the turning of the normal
 
 # Why a motion stopped: the constraint that left no room.
 NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD = 0, 1, 2, 3, 4, 5
@@ -49,6 +49,8 @@ class Problem(NamedTuple):
     """m, what motions keep to: the tolerance less what courses stray from the surface."""
     inner_rim: float
     """The rim less what the normals of courses stray, and less what follows from `near`."""
+    turning: float
+    """1/m, how fast the approach direction turns along the target surface, at most."""
     near: float
     """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_RIM."""
     scale: float
@@ -79,9 +81,10 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
         rim=rim,
         tolerance=float(tolerance),
         leash=leash,
-        # The replay takes the place on the course that is nearest to the tool point. It lies by up
-        # to twice `near` from the one that was aimed at, and the approach direction is another.
-        inner_rim=float(inner_rim - 2.0 * ways.turning * near),
+        # The replay takes the place on the course that is nearest to the tool point, up to twice
+        # `near` from the one aimed at, and wants the cone to hold at the tool point's own foot.
+        inner_rim=float(inner_rim - 3.0 * ways.turning * near) if near > 0.0 else inner_rim,
+        turning=ways.turning,
         near=float(near),
         # A gantry may have no links at all: its strokes are as good as any length then.
         scale=float(np.linalg.norm(chain.translations, axis=1).sum()) or 1.0,

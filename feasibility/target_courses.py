@@ -9,6 +9,8 @@ from numpy.typing import NDArray
 
 from surfaces import Cells
 
+ASIDE = 1.1  # [1] the normal may turn that much faster across the courses than along them
+
 
 class TargetCourses(NamedTuple):
     """Target point f + h n and approach direction -+n along the M courses of some cells."""
@@ -24,7 +26,7 @@ class TargetCourses(NamedTuple):
     stray_approach: float
     """How far an approach direction may be from the surface's own, at most."""
     turning: float
-    """1/m, how fast the direction turns for each metre that the target travels, at most."""
+    """1/m, how fast the direction turns for each metre on the target surface, at most."""
     folded: NDArray[np.bool_]
     """(M,) courses along which the offset surface folds."""
 
@@ -47,6 +49,6 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
         bends=bends,
         stray_point=float(stray + standoff * turned),
         stray_approach=float(turned),
-        turning=courses.turning(height),
+        turning=ASIDE * courses.turning(height),
         folded=folded,
     )

@@ -87,9 +87,14 @@ class Courses:
         return np.logical_or.reduceat(folded, self.first[:-1]) if len(self) else folded
 
     def turning(self, height: float) -> float:
-        """1/m, how fast the normal turns for each metre that the target travels, at most."""
+        """1/m, how fast the normal turns for each metre that the target travels, at most.
+
+        Courses along which the offset folds do not count.
+        """
         fastest = 0.0
+        counts = np.repeat(~self.folds(height), np.diff(self.first))
         for foot, normal in self._slopes_along():
+            foot, normal = foot[counts], normal[counts]
             way = np.linalg.norm(foot + height * normal, axis=1)
             turn = np.linalg.norm(normal, axis=1)
             moves = way > 0.0
