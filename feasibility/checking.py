@@ -76,6 +76,7 @@ def _complete_check(
         from feasibility.walk import covering_walk
 
         warm_up()
+    cells.courses  # noqa: B018 - part of the cells, made once
     began = time.monotonic()
     deadline = np.inf if search.time_limit is None else began + search.time_limit
     explorer = Explorer(

@@ -28,14 +28,26 @@ class TargetCourses(NamedTuple):
     turning: float
     """1/m, how fast the direction turns for each metre on the target surface, at most."""
     folded: NDArray[np.bool_]
-    """(M,) courses along which the offset surface folds."""
+    """(M,) courses where the offset surface folds, see `folded_courses`."""
+
+
+def folded_courses(cells: Cells, height: float) -> NDArray[np.bool_]:
+    """(M,) courses from or to a cell from which some course runs into a fold of the offset surface.
+
+    At a signed height (m) beyond a radius of curvature the offset surface runs backwards, but in
+    the direction of that curvature only; courses across it do not show it, their neighbours do.
+    """
+    folded = cells.courses.folds(height)
+    cell = np.zeros(len(cells), dtype=bool)
+    cell[cells.pairs[folded]] = True
+    return np.asarray(cell[cells.pairs].any(axis=1))
 
 
 def target_courses(cells: Cells, standoff: float) -> TargetCourses:
     """Offset the courses of `cells` to the tool's side by `standoff` (m)."""
     courses, sign = cells.courses, cells.surface.side_sign
     height = sign * standoff
-    folded = courses.folds(height)
+    folded = folded_courses(cells, height)
     cubics = np.empty_like(courses.cubics)
     cubics[..., :3] = courses.cubics[..., :3] + height * courses.cubics[..., 3:]
     cubics[..., 3:] = -sign * courses.cubics[..., 3:]
@@ -49,6 +61,6 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
         bends=bends,
         stray_point=float(stray + standoff * turned),
         stray_approach=float(turned),
-        turning=ASIDE * courses.turning(height),
+        turning=ASIDE * courses.turning(height, ~folded),
         folded=folded,
     )

@@ -31,11 +31,12 @@ PIECES = (1, 4, 8, 16, 32, 64)  # numbers of cubics that a course may be made of
 CLOSE = 1e-6  # [1], share of its length that a course may stray, and [1] that its normal may
 FACETED = 5e-4  # [1], the same for the normal of a mesh
 FACETED_FOOT = 0.01  # [1], share of a mesh's edges that a course may stray from it
+STANDS = 1e-3  # [1] a parallel curve that is so much shorter stands still
 PLACES = 3  # along a piece, where its slopes are looked at
 BETWEEN = 1.5  # [1], on what was measured at samples: for what lies between them
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on bends
 HALVES = (slice(0, 3), slice(3, 6))  # of a cubic's values: foot, normal
-BLOCK = 20_000  # courses fitted at once, to bound the memory
+BLOCK = 5_000  # courses fitted at once: what the processor's caches hold
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -83,16 +84,18 @@ class Courses:
         folded = np.zeros(len(self.cubics), dtype=bool)
         for foot, normal in self._slopes_along():
             onward = ((foot + height * normal) * foot).sum(axis=1)
-            folded |= ~(onward > 0.0)
+            folded |= ~(onward > STANDS * (foot**2).sum(axis=1))
         return np.logical_or.reduceat(folded, self.first[:-1]) if len(self) else folded
 
-    def turning(self, height: float) -> float:
+    def turning(self, height: float, which: NDArray[np.bool_]) -> float:
         """1/m, how fast the normal turns for each metre that the target travels, at most.
 
-        Courses along which the offset folds do not count.
+        Args:
+            height: signed height of the target over the surface, m.
+            which: (M,) courses that count.
         """
         fastest = 0.0
-        counts = np.repeat(~self.folds(height), np.diff(self.first))
+        counts = np.repeat(which, np.diff(self.first))
         for foot, normal in self._slopes_along():
             foot, normal = foot[counts], normal[counts]
             way = np.linalg.norm(foot + height * normal, axis=1)
@@ -160,20 +163,20 @@ def _fit(cells: Cells, pairs: NDArray[np.int64], count: int, parts: int) -> tupl
     """Cubics (m, count, 4, 6) through samples of m courses, and how far they stray (m, 2)."""
     t = np.linspace(0.0, 1.0, 2 * parts + 1)
     points, normals = cells.surface.trace(cells, pairs, t)
-    values = np.concatenate([points, normals], axis=2)  # (m, 2 parts + 1, 6)
-    values[:, 0] = np.hstack([cells.centres[pairs[:, 0]], cells.normals[pairs[:, 0]]])
-    values[:, -1] = np.hstack([cells.centres[pairs[:, 1]], cells.normals[pairs[:, 1]]])
+    # Places first, so that both maps are products of two matrices: (2 parts + 1, m, 6).
+    values = np.concatenate([points, normals], axis=2).swapaxes(0, 1).copy()
+    values[0] = np.hstack([cells.centres[pairs[:, 0]], cells.normals[pairs[:, 0]]])
+    values[-1] = np.hstack([cells.centres[pairs[:, 1]], cells.normals[pairs[:, 1]]])
     fit, evaluate = _maps(count, parts)
-    cubics = np.einsum("cs,msd->mcd", fit, values[:, ::2])
-    off = np.einsum("tc,mcd->mtd", evaluate, cubics) - values
-    stray = np.stack(
-        [
-            np.linalg.norm(off[..., :3], axis=2).max(axis=1),
-            np.linalg.norm(off[..., 3:], axis=2).max(axis=1),
-        ],
-        axis=1,
-    )
-    return cubics.reshape(len(pairs), count, 4, 6), BETWEEN * stray
+    cubics = fit @ values[::2].reshape(parts + 1, -1)
+    off = (evaluate @ cubics).reshape(values.shape) - values
+    stray = [np.sqrt((off[..., half] ** 2).sum(axis=2)).max(axis=0) for half in HALVES]
+    # The surface's own normal is the one at the nearest point, which is not the sample.
+    moves = [np.sqrt((np.diff(values[..., half], axis=0) ** 2).sum(axis=2)) for half in HALVES]
+    turning = np.divide(moves[1], moves[0], out=np.zeros_like(moves[0]), where=moves[0] > 0.0)
+    stray[1] = stray[1] + turning.max(axis=0) * stray[0]
+    by_course = cubics.reshape(count, 4, len(pairs), 6).transpose(2, 0, 1, 3)
+    return by_course, BETWEEN * np.stack(stray, axis=1)
 
 
 @cache
