@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 from feasibility.case_faults import Fault, Pair, Section, alternatives, close, shown
 
 if TYPE_CHECKING:
-    from surfaces import Surface
+    from surfaces import Patch
 
 Triple = tuple[float, float, float]
 
@@ -73,7 +73,7 @@ class SurfacePart:
             "cells": self.cells,
         }
 
-    def build(self) -> Surface:
+    def build(self) -> Patch:
         """Build the surface.
 
         Raises:
@@ -84,7 +84,7 @@ class SurfacePart:
         kind = KINDS[self.kind]
         lengths = {kind.lengths[key]: value for key, value in self.lengths.items()}
         try:
-            made: Surface = getattr(surfaces, self.kind)(
+            made: Patch = getattr(surfaces, self.kind)(
                 **lengths,
                 **{kind.u[1]: self.u, kind.v[1]: self.v},
                 side=self.side,

@@ -24,9 +24,9 @@ from feasibility.kernels import kernel, put
 from feasibility.newton import LANDING_STEPS, cholesky_solve, land
 from feasibility.problem import (
     CONE,
+    FOLD,
     LIMIT,
     LONG,
-    NEWTON,
     NEXT,
     SINGULAR,
     Problem,
@@ -114,6 +114,11 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
     return best
 
 
+def _within(problem: Problem, rim: float) -> Problem:
+    """The same problem with another cone, asked at one cell's centre: nothing strays there."""
+    return problem._replace(rim=rim, inner_rim=rim)
+
+
 def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """q with each turning joint at the winding that passes its limits least."""
     best, least = q, np.full(robot.n, np.inf)
@@ -159,7 +164,7 @@ def _smallest_angle(explorer: Explorer, relaxed: Problem, cell: int) -> float:
     # Bisect on the cone: is there a configuration inside a narrower one?
     for _ in range(9):
         middle = 0.5 * (low + high)
-        narrowed = relaxed._replace(rim=2.0 * np.sin(0.5 * middle))
+        narrowed = _within(relaxed, 2.0 * np.sin(0.5 * middle))
         if _solve(narrowed, explorer.work, cell, explorer.guesses(STARTS), _one(explorer)):
             high = middle
         else:
@@ -192,9 +197,6 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
         The cause; proved where branch and bound or the reach bound ruled the cell out.
     """
     problem, robot, work = explorer.problem, explorer.robot, explorer.work
-    folded = not np.isfinite(problem.curvature)
-    if folded:  # one configuration can be asked for all the same
-        problem = problem._replace(curvature=0.0, near=NEWTON * problem.tolerance)
     proved = explorer.rulings.get(cell) is Ruling.PROVED
     n = robot.n
     solutions = np.empty((ENOUGH, n))
@@ -202,15 +204,12 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
     unlimited = problem._replace(
         lower=np.where(turning, -np.inf, robot.lower), upper=np.where(turning, np.inf, robot.upper)
     )
-    slack_cone = problem._replace(rim=np.inf)
-    anything = unlimited._replace(rim=np.inf)
+    slack_cone = _within(problem, np.inf)
+    anything = _within(unlimited, np.inf)
     guesses = explorer.guesses(STARTS)
     if not problem.rim > 0.0 and not proved:
         detail = "a cone of 0 degrees leaves no room that a motion could be certified in"
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
-    if folded and _solve(problem, work, cell, guesses, _one(explorer)):
-        detail = "reached, but the offset surface folds, so no motion there can be certified"
-        return Cause(cell, CauseKind.DISCONNECTED, False, detail)
     if not _solve(anything, work, cell, guesses, _one(explorer)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
         origin = robot.model.jointPlacements[1].translation
@@ -263,6 +262,7 @@ def disconnected(explorer: Explorer, cell: int) -> Cause:
         CONE: "the tool axis is stopped at the rim of the cone",
         SINGULAR: "the arm is stopped at a singularity",
         LONG: "the motion takes too many steps",
+        FOLD: "the offset surface folds: the standoff reaches the radius of curvature there",
     }.get(code)
     detail = (
         f"reached by another motion only, which covers {int(roadmap.size[other])} of "

@@ -1,10 +1,11 @@
 """The independent replay: what must accept a motion before the word "feasible" is said.
 
 It shares no code with the search. It knows Pinocchio's frame placements and joint Jacobians, the
-surface's definition (`point`, `normal`), and the bound between samples; it sees only the walk, not
-how it was found. The bound is derived in `feasibility.segment`; here it is evaluated again
-from Pinocchio's Jacobian: the column of joint j moved to the tool point has the length r_j (the
-lever arm), and the length of its turn of the axis is s_j.
+courses between cell centres, which it compares with the surface's own nearest points and normals
+(`feasibility.following`), and the bound between samples; it sees only the walk, not how it was
+found. The bound is derived in `feasibility.segment`; here it is evaluated again from Pinocchio's
+Jacobian: the column of joint j moved to the tool point has the length r_j (the lever arm), and the
+length of its turn of the axis is s_j.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from feasibility.following import follow
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from feasibility.verdict import Certificate, Walk
 from robots import Robot
@@ -102,8 +104,8 @@ def second_derivatives(
     return total
 
 
-def _peak(ends: NDArray[np.float64], most: NDArray[np.float64]) -> float:
-    """Largest value along m segments of a norm with these values at their m + 1 ends.
+def _peaks(ends: NDArray[np.float64], most: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m,) largest values along m segments of a norm with these values at their m + 1 ends.
 
     `most` (m,) bounds the second derivative, so the norm is at most
     (1 - s) a + s b + s (1 - s) most / 2, whose largest value this is. NaN comes out as NaN.
@@ -112,8 +114,7 @@ def _peak(ends: NDArray[np.float64], most: NDArray[np.float64]) -> float:
     slope = np.abs(b - a)
     with np.errstate(divide="ignore", invalid="ignore"):
         inner = 0.5 * (a + b) + most / 8.0 + slope**2 / (2.0 * most)
-    along = np.where(2.0 * slope >= most, np.maximum(a, b), inner)
-    return float(np.max(along, initial=np.max(ends, initial=0.0)))
+    return np.where(2.0 * slope >= most, np.maximum(a, b), inner)
 
 
 def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
@@ -162,33 +163,21 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
-    surface = cells.surface
-    height = surface.side_sign * task.standoff
     poses = placements(robot, walk.q)
-
-    # The foot may come from anywhere: what counts is that the surface's own point and normal
-    # there, the standoff added, lie within the tolerance of the tool point.
-    foot = surface.closest(poses.points)
-    u = np.clip(foot.u, *surface.u_range)
-    v = np.clip(foot.v, *surface.v_range)
-    normals = surface.normal(u, v)
-    targets = surface.point(u, v) + height * normals
-    error = np.linalg.norm(poses.points - targets, axis=1)
-    chord = np.linalg.norm(poses.axes + surface.side_sign * normals, axis=1)
-
+    beside = follow(cells, task, walk, poses.points, poses.axes)
+    if beside.fault:
+        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), beside.fault)
     steps = np.abs(np.diff(walk.q, axis=0))
-    bounds = surface.bounds(height, tolerance)
-    bend = second_derivatives(steps, robot.prismatic, poses.levers, np.inf)
-    turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0)
-    speed = np.linalg.norm(np.diff(poses.points, axis=0), axis=1) + 0.5 * bend
-    # The normal used at a waypoint is the one at its foot, so it is exact there; but off the
-    # patch it is the border's, from which the normal at the tool point differs by this much.
-    off = (u != foot.u) | (v != foot.v)
-    if off.any():
-        chord[off] += bounds.curvature * error[off]
-    with np.errstate(invalid="ignore"):  # where the surface folds: inf * 0 is NaN, and refused
-        position = _peak(error, bounds.curvature * speed**2 + bend)
-        worst = _peak(chord, turn + bounds.bend * speed**2 + bounds.curvature * bend)
+    bend = second_derivatives(steps, robot.prismatic, poses.levers, np.inf) + beside.bends[:, 0]
+    turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0) + beside.bends[:, 1]
+    position = np.max(
+        _peaks(beside.error, bend) + beside.strays[:, 0], initial=np.max(beside.error, initial=0.0)
+    )
+    # At the tool point's own foot the normal is another than at its target.
+    chord = beside.chord + beside.turning * beside.error
+    with np.errstate(invalid="ignore"):  # a fold: inf * 0 is NaN, and refused
+        turn = turn + beside.turning * bend
+    worst = np.max(_peaks(chord, turn) + beside.strays[:, 1], initial=np.max(chord, initial=0.0))
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
         waypoints=len(walk.q),
@@ -197,13 +186,8 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
         min_limit_margin=margin,
     )
 
-    at = walk.cell >= 0
-    marked = walk.cell[at]
-    aims = task.targets(cells)
-    centre_error = np.linalg.norm(poses.points[at] - aims.points[marked], axis=1)
-    centre_chord = np.linalg.norm(poses.axes[at] - aims.approaches[marked], axis=1)
     visited = np.zeros(len(cells), dtype=bool)
-    visited[marked] = True
+    visited[walk.cell[walk.cell >= 0]] = True
     refusals = []
     if not margin >= 0.0:
         refusals.append(f"a joint passes its limit by {-margin:.3g}")
@@ -214,7 +198,10 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
             f"the tool axis tilts {np.degrees(certificate.max_angle):.4f} deg, "
             f"more than {task.cone_deg:g} deg"
         )
-    if not (centre_error <= tolerance).all() or not (centre_chord <= rim + CLOSE_TO_ZERO).all():
+    at = walk.cell >= 0
+    if not (position <= tolerance and worst <= rim + CLOSE_TO_ZERO) and (
+        (beside.error[at] > tolerance).any() or (beside.chord[at] > rim).any()
+    ):
         refusals.append("a marked waypoint is not at its cell's centre target")
     if not visited[needed].all():
         refusals.append(f"{int((needed & ~visited).sum())} cells are never visited")

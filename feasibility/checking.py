@@ -43,6 +43,7 @@ def check(
 
     Raises:
         RobotError: the arm is no serial chain of one-dof joints.
+        SurfaceError: the greedy search does not know this kind of surface.
 
     Example:
         >>> from robots import load_robot
@@ -55,8 +56,9 @@ def check(
     search = Search() if search is None else search
     if search.method == "greedy":
         from feasibility.greedy import greedy_check
+        from surfaces.grid import charted_grid
 
-        return greedy_check(robot, cells, task, search, progress)
+        return greedy_check(robot, charted_grid(cells), task, search, progress)
     return _complete_check(robot, cells, task, search, progress)
 
 
@@ -74,6 +76,7 @@ def _complete_check(
         from feasibility.walk import covering_walk
 
         warm_up()
+    cells.courses  # noqa: B018 - part of the cells, made once
     began = time.monotonic()
     deadline = np.inf if search.time_limit is None else began + search.time_limit
     explorer = Explorer(
@@ -178,12 +181,22 @@ def _answer(
             "A cone of 0 degrees leaves a motion no room between samples, so none can be "
             "certified; allow a small angle.",
         )
-    if not np.isfinite(explorer.problem.curvature):
+    folded = np.isinf(explorer.problem.bends).any(axis=1)
+    if folded.any():
         return (
             Answer.UNDECIDED,
             Evidence.BUDGET,
-            "The offset surface folds: the standoff is as large as the surface's radius of "
-            "curvature, so no motion can be certified; use a smaller standoff.",
+            "The offset surface folds: the standoff reaches the surface's radius of curvature on "
+            "its hollow side, so no motion can be certified there; use a smaller standoff.",
+        )
+    if not (explorer.problem.leash > 0.0 and explorer.problem.inner_rim > 0.0):
+        strays = explorer.cells.courses.strays.max(axis=0)
+        return (
+            Answer.UNDECIDED,
+            Evidence.BUDGET,
+            f"The surface is rougher than the task allows: it is known to {1e3 * strays[0]:.3g} mm "
+            f"and {np.degrees(strays[1]):.3g} deg only; use a finer or smoother mesh, a larger "
+            "tolerance or a wider cone.",
         )
     missed = int((~explorer.reached).sum())
     what = (

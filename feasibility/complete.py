@@ -53,8 +53,7 @@ def explore(explorer: Explorer) -> None:
 
 def _pivot(explorer: Explorer) -> bool:
     """Step 1; True when one component covers every cell."""
-    nu, nv = explorer.cells.shape
-    pivot = explorer.cells.index(nu // 2, nv // 2)
+    pivot = explorer.cells.middle
     explorer.tick("looking for configurations")
     guesses = explorer.guesses(PIVOT_SEEDS)
     room = roomy(explorer.problem, explorer.work, pivot, guesses)

@@ -1,5 +1,8 @@
 """One certified motion along the surface, from one cell's centre to its neighbour's.
 
+The way between the centres is a course (`surfaces.courses`), so that nothing here knows what kind
+of surface it is.
+
 The target moves, the arm follows: a predictor step, Newton on the tool point, and the free
 directions used to stay away from limits and from the rim of the cone, or to head for a goal
 configuration. A step is kept only when `feasibility.segment` shows that the straight joint segment
@@ -15,15 +18,16 @@ from feasibility.kernels import kernel
 from feasibility.newton import correct, linearise
 from feasibility.problem import (
     CONE,
+    FOLD,
     HERE,
     LONG,
     NEXT,
     SINGULAR,
     accept,
     aim,
+    bend_between,
     copy_slot,
     place,
-    set_course,
 )
 from feasibility.segment import segment_holds
 
@@ -33,14 +37,25 @@ NEWTON_STEPS = np.int64(8)  # of one step
 
 
 @kernel
-def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: ignore[no-untyped-def]
-    """Follow the target surface from target point `start` to `end`, from q (in place).
+def span_of(problem, work, course, begin, end):  # type: ignore[no-untyped-def]
+    """How far apart two places of a course are, over the problem's scale."""
+    aim(problem, work, course, begin)
+    x, y, z = work.target[0, 0], work.target[0, 1], work.target[0, 2]
+    aim(problem, work, course, end)
+    dx, dy, dz = work.target[0, 0] - x, work.target[0, 1] - y, work.target[0, 2] - z
+    return np.sqrt(dx * dx + dy * dy + dz * dz) / problem.scale
+
+
+@kernel
+def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  # type: ignore[no-untyped-def]
+    """Follow a course from `begin` to `end`, from q (in place).
 
     Args:
         problem: the `Problem`.
         work: the `Work` of this thread.
-        start: (3,) target point that q holds now.
-        end: (3,) target point to reach.
+        course: which course.
+        begin: place on the course in [0, 1] that q is at now.
+        end: place to reach, before or behind it.
         q: (n,) configuration, moved to the end of the motion.
         goal: (n,) configuration to head for, read when `has_goal`.
         has_goal: whether there is a goal.
@@ -52,22 +67,23 @@ def track(problem, work, start, end, q, goal, has_goal, ways, first):  # type: i
         and -2 when `ways` is full.
     """
     n = q.shape[0]
-    set_course(problem, work, start, end)
-    aim(problem, work, start, end, 0.0)
+    size = span_of(problem, work, course, begin, end)
+    aim(problem, work, course, begin)
     place(problem, work, HERE, q)
-    if not (work.error[0, 0] <= problem.tolerance and work.error[0, 1] <= problem.rim):
+    if not (work.error[0, 0] <= problem.leash and work.error[0, 1] <= problem.inner_rim):
         work.blame[0] = SINGULAR
         return -1
-    length = 0.0
-    for k in range(3):
-        length += (end[k] - start[k]) ** 2
-    size = np.sqrt(length) / problem.scale
     t, dt, written = 0.0, 1.0, 0
     for _ in range(MOST_STEPS):
         dt = min(dt, 1.0 - t)
         if 1.0 - t - dt < 0.1 * dt:
             dt = 1.0 - t  # no sliver at the end
-        aim(problem, work, start, end, t + dt)
+        here, there = begin + t * (end - begin), begin + (t + dt) * (end - begin)
+        bend_between(problem, work, course, here, there)
+        if not work.bend[0] < np.inf:
+            work.blame[0] = FOLD
+            return -1
+        aim(problem, work, course, there)
         copy_slot(work)
         if has_goal:
             share = dt / (1.0 - t)

@@ -17,7 +17,7 @@ from feasibility.search import Search
 from feasibility.task import Task
 from robots import Robot
 from robots.chain import Chain
-from surfaces import Cells
+from surfaces.grid import GridCells
 
 CAP = 20_000  # J-cells of one call at the step below, unless the search says otherwise
 CAP_STEP_DEG = 0.01
@@ -73,7 +73,7 @@ class JSpace:
     def __init__(
         self,
         robot: Robot,
-        cells: Cells,
+        cells: GridCells,
         task: Task,
         start: ArrayLike,
         search: Search | None = None,
@@ -96,7 +96,7 @@ class JSpace:
         if origin.shape != (robot.n,) or not np.isfinite(origin).all():
             raise ValueError(f"start must be {robot.n} finite joint values, got {origin.tolist()}")
         self.start = origin
-        self.steps = Steps.of(robot, cells.surface, task, search) if steps is None else steps
+        self.steps = Steps.of(robot, cells.charted, task, search) if steps is None else steps
         size = self.steps.size
         self._chain = Chain.checked(robot) if chain is None else chain
         self._chart = cells.chart
@@ -192,7 +192,7 @@ class JSpace:
 
 def continuity(
     robot: Robot,
-    cells: Cells,
+    cells: GridCells,
     task: Task,
     q: ArrayLike,
     target_cell: int,

@@ -85,6 +85,7 @@ class Explorer:
         self.low = np.where(self.robot.prismatic, np.clip(-far, lower, upper), self.low)
         self.high = np.where(self.robot.prismatic, np.clip(far, lower, upper), self.high)
         self.indptr, self.indices = self.cells.neighbours
+        self.links = self.cells.neighbours.links
         self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
 
     # -- reading the roadmap -------------------------------------------------------------------
@@ -145,7 +146,13 @@ class Explorer:
         """Spread all queued nodes; True when one component covers every cell."""
         while True:
             status = spread_out(
-                self.problem, self.work, self.roadmap, self.indptr, self.indices, BUDGET
+                self.problem,
+                self.work,
+                self.roadmap,
+                self.indptr,
+                self.indices,
+                self.links,
+                BUDGET,
             )
             if status == COVERED:
                 return True
@@ -187,12 +194,18 @@ class Explorer:
                 continue
             self.met[x, y] = self.met.get((x, y), 0) + 1
             share = float(self.rng.uniform(NARROWEST, WIDEST))
-            if meet(self.problem, self.work, self.room, x, y, share):
+            course = self.course(int(self.roadmap.cell[x]), int(self.roadmap.cell[y]))
+            if meet(self.problem, self.work, self.room, x, y, course, share):
                 self.spread()
                 return
             tries += 1
             if tries == MEETINGS:
                 return
+
+    def course(self, cell: int, other: int) -> int:
+        """The course between two neighbouring cells."""
+        entries = slice(self.indptr[cell], self.indptr[cell + 1])
+        return int(self.links[entries][self.indices[entries] == other][0])
 
     def room(self, rows: int) -> Roadmap:
         """The roadmap, grown until an edge and so many rows of `ways` fit."""

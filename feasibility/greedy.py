@@ -26,7 +26,7 @@ from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, def
 from feasibility.warmup import compiling_notice
 from robots import Robot
 from robots.chain import Chain
-from surfaces import Cells
+from surfaces.grid import GridCells
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -73,7 +73,7 @@ class _Run:
 
 def greedy_check(
     robot: Robot,
-    cells: Cells,
+    cells: GridCells,
     task: Task,
     search: Search | None = None,
     progress: Progress | None = None,
@@ -96,7 +96,7 @@ def greedy_check(
     """
     search = Search(method="greedy") if search is None else search
     called = time.perf_counter()
-    chain, steps = Chain.checked(robot), Steps.of(robot, cells.surface, task, search)
+    chain, steps = Chain.checked(robot), Steps.of(robot, cells.charted, task, search)
     with compiling_notice():
         JSpace(robot, cells, task, np.zeros(robot.n), search, chain, steps).load()
     began = time.perf_counter()
@@ -146,7 +146,7 @@ def greedy_check(
 
 def _starts(
     robot: Robot,
-    cells: Cells,
+    cells: GridCells,
     task: Task,
     search: Search,
     deadline: float,
@@ -175,12 +175,12 @@ def _starts(
             return
 
 
-def _touches_all(run: _Run, cells: Cells) -> bool:
+def _touches_all(run: _Run, cells: GridCells) -> bool:
     """True when the best tree touches every cell."""
     return len(cells) == 0 or (run.best is not None and len(run.best.jcell) == len(cells))
 
 
-def _replayed(robot: Robot, cells: Cells, task: Task, steps: Steps, run: _Run) -> Replay:
+def _replayed(robot: Robot, cells: GridCells, task: Task, steps: Steps, run: _Run) -> Replay:
     """Replay of all paths of the best tree by Pinocchio."""
     tree = run.best
     parents = {} if tree is None else tree.parent
@@ -189,7 +189,7 @@ def _replayed(robot: Robot, cells: Cells, task: Task, steps: Steps, run: _Run) -
 
 
 def _answer(
-    cells: Cells, search: Search, steps: Steps, run: _Run, replayed: Replay | None
+    cells: GridCells, search: Search, steps: Steps, run: _Run, replayed: Replay | None
 ) -> tuple[Answer, Evidence, str]:
     """Answer, evidence, and the sentences that say how it was found."""
     number = 0 if run.best is None else len(run.best.jcell)
@@ -245,7 +245,7 @@ def _beyond(robot: Robot, points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.linalg.norm(points - Chain.of(robot).translations[0], axis=1) - robot.reach
 
 
-def _touched(cells: Cells, tree: Tree | None) -> NDArray[np.bool_]:
+def _touched(cells: GridCells, tree: Tree | None) -> NDArray[np.bool_]:
     """(N,) cells of the tree."""
     touched = np.zeros(len(cells), dtype=bool)
     if tree is not None:
@@ -253,7 +253,7 @@ def _touched(cells: Cells, tree: Tree | None) -> NDArray[np.bool_]:
     return touched
 
 
-def _graph(cells: Cells, tree: Tree | None) -> nx.Graph:
+def _graph(cells: GridCells, tree: Tree | None) -> nx.Graph:
     """Graph G of the best tree: `q` on the cells it touches, `motion` on the edges."""
     import networkx as nx
 
@@ -282,7 +282,9 @@ def _tree(tree: Tree | None) -> nx.DiGraph | None:
     return graph
 
 
-def _causes(robot: Robot, cells: Cells, task: Task, steps: Steps, run: _Run) -> tuple[Cause, ...]:
+def _causes(
+    robot: Robot, cells: GridCells, task: Task, steps: Steps, run: _Run
+) -> tuple[Cause, ...]:
     """Why each cell outside the best tree is missed, as far as this search can tell."""
     beyond = _beyond(robot, task.targets(cells).points) - steps.tolerance
     causes = []

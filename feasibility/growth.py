@@ -92,8 +92,17 @@ def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-u
 
 
 @kernel
-def spread_out(problem, work, roadmap, indptr, indices, budget):  # type: ignore[no-untyped-def]
+def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type: ignore[no-untyped-def]
     """Spread every queued node into the neighbouring cells that its component does not cover yet.
+
+    Args:
+        problem: the `Problem`.
+        work: the `Work`.
+        roadmap: the `Roadmap`.
+        indptr: (N + 1,) where each cell's neighbours begin in `indices`.
+        indices: (k,) neighbours.
+        links: (k,) the course to each, see `Neighbours.links`.
+        budget: evaluations of the arm before coming back.
 
     Returns DONE when the queue is empty, COVERED when a component covers every cell, BUDGET after
     `budget` evaluations of the arm, FULL when an array has no room left; call again to go on.
@@ -119,8 +128,9 @@ def spread_out(problem, work, roadmap, indptr, indices, budget):  # type: ignore
                 count[CURSOR] += 1
                 continue
             put(q, roadmap.q[x])
+            begin, end = (0.0, 1.0) if cell < target else (1.0, 0.0)
             rows = track(
-                problem, work, problem.points[cell], problem.points[target], q, q, FREE,
+                problem, work, links[first + count[CURSOR]], begin, end, q, q, FREE,
                 roadmap.ways, count[WAYS],
             )  # fmt: skip
             if rows == -2:
@@ -260,7 +270,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
         problem: the `Problem`.
         work: the `Work`.
         roadmap: the `Roadmap`; an edge that ends nowhere near a node makes a new one.
-        pairs: (M, 2) neighbouring cells.
+        pairs: (M, 2) neighbouring cells, one for each course.
         state: (M + 1,) 1 where the pair has an edge, 2 where none was found; the last entry is
             the next pair to look at. Filled here.
         component: the root component.
@@ -301,11 +311,12 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
             if best_x >= 0:
                 for attempt in range(4):
                     a, b = (best_x, best_y) if attempt % 2 == 0 else (best_y, best_x)
-                    i, j = roadmap.cell[a], roadmap.cell[b]
+                    begin, end = (0.0, 1.0) if attempt % 2 == 0 else (1.0, 0.0)
+                    j = roadmap.cell[b]
                     put(q, roadmap.q[a])
                     rows = track(
-                        problem, work, problem.points[i], problem.points[j], q, roadmap.q[b],
-                        attempt < 2, roadmap.ways, count[WAYS],
+                        problem, work, k, begin, end, q, roadmap.q[b], attempt < 2,
+                        roadmap.ways, count[WAYS],
                     )  # fmt: skip
                     if rows == -2:
                         state[k] = 0

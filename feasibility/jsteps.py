@@ -30,7 +30,7 @@ from feasibility.search import Search
 from feasibility.task import Task
 from robots import Robot
 from robots.chain import Chain
-from surfaces import Surface
+from surfaces.charted import ChartedPatch
 
 TOLERANCE_STEPS = 0.5
 """Default tolerance, in steps times reach: half of what the tool can move in one step."""
@@ -61,7 +61,7 @@ class Steps:
         return self.cone_cosine < 1.0
 
     @staticmethod
-    def of(robot: Robot, surface: Surface, task: Task, search: Search) -> Steps:
+    def of(robot: Robot, surface: ChartedPatch, task: Task, search: Search) -> Steps:
         """The steps of a search."""
         step = math.radians(search.step_deg)
         reach = _extent(robot)
@@ -84,7 +84,7 @@ def _extent(robot: Robot) -> float:
 
 def _room(
     robot: Robot,
-    surface: Surface,
+    surface: ChartedPatch,
     task: Task,
     size: NDArray[np.float64],
     tolerance: float,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from feasibility.continuation import MOST_STEPS, track
 from feasibility.fibre import connect
 from feasibility.growth import CONNECT_STEPS
-from feasibility.problem import Problem, Work, aim, set_course
+from feasibility.problem import Problem, Work, aim
 from feasibility.roadmap import NODES, WAYS, Roadmap, add_edge, root_of, unite
 
 NARROWEST, WIDEST = 0.1, 0.9  # [1] share of the way between two centres where a meeting is tried
@@ -49,7 +49,9 @@ def nearest_pairs(
     return np.column_stack([x, y])[np.argsort(distance, kind="stable")]
 
 
-def meet(problem: Problem, work: Work, room: Room, x: int, y: int, share: float) -> bool:
+def meet(
+    problem: Problem, work: Work, room: Room, x: int, y: int, course: int, share: float
+) -> bool:
     """Try to join two nodes over neighbouring cells at a place between their centres.
 
     Args:
@@ -58,21 +60,21 @@ def meet(problem: Problem, work: Work, room: Room, x: int, y: int, share: float)
         room: see `Room`.
         x: node over one cell.
         y: node over a neighbour of it.
-        share: where between the centres, 0 at x's and 1 at y's.
+        course: the course between the two cells.
+        share: where on it.
 
     Returns:
         True when an edge was added and the components are one now.
     """
     roadmap = room(0)
-    start, end = (problem.points[roadmap.cell[k]] for k in (x, y))
-    set_course(problem, work, start, end)
-    aim(problem, work, start, end, share)
+    aim(problem, work, course, share)
     place, approach = work.target[0].copy(), work.target[1].copy()
+    starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)
     ways, ends = [], []
-    for node, centre in ((x, start), (y, end)):
+    for node, start in ((x, starts[0]), (y, starts[1])):
         q = roadmap.q[node].copy()
         rows = np.empty((MOST_STEPS + 1, len(q)))
-        count = track(problem, work, centre, place, q, q, False, rows, 0)
+        count = track(problem, work, course, start, share, q, q, False, rows, 0)
         if count < 0:
             return False
         ways.append(rows[:count])

@@ -138,7 +138,7 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
     when the tool point is at its target to `problem.near`, and the axis inside the cone.
     """
     n = q.shape[0]
-    inner = problem.rim - problem.curvature * problem.near
+    inner = problem.inner_rim
     hard = inner * (1.0 - slack)
     last = np.inf
     for it in range(most):

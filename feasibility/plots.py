@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from feasibility.scene import CAUSES, CENTRES, EDGES, MISSED, START, missed_by_cause
 from feasibility.verdict import Verdict
 from robots.kinematics import Kinematics
-from surfaces import Cells, Surface
+from surfaces import Cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,10 +35,10 @@ class Plot(Figure):
 
 
 def plot_graph(verdict: Verdict, title: str | None = None) -> Plot:
-    """Graph G unrolled over the parameters, cells that are not covered in red (Fig. 3).
+    """Graph G laid flat, cells that are not covered in red (Fig. 3).
 
     Args:
-        verdict: of either method, on a parametric surface.
+        verdict: of either method.
         title: above the figure; default says what is covered.
     """
     from matplotlib.collections import LineCollection
@@ -46,11 +46,19 @@ def plot_graph(verdict: Verdict, title: str | None = None) -> Plot:
     figure, axes = _over_parameters(verdict, title)
     lines = unrolled_edges(verdict)
     axes.add_collection(LineCollection(lines, colors=[EDGES], linewidths=1.0, zorder=2))
-    u, v = _scaled(verdict.cells)
-    covered = verdict.covered
-    axes.scatter(v[covered], u[covered], s=14, color=[CENTRES], zorder=3, label="covered")
+    centres, covered = verdict.cells.unrolled().centres, verdict.covered
+    axes.scatter(
+        centres[covered, 0], centres[covered, 1], s=14, color=[CENTRES], zorder=3, label="covered"
+    )
     if not covered.all():
-        axes.scatter(v[~covered], u[~covered], s=30, color=[MISSED], zorder=3, label="not covered")
+        axes.scatter(
+            centres[~covered, 0],
+            centres[~covered, 1],
+            s=30,
+            color=[MISSED],
+            zorder=3,
+            label="not covered",
+        )
     _mark_start(axes, verdict)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -60,24 +68,27 @@ def plot_causes(verdict: Verdict, title: str | None = None) -> Plot:
     """Which cells are not covered, and why: one colour for each cause.
 
     Args:
-        verdict: of either method, on a parametric surface.
+        verdict: of either method.
         title: above the figure; default says what is covered.
     """
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Patch
 
     figure, axes = _over_parameters(verdict, title)
-    boxes = _boxes(verdict.cells)
+    outlines = verdict.cells.unrolled().outlines
     handles = [Patch(color=(0.86, 0.91, 0.96), label=f"covered ({verdict.n_covered})")]
     axes.add_collection(
         PolyCollection(
-            list(boxes[verdict.covered]), facecolors=[(0.86, 0.91, 0.96)], edgecolors="w"
+            [outlines[k] for k in np.flatnonzero(verdict.covered)],
+            facecolors=[(0.86, 0.91, 0.96)],
+            edgecolors="w",
         )
     )
     for kind, cells in missed_by_cause(verdict).items():
         colour = MISSED if kind is None else CAUSES[kind]
         words = "cause not known" if kind is None else kind.replace("_", " ")
-        axes.add_collection(PolyCollection(list(boxes[cells]), facecolors=[colour], edgecolors="w"))
+        missed = [outlines[k] for k in cells]
+        axes.add_collection(PolyCollection(missed, facecolors=[colour], edgecolors="w"))
         handles.append(Patch(color=colour, label=f"{words} ({len(cells)})"))
     _mark_start(axes, verdict)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
@@ -132,11 +143,7 @@ def plot_transition(verdict: Verdict, edge: tuple[int, int] | None = None) -> Pl
 def cells_below(verdict: Verdict, walk: NDArray[np.float64]) -> NDArray[np.int64]:
     """The cell (k,) below the tool point at each row of a walk (k, n); -1 off the patch."""
     kinematics = Kinematics(verdict.robot)
-    foot = verdict.cells.surface.closest(np.array([kinematics.tool(q)[0] for q in walk]))
-    surface, (nu, nv) = verdict.cells.surface, verdict.cells.shape
-    rows = _bin(foot.u, surface.u_range, nu)
-    columns = _bin(foot.v, surface.v_range, nv)
-    return np.where(foot.inside, rows * nv + columns, -1)
+    return verdict.cells.locate(np.array([kinematics.tool(q)[0] for q in walk]))
 
 
 def unrolled_edges(verdict: Verdict) -> list[NDArray[np.float64]]:
@@ -144,12 +151,11 @@ def unrolled_edges(verdict: Verdict) -> list[NDArray[np.float64]]:
 
     An edge across the seam of a closed patch becomes two lines, one at either border.
     """
-    cells = verdict.cells
-    u, v = _scaled(cells)
-    turns = np.array([_turn(cells, "v"), _turn(cells, "u")])
+    flat = verdict.cells.unrolled()
+    turns = np.array(flat.turns)
     lines = []
     for a, b in verdict.graph.edges:
-        ends = np.array([[v[a], u[a]], [v[b], u[b]]])
+        ends = flat.centres[[a, b]]
         # Towards the copy of b that is nearest to a, and back from that of a nearest to b.
         shift = np.where(np.isfinite(turns), np.rint((ends[1] - ends[0]) / turns), 0.0)
         jump = np.where(shift != 0.0, shift * np.where(np.isfinite(turns), turns, 0.0), 0.0)
@@ -166,10 +172,13 @@ def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
     surface = verdict.cells.surface
     figure = Plot(figsize=(6.4, 5.2), layout="constrained")
     axes = figure.add_subplot()
-    axes.set_xlim(*_scale(surface, "v", np.array(surface.v_range)))
-    axes.set_ylim(*_scale(surface, "u", np.array(surface.u_range))[::-1])
-    axes.set_xlabel(f"v ({_unit(surface, 'v')})")
-    axes.set_ylabel(f"u ({_unit(surface, 'u')})")
+    flat = verdict.cells.unrolled()
+    if flat.outlines:
+        corners = np.concatenate(flat.outlines)
+        axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
+        axes.set_ylim(corners[:, 1].max(), corners[:, 1].min())
+    axes.set_xlabel(flat.labels[0])
+    axes.set_ylabel(flat.labels[1])
     edges = verdict.n_edges
     axes.set_title(
         title
@@ -183,9 +192,9 @@ def _mark_start(axes: Axes, verdict: Verdict) -> None:
     """A ring around the cell where the search starts."""
     if verdict.start is None:
         return
-    u, v = _scaled(verdict.cells)
+    x, y = verdict.cells.unrolled().centres[verdict.start]
     axes.scatter(
-        [v[verdict.start]], [u[verdict.start]], s=110, facecolors="none", edgecolors=[START],
+        [x], [y], s=110, facecolors="none", edgecolors=[START],
         linewidths=2.0, zorder=4, label="start",
     )  # fmt: skip
 
@@ -207,51 +216,10 @@ def _edge(verdict: Verdict, edge: tuple[int, int] | None) -> tuple[int, int]:
     return key
 
 
-def _boxes(cells: Cells) -> NDArray[np.float64]:
-    """The cells as rectangles (N, 4, 2) over (v, u), degrees or metres."""
-    u, v = _scaled(cells)
-    surface = cells.surface
-    half_u = np.ptp(_scale(surface, "u", np.array(surface.u_range))) / max(2 * cells.shape[0], 1)
-    half_v = np.ptp(_scale(surface, "v", np.array(surface.v_range))) / max(2 * cells.shape[1], 1)
-    corners = np.array([[-half_v, -half_u], [half_v, -half_u], [half_v, half_u], [-half_v, half_u]])
-    return np.column_stack([v, u])[:, None] + corners
-
-
-def _scaled(cells: Cells) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Parameters u and v of the centres, (N,) each, in degrees or metres."""
-    return _scale(cells.surface, "u", cells.u), _scale(cells.surface, "v", cells.v)
-
-
-def _scale(surface: Surface, name: str, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values of parameter 'u' or 'v', angles in degrees."""
-    return np.degrees(values) if _is_angle(surface, name) else values
-
-
-def _unit(surface: Surface, name: str) -> str:
-    """The unit of parameter 'u' or 'v' in a figure."""
-    return "degrees" if _is_angle(surface, name) else "m"
-
-
-def _is_angle(surface: Surface, name: str) -> bool:
-    """True where parameter 'u' or 'v' is in radians."""
-    return surface.units["uv".index(name)] == "rad"
-
-
-def _turn(cells: Cells, name: str) -> float:
-    """A full turn of parameter 'u' or 'v' where the patch closes on itself, degrees; else inf."""
-    return 360.0 if getattr(cells.surface, f"{name}_closed") else np.inf
-
-
-def _bin(values: NDArray[np.float64], limits: tuple[float, float], count: int) -> Any:
-    """Which of `count` equal parts of a range each value falls in."""
-    share = (values - limits[0]) / (limits[1] - limits[0])
-    return np.clip(np.floor(share * count), 0, count - 1).astype(np.int64)
-
-
 def _name(cells: Cells, cell: int) -> str:
-    """A cell as (row, column)."""
-    i, j = cells.unravel(cell)
-    return f"({i}, {j})"
+    """A cell as (row, column), or by its number on a mesh."""
+    index = cells.unravel(cell)
+    return str(index) if len(index) > 1 else str(index[0])
 
 
 def _joint_label(verdict: Verdict, joint: int) -> str:

@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.kernels import kernel
+from feasibility.target_courses import target_courses
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from robots import Robot
 from robots.chain import Chain, frames
 from surfaces import Cells
-from surfaces.chart import EDGE, SPHERE, Chart, foot, spot
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
-NEWTON_RIM = 2e-4  # [1] share of the cone that it costs, by way of the surface's curvature
+NEWTON_RIM = 1e-4  # [1] share of the cone that it costs, by way of the turning of the normal
 
 # Why a motion stopped: the constraint that left no room.
-NOTHING, LIMIT, CONE, SINGULAR, LONG = 0, 1, 2, 3, 4
+NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD = 0, 1, 2, 3, 4, 5
 
 HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
 
@@ -31,23 +31,28 @@ class Problem(NamedTuple):
     """(n,) rad or m, -inf where free."""
     upper: NDArray[np.float64]
     """(n,) rad or m, +inf where free."""
-    chart: Chart
     points: NDArray[np.float64]
     """(N, 3) target points of the cell centres."""
     approaches: NDArray[np.float64]
     """(N, 3) approach directions of the cell centres."""
-    height: float
-    """Signed height of the target surface over the surface, m."""
+    first_piece: NDArray[np.int64]
+    """(M + 1,) where the pieces of each course begin, see `surfaces.courses`."""
+    targets: NDArray[np.float64]
+    """(P, 4, 6) cubics of target point and approach direction along each piece."""
+    bends: NDArray[np.float64]
+    """(P, 2) largest second derivatives of both (m, 1) by t; inf where the offset folds."""
     rim: float
     """2 sin(alpha / 2): the largest |a - b|; inf when every direction will do."""
     tolerance: float
     """m."""
+    leash: float
+    """m, what motions keep to: the tolerance less what courses stray from the surface."""
+    inner_rim: float
+    """The rim less what the normals of courses stray, and less what follows from `near`."""
+    turning: float
+    """1/m, how fast the approach direction turns along the target surface, at most."""
     near: float
     """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_RIM."""
-    curvature: float
-    """kappa, 1/m, over the band of the target surface."""
-    bend: float
-    """beta, 1/m^2, over the same band."""
     scale: float
     """m, length that turns metres into comparable radians (the arm's reach)."""
 
@@ -56,26 +61,31 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
     """Gather arm, cells and task for the compiled search."""
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     targets = task.targets(cells)
-    height = cells.surface.side_sign * task.standoff
-    bounds = cells.surface.bounds(height, tolerance)
+    ways = target_courses(cells, task.standoff)
     chain = Chain.checked(robot)
     rim = np.inf if task.cone_deg >= 180.0 else float(2.0 * np.sin(0.5 * task.cone))
-    near = NEWTON * tolerance
-    if bounds.curvature > 0.0 and rim < np.inf:
-        near = min(near, NEWTON_RIM * rim / bounds.curvature)
+    leash = max(float(tolerance - ways.stray_point), 0.0)
+    inner_rim = max(rim - ways.stray_approach, 0.0)
+    near = NEWTON * leash
+    if ways.turning > 0.0 and rim < np.inf:
+        near = min(near, NEWTON_RIM * inner_rim / ways.turning)
     return Problem(
         chain=chain,
         lower=np.array(robot.lower),
         upper=np.array(robot.upper),
-        chart=cells.chart,
         points=np.ascontiguousarray(targets.points),
         approaches=np.ascontiguousarray(targets.approaches),
-        height=float(height),
+        first_piece=ways.first,
+        targets=ways.cubics,
+        bends=ways.bends,
         rim=rim,
         tolerance=float(tolerance),
+        leash=leash,
+        # The replay takes the place on the course that is nearest to the tool point, up to twice
+        # `near` from the one aimed at, and wants the cone to hold at the tool point's own foot.
+        inner_rim=float(inner_rim - 3.0 * ways.turning * near) if near > 0.0 else inner_rim,
+        turning=ways.turning,
         near=float(near),
-        curvature=float(bounds.curvature),
-        bend=float(bounds.bend),
         # A gantry may have no links at all: its strokes are as good as any length then.
         scale=float(np.linalg.norm(chain.translations, axis=1).sum()) or 1.0,
     )
@@ -112,9 +122,9 @@ class Work(NamedTuple):
     """(n,)"""
     target: NDArray[np.float64]
     """(2, 3) target point and approach direction."""
-    course: NDArray[np.float64]
-    """(5,) parameters u, v where a motion begins, how much they change, and 1.0 where it is the
-    straight line's foot that is followed instead, over a pole."""
+    bend: NDArray[np.float64]
+    """(2,) largest second derivatives of target point and approach direction over the present
+    step, by its own parameter in 0..1; zero while the target stands still."""
     counts: NDArray[np.int64]
     """(1,) forward kinematics evaluated."""
     blame: NDArray[np.int64]
@@ -138,7 +148,7 @@ def work_for(n: int) -> Work:
         held=np.zeros(n, dtype=np.bool_),
         trial=np.zeros(n),
         target=np.zeros((2, 3)),
-        course=np.zeros(5),
+        bend=np.zeros(2),
         counts=np.zeros(1, dtype=np.int64),
         blame=np.zeros(2, dtype=np.int64),
     )
@@ -160,7 +170,9 @@ def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
 
 @kernel
 def look_at(work, target, approach):  # type: ignore[no-untyped-def]
-    """Set `work.target`."""
+    """Set `work.target`, and let it stand still."""
+    work.bend[0] = 0.0
+    work.bend[1] = 0.0
     for k in range(3):
         work.target[0, k] = target[k]
         work.target[1, k] = approach[k]
@@ -181,53 +193,32 @@ def accept(work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def set_course(problem, work, start, end):  # type: ignore[no-untyped-def]
-    """Lay the line from target point `start` to `end` that `aim` follows: see `Work.course`.
-
-    It is straight in the surface's parameters, so that it stays on a patch which the straight line
-    through space would leave: the rim of a dome, the far side of a pipe. A closed parameter runs
-    the shorter way round. Only over a pole the straight line is the one that stays.
-    """
-    chart = problem.chart
-    u0, v0, _, _, _, _ = foot(chart, start[0], start[1], start[2])
-    u1, v1, _, _, _, _ = foot(chart, end[0], end[1], end[2])
-    du, dv = u1 - u0, v1 - v0
-    if chart.closed[0]:
-        du -= 2.0 * np.pi * np.round(du / (2.0 * np.pi))
-    if chart.closed[1]:
-        dv -= 2.0 * np.pi * np.round(dv / (2.0 * np.pi))
-    work.course[0], work.course[1], work.course[2], work.course[3] = u0, v0, du, dv
-    over_a_pole = False
-    if chart.code == SPHERE and chart.closed[1] and abs(dv) > 0.5 * np.pi:
-        # The cap through both places is on the patch if its pole is, and is convex if small.
-        if u0 + u1 < np.pi - EDGE:
-            over_a_pole = chart.low[0] <= EDGE
-        elif u0 + u1 > np.pi + EDGE:
-            over_a_pole = chart.high[0] >= np.pi - EDGE
-    work.course[4] = 1.0 if over_a_pole else 0.0
+def aim(problem, work, course, t):  # type: ignore[no-untyped-def]
+    """Set `work.target` to the place on a course at t in [0, 1]."""
+    first = problem.first_piece[course]
+    count = problem.first_piece[course + 1] - first
+    piece = min(np.int64(t * count), count - 1)
+    s = t * count - piece
+    for k in range(3):
+        for part in range(2):
+            value = problem.targets[first + piece, 3, 3 * part + k]
+            for power in range(2, -1, -1):
+                value = value * s + problem.targets[first + piece, power, 3 * part + k]
+            work.target[part, k] = value
 
 
 @kernel
-def aim(problem, work, start, end, t):  # type: ignore[no-untyped-def]
-    """Set `work.target` to the place on the course that `set_course` has laid, at t in [0, 1]."""
-    if work.course[4] > 0.0:
-        x = (1.0 - t) * start[0] + t * end[0]
-        y = (1.0 - t) * start[1] + t * end[1]
-        z = (1.0 - t) * start[2] + t * end[2]
-        _, _, height, nx, ny, nz = foot(problem.chart, x, y, z)
-        off = problem.height - height
-    else:
-        u = work.course[0] + t * work.course[2]
-        v = work.course[1] + t * work.course[3]
-        x, y, z, nx, ny, nz = spot(problem.chart, u, v)
-        off = problem.height
-    work.target[0, 0] = x + off * nx
-    work.target[0, 1] = y + off * ny
-    work.target[0, 2] = z + off * nz
-    sign = -problem.chart.side_sign
-    work.target[1, 0] = sign * nx
-    work.target[1, 1] = sign * ny
-    work.target[1, 2] = sign * nz
+def bend_between(problem, work, course, t0, t1):  # type: ignore[no-untyped-def]
+    """Set `work.bend` for a step along a course from t0 to t1, either way."""
+    first = problem.first_piece[course]
+    count = problem.first_piece[course + 1] - first
+    low = min(np.int64(min(t0, t1) * count), count - 1)
+    high = min(np.int64(max(t0, t1) * count), count - 1)
+    for part in range(2):
+        most = 0.0
+        for piece in range(low, high + 1):
+            most = max(most, problem.bends[first + piece, part])
+        work.bend[part] = most * (t1 - t0) ** 2
 
 
 @kernel

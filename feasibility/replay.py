@@ -18,7 +18,7 @@ from feasibility.task import Task
 from feasibility.verdict import Certificate
 from robots import Robot
 from robots.kinematics import Kinematics
-from surfaces import Cells
+from surfaces.grid import GridCells
 
 SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one number meet
 
@@ -42,7 +42,9 @@ class Replay:
     """One sentence for each thing that does not hold; empty when all does."""
 
 
-def replay(robot: Robot, cells: Cells, task: Task, steps: Steps, paths: Sequence[Path]) -> Replay:
+def replay(
+    robot: Robot, cells: GridCells, task: Task, steps: Steps, paths: Sequence[Path]
+) -> Replay:
     """Check that each path is what the search says: every J-cell, every step, both end cells.
 
     - each step is one J-cell move: of one joint, or of any for all moves;
@@ -120,7 +122,7 @@ def tool_poses(
 class Borders:
     """The parameter ranges of cells."""
 
-    def __init__(self, cells: Cells) -> None:
+    def __init__(self, cells: GridCells) -> None:
         """Read them from the centres and the number of cells."""
         surface = cells.surface
         self._centres = np.column_stack([cells.u, cells.v])  # (N, 2) rad or m

@@ -73,14 +73,16 @@ def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
     Each runs over the surface from target to target. It says that a motion joins the two cells; the
     motion itself may take another way (the greedy search stops as soon as it has entered a cell).
     """
-    surface, standoff = verdict.cells.surface, verdict.task.standoff
-    targets = verdict.task.targets(verdict.cells).points
+    cells = verdict.cells
     pairs = np.array(list(verdict.graph.edges), dtype=np.int64).reshape(-1, 2)
-    t = np.linspace(0.0, 1.0, _edge_points(verdict.cells))[:, None]
-    ends = targets[pairs]
-    chords = (1.0 - t) * ends[:, :1] + t * ends[:, 1:]
-    foot = surface.closest(chords)
-    return chords + (surface.side_sign * standoff - foot.height)[..., None] * foot.normal
+    keys = cells.pairs[:, 0] * len(cells) + cells.pairs[:, 1]
+    course = np.searchsorted(keys, pairs.min(axis=1) * len(cells) + pairs.max(axis=1))
+    t = np.linspace(0.0, 1.0, _edge_points(cells))
+    backwards = (pairs[:, 0] > pairs[:, 1])[:, None]
+    places = np.where(backwards, 1.0 - t, t)
+    foot, normal = cells.courses.at(np.repeat(course, len(t)), places.reshape(-1))
+    height = cells.surface.side_sign * verdict.task.standoff
+    return (foot + height * normal).reshape(len(pairs), len(t), 3)
 
 
 def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64]]:
@@ -110,8 +112,7 @@ def _cell_marks(cells: Cells) -> Iterator[Layer]:
     if len(cells) == 0:
         return
     path = "/surface/cell outlines"
-    outlines = cells.outlines(8 if len(cells) <= FULL_DETAIL else 1)
-    ends = np.stack([outlines[:, :-1], outlines[:, 1:]], axis=2).reshape(-1, 3)
+    ends = cells.borders(8 if len(cells) <= FULL_DETAIL else 1).reshape(-1, 3)
     lines = threejs.segments(path, ends, OUTLINES, opacity=0.8)
     rows = " x ".join(str(part) for part in cells.shape)
     yield Layer((lines,), Entry(f"{len(cells)} cells ({rows})", OUTLINES, path), len(cells))

@@ -11,14 +11,17 @@ behind it, so r_j <= max(r_j(0), r_j(1)) + 1/2 sum_{k>j} r_k |d_k|. The same wit
 s_j = |z_j x a| in place of r_j bounds |a''| <= Da.
 
 A vector function whose second derivative is at most M stays within s (1 - s) M / 2 of its chord, so
-its norm is at most (1 - s) c0 + s c1 + s (1 - s) M / 2: see `peak`. With L = |p1 - p0| the tool
-point moves at |p'| <= V = L + D/2. Let h be the signed distance from the surface; its gradient is
-the unit normal m, |Dm| <= kappa and |D^2 m| <= beta (`Surface.bounds`). So
+its norm is at most (1 - s) c0 + s c1 + s (1 - s) M / 2: see `peak`. Meanwhile the target moves
+along its course, a piecewise cubic with |T''| <= Tp and |b''| <= Tb (`work.bend`, zero where it
+stands still). So, with p - T and a - b as the vector functions,
 
-    |h(p(s)) - h*|  <= peak of both ends with M = kappa V^2 + D
-    |a - b|(s)      <= peak of both ends with M = Da + beta V^2 + kappa D,   b = -+ m(p(s))
+    |p - T|(s)  <= peak of both ends with M = D + Tp
+    |a - b|(s)  <= peak of both ends with M = Da + Tb
 
-and |a - b| = 2 sin(angle / 2) compares with the cone exactly. Limits are convex: the ends decide.
+and |a - b| = 2 sin(angle / 2) compares with the cone exactly. The cone is to hold at the tool
+point's own foot, where the normal differs from the target's by at most kappa |p - T|, kappa the
+turning of the normal along the target surface: so M = Da + Tb + kappa (D + Tp). (What this adds at
+the ends is in `Problem.inner_rim`.) Limits are convex: the ends decide.
 """
 
 from __future__ import annotations
@@ -77,20 +80,14 @@ def peak(a, b, most):  # type: ignore[no-untyped-def]
 def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
     """Do point and cone hold on the whole straight segment from q0 (slot 0) to q1 (slot 1)?
 
-    Returns the position bound over the tolerance and the cone bound over the rim: both must be
-    at most 1. NaN compares false, so it never certifies.
+    Slot 0 holds the errors against the target where it comes from, slot 1 against where it goes.
+
+    Returns the position bound over what motions keep to of the tolerance, and the cone bound over
+    what they keep to of the rim: both must be at most 1. NaN compares false, so it never
+    certifies.
     """
     total, total_axis = spread(problem, work, q0, q1)
-    length = 0.0
-    for k in range(3):
-        length += (work.point[1, k] - work.point[0, k]) ** 2
-    speed = np.sqrt(length) + 0.5 * total
-    position = peak(work.error[0, 0], work.error[1, 0], problem.curvature * speed * speed + total)
-    # The errors are against the targets of the two ends; the surface's own normal at the tool
-    # point differs from the target's by at most kappa times the distance.
-    cone = peak(
-        work.error[0, 1] + problem.curvature * work.error[0, 0],
-        work.error[1, 1] + problem.curvature * work.error[1, 0],
-        total_axis + problem.bend * speed * speed + problem.curvature * total,
-    )
-    return position / problem.tolerance, cone / problem.rim
+    position = peak(work.error[0, 0], work.error[1, 0], total + work.bend[0])
+    aside = problem.turning * (total + work.bend[0])
+    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + work.bend[1] + aside)
+    return position / problem.leash, cone / problem.inner_rim

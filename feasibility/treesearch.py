@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.continuity import JSpace, Outcome
-from surfaces import Cells
+from surfaces.grid import GridCells
 
 Progress = Callable[[int, int | None, str], None]
 """Called with the cells that the running tree touches, the number of cells, and what is done."""
@@ -53,7 +53,7 @@ class Tree:
 
 def tree_search(
     space: JSpace,
-    cells: Cells,
+    cells: GridCells,
     start: int,
     deadline: float = math.inf,
     progress: Progress | None = None,

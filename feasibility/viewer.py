@@ -218,7 +218,7 @@ def _points(verdict: Verdict) -> NDArray[np.float64]:
     base = np.zeros((1, 3))
     if len(verdict.cells) == 0:
         return base
-    corners = verdict.cells.outlines(1).reshape(-1, 3)
+    corners = verdict.cells.borders(1).reshape(-1, 3)
     return np.concatenate([base, corners])
 
 

@@ -2,6 +2,16 @@
 
 from surfaces.cells import Cells
 from surfaces.parametric import cylinder, hyperboloid, plane, sphere
+from surfaces.patch import Patch
 from surfaces.surface import Surface, SurfaceError
 
-__all__ = ["Cells", "Surface", "SurfaceError", "cylinder", "hyperboloid", "plane", "sphere"]
+__all__ = [
+    "Cells",
+    "Patch",
+    "Surface",
+    "SurfaceError",
+    "cylinder",
+    "hyperboloid",
+    "plane",
+    "sphere",
+]

@@ -1,94 +1,88 @@
-"""E-cells: a patch cut into a grid of parameter cells, and which of them touch."""
+"""E-cells: a surface cut into cells, and which of them touch."""
 
 from __future__ import annotations
 
-import operator
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from surfaces.neighbours import Neighbours, grid_neighbours
-from surfaces.surface import Surface, SurfaceError
+from surfaces.neighbours import Neighbours
+from surfaces.surface import Surface
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from surfaces.chart import Chart
+    from surfaces.courses import Courses
 
-_ARRAYS = ("u", "v", "centres", "normals", "areas")
+
+class Triangles(NamedTuple):
+    """Triangles to draw."""
+
+    vertices: NDArray[np.float64]
+    """(V, 3) m, in the root frame."""
+    faces: NDArray[np.int64]
+    """(F, 3)"""
+    normals: NDArray[np.float64]
+    """(V, 3) outward unit normals."""
+
+
+class Unrolled(NamedTuple):
+    """Cells on a flat picture, x to the right and y down."""
+
+    centres: NDArray[np.float64]
+    """(N, 2)"""
+    outlines: tuple[NDArray[np.float64], ...]
+    """N closed polylines (k, 2)."""
+    labels: tuple[str, str]
+    """Names of x and y with their units."""
+    turns: tuple[float, float]
+    """How much of x and y is once around, inf where the surface does not close."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cells:
-    """N = nu x nv cells of one surface, numbered row by row: cell (i, j) is i * nv + j.
-
-    A cell's centre lies at its mid parameters. Cells are values; they pickle. A grid without
-    cells (0 x nv) is allowed.
-    """
+class Cells(ABC):
+    """N cells of one surface, numbered from 0. Cells are values; they pickle."""
 
     surface: Surface
-    shape: tuple[int, int]
-    """(nu, nv)."""
-    u: NDArray[np.float64]
-    """(N,) first parameter of each centre, rad or m."""
-    v: NDArray[np.float64]
-    """(N,) second parameter of each centre, rad or m."""
     centres: NDArray[np.float64]
-    """(N, 3) m, in the root frame."""
+    """(N, 3) m, on the surface, in the root frame."""
     normals: NDArray[np.float64]
     """(N, 3) outward unit normals at the centres, in the root frame."""
     areas: NDArray[np.float64]
     """(N,) m^2."""
+    shape: tuple[int, ...]
+    """How cells are counted: (nu, nv) for a grid, (N,) for the cells of a mesh."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays."""
-        for name in _ARRAYS:
-            array = np.array(getattr(self, name), dtype=float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                array = np.array(value)
+                array.flags.writeable = False
+                object.__setattr__(self, field.name, array)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle as a call of the constructor; what is derived is derived again."""
-        return (Cells, (self.surface, self.shape, *(getattr(self, name) for name in _ARRAYS)))
-
-    @staticmethod
-    def grid(surface: Surface, nu: int, nv: int) -> Cells:
-        """Cut `surface` into nu x nv cells of equal parameter steps; see `Surface.cells`.
-
-        Raises:
-            SurfaceError: nu or nv is not a whole number >= 0.
-        """
-        nu, nv = _count("nu", nu), _count("nv", nv)
-        u_edges = np.linspace(*surface.u_range, nu + 1)
-        v_edges = np.linspace(*surface.v_range, nv + 1)
-        areas = surface.area(u_edges[:-1, None], u_edges[1:, None], v_edges[:-1], v_edges[1:])
-        u = np.repeat((u_edges[:-1] + u_edges[1:]) / 2.0, nv)
-        v = np.tile((v_edges[:-1] + v_edges[1:]) / 2.0, nu)
-        return Cells(
-            surface,
-            (nu, nv),
-            u,
-            v,
-            centres=surface.point(u, v),
-            normals=surface.normal(u, v),
-            areas=np.broadcast_to(areas, (nu, nv)).reshape(-1),
-        )
+        return (type(self), tuple(getattr(self, field.name) for field in fields(self)))
 
     def __len__(self) -> int:
         """Number of cells."""
-        return self.shape[0] * self.shape[1]
+        return len(self.centres)
 
-    @cached_property
+    @property
+    @abstractmethod
     def neighbours(self) -> Neighbours:
-        """(indptr, indices): each cell's neighbours, clockwise from the upper left one."""
-        closed = (self.surface.u_closed, self.surface.v_closed)
-        found = grid_neighbours(*self.shape, closed=closed, poles=self.surface.poles)
-        for array in found:
-            array.flags.writeable = False
-        return found
+        """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
+
+    @property
+    @abstractmethod
+    def middle(self) -> int:
+        """A cell near the middle of the surface, where a search may begin."""
 
     @cached_property
     def pairs(self) -> NDArray[np.int64]:
@@ -98,9 +92,11 @@ class Cells:
         return pairs
 
     @cached_property
-    def chart(self) -> Chart:
-        """What compiled loops need of these cells."""
-        return self.surface.chart(*self.shape)
+    def courses(self) -> Courses:
+        """The ways between the centres of the M `pairs`, as smooth curves."""
+        from surfaces.courses import courses_of
+
+        return courses_of(self)
 
     def graph(self) -> nx.Graph:
         """Adjacency as a graph: nodes are flat indices, edges are `pairs`."""
@@ -111,66 +107,41 @@ class Cells:
         graph.add_edges_from(self.pairs.tolist())
         return graph
 
-    def index(self, i: int, j: int) -> int:
-        """Flat index of the cell in row i (u) and column j (v).
+    @abstractmethod
+    def locate(self, points: ArrayLike) -> NDArray[np.int64]:
+        """(k,) the cell that the surface's point nearest to each of `points` (k, 3) m lies in.
 
-        Raises:
-            IndexError: there is no such cell.
+        -1 where that point is not on any cell.
         """
-        if not (0 <= i < self.shape[0] and 0 <= j < self.shape[1]):
-            raise IndexError(f"no cell ({i}, {j}) in a grid of {self.shape[0]} x {self.shape[1]}")
-        return int(i * self.shape[1] + j)
 
-    def unravel(self, k: int) -> tuple[int, int]:
-        """Row (u) and column (v) of the cell with flat index k.
-
-        Raises:
-            IndexError: there is no such cell.
-        """
-        if not 0 <= k < len(self):
-            raise IndexError(f"no cell {k} in a grid of {self.shape[0]} x {self.shape[1]}")
-        i, j = divmod(int(k), self.shape[1])
-        return i, j
-
-    def outlines(self, samples: int = 8) -> NDArray[np.float64]:
-        """Borders of the cells as closed polylines (N, 4 * samples + 1, 3) m, in the root frame.
+    @abstractmethod
+    def borders(self, samples: int = 8) -> NDArray[np.float64]:
+        """(k, 2, 3) m, ends of short straight lines that draw the borders of all cells.
 
         Args:
-            samples: straight pieces along each of a cell's four sides, >= 1. Every `samples`-th
-                point is a corner; the order is (u, v) = (low, low), (low, high), (high, high),
-                (high, low).
+            samples: straight pieces along each side of a cell where sides are bent, >= 1.
+        """
+
+    @abstractmethod
+    def triangles(
+        self, which: NDArray[np.int64], samples: int = 8, inset: float = 0.0
+    ) -> Triangles:
+        """Triangles that fill some cells, smooth where the surface bends.
+
+        Args:
+            which: (k,) flat indices.
+            samples: pieces along each side of a cell where sides are bent.
+            inset: share of its width that a cell is drawn smaller by.
+        """
+
+    @abstractmethod
+    def unrolled(self) -> Unrolled:
+        """The cells laid flat, for pictures on paper."""
+
+    @abstractmethod
+    def unravel(self, k: int) -> tuple[int, ...]:
+        """The cell with flat index k as people count it: (row, column), or (k,) on a mesh.
 
         Raises:
-            SurfaceError: `samples` is not a whole number >= 1.
+            IndexError: there is no such cell.
         """
-        if _count("samples", samples) == 0:
-            raise SurfaceError("samples must be a whole number >= 1, got 0")
-        t = np.arange(samples) / samples
-        zero, one = np.zeros(samples), np.ones(samples)
-        du = np.concatenate([zero, t, one, 1.0 - t, [0.0]]) - 0.5
-        dv = np.concatenate([t, one, 1.0 - t, zero, [0.0]]) - 0.5
-        width_u, width_v = (
-            (high - low) / max(count, 1)
-            for (low, high), count in zip(
-                (self.surface.u_range, self.surface.v_range), self.shape, strict=True
-            )
-        )
-        return self.surface.point(
-            self.u[:, None] + du * width_u,
-            self.v[:, None] + dv * width_v,
-        )
-
-    def __repr__(self) -> str:
-        """One line: how many cells of what."""
-        return f"Cells({self.shape[0]} x {self.shape[1]} of {self.surface!r})"
-
-
-def _count(name: str, value: Any) -> int:
-    """A whole number >= 0, or a clear error."""
-    try:
-        count = operator.index(value)
-    except TypeError:
-        count = -1
-    if count < 0 or isinstance(value, bool):
-        raise SurfaceError(f"{name} must be a whole number >= 0, got {value!r}")
-    return count

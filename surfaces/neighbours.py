@@ -27,6 +27,14 @@ class Neighbours(NamedTuple):
         return self.indices[self.indptr[k] : self.indptr[k + 1]]
 
     @property
+    def links(self) -> NDArray[np.int64]:
+        """The row of `pairs` that each entry of `indices` belongs to."""
+        count = len(self.indptr) - 1
+        owner = np.repeat(np.arange(count, dtype=np.int64), np.diff(self.indptr))
+        keys = np.minimum(owner, self.indices) * count + np.maximum(owner, self.indices)
+        return np.unique(keys, return_inverse=True)[1]
+
+    @property
     def pairs(self) -> NDArray[np.int64]:
         """(M, 2) pairs i < j of cells that touch, each once, sorted."""
         count = len(self.indptr) - 1

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.bounds import CurvatureSlices
-from surfaces.surface import Surface
+from surfaces.charted import ChartedPatch
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ _SLICES = 512  # over which the hyperboloid's curvatures are bounded
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Sphere(Surface):
+class Sphere(ChartedPatch):
     """u is the polar angle from +z, v the azimuth about z."""
 
     kind: ClassVar[str] = "sphere"
@@ -30,7 +30,7 @@ class Sphere(Surface):
     """m."""
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """The radius."""
         return (self.radius,)
 
@@ -62,7 +62,7 @@ class Sphere(Surface):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Cylinder(Surface):
+class Cylinder(ChartedPatch):
     """u is the angle about z, v the height along z."""
 
     kind: ClassVar[str] = "cylinder"
@@ -74,7 +74,7 @@ class Cylinder(Surface):
     """m."""
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """The radius."""
         return (self.radius,)
 
@@ -97,7 +97,7 @@ class Cylinder(Surface):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Hyperboloid(Surface):
+class Hyperboloid(ChartedPatch):
     """One sheet, r(z) = waist sqrt(1 + (z / flare)^2): u is the angle about z, v = z.
 
     With s = waist/flare, r^2 = waist^2 + s^2 z^2, r r' = s^2 z and
@@ -116,7 +116,7 @@ class Hyperboloid(Surface):
     """m, height at which the radius is sqrt(2) waist."""
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """Waist and flare."""
         return (self.waist, self.flare)
 
@@ -182,7 +182,7 @@ class Hyperboloid(Surface):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Plane(Surface):
+class Plane(ChartedPatch):
     """u and v are x and y of its own frame, the normal is +z."""
 
     kind: ClassVar[str] = "plane"
@@ -192,7 +192,7 @@ class Plane(Surface):
     v_angle: ClassVar[bool] = False
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """Nothing."""
         return ()
 

@@ -1,20 +1,17 @@
-"""Surface: a parametrised patch with a pose and a working side, and what can be asked of it."""
+"""Surface: what is to be covered, with its pose and working side, and what can be asked of it."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.bounds import CurvatureSlices, NormalBounds, normal_bounds
-
 if TYPE_CHECKING:
     from surfaces.cells import Cells
-    from surfaces.chart import Chart
 
 Side = Literal["inside", "outside"]
 TURN_TOLERANCE = 1e-9  # [rad]: a range this close to a full turn is one
@@ -28,12 +25,13 @@ class SurfaceError(ValueError):
 class Foot:
     """The points of a surface nearest to given points; every array has the points' leading shape.
 
-    The foot lies on the whole surface that the patch is cut from; `inside` tells whether it lies
-    on the patch.
+    The foot lies on the whole surface that a patch is cut from; `inside` tells whether it lies
+    on the patch. A mesh has nothing beyond its border: its foot is always its nearest point.
     """
 
     u: NDArray[np.float64]
-    """First parameter, rad or m; an angle is wrapped into the patch's range where it can be."""
+    """First parameter, rad or m; an angle is wrapped into the patch's range where it can be. NaN
+    where the surface has no parameters."""
     v: NDArray[np.float64]
     """Second parameter, likewise."""
     height: NDArray[np.float64]
@@ -41,26 +39,18 @@ class Foot:
     normal: NDArray[np.float64]
     """(..., 3) outward unit normal at the foot."""
     inside: NDArray[np.bool_]
-    """True where the foot's parameters lie in the patch's ranges (to 1e-9 rad or m)."""
+    """True where the foot lies on the patch, and the normal there leads to the point."""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Surface(ABC):
-    """A patch (u, v) -> point of a smooth surface, placed in the frame of the URDF's root link.
+    """A surface placed in the frame of the URDF's root link.
 
-    All methods are vectorised over parameters or points, and speak the root frame. Surfaces are
-    values: they pickle and are never changed in place. `surfaces.sphere` and its fellows build
-    them from checked numbers.
+    All methods are vectorised and speak the root frame. Surfaces are values: they pickle and are
+    never changed in place. `surfaces.sphere` and its fellows build them from checked numbers.
     """
 
     kind: ClassVar[str]
-    units: ClassVar[tuple[str, str]]
-    """'rad' or 'm', of u and of v."""
-    u_angle: ClassVar[bool]
-    """True where u is an angle about an axis, so that u and u + 2 pi are one place."""
-    v_angle: ClassVar[bool]
-    code: ClassVar[int]
-    """What `surfaces.chart` dispatches on."""
 
     rotation: NDArray[np.float64]
     """(3, 3) axes of the surface's own frame, as columns, in the root frame."""
@@ -68,10 +58,6 @@ class Surface(ABC):
     """(3,) m, origin of the surface's own frame in the root frame."""
     side: Side
     """'inside': the tool works at -d along the outward normal; 'outside': at +d."""
-    u_range: tuple[float, float]
-    """rad or m."""
-    v_range: tuple[float, float]
-    """rad or m."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the pose."""
@@ -90,138 +76,55 @@ class Surface(ABC):
         return -1.0 if self.side == "inside" else 1.0
 
     @property
-    def u_closed(self) -> bool:
-        """True where u runs through a full turn, so that its two ends are joined."""
-        return self.u_angle and self.u_range[1] - self.u_range[0] >= math.tau - TURN_TOLERANCE
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about the surface: repairs, doubts; one sentence each."""
+        return ()
 
     @property
-    def v_closed(self) -> bool:
-        """True where v runs through a full turn, so that its two ends are joined."""
-        return self.v_angle and self.v_range[1] - self.v_range[0] >= math.tau - TURN_TOLERANCE
-
-    @property
-    def poles(self) -> tuple[bool, bool]:
-        """Whether the rows of lowest and of highest u close around a pole of the patch."""
-        return (False, False)
-
-    @property
-    @abstractmethod
-    def shape(self) -> tuple[float, ...]:
-        """The lengths (m) that fix the surface in its own frame, as `surfaces.chart` wants them."""
+    def grain(self) -> float:
+        """m, typical length of a mesh's edges; 0 where the surface is smooth."""
+        return 0.0
 
     @abstractmethod
-    def local_point(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (..., 3) m in the surface's own frame, from parameters of one shape."""
-
-    @abstractmethod
-    def local_normal(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Outward unit normals (..., 3) in the surface's own frame."""
-
-    @abstractmethod
-    def area(
-        self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike
-    ) -> NDArray[np.float64]:
-        """Area (m^2) of the part u0..u1 by v0..v1; exact, vectorised."""
-
-    @abstractmethod
-    def curvature_slices(self, margin: float) -> CurvatureSlices:
-        """Bounds on the curvatures of the patch, widened by `margin` where it has open ends."""
-
-    def point(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
-        """Points (..., 3) m of the surface in the root frame."""
-        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
-        return self.local_point(u, v) @ self.rotation.T + self.position
-
-    def normal(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
-        """Outward unit normals (..., 3) in the root frame.
-
-        Outward is away from the centre or axis of a sphere, cylinder or hyperboloid, and +z of
-        the own frame of a plane.
-        """
-        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
-        return self.local_normal(u, v) @ self.rotation.T
-
     def closest(self, points: ArrayLike) -> Foot:
         """The feet of `points` (..., 3) m on the surface; see `Foot`.
-
-        Where several points are equally near (centre of a sphere, axis of a cylinder), one of
-        them is taken, on the patch if there is one.
 
         Raises:
             ValueError: `points` does not end in an axis of length 3.
         """
-        from surfaces.chart import feet
 
-        points = np.asarray(points, dtype=float)
-        if points.shape[-1:] != (3,):
-            raise ValueError(f"points must have shape (..., 3), got {points.shape}")
-        shape = points.shape[:-1]
-        values, inside = feet(self.chart(), np.array(points.reshape(-1, 3)))
-        return Foot(
-            u=values[:, 0].reshape(shape),
-            v=values[:, 1].reshape(shape),
-            height=values[:, 2].reshape(shape),
-            normal=values[:, 3:].reshape(*shape, 3),
-            inside=inside.reshape(shape),
-        )
+    @abstractmethod
+    def trace(
+        self, cells: Cells, pairs: NDArray[np.int64], t: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Ways on the surface from cell centre to cell centre.
 
-    def chart(self, nu: int = 1, nv: int = 1) -> Chart:
-        """What compiled loops need of the surface, cut into nu x nv cells."""
-        from surfaces.chart import Chart
+        Args:
+            cells: cells of this surface.
+            pairs: (m, 2) rows of `cells.pairs`.
+            t: (k,) places on the way, 0 at the first cell's centre, 1 at the second's.
 
-        return Chart(
-            code=self.code,
-            shape=(*map(float, self.shape), 0.0, 0.0)[:2],
-            rotation=tuple(self.rotation.ravel().tolist()),
-            position=tuple(self.position.tolist()),
-            side_sign=self.side_sign,
-            low=(float(self.u_range[0]), float(self.v_range[0])),
-            high=(float(self.u_range[1]), float(self.v_range[1])),
-            closed=(bool(self.u_closed), bool(self.v_closed)),
-            cells=(int(nu), int(nv)),
-        )
-
-    def cells(self, nu: int, nv: int) -> Cells:
-        """Cut the patch into nu x nv E-cells of equal parameter steps.
-
-        Raises:
-            SurfaceError: nu or nv is not a whole number >= 0.
-
-        Example:
-            >>> from surfaces import sphere
-            >>> cells = sphere(1.0, polar_deg=(10, 90), azimuth_deg=(10, 180)).cells(9, 10)
-            >>> len(cells), len(cells.pairs)
-            (90, 305)
+        Returns:
+            Points (m, k, 3) m and outward unit normals (m, k, 3); both continuous in t.
         """
-        from surfaces.cells import Cells
 
-        return Cells.grid(self, nu, nv)
-
-    def bounds(self, height: float, slack: float = 0.0) -> NormalBounds:
-        """Bounds on how fast the normal turns near the parallel surface at a signed height.
-
-        They hold at every point whose foot lies on the patch and whose height differs from
-        `height` by at most `slack` (m); see `surfaces.bounds`.
-        """
-        return normal_bounds(self.curvature_slices(abs(slack)), height, abs(slack))
-
-    def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Surface:
-        """The same patch after the rigid motion x -> rotation x + translation of the root frame."""
+    def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
+        """The same surface after the rigid motion x -> rotation x + translation."""
         turn = np.asarray(rotation, dtype=float)
         shift = np.asarray(translation, dtype=float)
         return replace(self, rotation=turn @ self.rotation, position=turn @ self.position + shift)
 
-    def __repr__(self) -> str:
-        """One line: the kind, its lengths, ranges (degrees or metres), side and position."""
-        lengths = ", ".join(f"{length:g}" for length in self.shape)
-        ranges = []
-        for name, (low, high) in (("u", self.u_range), ("v", self.v_range)):
-            if self.units["uv".index(name)] == "rad":
-                ranges.append(f"{name}_deg=({math.degrees(low):g}, {math.degrees(high):g})")
-            else:
-                ranges.append(f"{name}=({low:g}, {high:g})")
-        parts = [lengths, *ranges, f"side={self.side!r}", f"position={self.position.tolist()}"]
-        return f"{self.kind}({', '.join(part for part in parts if part)})"
+
+def points_of(points: ArrayLike) -> NDArray[np.float64]:
+    """Points as an array (..., 3).
+
+    Raises:
+        ValueError: they do not end in an axis of length 3.
+    """
+    array = np.asarray(points, dtype=float)
+    if array.shape[-1:] != (3,):
+        raise ValueError(f"points must have shape (..., 3), got {array.shape}")
+    return array
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:

@@ -124,9 +124,22 @@ def test_removed_waypoints(name):
 def test_a_cut_across_the_walk(name):
     """From the first waypoint straight to the last, marks and all: no motion along the surface."""
     walk = witness(name)
-    q = np.vstack([walk.q, walk.q[:1], walk.q[len(walk.q) // 2 :][:1]])
-    cell = np.concatenate([walk.cell, [-1, -1]])
+    last, first = walk.q[-1:], walk.q[:1]
+    q, cell = np.vstack([walk.q, first]), np.append(walk.cell, walk.cell[0])
+    neighbours = question(name)[1].neighbours.of(int(walk.cell[-1]))
+    refusal = ask(name, q, cell).refusal
+    assert ("strays" if walk.cell[0] in neighbours else "do not touch") in refusal
+    # Back to a neighbour of the last cell, but to another of its own configurations: no way at all.
+    q, cell = np.vstack([walk.q, last + 0.3, last]), np.append(walk.cell, [-1, walk.cell[-1]])
     assert "strays" in ask(name, q, cell).refusal
+
+
+def test_a_motion_that_ends_between_centres(name):
+    """What lies before the first mark or behind the last belongs to no course."""
+    walk = witness(name)
+    q, cell = np.vstack([walk.q, walk.q[-1:]]), np.append(walk.cell, -1)
+    assert "away from every cell's centre" in ask(name, q, cell).refusal
+    assert "away from every cell's centre" in ask(name, q[::-1], cell[::-1]).refusal
 
 
 def test_limits_are_exact(name):
@@ -171,12 +184,19 @@ def test_marks_are_checked(name):
     first, other = rows[0], rows[walk.cell[rows] != walk.cell[rows[0]]][0]
     wrong = walk.cell.copy()
     wrong[first] = walk.cell[other]
-    assert "not at its cell's centre" in ask(name, cell=wrong).refusal
+    misplaced = ("not at its cell's centre", "do not touch")
+    assert any(words in ask(name, cell=wrong).refusal for words in misplaced)
     swapped = walk.cell.copy()
     swapped[[first, other]] = walk.cell[[other, first]]
-    assert "not at its cell's centre" in ask(name, cell=swapped).refusal
+    assert any(words in ask(name, cell=swapped).refusal for words in misplaced)
     missing = np.where(walk.cell == walk.cell[other], -1, walk.cell)
-    assert ask(name, cell=missing).refusal == "1 cells are never visited"
+    unmarked = ask(name, cell=missing).refusal
+    assert any(words in unmarked for words in ("never visited", "strays", *misplaced))
+    standing = Walk(walk.q[:1], walk.cell[:1])
+    needed = np.zeros(len(cells), dtype=bool)
+    needed[[walk.cell[0], walk.cell[other]]] = True
+    robot, _, task = question(name)
+    assert replay(robot, cells, task, standing, needed).refusal == "1 cells are never visited"
     for impossible in (len(cells), -2, 10**9):
         bad = walk.cell.copy()
         bad[first] = impossible
@@ -185,7 +205,7 @@ def test_marks_are_checked(name):
     if len(between_centres):
         early = walk.cell.copy()
         early[between_centres[len(between_centres) // 2]] = walk.cell[other]
-        assert "not at its cell's centre" in ask(name, cell=early).refusal
+        assert any(words in ask(name, cell=early).refusal for words in misplaced)
 
 
 def test_a_turn_more_in_one_joint(name):
@@ -258,20 +278,21 @@ def test_one_joint():
     assert outcome.certificate.max_position_error == pytest.approx(sag, rel=0.05)
 
 
-def test_a_motion_beside_the_patch_is_refused():
-    """What counts is the patch: a foot beyond its border is as far as the border is."""
+def test_a_motion_beside_its_target_is_refused():
+    """A mark says that the tool point is at the cell's centre, within the tolerance."""
     arm = planar_arm(3)
     task = Task(0.0, 180, 1e-3)
     q = np.array([[0.0, 0.9, -0.9]])
     (point,), _ = tools(arm, q)
-    for beyond, accepted in ((-0.01, True), (0.0, True), (9e-4, True), (1.1e-3, False)):
+    for beside, accepted in ((0.0, True), (9e-4, True), (1.1e-3, False)):
         patch = plane(
-            (point[0] - 0.2, point[0] - beyond), (point[1] - 0.1, point[1] + 0.1), side="outside"
-        )
+            (point[0] - 0.1 + beside, point[0] + 0.1 + beside), (point[1] - 0.1, point[1] + 0.1),
+            position=(0, 0, point[2]), side="outside",
+        )  # fmt: skip
         cells = patch.cells(1, 1)
-        outcome = replay(arm, cells, task, Walk(q, np.array([-1])), np.zeros(1, dtype=bool))
+        outcome = replay(arm, cells, task, Walk(q, np.array([0])), np.zeros(1, dtype=bool))
         assert outcome.accepted is accepted
-        assert outcome.certificate.max_position_error == pytest.approx(max(beyond, 0.0), abs=1e-12)
+        assert outcome.certificate.max_position_error == pytest.approx(beside, abs=1e-12)
 
 
 def test_a_surface_that_folds_certifies_nothing_but_standing_still():
@@ -280,8 +301,10 @@ def test_a_surface_that_folds_certifies_nothing_but_standing_still():
     cells = sphere(0.1, (0, 180), (-180, 180), side="inside").cells(4, 4)
     task = Task(0.1, 180, 0.05)
     q = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
-    outcome = replay(arm, cells, task, Walk(q, np.array([-1, -1])), np.zeros(16, dtype=bool))
-    assert not outcome.accepted
+    nowhere = np.zeros(16, dtype=bool)
+    for a, b in cells.pairs:
+        assert not replay(arm, cells, task, Walk(q, np.array([a, b])), nowhere).accepted
+    assert replay(arm, cells, task, Walk(q[:1], np.array([5])), nowhere).accepted
 
 
 def test_it_shares_no_code_with_the_search():

@@ -249,6 +249,7 @@ HARD = Problem(
 
 def test_a_time_limit_is_honoured() -> None:
     setup = built(HARD, load_robot("puma560"))
+    assert len(setup[1].courses) > 100_000  # part of the cells, as are their centres
     verdict_of(*DRAWN[0])  # loads the kernels
     began = time.monotonic()
     verdict = check(*setup, Search(time_limit=1.0))
@@ -266,6 +267,7 @@ def test_a_time_limit_is_honoured() -> None:
 @pytest.mark.parametrize("time_limit", [1e-9, 1e-4, 1e-2, 5e-2])
 def test_hardly_any_time_gives_undecided_and_no_error(time_limit: float) -> None:
     setup = built(HARD, load_robot("puma560"))
+    assert len(setup[1].courses) > 100_000  # part of the cells, as are their centres
     verdict_of(*DRAWN[0])  # loads the kernels
     began = time.monotonic()
     verdict = check(*setup, Search(time_limit=time_limit))

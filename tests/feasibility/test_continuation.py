@@ -35,12 +35,13 @@ def test_tracks_end_over_the_next_centre(name):
     for cell in range(0, len(cells), 2):
         guesses = rng.uniform(*finite_limits(robot), (6, robot.n))
         starts = guesses[roomy(problem, work, cell, guesses) >= 0.0]
-        for other in cells.neighbours.of(cell):
+        entries = slice(*cells.neighbours.indptr[cell : cell + 2])
+        links = cells.neighbours.links[entries]
+        for other, course in zip(cells.neighbours.of(cell), links, strict=True):
+            begin, end = (0.0, 1.0) if cell < other else (1.0, 0.0)
             for start in starts[:2]:
                 q = start.copy()
-                rows = track(
-                    problem, work, problem.points[cell], problem.points[other], q, q, False, ways, 0
-                )
+                rows = track(problem, work, course, begin, end, q, q, False, ways, 0)
                 if rows < 0:
                     assert rows == -1
                     assert work.blame[0] > 0
@@ -60,7 +61,7 @@ def test_a_track_does_not_start_off_its_target():
     problem, work = problem_of(robot, cells, task), work_for(robot.n)
     ways = np.empty((500, robot.n))
     q = np.zeros(robot.n)
-    assert track(problem, work, problem.points[0], problem.points[1], q, q, False, ways, 0) == -1
+    assert track(problem, work, 0, 0.0, 1.0, q, q, False, ways, 0) == -1
 
 
 @pytest.mark.parametrize("name", QUESTIONS)

@@ -36,7 +36,7 @@ def tools(robot: Robot, q: Floats) -> tuple[Floats, Floats]:
 
 def local_frame(surface: Surface, u: Floats, v: Floats) -> tuple[Floats, Floats]:
     """Points and outward normals (k, 3) at parameters, in the surface's own frame."""
-    size, kind = surface.shape, surface.kind
+    size, kind = surface.lengths, surface.kind
     if kind == "plane":
         zero = np.zeros_like(u)
         return np.stack([u, v, zero], -1), np.stack([zero, zero, zero + 1.0], -1)
@@ -61,7 +61,7 @@ def feet(surface: Surface, points: Floats) -> tuple[Floats, Floats]:
         return np.arctan2(across, z), np.arctan2(y, x)
     v = z.copy()
     if surface.kind == "hyperboloid":
-        waist, flare = surface.shape
+        waist, flare = surface.lengths
         for _ in range(50):  # Newton on d/dv of the squared distance from the profile
             radius = waist * np.sqrt(1.0 + (v / flare) ** 2)
             rise = waist**2 * v / (flare**2 * radius)

@@ -1,0 +1,203 @@
+"""Where on the courses a given motion is, found from the motion alone, for its replay.
+
+Between two marked waypoints a walk either stays over one cell, or goes to a neighbouring cell along
+the course between the two. For each waypoint in between, the place on that course is taken that is
+nearest to the tool point. Any places would do for a proof; these show the least error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.target_courses import TargetCourses, target_courses
+from feasibility.task import Task
+from feasibility.verdict import Walk
+from surfaces import Cells
+
+Array = NDArray[np.float64]
+
+GUESSES = 4  # places tried first on each piece of a course
+REFINEMENTS = 4  # Newton steps from the best of them
+BLOCK = 4096  # waypoints at once, to bound the memory
+LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
+STAYS = -1  # in place of a course
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Following:
+    """A walk of m waypoints beside the targets that it follows."""
+
+    error: Array
+    """(m,) m, distance of each tool point from its target point."""
+    chord: Array
+    """(m,) |a - b| of tool axis and approach direction."""
+    bends: Array
+    """(m - 1, 2) largest second derivatives of target point and approach direction along each
+    segment, by the segment's own parameter in 0..1."""
+    strays: Array
+    """(m - 1, 2) how far target point and approach direction are from the surface's own."""
+    turning: float
+    """1/m, how fast the approach direction turns along the target surface, at most."""
+    fault: str
+    """What makes the walk no motion along courses; empty when nothing does."""
+
+
+def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> Following:
+    """Lay a walk beside the courses of its cells.
+
+    Args:
+        cells: the cells.
+        task: standoff.
+        walk: the motion, its marks within range.
+        points: (m, 3) its tool points, m.
+        axes: (m, 3) its approach axes.
+    """
+    m = len(points)
+    segments = np.zeros((max(m - 1, 0), 2))
+    nothing = Following(np.zeros(m), np.zeros(m), segments, segments, 0.0, "")
+    if m == 0:
+        return nothing
+    marks = np.flatnonzero(walk.cell >= 0)
+    if len(marks) == 0 or marks[0] != 0 or marks[-1] != m - 1:
+        return _faulty(nothing, "the motion begins or ends away from every cell's centre")
+    start, end = walk.cell[marks[:-1]], walk.cell[marks[1:]]
+    course = _courses(cells, start, end)
+    if (course < STAYS).any():
+        k = int(np.flatnonzero(course < STAYS)[0])
+        names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
+        return _faulty(nothing, f"the motion goes from cell {names}, which do not touch")
+    ways = target_courses(cells, task.standoff)
+
+    # Each segment, and each waypoint between marks, belongs to one stretch from mark to mark.
+    stretch = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
+    t0, t1 = np.zeros(m - 1), np.zeros(m - 1)
+    backwards = (start > end)[stretch]
+    places = np.zeros(m)
+    inner = np.flatnonzero(walk.cell < 0)
+    along = inner[course[stretch[inner]] != STAYS]
+    places[along] = _nearest(ways, course[stretch[along]], points[along])
+    t0, t1 = places[:-1].copy(), places[1:].copy()
+    t0[marks[:-1]] = backwards[marks[:-1]]
+    t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
+
+    aims = task.targets(cells)
+    target, approach = np.empty((m, 3)), np.empty((m, 3))
+    target[marks], approach[marks] = (
+        aims.points[walk.cell[marks]],
+        aims.approaches[walk.cell[marks]],
+    )
+    still = inner[course[stretch[inner]] == STAYS]
+    over = start[stretch[still]]
+    target[still], approach[still] = aims.points[over], aims.approaches[over]
+    target[along], approach[along] = _at(ways, course[stretch[along]], places[along])
+
+    bends, strays = np.zeros((m - 1, 2)), np.zeros((m - 1, 2))
+    moves = np.flatnonzero(course[stretch] != STAYS)
+    used, which = np.unique(course[stretch[moves]], return_inverse=True)
+    bends[moves] = _bends(ways, course[stretch[moves]], t0[moves], t1[moves])
+    found, fault = _strays(cells, task.standoff, used)
+    strays[moves] = found[which]
+    return Following(
+        error=np.linalg.norm(points - target, axis=1),
+        chord=np.linalg.norm(axes - approach, axis=1),
+        bends=bends,
+        strays=strays,
+        turning=ways.turning,
+        fault=fault,
+    )
+
+
+def _faulty(following: Following, fault: str) -> Following:
+    """The same with a fault."""
+    return replace(following, fault=fault)
+
+
+def _courses(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k,) the course between two cells; STAYS where they are one, less where there is none."""
+    pairs, count = cells.pairs, len(cells)
+    keys = pairs[:, 0] * count + pairs[:, 1]
+    asked = np.minimum(start, end) * count + np.maximum(start, end)
+    row = np.searchsorted(keys, asked)
+    known = row < len(keys)
+    known[known] = keys[row[known]] == asked[known]
+    return np.where(start == end, STAYS, np.where(known, row, STAYS - 1))
+
+
+def _pieces(
+    ways: TargetCourses, course: NDArray[np.int64], t: Array
+) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+    """Piece (k,) that holds at t, place s (k,) on it, and number of pieces (k,) of the course."""
+    count = np.diff(ways.first)[course]
+    piece = np.clip((t * count).astype(np.int64), 0, count - 1)
+    return ways.first[course] + piece, t * count - piece, count
+
+
+def _at(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    """Target points and approach directions (k, 3) at t."""
+    piece, s, _ = _pieces(ways, course, t)
+    values = np.einsum("kp,kpd->kd", np.vander(s, 4, increasing=True), ways.cubics[piece])
+    return values[:, :3], values[:, 3:]
+
+
+def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> Array:
+    """(k,) t of the place on each course that is nearest to a point."""
+    t = np.empty(len(course))
+    counts = np.diff(ways.first)[course]
+    for count in np.unique(counts):
+        alike = np.flatnonzero(counts == count)
+        grid = np.linspace(0.0, 1.0, GUESSES * count + 1)
+        for first in range(0, len(alike), BLOCK):
+            some = alike[first : first + BLOCK]
+            places, _ = _at(ways, np.repeat(course[some], len(grid)), np.tile(grid, len(some)))
+            away = places.reshape(len(some), len(grid), 3) - points[some, None]
+            t[some] = grid[np.argmin((away**2).sum(axis=2), axis=1)]
+    for _ in range(REFINEMENTS):
+        piece, s, count = _pieces(ways, course, t)
+        cubics = ways.cubics[piece, :, :3]
+        off = np.einsum("kp,kpd->kd", np.vander(s, 4, increasing=True), cubics) - points
+        slope = cubics[:, 1] + s[:, None] * (2.0 * cubics[:, 2] + 3.0 * s[:, None] * cubics[:, 3])
+        slope *= count[:, None]
+        square = (slope**2).sum(axis=1)
+        step = np.divide((off * slope).sum(axis=1), square, out=np.zeros(len(t)), where=square > 0)
+        widest = 1.0 / (GUESSES * count)
+        t = np.clip(t - np.clip(step, -widest, widest), 0.0, 1.0)
+    return t
+
+
+def _bends(ways: TargetCourses, course: NDArray[np.int64], t0: Array, t1: Array) -> Array:
+    """(k, 2) largest second derivatives along segments from t0 to t1, by their own parameter."""
+    low, _, _ = _pieces(ways, course, np.minimum(t0, t1))
+    high, _, _ = _pieces(ways, course, np.maximum(t0, t1))
+    most = ways.bends[low].copy()
+    for ahead in range(1, int((high - low).max(initial=0)) + 1):
+        piece = np.minimum(low + ahead, high)
+        most = np.maximum(most, ways.bends[piece])
+    with np.errstate(invalid="ignore"):  # a fold, and no way at all: NaN, which is refused
+        return np.asarray(most * ((t1 - t0) ** 2)[:, None])
+
+
+def _strays(cells: Cells, standoff: float, used: NDArray[np.int64]) -> tuple[Array, str]:
+    """How far target points and directions of courses are from the surface's, and a fault.
+
+    The surface itself is asked for its nearest points, at places that the fit of the courses did
+    not look at; what the courses say of themselves counts where it is more.
+    """
+    courses, surface = cells.courses, cells.surface
+    count = np.diff(courses.first)[used]
+    owner = np.repeat(np.arange(len(used)), count)
+    piece = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    t = ((piece[:, None] + LOOKS) / count[owner][:, None]).reshape(-1)
+    owner = np.repeat(owner, len(LOOKS))
+    foot, normal = courses.at(used[owner], t)
+    found = surface.closest(foot)
+    strays = courses.strays[used].copy()
+    np.maximum.at(strays[:, 0], owner, np.abs(found.height))
+    np.maximum.at(strays[:, 1], owner, np.linalg.norm(normal - found.normal, axis=1))
+    if not np.isfinite(strays).all():
+        return strays, "a course between two cells is not known"
+    if not found.inside.all():
+        return strays, "a course between two cells leaves the surface"
+    return np.column_stack([strays[:, 0] + standoff * strays[:, 1], strays[:, 1]]), ""
