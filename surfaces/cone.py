@@ -34,7 +34,7 @@ class Cone(SmoothPatch):
     """dr/dz, of either sign."""
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """Radius (m) and slope."""
         return (self.radius, self.slope)
 

@@ -38,7 +38,7 @@ class Ellipsoid(SmoothPatch):
     """m, along x, y and z."""
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """The semi-axes."""
         return self.semi_axes
 

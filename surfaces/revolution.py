@@ -37,7 +37,7 @@ class Revolution(SmoothPatch):
     profile: Profile
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """Radius and height at the profile's ends: r, z, r, z."""
         return (*self.profile.points[0].tolist(), *self.profile.points[-1].tolist())
 

@@ -5,16 +5,13 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.bounds import CurvatureSlices
-from surfaces.surface import Foot, Surface, SurfaceError
-
-if TYPE_CHECKING:
-    from surfaces.chart import Chart
+from surfaces.patch import Patch
+from surfaces.surface import Foot, points_of
 
 Array = NDArray[np.float64]
 
@@ -37,10 +34,8 @@ class LocalFeet(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class SmoothPatch(Surface):
-    """A patch that gives points, normals and feet in its own frame, without a compiled chart."""
-
-    code: ClassVar[int] = -1
+class SmoothPatch(Patch):
+    """A patch that gives points, normals and feet in its own frame."""
 
     @abstractmethod
     def local_feet(self, points: Array) -> LocalFeet:
@@ -56,9 +51,7 @@ class SmoothPatch(Surface):
         Raises:
             ValueError: `points` does not end in an axis of length 3.
         """
-        points = np.asarray(points, dtype=float)
-        if points.shape[-1:] != (3,):
-            raise ValueError(f"points must have shape (..., 3), got {points.shape}")
+        points = points_of(points)
         flat = points.reshape(-1, 3)
         finite = np.isfinite(flat).all(axis=1)
         values = np.full((len(flat), 6), np.nan)
@@ -83,22 +76,6 @@ class SmoothPatch(Surface):
         (u0, u1), (v0, v1) = self.u_range, self.v_range
         within = (u >= u0 - EDGE) & (u <= u1 + EDGE) & (v >= v0 - EDGE) & (v <= v1 + EDGE)
         return np.asarray(within)
-
-    def curvature_slices(self, margin: float) -> CurvatureSlices:
-        """No such bounds are known.
-
-        Raises:
-            SurfaceError: always.
-        """
-        raise SurfaceError(f"{self.kind}: no bounds on how fast its normals turn are known")
-
-    def chart(self, nu: int = 1, nv: int = 1) -> Chart:
-        """There is none.
-
-        Raises:
-            SurfaceError: always.
-        """
-        raise SurfaceError(f"{self.kind}: has no compiled chart")
 
 
 def wrapped(angle: Array, low: float, high: float) -> Array:

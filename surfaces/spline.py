@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,9 @@ from surfaces.spline_map import SplineMap
 from surfaces.surface import Side, SurfaceError
 from surfaces.tables import table
 
+if TYPE_CHECKING:
+    from surfaces.cells import Cells
+
 Array = NDArray[np.float64]
 
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -38,15 +41,10 @@ class SplinePatch(SmoothPatch):
     """
 
     kind: ClassVar[str] = "bspline"
-    units: ClassVar[tuple[str, str]] = ("1", "1")
+    units: ClassVar[tuple[str, str]] = ("", "")
     u_angle: ClassVar[bool] = False
     v_angle: ClassVar[bool] = False
     net: SplineMap
-
-    @property
-    def shape(self) -> tuple[float, ...]:
-        """No lengths; the net holds all."""
-        return ()
 
     @property
     def u_closed(self) -> bool:
@@ -70,6 +68,22 @@ class SplinePatch(SmoothPatch):
         """By quadrature of |S_u x S_v|, cut at the knots."""
         breaks = self.net.breaks(0), self.net.breaks(1)
         return rectangle_areas(self.net.element, u0, u1, v0, v1, *breaks)
+
+    def trace(
+        self, cells: Cells, pairs: NDArray[np.int64], t: NDArray[np.float64]
+    ) -> tuple[Array, Array]:
+        """See `Surface.trace`: straight in u and v, the shorter way round where they are closed."""
+        places = []
+        for name, (low, high), closed in (
+            ("u", self.u_range, self.u_closed),
+            ("v", self.v_range, self.v_closed),
+        ):
+            x = getattr(cells, name)
+            along = x[pairs[:, 1]] - x[pairs[:, 0]]
+            if closed:
+                along -= (high - low) * np.round(along / (high - low))
+            places.append(x[pairs[:, 0], None] + t * along[:, None])
+        return self.point(*places), self.normal(*places)
 
     def local_feet(self, points: Array) -> LocalFeet:
         """By search; see `surfaces.foot_search`."""
@@ -146,9 +160,11 @@ def _spline_map(
     """The spline, or None after a fault."""
     net = checked_points(points, faults)
     shape = (MOST_DEGREE + 1, MOST_DEGREE + 1) if net is None else net.shape[:2]
+    before = len(faults)
     p, q = checked_degree(degree, shape, faults)
+    fits = net is not None and len(faults) == before
     checked = None if net is None else checked_weights(weights, shape, faults)
-    if net is None or faults:
+    if net is None or not fits:
         return None
     if knots is None:
         knots = (None, None)

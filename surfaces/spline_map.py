@@ -147,7 +147,10 @@ class SplineMap:
         if np.abs(point[0] - point[1]).max() > _JOINED * self.extent:
             return False
         cross = np.cross(*self._tangents(ends))
-        normal = cross / np.linalg.norm(cross, axis=-1, keepdims=True)
+        length = np.linalg.norm(cross, axis=-1, keepdims=True)
+        if not (length > 0.0).all():
+            return False
+        normal = cross / length
         return bool(np.linalg.norm(normal[0] - normal[1], axis=-1).max() <= _SMOOTH)
 
     def _wrapped(self, x: Array) -> Array:

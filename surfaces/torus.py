@@ -35,7 +35,7 @@ class Torus(SmoothPatch):
     """m, radius of the tube, less than `ring`."""
 
     @property
-    def shape(self) -> tuple[float, ...]:
+    def lengths(self) -> tuple[float, ...]:
         """Ring and tube."""
         return (self.ring, self.tube)
 

@@ -48,8 +48,6 @@ class Searched(SmoothPatch):
     jet: object
     sign: float
 
-    shape = ()
-
     def local_point(self, u, v):
         x = np.stack([u, v], -1)
         return self.jet(x.reshape(-1, 2)).point.reshape(*u.shape, 3)

@@ -34,7 +34,7 @@ PATCHES = {
 def size_of(surface):
     if surface.kind == "cone":
         return max(surface.radius, *(abs(z) for z in surface.v_range))
-    return max(surface.shape)
+    return max(surface.lengths)
 
 
 def whole_ranges(surface):
