@@ -6,15 +6,19 @@ import time
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.division import Division, Plan
 from feasibility.search import Search
 from feasibility.task import Task
+from feasibility.verdict import Cause
 from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
     from feasibility.complete import Explorer, Progress
+
+MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
 
 def divide(
@@ -60,7 +64,6 @@ def divide(
 
     called = time.monotonic()
     with compiling_notice():
-        from feasibility.causes import causes_of, diagnose
         from feasibility.complete import Explorer, OutOfTime, explore, problem_of
         from feasibility.gathering import gather
         from feasibility.plans import plans
@@ -81,9 +84,9 @@ def divide(
     blocked = _no_room(explorer) if len(cells) else ""
     nothing = Plan((), (), 0)
     fewest, connected = (nothing, nothing) if blocked else plans(explorer, task)
-    known = {cause.cell: cause for cause in causes_of(explorer)}
-    missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0).tolist()
-    causes = tuple(known.get(cell) or diagnose(explorer, cell) for cell in missing)
+    folded = bool(_folds(explorer).any())
+    missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
+    causes = _causes(explorer, missing, ended)
     done = time.monotonic()
     return Division(
         robot=robot,
@@ -93,8 +96,9 @@ def divide(
         fewest=fewest,
         connected=connected,
         left_out=causes,
-        ended=ended and not blocked,
-        message=blocked or _message(fewest, connected, len(causes), len(cells), ended),
+        unsettled=np.setdiff1d(missing, [cause.cell for cause in causes]),
+        ended=ended and not blocked and not folded,
+        message=blocked or _message(fewest, connected, len(missing), len(cells), ended, folded),
         timing={
             "load_s": began - called,
             "search_s": searched - began,
@@ -111,22 +115,50 @@ def divide(
     )
 
 
+def _causes(explorer: Explorer, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
+    """Why cells are in no patch; of a search that did not end, only what is proved."""
+    from feasibility.causes import causes_of, diagnose, disconnected
+    from feasibility.proof import Ruling
+
+    if not ended:
+        proved = [c for c in missing.tolist() if explorer.rulings.get(c) is Ruling.PROVED]
+        return tuple(diagnose(explorer, cell) for cell in proved[:MOST_EXPLAINED])
+    known = {cause.cell: cause for cause in causes_of(explorer)}
+    return tuple(
+        known.get(c) or (disconnected if explorer.reached[c] else diagnose)(explorer, c)
+        for c in missing.tolist()
+    )
+
+
 def _no_room(explorer: Explorer) -> str:
     """Why no motion at all can be certified; empty where one can."""
-    if not explorer.problem.rim > 0.0:
+    problem = explorer.problem
+    if not problem.rim > 0.0:
         return (
             "A cone of 0 degrees leaves a motion no room between samples, so none can be "
             "certified; allow a small angle."
         )
-    if not np.isfinite(explorer.problem.curvature):
+    if len(problem.bends) and _folds(explorer).all():
         return (
-            "The offset surface folds: the standoff is as large as the surface's radius of "
-            "curvature, so no motion can be certified; use a smaller standoff."
+            "The offset surface folds: the standoff reaches the surface's radius of curvature on "
+            "its hollow side, so no motion can be certified; use a smaller standoff."
+        )
+    if not (problem.leash > 0.0 and problem.inner_rim > 0.0):
+        return (
+            "The surface is rougher than the task allows, so no motion can be certified; use a "
+            "finer or smoother mesh, a larger tolerance or a wider cone."
         )
     return ""
 
 
-def _message(fewest: Plan, connected: Plan, left_out: int, total: int, ended: bool) -> str:
+def _folds(explorer: Explorer) -> NDArray[np.bool_]:
+    """Ways from cell to cell on which the offset surface folds, so that no motion follows them."""
+    return np.asarray(np.isinf(explorer.problem.bends).any(axis=1), dtype=bool)
+
+
+def _message(
+    fewest: Plan, connected: Plan, left_out: int, total: int, ended: bool, folded: bool
+) -> str:
     """One or two sentences: what was found, and on what it rests."""
     refused = [p.refusal for p in (*fewest.patches, *connected.patches) if not p.accepted]
     if refused:
@@ -154,6 +186,11 @@ def _message(fewest: Plan, connected: Plan, left_out: int, total: int, ended: bo
         most = len(connected.patches)
         least = "" if connected.optimal else f" (at least {connected.bound})"
         sentence += f" Patches that are each connected on the surface: {most}{least}."
+    if folded:
+        sentence += (
+            " Where the standoff reaches the surface's radius of curvature its offset folds and no "
+            "motion can be certified: these are the fewest known."
+        )
     if not ended:
         sentence += " The time limit ran out: these are the fewest known."
     return sentence

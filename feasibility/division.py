@@ -89,14 +89,23 @@ class Division:
     where that costs no patch."""
     left_out: tuple[Cause, ...]
     """Cells that are in no patch, in order of index, and why."""
+    unsettled: NDArray[np.int64]
+    """Cells that are in no patch because the time limit ran out before anything could be said."""
     ended: bool
-    """Did the search run to its end? Otherwise the patches are the fewest known."""
+    """Did the search run to its end, free to move everywhere? Otherwise the patches are the fewest
+    known: a time limit struck, or no motion can be certified over a part of the surface."""
     message: str
     """What was found, and on what it rests."""
     timing: Mapping[str, float] = field(default_factory=dict)
     """Seconds: load_s, search_s, divide_s, total_s."""
     statistics: Mapping[str, Any] = field(default_factory=dict)
     """Counts of work done."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the cells."""
+        cells = np.array(self.unsettled, dtype=np.int64)
+        cells.flags.writeable = False
+        object.__setattr__(self, "unsettled", cells)
 
     @property
     def patches(self) -> tuple[SubPatch, ...]:
@@ -119,12 +128,19 @@ class Division:
         return self.ended and self.fewest.accepted and self.connected.accepted
 
     @property
+    def n_covered(self) -> int:
+        """Number of cells that are in a patch whose walk is accepted."""
+        return sum(len(patch.cells) for patch in self.patches if patch.accepted)
+
+    @property
     def whole(self) -> bool:
         """Is every cell in a patch whose walk is accepted?"""
-        covered = sum(len(patch.cells) for patch in self.patches)
-        return self.fewest.accepted and covered == len(self.cells)
+        return self.n_covered == len(self.cells)
 
     def __repr__(self) -> str:
         """The division in one line."""
-        covered = sum(len(patch.cells) for patch in self.patches)
-        return f"{len(self.patches)} patches, {covered} of {len(self.cells)} cells. {self.message}"
+        number = len(self.patches)
+        return (
+            f"{number} patch{'' if number == 1 else 'es'}, {self.n_covered} of {len(self.cells)} "
+            f"cells. {self.message}"
+        )

@@ -12,7 +12,7 @@ from feasibility.connected_cover import connected_cover
 from feasibility.labels import Bools, Ints, Labels, pieces_of
 from feasibility.set_cover import set_cover
 
-TIME_LIMIT = 20.0  # [s]
+TIME_LIMIT = 10.0  # [s]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -102,8 +102,11 @@ def fewest_patches(
     if free.pieces > few.pieces:  # out of time
         free = Labels(few.label, few.pieces, free.bound)
     connected = _connected(free, pairs, max(free.bound, chosen.bound))
-    if len(connected) <= len(rows):
+    used = len(np.unique(connected.rows))
+    if used == len(connected) <= len(rows):
         return Cover(connected, connected, left_out)
+    if used < len(rows):  # the set cover ran out of time
+        few = free
     fewest = _partition(few.label, few.label, few.pieces, chosen.bound)
     return Cover(fewest, connected, left_out)
 
