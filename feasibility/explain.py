@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 SHARE = 27  # verdicts' worth of evaluations that all thresholds together may take
 LEAST = 100_000  # evaluations that they may always take
+GUESSES = 24  # configurations from which other covering motions may begin
+POSTURES = 8  # of these, as far apart as can be
 PATIENCE = 20.0  # times the time limit of the verdict
 
 Progress = Callable[[int, int | None, str], None]
@@ -122,8 +124,10 @@ def explain(
     here = Finding(0.0, verdict.answer, verdict.evidence, verdict.message)
     angle = np.inf if verdict.certificate is None else verdict.certificate.max_angle
     start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
-    dropped = None
-    if not verdict.feasible:
+    dropped, motions = None, [start]
+    if verdict.feasible:
+        motions += prober.others(GUESSES, POSTURES)
+    else:
         rest = prober.attempt(setup, q, 2 * cost, deep=False, needed=verdict.covered)
         dropped = drop(verdict, rest)
     thresholds: list[Threshold] = []
@@ -133,7 +137,7 @@ def explain(
         fair = (total - prober.spent) // (len(asked) - done)
         turning = Turning(prober, quantity, cost, prober.spent + fair)
         if verdict.feasible:
-            thresholds.append(turning.tighten(start))
+            thresholds.append(turning.tighten(motions))
         else:
             thresholds.append(turning.widen(replace(here, value=quantity.given), q))
     return Explanation(

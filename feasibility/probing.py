@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from feasibility.certificate import replay
 from feasibility.complete import explore
 from feasibility.explorer import Explorer, OutOfTime
+from feasibility.fibre import roomy
 from feasibility.kernels import kernel
 from feasibility.newton import land
 from feasibility.problem import Problem, problem_of, work_for
@@ -28,6 +29,7 @@ from feasibility.walk import covering_walk
 
 FOLLOW_STEPS = np.int64(15)  # Newton steps that put a neighbour's configuration onto the fibre
 PLANTS = 2  # missed cells that an attempt starts from, besides the first
+SAME = 0.2  # [rad] or [m], configurations nearer than that are taken for one
 NO_CELL = -1
 
 
@@ -59,9 +61,14 @@ class Rationed(Explorer):
         Raises:
             OutOfTime: it is, or the deadline has passed.
         """
-        Explorer.tick(self, text)
+        super().tick(text)
         if self.work.counts[0] > self.most:
             raise OutOfTime
+
+    def plant(self, cell: int, guesses: NDArray[np.float64]) -> int:
+        """Plant, unless the ration is used up; see `Explorer.plant`."""
+        self.tick("looking for configurations")
+        return super().plant(cell, guesses)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -221,11 +228,30 @@ class Prober:
             detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
             return Trial(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
         best = f"the best motion covers {int(explorer.covered.sum())} of {len(cells)} cells"
-        if ended and explorer.problem.rim > 0.0 and not folds(setup):
+        if ended and certifiable(explorer.problem):
             detail = f"the search ended without a covering motion; {best}"
             return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
         detail = f"not found with {int(explorer.work.counts[0])} evaluations of the arm; {best}"
         return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+
+    def others(self, guesses: int, most: int) -> list[Trial]:
+        """Covering motions of the case as it stands, from postures far from each other.
+
+        Args:
+            guesses: random configurations that are put over a cell in the middle.
+            most: searches.
+        """
+        robot, cells, _ = self.setup
+        explorer = Explorer(robot, cells, self.problem, self.seed + 1)
+        tried = explorer.guesses(guesses)
+        room = roomy(self.problem, self.work, cells.middle, tried)
+        order = np.argsort(-room, kind="stable")
+        trials = []
+        for q in apart(tried[order[room[order] >= 0.0]], most):
+            seeds = np.full((len(cells), robot.n), np.nan)
+            seeds[cells.middle] = q
+            trials.append(self.attempt(self.setup, seeds, np.inf, deep=False))
+        return [trial for trial in trials if trial.feasible]
 
     def _plant(self, explorer: Explorer, seeds: NDArray[np.float64]) -> None:
         """Plant seeds until one component covers every cell, hard cells first."""
@@ -262,7 +288,22 @@ def configurations(explorer: Explorer) -> NDArray[np.float64]:
     return q
 
 
-def folds(setup: Setup) -> bool:
-    """Does the offset surface fold somewhere, so that no motion can be certified there?"""
-    surface, task = setup.cells.surface, setup.task
-    return not np.isfinite(surface.bounds(surface.side_sign * task.standoff).curvature)
+def certifiable(problem: Problem) -> bool:
+    """Could a motion be certified everywhere, if there were one?
+
+    Not in a cone of 0 degrees, where the offset surface folds, or where the surface is known less
+    well than the task asks for.
+    """
+    smooth = bool(np.isfinite(problem.bends).all())
+    return smooth and problem.rim > 0.0 and problem.leash > 0.0 and problem.inner_rim > 0.0
+
+
+def apart(q: NDArray[np.float64], most: int) -> NDArray[np.float64]:
+    """Up to `most` of the configurations (k, n), each as far as can be from those before it."""
+    chosen = [0] if len(q) else []
+    while chosen and len(chosen) < min(most, len(q)):
+        distance = np.linalg.norm(q[:, None] - q[chosen], axis=2).min(axis=1)
+        if distance.max() < SAME:
+            break
+        chosen.append(int(distance.argmax()))
+    return q[chosen]

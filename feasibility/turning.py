@@ -8,6 +8,7 @@ a proof; what the proof finds instead is a configuration of another branch, whic
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -61,9 +62,15 @@ class Turning:
 
     # -- a case that is feasible as it stands ----------------------------------------------------
 
-    def tighten(self, here: Trial) -> Threshold:
-        """How far the quantity can go before the case is no longer feasible."""
-        good, other = self._outwards(Side(0, here))
+    def tighten(self, here: Sequence[Trial]) -> Threshold:
+        """How far the quantity can go before the case is no longer feasible.
+
+        Args:
+            here: covering motions of the case as it stands, at least one.
+        """
+        end = self.quantity.last + 1
+        best = max((self._slid(Side(0, trial), end) for trial in here), key=lambda side: side.k)
+        good, other = self._outwards(best)
         return Threshold(self.quantity, self._finding(good), other)
 
     def _outwards(self, here: Side) -> tuple[Side, Finding | None]:
@@ -218,18 +225,16 @@ class Turning:
 
     def _beyond(self, edge: Edge, far: int) -> Side | Finding:
         """Past the last feasible value: a proof, or a motion after all, or nothing found."""
-        good, way = edge.good, 1 if far > edge.good.k else -1
-        seeds, k = good.trial.q.copy(), edge.bad
+        k, seeds = edge.bad, np.full_like(edge.good.trial.q, np.nan)
         if edge.failed != NO_CELL:
             proof, q = self._proof_beyond(edge, far)
             if proof is not None:
                 return proof
-            k = good.k + way
-            if q is not None:  # another branch reaches this cell
+            k = edge.good.k + (1 if far > edge.good.k else -1)
+            if q is not None:
                 seeds[edge.failed] = q
-        if edge.other is not None and self.prober.spent >= self.stop:
-            return edge.other
-        trial = self._search(k, seeds, deep=self.prober.spent < self.stop)
+        # This motion goes no further. Another one may, so the search begins afresh.
+        trial = self._search(k, seeds, deep=True)
         return Side(k, trial) if trial.feasible else self._finding(Side(k, trial))
 
     def _proof_beyond(
