@@ -132,7 +132,7 @@ def _lloyd(
     """The most even labels of some rounds, all lengths in cells; `seeds` (N,) is changed."""
     labels = np.empty(len(area), dtype=np.int64)
     best, least = labels, math.inf
-    anchors, offsets, areas = centre[seeds], np.zeros(len(seeds)), np.empty(len(seeds))
+    anchors, offsets = centre[seeds], np.zeros(len(seeds))
     for done in range(_MOVING + _EVENING):
         flood(graph.across, step, centre, seeds, anchors, offsets, labels)
         if done < _MOVING:

@@ -95,3 +95,12 @@ def pieces(across: NDArray[np.int64]) -> NDArray[np.int64]:
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     return rank[inverse]
+
+
+def sum_by(
+    labels: NDArray[np.int64], values: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """(count, ...) sums of the rows of `values` (F,) or (F, C) that have the same label."""
+    columns = values.reshape(len(values), -1).T
+    sums = [np.bincount(labels, weights=column, minlength=count) for column in columns]
+    return np.stack(sums, axis=1).astype(float).reshape(count, *values.shape[1:])
