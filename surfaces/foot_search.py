@@ -16,7 +16,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 
@@ -57,6 +56,8 @@ class FootSearch:
             lines: for each parameter the values to sample at, rising from end to end of the box.
             closed: for each parameter whether its two ends are one place.
         """
+        from scipy.spatial import cKDTree  # takes longer to load than many a search
+
         self._point, self._jet = point, jet
         self._low = np.array([line[0] for line in lines])
         self._high = np.array([line[-1] for line in lines])

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
-from scipy.spatial import cKDTree
 
 from surfaces.foot_search import FootSearch, Jet
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
@@ -58,6 +60,8 @@ class Profile:
 
     @cached_property
     def _splines(self) -> tuple[CubicSpline, CubicSpline]:
+        from scipy.interpolate import CubicSpline  # takes longer to load than many a search
+
         r_ends = tuple((2, 0.0) if pole else "not-a-knot" for pole in self.poles)
         z_ends = tuple((1, 0.0) if pole else "not-a-knot" for pole in self.poles)
         r, z = self.points.T
@@ -161,6 +165,8 @@ class Profile:
 
     def _crossing_fault(self) -> str:
         """Where the curve crosses itself, looked for on the chords between its samples."""
+        from scipy.spatial import cKDTree
+
         points = self.at(self.fractions(_SAMPLES))
         a, b = points[:-1], points[1:]
         tree = cKDTree((a + b) / 2.0)

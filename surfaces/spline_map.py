@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import NdBSpline
 
 from surfaces.foot_search import FootSearch, Jet
+
+if TYPE_CHECKING:
+    from scipy.interpolate import NdBSpline
 
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
@@ -57,6 +60,8 @@ class SplineMap:
     @cached_property
     def _spline(self) -> NdBSpline:
         """In homogeneous coordinates (w x, w y, w z, w) where there are weights."""
+        from scipy.interpolate import NdBSpline  # takes longer to load than many a search
+
         net = self.points
         if self.weights is not None:
             w = self.weights[:, :, None]
