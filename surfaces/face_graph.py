@@ -101,6 +101,6 @@ def sum_by(
     labels: NDArray[np.int64], values: NDArray[np.float64], count: int
 ) -> NDArray[np.float64]:
     """(count, ...) sums of the rows of `values` (F,) or (F, C) that have the same label."""
-    columns = values.reshape(len(values), -1).T
-    sums = [np.bincount(labels, weights=column, minlength=count) for column in columns]
-    return np.stack(sums, axis=1).astype(float).reshape(count, *values.shape[1:])
+    if values.ndim == 1:
+        return np.bincount(labels, weights=values, minlength=count).astype(float)
+    return np.column_stack([sum_by(labels, column, count) for column in values.T])
