@@ -169,7 +169,12 @@ def _fit(cells: Cells, pairs: NDArray[np.int64], count: int, parts: int) -> tupl
     values[-1] = np.hstack([cells.centres[pairs[:, 1]], cells.normals[pairs[:, 1]]])
     fit, evaluate = _maps(count, parts)
     cubics = fit @ values[::2].reshape(parts + 1, -1)
-    off = (evaluate @ cubics).reshape(values.shape) - values
+    off = (evaluate @ cubics).reshape(values.shape)
+    if cells.surface.grain:
+        # Least squares also cut corners along the facets, which takes nothing off the surface.
+        places, normals = cells.surface.beneath(cells, pairs, off[..., :3].swapaxes(0, 1))
+        values = np.concatenate([places, normals], axis=2).swapaxes(0, 1)
+    off = off - values
     stray = [np.sqrt((off[..., half] ** 2).sum(axis=2)).max(axis=0) for half in HALVES]
     # The surface's own normal is the one at the nearest point, which is not the sample.
     moves = [np.sqrt((np.diff(values[..., half], axis=0) ** 2).sum(axis=2)) for half in HALVES]

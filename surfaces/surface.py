@@ -108,6 +108,22 @@ class Surface(ABC):
             Points (m, k, 3) m and outward unit normals (m, k, 3); both continuous in t.
         """
 
+    def beneath(
+        self, cells: Cells, pairs: NDArray[np.int64], points: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """The places of the surface nearest to points near the way between two cells.
+
+        Args:
+            cells: cells of this surface.
+            pairs: (m, 2) rows of `cells.pairs`.
+            points: (m, k, 3) m.
+
+        Returns:
+            Places (m, k, 3) m and outward unit normals (m, k, 3).
+        """
+        foot = self.closest(points)
+        return points - foot.height[..., None] * foot.normal, foot.normal
+
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
         """The same surface after the rigid motion x -> rotation x + translation."""
         turn = np.asarray(rotation, dtype=float)
