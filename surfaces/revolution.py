@@ -24,10 +24,10 @@ _ORIGIN = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Revolution(SmoothPatch):
-    """u is the chord length along the profile, v the angle about z.
+    """u is the chord length along the profile, v the angle about z; outward is along S_u x S_v.
 
-    Outward is to the right of the profile as it is walked, with r to the right and z up: a profile
-    listed upwards has its outward side away from the axis.
+    So outward is to the left of the profile as u walks it, with r to the right and z up: away from
+    the axis where u runs down, as a sphere's polar angle does.
     """
 
     kind: ClassVar[str] = "revolution"
@@ -38,8 +38,8 @@ class Revolution(SmoothPatch):
 
     @property
     def lengths(self) -> tuple[float, ...]:
-        """Radius and height at the profile's ends: r, z, r, z."""
-        return (*self.profile.points[0].tolist(), *self.profile.points[-1].tolist())
+        """Radius and height at the profile's ends, as they were listed: r, z, r, z."""
+        return (*self.profile.points[-1].tolist(), *self.profile.points[0].tolist())
 
     @property
     def poles(self) -> tuple[bool, bool]:
@@ -56,7 +56,7 @@ class Revolution(SmoothPatch):
         return np.stack([r * np.cos(v), r * np.sin(v), z], axis=-1)
 
     def local_normal(self, u: Array, v: Array) -> Array:
-        """(z' cos v, z' sin v, -r') over its length."""
+        """(-z' cos v, -z' sin v, r') over its length."""
         out, up = _normal(self.profile, u)
         return np.stack([out * np.cos(v), out * np.sin(v), up], axis=-1)
 
@@ -86,7 +86,7 @@ def _normal(profile: Profile, u: Array) -> tuple[Array, Array]:
     """The part of the unit normal away from the axis, and along it."""
     dr, dz = np.moveaxis(profile.at(u, 1), -1, 0)
     speed = np.hypot(dr, dz)
-    return dz / speed, -dr / speed
+    return -dz / speed, dr / speed
 
 
 def revolution(
@@ -103,8 +103,9 @@ def revolution(
     between neighbouring points.
 
     Args:
-        profile: (n, 2) m, points (r, z), 2 to 1000 of them, r > 0 but at the ends. Listed upwards,
-            the outward side is away from the axis.
+        profile: (n, 2) m, points (r, z), 2 to 1000 of them, r > 0 but at the ends. The outward side
+            is to the right as the list is walked, with r to the right and z up: away from the axis
+            if the points are listed upwards. The parameter u runs from the last point to the first.
         angle_deg: (low, high) angle about z, at most a full turn apart.
         side: 'inside' or 'outside', where the tool works.
         position: (3,) m, origin of the surface's frame in the root frame.
@@ -129,7 +130,7 @@ def revolution(
     made = Revolution(
         u_range=(0.0, curve.length),
         v_range=check.angles("angle_deg", angle_deg),
-        profile=curve,
+        profile=Profile(curve.points[::-1]),
         side=check.side(side),
         position=check.vector("position", position, "metres"),
         rotation=check.rotation("rpy_deg", rpy_deg),

@@ -81,7 +81,9 @@ def test_normals_are_unit_outward_and_normal_to_finite_differences(shape):
     u, v = random_parameters(shape, 2000)
     n = shape.normal(u, v)
     assert np.abs(np.linalg.norm(n, axis=1) - 1).max() < 1e-14
-    for tangent in tangents(shape, u, v):
+    du, dv = tangents(shape, u, v)
+    assert np.einsum("ij,ij->i", np.cross(du, dv), n).min() > 0  # neighbours go clockwise outside
+    for tangent in (du, dv):
         assert np.abs(np.einsum("ij,ij->i", tangent, n)).max() < 1e-9
     away = (shape.point(u, v) - shape.position) @ shape.rotation
     if shape.kind == "cone":

@@ -41,8 +41,8 @@ def shape(request):
 
 
 def outward(surface, u):
-    """Away from the axis, the profile walked upwards."""
-    return surface.profile.at(u, 1)[:, 1]
+    """Away from the axis where u runs down, as the points are listed upwards."""
+    return -surface.profile.at(u, 1)[:, 1]
 
 
 def test_the_profile_goes_through_its_points_and_is_twice_differentiable(shape):
@@ -58,6 +58,14 @@ def test_the_profile_goes_through_its_points_and_is_twice_differentiable(shape):
         if pole:
             assert profile.at(np.array(end), 1)[1] == pytest.approx(0.0, abs=1e-14)
             assert profile.at(np.array(end), 2)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_the_right_of_a_list_walked_upwards_is_away_from_the_axis():
+    up, down = (revolution(points, (0, 360)) for points in (VASE, VASE[::-1]))
+    assert up.point(0.0, 0.0) == pytest.approx(np.array([0.25, 0.0, 0.7]))
+    assert up.closest([1.0, 0.0, 0.2]).height > 0.5
+    assert down.closest([1.0, 0.0, 0.2]).height < -0.5
+    assert up.lengths == (0.2, 0.0, 0.25, 0.7)
 
 
 def test_points_are_the_profile_turned(shape):
@@ -78,7 +86,9 @@ def test_normals_are_unit_and_normal_to_finite_differences(shape):
     v = v[: len(u)]
     n = shape.normal(u, v)
     assert np.abs(np.linalg.norm(n, axis=1) - 1).max() < 1e-14
-    for tangent in tangents(shape, u, v, step):
+    du, dv = tangents(shape, u, v, step)
+    assert np.einsum("ij,ij->i", np.cross(du, dv), n).min() > 0
+    for tangent in (du, dv):
         assert np.abs(np.einsum("ij,ij->i", tangent, n)).max() < 1e-9
     away = (shape.point(u, v) - shape.position) @ shape.rotation * [1, 1, 0]
     assert (np.einsum("ij,ij->i", away, n @ shape.rotation) * outward(shape, u) >= 0).all()
@@ -114,16 +124,16 @@ def test_no_point_of_the_whole_turn_is_nearer_than_the_foot(shape):
 
 def test_poles_have_a_normal_along_the_axis_and_join_their_row():
     bowl = PATCHES["bowl"]
-    assert bowl.poles == (True, False)
+    assert bowl.poles == (False, True)
     assert PATCHES["ball"].poles == (True, True)
     assert PATCHES["shield"].poles == (False, False)
-    down = bowl.normal(0.0, np.linspace(-3, 3, 7))
+    down = bowl.normal(bowl.profile.length, np.linspace(-3, 3, 7))
     assert down == pytest.approx(np.tile(-bowl.rotation[:, 2], (7, 1)), abs=1e-14)
     foot = PATCHES["shield"].closest([0.0, 0.0, -0.5])  # on the axis every azimuth is one
     assert foot.inside
     assert foot.height == pytest.approx(-0.1)  # listed downwards: outward is towards the axis
     cells = bowl.cells(4, 8)
-    assert np.diff(cells.neighbours.indptr)[:8].min() == 8
+    assert np.diff(cells.neighbours.indptr)[-8:].min() == 8
     foot = bowl.closest(cells.centres)
     assert foot.inside.all()
     assert np.abs(foot.height).max() < 1e-14
