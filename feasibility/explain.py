@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
 SHARE = 27  # verdicts' worth of evaluations that all thresholds together may take
 LEAST = 100_000  # evaluations that they may always take
-GUESSES = 24  # configurations from which other covering motions may begin
-POSTURES = 8  # of these, as far apart as can be
+GUESSES = 64  # configurations from which other covering motions may begin
+POSTURES = 6  # of these, as far apart as can be
 PATIENCE = 20.0  # times the time limit of the verdict
 
 Progress = Callable[[int, int | None, str], None]
@@ -122,14 +122,15 @@ def explain(
     total = max(SHARE * cost, LEAST)
     q = known_configurations(verdict)
     here = Finding(0.0, verdict.answer, verdict.evidence, verdict.message)
-    angle = np.inf if verdict.certificate is None else verdict.certificate.max_angle
+    angle = None if verdict.certificate is None else verdict.certificate.max_angle
     start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
     dropped, motions = None, [start]
     if verdict.feasible:
         motions += prober.others(GUESSES, POSTURES)
     else:
-        rest = prober.attempt(setup, q, 2 * cost, deep=False, needed=verdict.covered)
-        dropped = drop(verdict, rest)
+        covered = verdict.covered
+        rest = prober.attempt(prober.problem, q, 2 * cost, deep=False, needed=covered)
+        dropped = drop(verdict, prober.confirmed(setup, rest, covered))
     thresholds: list[Threshold] = []
     for done, quantity in enumerate(asked):
         if time.monotonic() > deadline:

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from feasibility.explorer import Explorer, OutOfTime
 from feasibility.fibre import roomy
 from feasibility.kernels import kernel
 from feasibility.newton import land
-from feasibility.problem import Problem, problem_of, work_for
+from feasibility.problem import HERE, Problem, place, problem_of, work_for
 from feasibility.proof import Ruling, root_box, rule
 from feasibility.quantities import Kind, Quantity, Setup
 from feasibility.roadmap import NODES
@@ -29,7 +29,7 @@ from feasibility.walk import covering_walk
 
 FOLLOW_STEPS = np.int64(15)  # Newton steps that put a neighbour's configuration onto the fibre
 PLANTS = 2  # missed cells that an attempt starts from, besides the first
-SAME = 0.2  # [rad] or [m], configurations nearer than that are taken for one
+SAME = 0.05  # [1], postures nearer than that are taken for one, see `Prober._posture`
 NO_CELL = -1
 
 
@@ -73,7 +73,7 @@ class Rationed(Explorer):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trial:
-    """What an attempt came to."""
+    """What a search came to."""
 
     answer: Answer
     evidence: Evidence
@@ -81,14 +81,15 @@ class Trial:
     q: NDArray[np.float64]
     """(N, n) a configuration of the best component over each cell; NaN where it has none."""
     walk: Walk | None
-    """The covering motion that the replay accepted; None unless feasible."""
-    angle: float = np.inf
-    """rad, bound of the replay on its angle between tool axis and approach direction."""
+    """A covering motion; None unless feasible."""
+    angle: float | None = None
+    """rad, the replay's bound on the angle between tool axis and approach direction along the walk;
+    None until the replay has seen it. Until then the trial leads on, and is not told to anyone."""
 
     @property
-    def feasible(self) -> bool:
-        """True with a covering motion that the replay accepted."""
-        return self.answer is Answer.FEASIBLE
+    def found(self) -> bool:
+        """True with a covering motion."""
+        return self.walk is not None
 
 
 class Prober:
@@ -102,6 +103,7 @@ class Prober:
         self.seed = seed
         self.deadline = deadline
         self.problem = problem_of(*setup)
+        self._latest = ("", 0), self.problem
         self.work = work_for(setup.robot.n)
         self.spent_before = 0
         self.tick = tick or (lambda: None)
@@ -114,15 +116,16 @@ class Prober:
         return self.spent_before + int(self.work.counts[0])
 
     def problem_at(self, quantity: Quantity, k: int) -> Problem:
-        """The problem with a quantity k steps from where it stands, as `follow` and `rule` need it.
-
-        Only the cell centres are right, not the ways between them, where a surface is shifted.
-        """
+        """The problem with a quantity k steps from where it stands, without making it anew."""
         if quantity.kind in (Kind.CONE, Kind.STANDOFF):
-            return problem_of(*quantity.applied(self.setup, k))
+            if self._latest[0] != (quantity.name, k):
+                self._latest = (quantity.name, k), problem_of(*quantity.applied(self.setup, k))
+            return self._latest[1]
         if quantity.kind is Kind.SHIFT:
             shift = quantity.value(k) * np.array(quantity.axis)
-            return self.problem._replace(points=self.problem.points + shift)
+            targets = self.problem.targets.copy()
+            targets[:, 0, :3] += shift  # the constant coefficients of the target points
+            return self.problem._replace(points=self.problem.points + shift, targets=targets)
         robot = quantity.applied(self.setup, k).robot
         return self.problem._replace(lower=np.array(robot.lower), upper=np.array(robot.upper))
 
@@ -177,7 +180,7 @@ class Prober:
 
     def attempt(
         self,
-        setup: Setup,
+        problem: Problem,
         seeds: NDArray[np.float64],
         most: float,
         deep: bool,
@@ -186,22 +189,21 @@ class Prober:
         """Search for a covering motion, from known configurations first.
 
         Args:
-            setup: the case.
+            problem: see `problem_at`.
             seeds: (N, n) configurations to start from, one for each cell; NaN where there is none.
             most: evaluations of the arm after which the search is stopped.
             deep: go on with the whole search where the seeds do not lead to a covering motion.
             needed: (N,) cells that are to be covered; all by default.
 
         Returns:
-            What it came to: feasible with a replayed witness; infeasible where the whole search
-            ended in time; undecided otherwise.
+            What it came to: feasible with a motion that is still to be `confirmed`; infeasible
+            where the whole search ended in time; undecided otherwise.
         """
         self.tick()
-        robot, cells, task = setup
+        robot, cells, _ = self.setup
+        robot = robot.with_limits(np.column_stack([problem.lower, problem.upper]))
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
-        explorer = Rationed(
-            robot, cells, problem_of(*setup), self.seed, deadline=self.deadline, most=most
-        )
+        explorer = Rationed(robot, cells, problem, self.seed, deadline=self.deadline, most=most)
         ended = False
         try:
             self._plant(explorer, seeds)
@@ -215,24 +217,35 @@ class Prober:
         q = configurations(explorer)
         if needed.any() and explorer.covered[needed].all():
             walk = covering_walk(explorer.roadmap, explorer.best)
-            replayed = replay(robot, cells, task, walk, needed)
-            if replayed.accepted:
-                detail = f"one motion of {len(walk.q)} waypoints, replayed"
-                angle = replayed.certificate.max_angle
-                return Trial(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk, angle)
-            detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
-            return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+            detail = f"one motion of {len(walk.q)} waypoints"
+            return Trial(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
         proved = [k for k, ruling in explorer.rulings.items() if ruling is Ruling.PROVED]
         if proved:
             self.suspect(proved[0])
             detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
             return Trial(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
         best = f"the best motion covers {int(explorer.covered.sum())} of {len(cells)} cells"
-        if ended and certifiable(explorer.problem):
+        if ended and certifiable(problem):
             detail = f"the search ended without a covering motion; {best}"
             return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
         detail = f"not found with {int(explorer.work.counts[0])} evaluations of the arm; {best}"
         return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+
+    def confirmed(
+        self, setup: Setup, trial: Trial, needed: NDArray[np.bool_] | None = None
+    ) -> Trial:
+        """A trial whose motion the replay has seen: feasible still, or undecided if it refuses."""
+        if trial.walk is None or trial.angle is not None:
+            return trial
+        self.tick()
+        robot, cells, task = setup
+        needed = np.ones(len(cells), dtype=bool) if needed is None else needed
+        replayed = replay(robot, cells, task, trial.walk, needed)
+        if replayed.accepted:
+            angle = replayed.certificate.max_angle
+            return replace(trial, detail=f"{trial.detail}, replayed", angle=angle)
+        detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
+        return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, trial.q, None)
 
     def others(self, guesses: int, most: int) -> list[Trial]:
         """Covering motions of the case as it stands, from postures far from each other.
@@ -247,11 +260,21 @@ class Prober:
         room = roomy(self.problem, self.work, cells.middle, tried)
         order = np.argsort(-room, kind="stable")
         trials = []
-        for q in apart(tried[order[room[order] >= 0.0]], most):
+        tried = tried[order[room[order] >= 0.0]]
+        for k in apart(np.array([self._posture(q) for q in tried]), most):
             seeds = np.full((len(cells), robot.n), np.nan)
-            seeds[cells.middle] = q
-            trials.append(self.attempt(self.setup, seeds, np.inf, deep=False))
-        return [trial for trial in trials if trial.feasible]
+            seeds[cells.middle] = tried[k]
+            trials.append(self.attempt(self.problem, seeds, np.inf, deep=False))
+        return [trial for trial in trials if trial.found]
+
+    def _posture(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(7 n,) numbers that differ where postures do: where the joints are, most of all.
+
+        Joint values alone would tell little: turning wrists by half turns changes much of them.
+        """
+        place(self.problem, self.work, HERE, q)
+        origins, axes = self.work.origins[0] / self.problem.scale, self.work.axes[0]
+        return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
 
     def _plant(self, explorer: Explorer, seeds: NDArray[np.float64]) -> None:
         """Plant seeds until one component covers every cell, hard cells first."""
@@ -298,12 +321,12 @@ def certifiable(problem: Problem) -> bool:
     return smooth and problem.rim > 0.0 and problem.leash > 0.0 and problem.inner_rim > 0.0
 
 
-def apart(q: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """Up to `most` of the configurations (k, n), each as far as can be from those before it."""
-    chosen = [0] if len(q) else []
-    while chosen and len(chosen) < min(most, len(q)):
-        distance = np.linalg.norm(q[:, None] - q[chosen], axis=2).min(axis=1)
-        if distance.max() < SAME:
+def apart(features: NDArray[np.float64], most: int) -> list[int]:
+    """Rows of (k, m) features, each as far as can be from those chosen before it; up to `most`."""
+    chosen = [0] if len(features) else []
+    while chosen and len(chosen) < min(most, len(features)):
+        away = np.linalg.norm(features[:, None] - features[chosen], axis=2).min(axis=1)
+        if away.max() < SAME:
             break
-        chosen.append(int(distance.argmax()))
-    return q[chosen]
+        chosen.append(int(away.argmax()))
+    return chosen

@@ -97,7 +97,14 @@ class Quantity:
 def shifted(cells: Cells, translation: np.ndarray) -> Cells:
     """The same cells on the surface moved by a translation (3,) m of the root frame."""
     surface = cells.surface.moved(np.eye(3), translation)
-    return replace(cells, surface=surface, centres=cells.centres + translation)
+    moved = replace(cells, surface=surface, centres=cells.centres + translation)
+    # What is derived from the cells is moved too: deriving the courses again takes longer than a
+    # search along them.
+    cubics = cells.courses.cubics.copy()
+    cubics[:, 0, :3] += translation  # the constant coefficients of the feet
+    vars(moved)["courses"] = replace(cells.courses, cubics=cubics)
+    vars(moved)["neighbours"] = cells.neighbours
+    return moved
 
 
 def quantities(setup: Setup, widen: bool) -> tuple[Quantity, ...]:

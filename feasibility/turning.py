@@ -26,7 +26,7 @@ HINT_BOXES = 1500  # for one cell, where a configuration is as welcome as a proo
 BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is looked for
 LOOKED_AT = 3  # cells asked for a proof before a search is made
 SCAN = 20  # values looked at on the way to the end of a quantity that is not monotone
-OVERDRAFT = 2  # verdicts' worth of evaluations past `stop` for halving a wide bracket
+OVERDRAFT = 1  # verdicts' worth of evaluations past `stop` for halving a wide bracket
 SHORT = 2  # verdicts' worth of evaluations that a search from known configurations may take
 
 
@@ -69,9 +69,14 @@ class Turning:
             here: covering motions of the case as it stands, at least one.
         """
         end = self.quantity.last + 1
-        best = max((self._slid(Side(0, trial), end) for trial in here), key=lambda side: side.k)
+        # The cone is no matter of posture, and asking each motion for its angle is dear.
+        motions = here[:1] if self.quantity.kind is Kind.CONE else here
+        best = max((self._slid(Side(0, trial), end) for trial in motions), key=lambda side: side.k)
         good, other = self._outwards(best)
-        return Threshold(self.quantity, self._finding(good), other)
+        told = self._told(good)
+        if not told.feasible:  # the replay refuses what the search found
+            return Threshold(self.quantity, self._told(Side(0, here[0])), told)
+        return Threshold(self.quantity, told, other)
 
     def _outwards(self, here: Side) -> tuple[Side, Finding | None]:
         """The last feasible side on the way to the end; and what was found past it, if anything."""
@@ -80,7 +85,7 @@ class Turning:
             cell, q = self.prober.follow(self.prober.problem_at(self.quantity, end), here.trial.q)
             if cell == NO_CELL:
                 trial = self._search(end, q)
-                if trial.feasible:
+                if trial.found:
                     return Side(end, trial), None
                 return self._narrow(here, end, self._finding(Side(end, trial)))
         return self._narrow(here, end + 1)
@@ -108,13 +113,20 @@ class Turning:
                 continue
             entry = Side(k, found)
             good, other = self._narrow(entry, before)
-            span = None
-            if self.quantity.kind is Kind.STANDOFF:
-                last_good, beyond = self._outwards(entry)
-                span = Span(self._finding(last_good), beyond)
-            return Threshold(self.quantity, self._finding(good), other or known, span)
+            told = self._told(good)
+            if not told.feasible:
+                return Threshold(self.quantity, None, told)
+            return Threshold(self.quantity, told, other or known, self._span(entry))
         tried = "" if self.quantity.monotone else f"{looked} of {count} values tried"
         return Threshold(self.quantity, None, known, None, tried)
+
+    def _span(self, entry: Side) -> Span | None:
+        """How far on a standoff stays feasible; None for other quantities."""
+        if self.quantity.kind is not Kind.STANDOFF:
+            return None
+        good, other = self._outwards(entry)
+        told = self._told(good)
+        return Span(told, other) if told.feasible else Span(self._told(entry), told)
 
     def _look(self, k: int, seeds: NDArray[np.float64]) -> Trial | Finding:
         """Is it feasible at k steps? A trial if so, or what speaks against it."""
@@ -130,7 +142,7 @@ class Turning:
             if q is not None:
                 seeds[cell] = q
         trial = self._search(k, seeds, deep=self.quantity.monotone)
-        return trial if trial.feasible else self._finding(Side(k, trial))
+        return trial if trial.found else self._finding(Side(k, trial))
 
     # -- between the two -------------------------------------------------------------------------
 
@@ -178,7 +190,7 @@ class Turning:
                     bad, failed, other = k, cell, None
                     continue
             trial = self._search(k, q)
-            if trial.feasible:
+            if trial.found:
                 good = self._slid(Side(k, trial), bad)
             else:
                 bad, failed, other, trusted = k, NO_CELL, self._finding(Side(k, trial)), False
@@ -213,7 +225,11 @@ class Turning:
         if walk is None or not self.quantity.monotone:
             return good
         if self.quantity.kind is Kind.CONE:
-            angle = good.trial.angle
+            setup = self.quantity.applied(self.prober.setup, good.k)
+            trial = self.prober.confirmed(setup, good.trial)
+            if trial.angle is None:
+                return good
+            angle, good = trial.angle, Side(good.k, trial)
             k = last_true(lambda k: value(k) > angle, good.k, bad)
         elif self.quantity.kind is Kind.LOWER:
             least = float(walk.q[:, joint].min())
@@ -235,7 +251,7 @@ class Turning:
                 seeds[edge.failed] = q
         # This motion goes no further. Another one may, so the search begins afresh.
         trial = self._search(k, seeds, deep=True)
-        return Side(k, trial) if trial.feasible else self._finding(Side(k, trial))
+        return Side(k, trial) if trial.found else self._finding(Side(k, trial))
 
     def _proof_beyond(
         self, edge: Edge, far: int
@@ -255,8 +271,13 @@ class Turning:
     def _search(self, k: int, seeds: NDArray[np.float64], deep: bool = False) -> Trial:
         """Search at k steps: from the seeds alone, or deeper, with half of what is left."""
         left = self.stop - self.prober.spent
-        most = max(left // 2, self.verdict_cost) if deep else SHORT * self.verdict_cost
-        return self.prober.attempt(self.quantity.applied(self.prober.setup, k), seeds, most, deep)
+        most = max(left, self.verdict_cost) // 2 if deep else SHORT * self.verdict_cost
+        return self.prober.attempt(self.prober.problem_at(self.quantity, k), seeds, most, deep)
+
+    def _told(self, side: Side) -> Finding:
+        """A feasible side, once the replay has seen its motion."""
+        setup = self.quantity.applied(self.prober.setup, side.k)
+        return self._finding(Side(side.k, self.prober.confirmed(setup, side.trial)))
 
     def _finding(self, side: Side) -> Finding:
         """A side, as it is told."""
