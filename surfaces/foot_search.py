@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 _MOST_STEPS = 60
 _MOST_HALVINGS = 40
 _MOST_RIVALS = 8  # valleys tried for one point, besides the nearest sample's
-_CHUNK = 2_000_000  # pairs of a point and a sample held at a time
+_BLOCK = 1_000_000  # pairs of a point and a sample held at a time, about
 _STILL = 1e-14  # of the box's width: a step this short ends a descent
 _EPSILON = float(np.finfo(float).eps)
 
@@ -81,13 +81,14 @@ class FootSearch:
         _, start = self._tree.query(points)
         found = self._descend(points, self._samples[start])
         gap = np.linalg.norm(self._point(found) - points, axis=1)
-        chunk = max(1, _CHUNK // len(self._samples))
-        for first in range(0, len(points), chunk):
-            part = slice(first, first + chunk)
-            owner, rival = self._rivals(points[part], gap[part] + self._reach, start[part])
+        radius = gap + self._reach
+        many = self._tree.query_ball_point(points, radius, return_length=True)
+        blocks = np.flatnonzero(np.diff(np.cumsum(many) // _BLOCK)) + 1
+        for part in np.split(np.arange(len(points)), blocks):
+            owner, rival = self._rivals(points[part], radius[part], start[part])
             if not len(owner):
                 continue
-            owner += first
+            owner += part[0]
             other = self._descend(points[owner], self._samples[rival])
             away = np.linalg.norm(self._point(other) - points[owner], axis=1)
             order = np.lexsort((away, owner))
@@ -111,11 +112,12 @@ class FootSearch:
             offset = self._places[which] - points[owner]
             return np.asarray(np.einsum("nm,nm->n", offset, offset))
 
+        away = square(sample)
         for shift in itertools.product((-1, 0, 1), repeat=len(self._shape)):
             if any(shift):
-                lowest = square(sample) <= square(self._beside(sample, shift))
-                owner, sample = owner[lowest], sample[lowest]
-        order = np.lexsort((square(sample), owner))
+                lowest = away <= square(self._beside(sample, shift))
+                owner, sample, away = owner[lowest], sample[lowest], away[lowest]
+        order = np.lexsort((away, owner))
         owner, sample = owner[order], sample[order]
         rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
         return owner[rank < _MOST_RIVALS], sample[rank < _MOST_RIVALS]
