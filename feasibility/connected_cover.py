@@ -13,12 +13,15 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Iterator
 
 import numpy as np
 
 from feasibility.labels import Bools, Ints, Labels, Lists, count_of, neighbours_of, pieces_of
 from feasibility.separators import fewest_labels
 from feasibility.set_cover import set_cover, undominated
+
+OTHER_COVERS = 40  # other choices of regions that patches are grown of
 
 
 def connected_cover(covers: Bools, pairs: Ints, deadline: float = np.inf) -> Labels:
@@ -47,23 +50,42 @@ def connected_cover(covers: Bools, pairs: Ints, deadline: float = np.inf) -> Lab
 def _one_part(covers: Bools, pairs: Ints, deadline: float) -> Labels:
     """Label cells that hang together."""
     regions, rows = _regions(covers, pairs)
-    left = deadline - time.monotonic()
-    chosen = set_cover(regions, min(left, 1e6))
-    use = np.array(chosen.rows, dtype=np.int64)
-    label, pieces, bound = np.zeros(0, dtype=np.int64), covers.shape[1] + 1, chosen.bound
+    chosen = set_cover(regions, deadline - time.monotonic())
     neighbours = neighbours_of(covers.shape[1], pairs)
-    for turn in range(2 * len(use)):
-        order = np.roll(use, turn // 2)[:: 1 - 2 * (turn % 2)]
-        grown = order[_grow(regions[order], neighbours)]
-        count = count_of(grown, pairs)
-        if count < pieces:
-            label, pieces = grown, count
-        if pieces <= bound:
+    best = Labels(np.zeros(0, dtype=np.int64), covers.shape[1] + 1, chosen.bound)
+    for use in _choices(regions, chosen.rows):
+        if best.pieces <= best.bound:
             break
-    if pieces > bound and time.monotonic() < deadline:
-        exact = fewest_labels(regions, pairs, Labels(label, pieces, bound), deadline)
-        label, pieces, bound = exact.label, exact.pieces, exact.bound
-    return Labels(rows[label], pieces, bound)
+        if len(use) < best.pieces:
+            grown = use[_grow(regions[use], neighbours)]
+            count = count_of(grown, pairs)
+            if count < best.pieces:
+                best = Labels(grown, count, chosen.bound)
+    if best.pieces > best.bound:
+        best = fewest_labels(regions, pairs, best, deadline)
+    return Labels(rows[best.label], best.pieces, best.bound)
+
+
+def _choices(regions: Bools, least: tuple[int, ...]) -> Iterator[Ints]:
+    """Regions to grow patches of, in the order in which they get their way.
+
+    First the regions of a least set cover in several orders, then other covers: all regions,
+    thrown out one by one in random order where the rest still covers everything.
+    """
+    use = np.array(least, dtype=np.int64)
+    for turn in range(2 * len(use)):
+        yield np.roll(use, turn // 2)[:: 1 - 2 * (turn % 2)]
+    rng = np.random.default_rng(0)
+    for _ in range(OTHER_COVERS):
+        order = rng.permutation(len(regions))
+        counts = regions.sum(axis=0)
+        kept = []
+        for k in order.tolist():
+            if (counts[regions[k]] > 1).all():
+                counts = counts - regions[k]
+            else:
+                kept.append(k)
+        yield np.array(kept, dtype=np.int64)
 
 
 def _regions(covers: Bools, pairs: Ints) -> tuple[Bools, Ints]:

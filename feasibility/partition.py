@@ -91,15 +91,15 @@ def fewest_patches(
     now = time.monotonic()
     left_out = needed & ~covers.any(axis=0)
     covers = covers & needed
-    chosen = set_cover(covers[:, covers.any(axis=0)], 0.4 * time_limit)
+    chosen = set_cover(covers[:, covers.any(axis=0)], 0.3 * time_limit)
     rows = np.array(chosen.rows, dtype=np.int64)
-    few = connected_cover(covers[rows], pairs, now + 0.6 * time_limit)
-    few = Labels(np.append(rows, -1)[few.label], few.pieces, few.bound)
-    if few.pieces <= len(rows):
-        answer = _connected(few, pairs, chosen.bound)
-        return Cover(answer, answer, left_out)
-    free = connected_cover(covers, pairs, now + time_limit)
-    if free.pieces > few.pieces:  # out of time
+    free = connected_cover(covers, pairs, now + 0.7 * time_limit)
+    few = (
+        connected_cover(covers[rows], pairs, now + time_limit) if free.pieces > len(rows) else free
+    )
+    if few is not free:
+        few = Labels(np.append(rows, -1)[few.label], few.pieces, few.bound)
+    if few.pieces < free.pieces:  # out of time
         free = Labels(few.label, few.pieces, free.bound)
     connected = _connected(free, pairs, max(free.bound, chosen.bound))
     used = len(np.unique(connected.rows))

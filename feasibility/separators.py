@@ -19,7 +19,7 @@ is its first node, which leaves one way to root it out of many.
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -45,6 +45,8 @@ class _Programme:
         self.lower: list[float] = []
         self.upper: list[float] = []
         self.fixed = np.zeros(2 * self.half)  # columns that must be 1
+        links = [(i, j) for i, near in enumerate(neighbours) for j in near if i < j]
+        self.links = np.array(links, dtype=np.int64).reshape(-1, 2)
         alone = regions.sum(axis=0) == 1
         for c in range(regions.shape[1]):
             columns = [int(k) for k in self.at[regions[:, c], c]]
@@ -56,6 +58,8 @@ class _Programme:
             self.fixed[self.at[label, own]] = 1.0
             # Nodes without a choice come first, so the first of them is the root of its patch.
             self.fixed[self.half + self.at[label, own[:1]]] = 1.0
+            for c in own[1:].tolist():
+                self.separate(label, {c}, [c], alone & regions[label])
 
     def _roots(self, label: int, c: int) -> None:
         """A root is in its patch, and the first node of it; a patch of one node has a root."""
@@ -65,7 +69,7 @@ class _Programme:
         for d in near:
             if d < c:
                 self.add({r: 1.0, int(self.at[label, d]): 1.0}, 0.0, 1.0)
-        self.separate(label, [c], [c])
+        self.separate(label, {c}, [c], np.ones(len(self.neighbours), dtype=bool))
 
     def add(self, row: Row, lower: float, upper: float) -> None:
         """One linear constraint."""
@@ -73,30 +77,41 @@ class _Programme:
         self.lower.append(lower)
         self.upper.append(upper)
 
-    def separate(self, label: int, inside: Sequence[int], heads: Iterable[int]) -> None:
-        """The constraints of the set `inside` of nodes, for its members `heads`."""
-        members = set(inside)
-        border = {d for c in inside for d in self.neighbours[c]} - members
-        row: Row = {int(self.half + self.at[label, c]): 1.0 for c in inside}
-        row |= {int(self.at[label, d]): 1.0 for d in border if self.regions[label, d]}
-        for head in heads:
-            self.add({**row, int(self.at[label, head]): -1.0}, 0.0, np.inf)
+    def separate(self, label: int, inside: set[int], heads: Iterable[int], met: Bools) -> None:
+        """Constraints for the sets around a piece, one after another until the label is met again.
+
+        Args:
+            label: the label.
+            inside: nodes of the piece.
+            heads: members of it that get a constraint for each set.
+            met: (n,) nodes that have the label.
+        """
+        around = set(inside)
+        while True:
+            border = {
+                d for c in around for d in self.neighbours[c] if self.regions[label, d]
+            } - around
+            row: Row = {int(self.half + self.at[label, c]): 1.0 for c in around}
+            row |= {int(self.at[label, d]): 1.0 for d in border}
+            for head in heads:
+                self.add({**row, int(self.at[label, head]): -1.0}, 0.0, np.inf)
+            if not border or any(met[d] for d in border):
+                return
+            around |= border
 
     def cut(self, label: Ints, roots: Bools) -> int:
         """Add what the labels (n,) violate; returns the number of pieces without a root."""
         stray = 0
-        links = [(i, j) for i, near in enumerate(self.neighbours) for j in near if i < j]
-        piece = pieces_of(label, np.array(links, dtype=np.int64).reshape(-1, 2))
+        piece = pieces_of(label, self.links)
         for k in range(int(piece.max()) + 1):
             inside = np.flatnonzero(piece == k)
             own = int(label[inside[0]])
             if roots[own, inside].any():
                 continue
             stray += 1
-            columns = self.at[own, inside]
-            certain = inside[self.fixed[columns] == 1.0]
+            certain = inside[self.fixed[self.at[own, inside]] == 1.0]
             heads = certain[:1] if len(certain) else inside[:: 1 + len(inside) // MOST_CUTS]
-            self.separate(own, inside.tolist(), heads.tolist())
+            self.separate(own, set(inside.tolist()), heads.tolist(), label == own)
         return stray
 
 

@@ -145,7 +145,7 @@ def drawn(arm: str, number: int) -> tuple:
     return built(problem, load_robot(arm))
 
 
-DRAWN = [("puma560", number) for number in range(14)] + [("ur5", number) for number in range(8)]
+DRAWN = [("puma560", number) for number in range(22)] + [("ur5", number) for number in range(8)]
 
 
 @pytest.mark.parametrize(("arm", "number"), DRAWN)
