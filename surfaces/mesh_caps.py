@@ -8,14 +8,15 @@ beyond become two faces that meet in the cap's middle corner. The surface stays 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from surfaces.triangles import Floats, Ints, doubled_areas, half_edge_ends, half_edges
+from surfaces.triangles import Floats, Ints, components, doubled_areas, half_edge_ends, half_edges
 
-ROUNDS = 100
+PATIENCE = 10  # rounds without one cap less
 
 
-def thin(vertices: Floats, faces: Ints, height: float) -> np.ndarray:
-    """(F,) bool: faces whose least height is below `height` (m)."""
+def thin(vertices: Floats, faces: Ints, height: float) -> NDArray[np.bool_]:
+    """(F,) faces whose least height is below `height` (m)."""
     corners = vertices[faces]
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     return np.linalg.norm(doubled_areas(vertices, faces), axis=1) <= height * longest
@@ -34,31 +35,47 @@ def flipped(vertices: Floats, faces: Ints, height: float) -> tuple[Ints, int, in
     Returns:
         The faces, how many caps were flipped, and how many were dropped.
     """
-    before = len(faces)
-    count = 0
-    for _ in range(ROUNDS):
-        caps = np.flatnonzero(thin(vertices, faces, height))
-        if not len(caps):
-            break
-        faces, done = _flip_some(vertices, faces, caps)
+    before, count = len(faces), 0
+    is_cap = thin(vertices, faces, height)
+    if not is_cap.any():
+        return faces, 0, 0
+    # A piece of nothing but caps has no surface to join them to.
+    pieces = components(half_edges(faces).of_count(2) // 3, len(faces))
+    solid = (np.bincount(pieces, ~is_cap) > 0)[pieces]
+    faces, is_cap = faces[solid].copy(), is_cap[solid]
+    best, patience = len(is_cap), PATIENCE
+    while is_cap.any() and patience:
+        # All that a flip needs to know are the faces around the corners of caps.
+        near = np.zeros(len(vertices), bool)
+        near[faces[is_cap]] = True
+        active = np.flatnonzero(near[faces].any(axis=1))
+        faces[active], done = _flip_some(vertices, faces[active], is_cap[active])
         count += done
-        if not done:
-            break
-    faces = faces[~thin(vertices, faces, height)]
+        is_cap[active] = thin(vertices, faces[active], height)
+        left = int(is_cap.sum())
+        patience = (PATIENCE if left < best else patience - 1) * (done > 0)
+        best = min(best, left)
+    faces = faces[~is_cap]
     return faces, count, before - len(faces)
 
 
-def _flip_some(vertices: Floats, faces: Ints, caps: Ints) -> tuple[Ints, int]:
+def _flip_some(vertices: Floats, faces: Ints, is_cap: NDArray[np.bool_]) -> tuple[Ints, int]:
     """Flip as many caps at once as do not touch each other's faces."""
+    caps = np.flatnonzero(is_cap)
     corners = vertices[faces[caps]]
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).argmax(axis=1)
-    halves = 3 * caps + longest
+    long_edge = np.full(len(faces), -1, np.int64)
+    long_edge[caps] = 3 * caps + longest
     inner = half_edges(faces).of_count(2)
     partner = np.full(faces.size, -1, np.int64)
     partner[inner[:, 0]] = inner[:, 1]
     partner[inner[:, 1]] = inner[:, 0]
+    halves = long_edge[caps]
     halves = halves[partner[halves] >= 0]
     across = partner[halves]
+    # A cap that looks on another one waits for it, unless that looks back.
+    ready = ~is_cap[across // 3] | (long_edge[across // 3] == across)
+    halves, across = halves[ready], across[ready]
     # A cap goes first where no other cap of lower number wants one of its two faces.
     claim = np.full(len(faces), len(faces), np.int64)
     for half in (halves, across):
@@ -82,8 +99,8 @@ def _flip_some(vertices: Floats, faces: Ints, caps: Ints) -> tuple[Ints, int]:
     return faces, int(kept.sum())
 
 
-def _absent(faces: Ints, a: Ints, b: Ints) -> np.ndarray:
-    """(n,) bool: no face has the edge a-b."""
+def _absent(faces: Ints, a: Ints, b: Ints) -> NDArray[np.bool_]:
+    """(n,) no face has the edge a-b."""
     size = int(faces.max()) + 1
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     present = np.minimum(tails, heads) * size + np.maximum(tails, heads)

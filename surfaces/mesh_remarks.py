@@ -38,7 +38,7 @@ def _about_pieces(mesh: TriangleMesh) -> list[str]:
     if len(areas) == 1:
         return []
     faces = np.bincount(pieces)
-    named = [f"{faces[k]} faces, {areas[k]:.4g} m^2" for k in range(min(LISTED, len(areas)))]
+    named = [f"{_faces(faces[k])}, {areas[k]:.4g} m^2" for k in range(min(LISTED, len(areas)))]
     more = f"; {len(areas) - LISTED} smaller ones" if len(areas) > LISTED else ""
     return [
         f"the mesh is in {len(areas)} separate pieces ({'; '.join(named)}{more}): no continuous "
@@ -83,3 +83,8 @@ def _about_sides(mesh: TriangleMesh) -> list[str]:
         f"{inverted.sum()} closed piece{'s' if inverted.sum() > 1 else ''} of the mesh "
         f"face{'' if inverted.sum() > 1 else 's'} inwards: there, side 'outside' is the inner side"
     ]
+
+
+def _faces(count: int) -> str:
+    """A number of faces."""
+    return f"{count} face{'s' if count != 1 else ''}"

@@ -34,11 +34,11 @@ def clean(
 ) -> TriangleMesh:
     """Check the triangles of a surface, repair what is safe, and say in `notes` what was done.
 
-    Repaired: vertices that lie within a millionth of the mesh's diagonal of each other become one;
+    Repaired: vertices closer than a few ten-millionths of the mesh's diagonal become one;
     vertices without a face, faces without area and repeated faces go; faces that disagree with
     their neighbours about the outer side are turned over, so that the larger area of each piece
     stays as it is; a vertex at which several fans of faces touch is split. None of it moves the
-    surface by more than that distance. Separate pieces and holes stay, and are noted.
+    surface by more than a millionth of the diagonal. Separate pieces and holes stay, and are noted.
 
     Args:
         vertices: (V, 3) m.
@@ -81,10 +81,10 @@ def clean(
         notes.append(f"{_count(dropped, 'face')} thinner than {distance:.2g} m dropped")
     if drop_crumbs:
         corners = _drop_crumbs(points, corners, notes)
+    _refuse_empty(corners, notes)
     points, corners, split = one_fan_each(points, corners)
     if split:
         notes.append(f"{_count(split, 'vertex', 'vertices')} added where pieces touch in a point")
-    _refuse_empty(corners, notes)
     points, corners = _compact(points, corners, [])
     return TriangleMesh(points, corners, tuple(notes))
 
@@ -230,6 +230,7 @@ def _drop_crumbs(points: Floats, corners: Ints, notes: list[str]) -> Ints:
     pieces = piece_numbers(half_edges(corners).of_count(2) // 3, areas)
     sizes = np.bincount(pieces, areas)
     crumbs = sizes < CRUMB * sizes.sum()
+    crumbs[0] = False  # the largest piece stays, however many there are
     if not crumbs.any():
         return corners
     notes.append(
