@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.face_graph import FaceGraph, face_graph
+from surfaces.face_graph import FaceGraph, face_graph, sum_by
 from surfaces.flooding import far_seeds, flood, recentre, smooth, units, whole_steps
 from surfaces.subdivide import Subdivision, subdivide
 from surfaces.surface import SurfaceError
@@ -25,6 +25,8 @@ FACES_PER_CELL = 80
 MOST_CELLS = 20_000
 _RIM = 0.6  # cells: how far outside the border counts as a seed
 _MOVING = 10  # rounds in which seeds move
+_MOST_MOVING = 40  # as long as areas are more uneven than
+_UNEVEN = 0.12  # this, std / mean
 _EVENING = 6  # rounds after that, at most, in which head starts alone even out the areas
 _EVEN = 0.03  # std / mean of the areas that is good enough
 _GAIN = 0.5  # share of a missing area that one round makes up for
@@ -116,7 +118,7 @@ def cluster_faces(
     target = np.repeat(piece_area / quota, quota)
     seeds = far_seeds(graph.across, whole_steps(step), graph.piece, quota, units(_RIM))
     labels = _lloyd(graph, step, edge, centre, area, target, seeds)
-    smooth(graph.across, whole_steps(edge), labels)
+    smooth(graph.across, whole_steps(edge), area, target, labels)
     return labels
 
 
@@ -133,21 +135,23 @@ def _lloyd(
     labels = np.empty(len(area), dtype=np.int64)
     best, least = labels, math.inf
     anchors, offsets = centre[seeds], np.zeros(len(seeds))
-    for done in range(_MOVING + _EVENING):
+    moving, evened = True, 0
+    for done in range(1, _MOST_MOVING + _EVENING + 1):
         flood(graph.across, step, centre, seeds, anchors, offsets, labels)
-        if done < _MOVING:
+        areas = sum_by(labels, area, len(seeds))
+        uneven = float((areas / target).std())
+        moving = moving and (done < _MOVING or (uneven > _UNEVEN and done < _MOST_MOVING))
+        if moving:
             recentre(centre, graph.normal, area, labels, seeds, anchors)
-        share = np.bincount(labels, weights=area, minlength=len(seeds)) / target
-        uneven = float(share.std())
-        if done >= _MOVING - 1 and uneven < least:
-            best, least = labels.copy(), uneven
-            if uneven <= _EVEN:
-                break
-        missing = target * (1.0 - share)
-        if done < _MOVING - 1:  # a border moves half as far, and around a cell it is about 4 long
-            offsets += _GAIN * missing / np.sqrt(target) / 2.0
+            # A border moves half as far as a head start, and around a cell it is about 4 long.
+            offsets += _GAIN * (target - areas) / np.sqrt(target) / 2.0
         else:
-            offsets += _head_starts(graph.across, edge, labels, missing)
+            evened += 1
+            if uneven < least:
+                best, least = labels.copy(), uneven
+            if uneven <= _EVEN or evened > _EVENING:
+                break
+            offsets += _head_starts(graph.across, edge, labels, target - areas)
         offsets = np.clip(offsets - offsets.mean(), -_MOST_OFFSET, _MOST_OFFSET)
     return best
 

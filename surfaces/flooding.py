@@ -18,6 +18,9 @@ kernel = njit(cache=True, error_model="numpy")
 DETOUR = 1.35
 """Over flat ground, steps from face to face are at most about this much longer than the straight
 line. Where they are longer still, the straight line leaves the surface."""
+SLACK = 0.1137
+"""Share of its area that a cell may be off for a smoother border; odd, so that no whole number of
+equal faces lies just there."""
 _FINE = 749_371.0  # units of a rounded distance in one length; odd, so that no fraction is a tie
 _BITS = np.int64(22)  # of a face's index, in a heap's entries; MOST_FACES fits
 _MASK = np.int64((1 << 22) - 1)
@@ -240,40 +243,57 @@ def recentre(centre, normal, area, labels, seeds, anchors):  # type: ignore[no-u
 
 
 @kernel
-def smooth(across, edge, labels):  # type: ignore[no-untyped-def]
+def smooth(across, edge, area, target, labels):  # type: ignore[no-untyped-def]
     """Give away teeth: faces on a border that are held by one edge only, and a short one.
 
     Such a face can leave without tearing its cell. It goes to the neighbour it shares the longest
-    border with, so that all borders together get shorter with each move; hence it ends.
+    border with, so that all borders together get shorter with each move; hence it ends. No cell
+    may stray far from its target: along a wedge, borders would slide to the tip.
 
     Args:
         across: (F, 3) faces across the edges, or -1.
         edge: (F, 3) whole numbers, the lengths of the edges.
+        area: (F,) areas.
+        target: (N,) areas that the cells should have.
         labels: (F,) cell of each face, changed.
     """
+    areas = np.zeros(target.shape[0])
+    for face in range(labels.shape[0]):
+        areas[labels[face]] += area[face]
     moved = True
     while moved:
         moved = False
         for face in range(labels.shape[0]):
-            own, held, holder = labels[face], 0, np.int64(0)
-            for k in range(3):
-                other = across[face, k]
-                if other >= 0 and labels[other] == own:
-                    held += 1
-                    holder = edge[face, k]
-            if held != 1:
+            own, to = labels[face], _tooth_to(across, edge, labels, face)
+            if to < 0 or areas[own] - area[face] < (1.0 - SLACK) * target[own]:
                 continue
-            most, to = holder, np.int64(-1)
-            for k in range(3):
-                other = across[face, k]
-                if other < 0 or labels[other] == own:
-                    continue
-                shared = np.int64(0)
-                for m in range(3):
-                    if across[face, m] >= 0 and labels[across[face, m]] == labels[other]:
-                        shared += edge[face, m]
-                if shared > most:
-                    most, to = shared, labels[other]
-            if to >= 0:
-                labels[face] = to
-                moved = True
+            if areas[to] + area[face] > (1.0 + SLACK) * target[to]:
+                continue
+            areas[own] -= area[face]
+            areas[to] += area[face]
+            labels[face] = to
+            moved = True
+
+
+@kernel
+def _tooth_to(across, edge, labels, face):  # type: ignore[no-untyped-def]
+    """The cell that a face should go to: the one it shares most border with; or -1."""
+    own, held, most = labels[face], 0, np.int64(0)
+    for k in range(3):
+        if across[face, k] >= 0 and labels[across[face, k]] == own:
+            held += 1
+            most = edge[face, k]
+    to = np.int64(-1)
+    if held != 1:
+        return to
+    for k in range(3):
+        other = across[face, k]
+        if other < 0 or labels[other] == own:
+            continue
+        shared = np.int64(0)
+        for m in range(3):
+            if across[face, m] >= 0 and labels[across[face, m]] == labels[other]:
+                shared += edge[face, m]
+        if shared > most:
+            most, to = shared, labels[other]
+    return to

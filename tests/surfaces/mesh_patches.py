@@ -121,6 +121,12 @@ def slivers() -> Mesh:
     return bent(lambda u, v: (0.2 * np.cos(6 * u), 0.2 * np.sin(6 * u), 0.9 * v), 50, 1)
 
 
+def wedge() -> Mesh:
+    """One triangle, 50 times longer than wide: all cells lie in a row."""
+    corners = np.array([[0.0, -0.01, 0.0], [1.0, 0.0, 0.0], [0.0, 0.01, 0.0]])
+    return Mesh(corners, np.array([[0, 1, 2]], dtype=np.int64))
+
+
 def scattered(count: int = 3000, seed: int = 5) -> Mesh:
     """A wavy patch over random points, dense in one corner: triangles of all shapes and sizes."""
     from scipy.spatial import Delaunay
@@ -166,6 +172,7 @@ CONNECTED: dict[str, Callable[[], Mesh]] = {
     "holed": holed,
     "slivers": slivers,
     "scattered": scattered,
+    "wedge": wedge,
 }
 """Each in one piece."""
 
