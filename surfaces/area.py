@@ -1,4 +1,4 @@
-"""Area of parameter rectangles of any smooth patch: Gauss-Legendre, halved until it is exact."""
+"""Area of parameter rectangles of any smooth patch: Gauss-Legendre, halved where that is needed."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from surfaces.surface import SurfaceError
 
 Array = NDArray[np.float64]
 
-TOLERANCE = 1e-11  # of a piece's area: the two rules differ by no more
+TOLERANCE = 1e-10  # of a piece's area: the two rules differ by no more
 _ROUNDING = 1e-15  # of the whole rectangle's, likewise
-_COARSE, _FINE = (np.polynomial.legendre.leggauss(count) for count in (5, 7))
-_MOST_HALVINGS = 14
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(9)
+_MOST_HALVINGS = 60
 _MOST_PIECES = 200_000  # rectangles held at a time
 _WHOLE = np.array([-np.inf, np.inf])
 
@@ -30,10 +30,11 @@ def rectangle_areas(
 ) -> Array:
     """The integral of `element` over u0..u1 by v0..v1, for many rectangles; relative 1e-10.
 
-    A rectangle is cut at the breaks it crosses. A piece is done when the rules of 5 x 5 and of
-    7 x 7 nodes differ by `TOLERANCE` of its area, and quartered until it is; the finer rule's
-    value is taken, which is better by several digits. Areas are positive, so the errors add up to
-    no more than that share of the whole.
+    A rectangle is cut at the breaks it crosses. On each piece 9 x 9 samples are summed by Gauss
+    and Legendre's rule, exact up to degree 17, and again with only 7 of the 9 used along u, and
+    along v, exact up to degree 7. Where these differ by more than `TOLERANCE` of the area, the
+    piece is halved across the worse direction. The first sum is better than they show, by several
+    digits. Areas are positive, so the errors add up to no more than that share of the whole.
 
     Args:
         element: (u, v) of one shape -> area element |du x dv|, of that shape.
@@ -93,12 +94,12 @@ def _integrated(
     for _ in range(_MOST_HALVINGS):
         if not len(pieces):
             return done
-        coarse, fine = (_ruled(element, pieces, *rule) for rule in (_COARSE, _FINE))
-        whole = done + np.bincount(owner, fine, count)
-        settled = np.abs(fine - coarse) <= TOLERANCE * fine + _ROUNDING * whole[owner]
-        done += np.bincount(owner[settled], fine[settled], count)
-        pieces = _quartered(pieces[~settled]).reshape(-1, 4)
-        owner = np.repeat(owner[~settled], 4)
+        area, error_u, error_v = _ruled(element, pieces)
+        whole = done + np.bincount(owner, area, count)
+        rough = np.maximum(error_u, error_v) > TOLERANCE * area + _ROUNDING * whole[owner]
+        done += np.bincount(owner[~rough], area[~rough], count)
+        pieces = _halved(pieces[rough], (error_u >= error_v)[rough])
+        owner = np.tile(owner[rough], 2)
         if len(pieces) > 16 * _MOST_PIECES:
             break
     if len(pieces):
@@ -106,34 +107,40 @@ def _integrated(
     return done
 
 
-def _quartered(pieces: Array) -> Array:
-    """(n, 4, 4) the four quarters of each rectangle."""
-    u0, u1, v0, v1 = pieces.T
-    u, v = (u0 + u1) / 2.0, (v0 + v1) / 2.0
-    return np.stack(
-        [
-            np.stack([a, b, c, d], axis=1)
-            for a, b in ((u0, u), (u, u1))
-            for c, d in ((v0, v), (v, v1))
-        ],
-        axis=1,
-    )
+def _halved(pieces: Array, across_u: NDArray[np.bool_]) -> Array:
+    """Both halves of each rectangle, all lower ones first; cut across u or across v."""
+    middle = np.where(across_u, pieces[:, :2].mean(axis=1), pieces[:, 2:].mean(axis=1))
+    low, high = pieces.copy(), pieces.copy()
+    low[across_u, 1] = high[across_u, 0] = middle[across_u]
+    low[~across_u, 3] = high[~across_u, 2] = middle[~across_u]
+    return np.concatenate([low, high])
 
 
-def _ruled(
-    element: Callable[[Array, Array], Array], pieces: Array, nodes: Array, weights: Array
-) -> Array:
-    """Gauss and Legendre's rule over each rectangle (n, 4)."""
-    values = np.empty(len(pieces))
-    step = 1_000_000 // len(nodes) ** 2
+def _fewer(unused: tuple[int, ...]) -> Array:
+    """Weights (9,) of a rule without some of the nodes: exact for as many powers as are left."""
+    kept = np.delete(np.arange(len(_NODES)), unused)
+    powers = np.arange(len(kept))
+    moments = np.where(powers % 2 == 0, 2.0 / (powers + 1.0), 0.0)
+    weights = np.zeros(len(_NODES))
+    weights[kept] = np.linalg.solve(_NODES[kept] ** powers[:, None], moments)
+    return weights
+
+
+_RULES = np.stack([_WEIGHTS, _fewer(unused=(2, 6))])
+
+
+def _ruled(element: Callable[[Array, Array], Array], pieces: Array) -> tuple[Array, Array, Array]:
+    """Of each rectangle (n, 4) the area, and its change with fewer nodes along u, and along v."""
+    sums = np.empty((len(pieces), 2, 2))
+    step = 1_000_000 // len(_NODES) ** 2
     for first in range(0, len(pieces), step):
         u0, u1, v0, v1 = pieces[first : first + step].T[:, :, None, None]
         half_u, half_v = (u1 - u0) / 2.0, (v1 - v0) / 2.0
-        u = u0 + half_u * (1.0 + nodes[:, None])
-        v = v0 + half_v * (1.0 + nodes[None, :])
-        u, v = np.broadcast_arrays(u, v)
-        sampled = np.einsum("nij,i,j->n", element(u, v), weights, weights)
-        values[first : first + step] = sampled * half_u[:, 0, 0] * half_v[:, 0, 0]
-    if not np.isfinite(values).all():
+        u = u0 + half_u * (1.0 + _NODES[:, None])
+        v = v0 + half_v * (1.0 + _NODES[None, :])
+        sampled = element(*np.broadcast_arrays(u, v))
+        sums[first : first + step] = _RULES @ sampled @ _RULES.T * (half_u * half_v)
+    if not np.isfinite(sums).all():
         raise SurfaceError("the area cannot be integrated: the area element is not finite")
-    return values
+    area = sums[:, 0, 0]
+    return area, np.abs(sums[:, 1, 0] - area), np.abs(sums[:, 0, 1] - area)

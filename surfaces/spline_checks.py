@@ -20,7 +20,7 @@ _LEAST = 1e-6  # of the extent, and of a right angle's sine
 _KNOT_GAP = 1e-9  # of the range
 _KINK = 1e-6  # [rad]
 _SAMPLES = 8  # in each span
-_MOST_SAMPLES = 1000  # along each parameter, if that leaves two for each span
+_MOST_SAMPLES = 600  # along each parameter, if that leaves two for each span
 
 
 def checked_points(points: Any, faults: list[str]) -> Array | None:
@@ -57,7 +57,7 @@ def checked_weights(weights: Any, shape: tuple[int, ...], faults: list[str]) -> 
         return None
     expected = f"one number > 0 for each point, {shape[0]} x {shape[1]}"
     found = table("weights", weights, (shape[0], shape[1]), expected, MOST_POINTS, faults)
-    if found is None:
+    if found is None or not found.size:
         return None
     if found.min() <= 0.0 or found.max() > LARGEST_RATIO * found.min():
         i, j = np.unravel_index(int(np.argmin(found)), found.shape)
@@ -111,7 +111,7 @@ def checked_knots(name: str, knots: Any, count: int, degree: int, faults: list[s
 def regularity_faults(spline: SplineMap) -> list[str]:
     """Where the patch has no normal, has a kink or folds, as far as a dense grid shows it.
 
-    The grid has 8 samples in each knot span (fewer where there are more than 125 spans), and looks
+    The grid has 8 samples in each knot span (fewer where there are more than 75 spans), and looks
     at a knot from both sides. Between samples the normal is taken to turn by less than a right
     angle; a fold turns it over, so that it shows even where no sample meets the crease.
     """

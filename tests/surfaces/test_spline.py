@@ -265,6 +265,10 @@ POLE = np.array([[(0, 0, 1.0)] * 4, *(hood()[1:4, :4])])
 BAD = {
     "not a list": ({"points": "net"}, "points must be a list, got str"),
     "empty": ({"points": []}, "points must be rows"),
+    "nothing": (
+        {"points": np.zeros((0, 0, 3)), "weights": []},
+        "points must have at least 4 rows",
+    ),
     "one row": ({"points": hood()[:1]}, "at least 4 rows for the degree 3, got 1"),
     "few columns": ({"points": hood()[:, :2]}, "at least 4 columns for the degree 3, got 2"),
     "ragged": ({"points": [*hood().tolist(), [(0, 0, 0)]]}, r"7 x 3 .* 1 x 3 in points\[6\]"),
