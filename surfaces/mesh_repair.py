@@ -79,9 +79,9 @@ def clean(
         )
     if dropped:
         notes.append(f"{_count(dropped, 'face')} thinner than {distance:.2g} m dropped")
+    _refuse_empty(corners, notes)
     if drop_crumbs:
         corners = _drop_crumbs(points, corners, notes)
-    _refuse_empty(corners, notes)
     points, corners, split = one_fan_each(points, corners)
     if split:
         notes.append(f"{_count(split, 'vertex', 'vertices')} added where pieces touch in a point")

@@ -322,3 +322,49 @@ def test_holes_are_counted_and_measured():
     note = next(note for note in mesh.notes if "hole" in note)
     assert "3 holes" in note
     assert "0.4 m around" in note
+
+
+def knotted(rng):
+    """Faces between points of a small grid: many are straight, doubled or meet in bundles."""
+    count = int(rng.integers(3, 12))
+    return rng.integers(0, 3, (count, 3)).astype(float), rng.integers(
+        0, count, (rng.integers(1, 8), 3)
+    )
+
+
+def battered(rng):
+    """A plate with faces gone or turned over, and vertices moved onto lines between others."""
+    vertices, faces = w.plate(int(rng.integers(1, 6)), int(rng.integers(1, 6)))
+    vertices = vertices + rng.choice([0, 1e-7, 1e-3]) * rng.normal(size=vertices.shape)
+    for a, b, c in rng.integers(0, len(vertices), (rng.integers(0, 6), 3)):
+        vertices[a] = vertices[b] + rng.random() * (vertices[c] - vertices[b])
+    turned = rng.random(len(faces)) < 0.2
+    faces = np.where(turned[:, None], faces[:, ::-1], faces)
+    return vertices, faces[np.sort(rng.permutation(len(faces))[: rng.integers(1, len(faces) + 1)])]
+
+
+@pytest.mark.parametrize("make", [knotted, battered])
+@pytest.mark.parametrize("seed", range(8))
+def test_any_arrays_are_refused_or_made_clean(make, seed):
+    rng = np.random.default_rng(seed)
+    outcomes = {True: 0, False: 0}
+    for _ in range(20):
+        vertices, faces = make(rng)
+        try:
+            mesh = clean(vertices, faces, drop_crumbs=bool(rng.integers(2)))
+        except SurfaceError:
+            outcomes[False] += 1
+            continue
+        outcomes[True] += 1
+        w.assert_clean(mesh)
+        # No more area than there was, and none lost without a word.
+        size = np.linalg.norm(
+            np.cross(*(np.diff(vertices[faces], axis=1).transpose(1, 0, 2))), axis=1
+        )
+        before = size.sum() / 2
+        assert mesh.area <= before + 1e-4 * max(before, 1e-3)
+        if not any("dropped" in note for note in mesh.notes):
+            assert mesh.area == pytest.approx(before, rel=1e-4)
+        again = clean(mesh.vertices, mesh.faces)
+        assert again.area == pytest.approx(mesh.area, rel=1e-9)
+    assert outcomes[True] > 3
