@@ -124,7 +124,7 @@ def explain(
     here = Finding(0.0, verdict.answer, verdict.evidence, verdict.message)
     angle = None if verdict.certificate is None else verdict.certificate.max_angle
     start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
-    dropped, motions = None, [start]
+    dropped, motions = None, [start] if verdict.feasible else []
     if verdict.feasible:
         motions += prober.others(GUESSES, POSTURES)
     else:
@@ -136,9 +136,9 @@ def explain(
         if time.monotonic() > deadline:
             break
         fair = (total - prober.spent) // (len(asked) - done)
-        turning = Turning(prober, quantity, cost, prober.spent + fair)
+        turning = Turning(prober, quantity, cost, prober.spent + fair, motions)
         if verdict.feasible:
-            thresholds.append(turning.tighten(motions))
+            thresholds.append(turning.tighten())
         else:
             thresholds.append(turning.widen(replace(here, value=quantity.given), q))
     return Explanation(

@@ -318,7 +318,8 @@ def certifiable(problem: Problem) -> bool:
     well than the task asks for.
     """
     smooth = bool(np.isfinite(problem.bends).all())
-    return smooth and problem.rim > 0.0 and problem.leash > 0.0 and problem.inner_rim > 0.0
+    known = bool((problem.strays < (problem.tolerance, problem.rim)).all())
+    return smooth and known and problem.rim > 0.0
 
 
 def apart(features: NDArray[np.float64], most: int) -> list[int]:

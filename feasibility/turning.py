@@ -27,7 +27,8 @@ BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is loo
 LOOKED_AT = 3  # cells asked for a proof before a search is made
 SCAN = 20  # values looked at on the way to the end of a quantity that is not monotone
 OVERDRAFT = 1  # verdicts' worth of evaluations past `stop` for halving a wide bracket
-SHORT = 2  # verdicts' worth of evaluations that a search from known configurations may take
+TRIES = 2  # other motions that are searched for past the end of one
+SHORT = 1  # verdicts' worth of evaluations that a search from known configurations may take
 
 
 class Side(NamedTuple):
@@ -59,23 +60,21 @@ class Turning:
     """Evaluations that one verdict of the case takes."""
     stop: int
     """Evaluations (of the prober) at which no further search is begun, except to end with one."""
+    motions: Sequence[Trial] = ()
+    """Covering motions of the case as it stands, the one of its verdict first."""
 
     # -- a case that is feasible as it stands ----------------------------------------------------
 
-    def tighten(self, here: Sequence[Trial]) -> Threshold:
-        """How far the quantity can go before the case is no longer feasible.
-
-        Args:
-            here: covering motions of the case as it stands, at least one.
-        """
+    def tighten(self) -> Threshold:
+        """How far the quantity can go before the case is no longer feasible."""
         end = self.quantity.last + 1
         # The cone is no matter of posture, and asking each motion for its angle is dear.
-        motions = here[:1] if self.quantity.kind is Kind.CONE else here
+        motions = self.motions[: 1 if self.quantity.kind is Kind.CONE else None]
         best = max((self._slid(Side(0, trial), end) for trial in motions), key=lambda side: side.k)
         good, other = self._outwards(best)
         told = self._told(good)
         if not told.feasible:  # the replay refuses what the search found
-            return Threshold(self.quantity, self._told(Side(0, here[0])), told)
+            return Threshold(self.quantity, self._told(Side(0, self.motions[0])), told)
         return Threshold(self.quantity, told, other)
 
     def _outwards(self, here: Side) -> tuple[Side, Finding | None]:
@@ -102,7 +101,7 @@ class Turning:
         last = self.quantity.last
         count = 1 if self.quantity.monotone else min(SCAN, last)
         values = [max(1, round(last * (i + 1) / count)) for i in range(count)]
-        known, before, looked = here, 0, 0
+        known, before, looked, proved = here, 0, 0, 0
         for k in values:
             if looked and self.prober.spent >= self.stop:
                 break
@@ -110,6 +109,7 @@ class Turning:
             found = self._look(k, seeds)
             if isinstance(found, Finding):
                 known, before = found, k
+                proved += found.evidence is Evidence.PROOF
                 continue
             entry = Side(k, found)
             good, other = self._narrow(entry, before)
@@ -117,7 +117,9 @@ class Turning:
             if not told.feasible:
                 return Threshold(self.quantity, None, told)
             return Threshold(self.quantity, told, other or known, self._span(entry))
-        tried = "" if self.quantity.monotone else f"{looked} of {count} values tried"
+        tried = ""
+        if not self.quantity.monotone:
+            tried = f"{looked} of {count} values tried, {proved} of them proved infeasible"
         return Threshold(self.quantity, None, known, None, tried)
 
     def _span(self, entry: Side) -> Span | None:
@@ -250,6 +252,13 @@ class Turning:
             if q is not None:
                 seeds[edge.failed] = q
         # This motion goes no further. Another one may, so the search begins afresh.
+        problem, tries = self.prober.problem_at(self.quantity, k), 0
+        for motion in self.motions:
+            cell, q = self.prober.follow(problem, motion.q)
+            if cell == NO_CELL and tries < TRIES and self.prober.spent < self.stop:
+                tries += 1
+                if (trial := self._search(k, q)).found:
+                    return Side(k, trial)
         trial = self._search(k, seeds, deep=True)
         return Side(k, trial) if trial.found else self._finding(Side(k, trial))
 

@@ -1,0 +1,236 @@
+"""An explanation as sentences for people, and as one JSON object."""
+
+from __future__ import annotations
+
+import math
+import textwrap
+from collections.abc import Iterator
+from typing import Any
+
+from feasibility.explain import Dropped, Explanation
+from feasibility.quantities import Kind, Quantity
+from feasibility.thresholds import Finding, Threshold
+from feasibility.verdict import Answer, Evidence
+from feasibility.version import version
+
+WIDTH = 100  # columns
+
+HEADS = {
+    Answer.FEASIBLE: "feasible. How far it can be tightened, one thing at a time:",
+    Answer.INFEASIBLE: "infeasible. What would make it feasible, one thing at a time:",
+    Answer.UNDECIDED: "undecided. What was found to make it feasible, one thing at a time:",
+}
+
+
+def as_text(explanation: Explanation, case_name: str) -> str:
+    """The thresholds for people: what helps first, then what does not."""
+    verdict = explanation.verdict
+    lines = [f"{case_name}: {HEADS[verdict.answer]}", *_item(verdict.message), ""]
+    if len(verdict.cells) == 0:
+        return f"{case_name}: there are no cells to cover, so there is nothing to explain."
+    helps = [t for t in explanation.thresholds if t.feasible is not None]
+    others = [t for t in explanation.thresholds if t.feasible is None]
+    for threshold in helps:
+        lines += _item(sentence(threshold, verdict.feasible), "- ")
+    if not helps:
+        lines += _item("No single change that was looked at was found to make it feasible.")
+    if others:
+        lines += ["", "What does not help alone:"]
+        for threshold in others:
+            lines += _item(sentence(threshold, verdict.feasible), "- ")
+    if explanation.dropped is not None:
+        lines += ["", *_item(dropping(explanation.dropped, len(verdict.cells)))]
+    if explanation.left_out:
+        names = ", ".join(explanation.left_out)
+        lines += ["", *_item(f"The time limit left no time for: {names}.")]
+    return "\n".join(lines)
+
+
+def _item(text: str, mark: str = "") -> list[str]:
+    """Wrapped lines of one item."""
+    return textwrap.wrap(
+        text,
+        WIDTH,
+        initial_indent="  " + mark,
+        subsequent_indent="  " + " " * len(mark),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+
+
+def sentence(threshold: Threshold, tightened: bool) -> str:
+    """One threshold as a sentence.
+
+    Args:
+        threshold: what was found.
+        tightened: the case is feasible, and this is a margin.
+    """
+    quantity, found = threshold.quantity, threshold.feasible
+    if found is None:
+        return _helpless(threshold)
+    value, now = shown(quantity, found.value), shown(quantity, quantity.given)
+    text = (_margin if tightened else _remedy)(quantity, value, now)
+    if threshold.span is not None:
+        text += f", and on to {shown(quantity, threshold.span.feasible.value)}"
+        if threshold.span.other is not None:
+            text += f" ({_against(quantity, threshold.span.other)})"
+    if threshold.other is not None:
+        text += f"; {_against(quantity, threshold.other)}"
+    elif tightened and found.value == quantity.end:
+        text += ", the furthest that was looked at"
+    return text + "."
+
+
+def _margin(quantity: Quantity, value: str, now: str) -> str:
+    """How far a feasible case can be tightened."""
+    if quantity.kind is Kind.CONE:
+        return f"alpha can tighten to {value} ({now} now)"
+    if quantity.kind in (Kind.LOWER, Kind.UPPER):
+        return f"the {quantity.name} can tighten to {value} ({now} now)"
+    if quantity.kind is Kind.STANDOFF:
+        return f"the standoff can {_change(quantity)} to {value} ({now} now)"
+    return f"the surface can shift by {value} {quantity.name.removeprefix('shift ')}"
+
+
+def _remedy(quantity: Quantity, value: str, now: str) -> str:
+    """What would make a case feasible."""
+    if quantity.kind is Kind.CONE:
+        return f"feasible from alpha = {value} on ({now} now)"
+    if quantity.kind in (Kind.LOWER, Kind.UPPER):
+        joint, side, _ = quantity.name.rsplit(" ", 2)
+        way = "down" if side == "lower" else "up"
+        return f"{joint} would need {way} to {value}; it stops at {now}"
+    if quantity.kind is Kind.STANDOFF:
+        return f"feasible when the standoff {_change(quantity)}s to {value} ({now} now)"
+    way = quantity.name.removeprefix("shift ")
+    return f"feasible when the surface shifts by {value} {way}"
+
+
+def _helpless(threshold: Threshold) -> str:
+    """No value was found to help."""
+    quantity, other = threshold.quantity, threshold.other
+    end = shown(quantity, quantity.end)
+    text = {
+        Kind.CONE: f"a wider cone, up to {end}",
+        Kind.LOWER: f"the {quantity.name}, down to {end}",
+        Kind.UPPER: f"the {quantity.name}, up to {end}",
+        Kind.STANDOFF: f"a {quantity.name}, as far as {end}",
+        Kind.SHIFT: f"a {quantity.name}, up to {end}",
+    }[quantity.kind]
+    if threshold.tried:
+        text += f" ({threshold.tried})"
+    if other is not None:
+        text += f": {_against(quantity, other)}"
+    return text + "."
+
+
+def _change(quantity: Quantity) -> str:
+    """Whether a standoff becomes larger or smaller."""
+    return "grow" if quantity.end > quantity.given else "shrink"
+
+
+def _against(quantity: Quantity, other: Finding) -> str:
+    """What speaks against a value."""
+    at = shown(quantity, other.value)
+    if other.evidence is Evidence.PROOF and other.cell is not None:
+        return f"at {at} {other.detail}"
+    if other.value == quantity.given:
+        return f"{other.answer} as it is, at {at}"
+    return f"at {at} {other.detail}"
+
+
+def shown(quantity: Quantity, value: float) -> str:
+    """A value with its unit: degrees or millimetres."""
+    if quantity.unit == "rad":
+        return f"{round(math.degrees(value), 2):g} deg"
+    return f"{round(1e3 * value, 2):g} mm"
+
+
+def dropping(dropped: Dropped, cells: int) -> str:
+    """Which part of the surface would have to be given up."""
+    number, percent = len(dropped.cells), f"{100.0 * dropped.share:.3g} % of the area"
+    if number == cells:
+        return f"No cell is covered; all {cells} would have to be dropped."
+    one = number == 1
+    which = f"the cell that the best motion misses ({percent})"
+    if not one:
+        which = f"the {number:,} cells that the best motion misses ({percent})"
+    if dropped.waypoints is None:
+        return f"Dropping {which} may leave one motion, but none was certified."
+    rest = cells - number
+    return (
+        f"Dropping {which} leaves one motion over the other {rest:,}, of {dropped.waypoints:,} "
+        "waypoints, replayed."
+    )
+
+
+def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
+    """The explanation as the object that `coverable explain --json` prints."""
+    verdict = explanation.verdict
+    dropped = explanation.dropped
+    return {
+        "case": case_name,
+        "verdict": str(verdict.answer),
+        "evidence": str(verdict.evidence),
+        "cells": len(verdict.cells),
+        "covered": verdict.n_covered,
+        "thresholds": [_threshold(t, verdict.feasible) for t in explanation.thresholds],
+        "not_looked_at": list(explanation.left_out),
+        "dropped": None
+        if dropped is None
+        else {
+            "cells": [list(verdict.cells.unravel(int(k))) for k in dropped.cells],
+            "area_m2": dropped.area,
+            "share": dropped.share,
+            "waypoints": dropped.waypoints,
+        },
+        "evaluations": explanation.evaluations,
+        "seconds": round(explanation.seconds, 6),
+        "robot": verdict.robot.name,
+        "seed": int(verdict.seed),
+        "version": version(),
+    }
+
+
+def _threshold(threshold: Threshold, tightened: bool) -> dict[str, Any]:
+    """One threshold as an object; keys say the unit."""
+    quantity, span = threshold.quantity, threshold.span
+    found = dict(_numbers(quantity, "given", quantity.given))
+    found |= _numbers(quantity, "furthest", quantity.end)
+    if threshold.resolution is not None:
+        found |= _numbers(quantity, "resolution", threshold.resolution)
+    return {
+        "quantity": quantity.name,
+        "kind": str(quantity.kind),
+        **found,
+        "feasible": _finding(quantity, threshold.feasible),
+        "other": _finding(quantity, threshold.other),
+        "until": None
+        if span is None
+        else {
+            "feasible": _finding(quantity, span.feasible),
+            "other": _finding(quantity, span.other),
+        },
+        "tried": threshold.tried,
+        "sentence": sentence(threshold, tightened),
+    }
+
+
+def _finding(quantity: Quantity, finding: Finding | None) -> dict[str, Any] | None:
+    """A verdict at one value; null where there is none."""
+    if finding is None:
+        return None
+    return {
+        **dict(_numbers(quantity, "value", finding.value)),
+        "verdict": str(finding.answer),
+        "evidence": str(finding.evidence),
+        "detail": finding.detail,
+    }
+
+
+def _numbers(quantity: Quantity, name: str, value: float) -> Iterator[tuple[str, float]]:
+    """A number under a key with its unit, free of the dust of conversions."""
+    if quantity.unit == "rad":
+        yield f"{name}_deg", round(math.degrees(value), 6)
+    else:
+        yield f"{name}_m", round(value, 9)
