@@ -78,9 +78,11 @@ def read_mesh(
         SurfaceError: no such file, not a mesh, damaged, too large, or not a surface; with the
             file's name, the place and what would do.
     """
-    name = repr(Path(os.fspath(path)).name[:100])
+    name = repr(Path(os.fsdecode(path)).name[:100])
     if scale is not None:
-        number = isinstance(scale, (int, float)) and not isinstance(scale, bool)
+        number = isinstance(scale, (int, float, np.integer, np.floating)) and not isinstance(
+            scale, bool
+        )
         if not number or not 1e-9 <= scale <= 1e9:
             raise SurfaceError(
                 f"scale must be a number > 0 (metres per unit of {name}), within 1e-9 .. 1e9, "
@@ -118,7 +120,7 @@ def _read(path: str | os.PathLike[str]) -> RawMesh:
                 f"has {status.st_size:,} bytes, more than the {LARGEST_FILE:,} that are read; "
                 "thin the mesh, or save it as binary STL"
             )
-        suffix = Path(os.fspath(path)).suffix.lower()
+        suffix = Path(os.fsdecode(path)).suffix.lower()
         try:
             _check_start(stream.read(80), suffix)
             stream.seek(0)

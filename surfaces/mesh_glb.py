@@ -62,7 +62,7 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
     if len(parts) > 1:
         notes.append(f"{len(parts)} meshes of the file's scene were joined")
     if others:
-        notes.append(f"{others} meshes of points or lines were left out")
+        notes.append(f"points and lines ({others} of the scene's meshes) were left out")
     return RawMesh(mesh.vertices, mesh.faces, (*notes, *mesh.notes))
 
 

@@ -129,8 +129,8 @@ def take_faces(mesh: TriangleMesh, indices: ArrayLike) -> TriangleMesh:
     outside = (numbers < 0) | (numbers >= count)
     if outside.any():
         raise SurfaceError(
-            f"{outside.sum()} indices name no face, the first is {numbers[outside.argmax()]}; "
-            f"the faces are 0 .. {count - 1}"
+            f"{outside.sum()} of {len(numbers)} indices name no face, the first is "
+            f"{numbers[outside.argmax()]}; the faces are 0 .. {count - 1}"
         )
     chosen = np.zeros(count, bool)
     chosen[numbers] = True

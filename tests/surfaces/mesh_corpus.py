@@ -484,7 +484,7 @@ REPAIRED = (
         CUBE_AREA,
         12,
         8,
-        (Y_UP, "1 meshes of points"),
+        (Y_UP, "points and lines (1 of the scene's meshes)"),
     ),
     Repaired(
         "normals.stl",

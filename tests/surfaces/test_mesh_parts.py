@@ -186,7 +186,7 @@ def test_nothing_left_says_where_the_mesh_is(cut, said):
         (lambda m: cut_box(m, (0, 0, np.inf), "x"), ("low must be three", "high must be three")),
         (lambda m: faces_within_cone(m, (0, 0, 0), -3), ("direction must", "half_angle_deg must")),
         (lambda m: faces_within_cone(m, (0, 0, 1), 200), ("at most 180",)),
-        (lambda m: take_faces(m, [0, 400]), ("1 indices name no face, the first is 400",)),
+        (lambda m: take_faces(m, [0, 400]), ("1 of 2 indices name no face, the first is 400",)),
         (lambda m: take_faces(m, [-1]), ("the first is -1",)),
         (lambda m: take_faces(m, [0.5]), ("whole numbers",)),
         (lambda m: take_faces(m, [[1], [1, 2]]), ("whole numbers",)),
