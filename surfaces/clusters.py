@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from surfaces.face_graph import FaceGraph, face_graph, sum_by
 from surfaces.flooding import far_seeds, flood, recentre, smooth, units, whole_steps
-from surfaces.subdivide import Subdivision, subdivide
+from surfaces.subdivide import MOST_FACES, Subdivision, subdivide
 from surfaces.surface import SurfaceError
 
 FACES_PER_CELL = 80
@@ -99,10 +99,12 @@ def cluster_faces(
         count: number of cells, at least one for each separate piece and at most one for each face.
 
     Raises:
-        SurfaceError: `count` is no such number.
+        SurfaceError: `count` is no such number, or there are more than 4,000,000 faces.
     """
     faces = np.asarray(faces, dtype=np.int64)
     count = _whole(count)
+    if len(faces) > MOST_FACES:
+        raise SurfaceError(f"{len(faces):,} faces are too many; thin the mesh to {MOST_FACES:,}")
     if not 1 <= count <= len(faces):
         raise SurfaceError(
             f"{count} cells cannot be made of {len(faces)} faces; each needs one at least. "

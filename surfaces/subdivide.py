@@ -124,12 +124,12 @@ def _next_split(
     edges = edges_of(vertices, faces)
     most = most_area * (1.0 + SAME)
     count = np.ceil(edges.length / math.sqrt(LONGEST * most)).astype(np.int64).clip(1)
-    if count.sum() > MOST_FACES:
-        raise _too_many()
     wide: NDArray[np.bool_] = np.all(count[edges.of_face] > 1, axis=1)
     if wide.any():
         return halve(faces, edges, wide, len(vertices))
     if (count > 1).any():
+        if count[edges.of_face].sum() - 2 * len(faces) > MOST_FACES:
+            raise _too_many()
         return cut_across(vertices, faces, edges, count)
     large: NDArray[np.bool_] = _area(vertices, faces) > most
     return halve(faces, edges, large, len(vertices)) if large.any() else None
