@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-def acceleration_excess(spline: BSpline, grid: Array, x: Array, most: Array) -> float:
-    """Largest joint acceleration over its limit, between the places of the grid too."""
+def acceleration_excess(spline: BSpline, grid: Array, x: Array, most: Array) -> Array:
+    """(m - 1,) largest share of its limit that a joint's acceleration has on each piece."""
     h = np.diff(grid)
     u = 0.5 * np.diff(x) / h
     slope, bend = spline.derivative(1), spline.derivative(2)
@@ -35,7 +35,8 @@ def acceleration_excess(spline: BSpline, grid: Array, x: Array, most: Array) -> 
     ]
     # The last place of a piece is evaluated on the piece: second derivatives are continuous.
     inner = 2.0 * values[1] - 0.5 * (values[0] + values[2])
-    return max(float((np.abs(value) / most).max()) for value in (values[0], inner, values[2]))
+    shares = [(np.abs(value) / most).max(axis=1) for value in (values[0], inner, values[2])]
+    return np.asarray(np.max(shares, axis=0))
 
 
 def parameterised(

@@ -132,9 +132,9 @@ def _shortest(steps: csr_array, candidates: list[NDArray[np.int64]]) -> NDArray[
     distance = dijkstra(steps, indices=cells)[:, cells]
     if not np.isfinite(distance).all():
         return best  # some cells cannot be reached from others; which, the caller will find
-    promising = np.argsort(lengths, kind="stable")[:MOST_CANDIDATES]
+    alike = np.round(np.array(lengths) / min(lengths), 9)  # of equal ones the first
+    promising = np.argsort(alike, kind="stable")[:MOST_CANDIDATES]
     tours = [improved(distance, np.searchsorted(cells, candidates[k])) for k in promising]
-    # Of orders that are alike the first: rows before whatever else is as short.
     shortened = np.array([tour_length(distance, tour) for tour in tours])
     first = int(np.flatnonzero(shortened <= shortened.min() * (1.0 + TIE))[0])
     return cells[tours[first]]

@@ -35,7 +35,8 @@ Array = NDArray[np.float64]
 DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
 ALLOWED = 0.999  # [1] share of an acceleration limit that toppra is given
-SLOWEST = 0.5  # [1] a run slowed down more than this to mend accelerations is not accepted
+TRIES = 4  # runs of toppra, each slower where the one before was over an acceleration limit
+MOST_OVER = 4.0  # [1] share of an acceleration limit that running slower altogether may mend
 FINER = 4  # times that the period may be halved
 CROWDED = 0.2  # [1] share of the period; samples nearer to a passage of a centre are left out
 
@@ -136,15 +137,24 @@ def timed_curve(robot: Robot, curve: Curve, limits: MotionLimits) -> TimedCurve:
     most = squared_speeds(robot, spline, grid, limits)
     # In s = k * unit, speeds are about 1, which is what the solver's tolerances are made for.
     unit = 1.0 / float(np.sqrt(np.median(most)))
-    x = parameterised(spline, grid, unit, most, ALLOWED * limits.acceleration) / unit**2
-    over = max(acceleration_excess(spline, grid, x, limits.acceleration), float((x / most).max()))
-    if over > 1.0:
-        if over * SLOWEST**2 > 1.0:
+    allowed = most
+    for _ in range(TRIES):
+        x = parameterised(spline, grid, unit, allowed, ALLOWED * limits.acceleration) / unit**2
+        over = acceleration_excess(spline, grid, x, limits.acceleration)
+        if over.max() <= 1.0:
+            break
+        # Slower there and around, where toppra's own rounding has got too fast.
+        wide = np.maximum.reduce([np.roll(np.append(over, 0.0), k) for k in range(-2, 4)])
+        slower = np.minimum(allowed, x / np.maximum(wide, 1.0) ** 2)
+        allowed = np.where(wide > 1.0, slower, allowed)
+    worst = max(float(over.max()), float((x / most).max()))
+    if worst > 1.0:
+        if worst > MOST_OVER:
             raise PathError(
-                f"no timing was found that keeps to the accelerations; they are {over:.2g} times "
+                f"no timing was found that keeps to the accelerations; they are {worst:.2g} times "
                 "too large at a turn"
             )
-        x = x / over
+        x = x / worst
     rate = np.sqrt(x)
     time = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(grid) / (rate[:-1] + rate[1:]))])
     if not np.isfinite(time).all():
