@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from feasibility.probing import Trial
 
 SHARE = 27  # verdicts' worth of evaluations that all thresholds together may take
+FEW, EACH = 2000, 32  # evaluations, and those for each cell, that any search should have
 LEAST = 100_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
@@ -118,7 +119,8 @@ def explain(
 
     deadline = np.inf if search.time_limit is None else began + PATIENCE * search.time_limit
     prober = Prober(setup, search.seed, deadline, tick)
-    cost = max(int(verdict.statistics["fk"]), 1)
+    # An early proof makes a verdict cheap, but the searches that follow are no cheaper for that.
+    cost = max(int(verdict.statistics["fk"]), FEW + EACH * len(cells))
     total = max(SHARE * cost, LEAST)
     q = known_configurations(verdict)
     here = Finding(0.0, verdict.answer, verdict.evidence, verdict.message)

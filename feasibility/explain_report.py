@@ -36,7 +36,10 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         lines += _item("No single change that was looked at was found to make it feasible.")
     if others:
         lines += ["", "What does not help alone:"]
-        for threshold in others:
+        ruled_out = [_helpless_label(t.quantity) for t in others if t.ruled_out]
+        if ruled_out:
+            lines += _item(f"proved: {'; '.join(ruled_out)}.", "- ")
+        for threshold in (t for t in others if not t.ruled_out):
             lines += _item(sentence(threshold, verdict.feasible), "- ")
     if explanation.dropped is not None:
         lines += ["", *_item(dropping(explanation.dropped, len(verdict.cells)))]
@@ -109,19 +112,24 @@ def _remedy(quantity: Quantity, value: str, now: str) -> str:
 def _helpless(threshold: Threshold) -> str:
     """No value was found to help."""
     quantity, other = threshold.quantity, threshold.other
+    text = _helpless_label(quantity)
+    if threshold.tried:
+        text += f" ({threshold.tried})"
+    if other is not None:
+        text += f": {_against(quantity, other)}"
+    return text + "."
+
+
+def _helpless_label(quantity: Quantity) -> str:
+    """A quantity and how far it was looked at."""
     end = shown(quantity, quantity.end)
-    text = {
+    return {
         Kind.CONE: f"a wider cone, up to {end}",
         Kind.LOWER: f"the {quantity.name}, down to {end}",
         Kind.UPPER: f"the {quantity.name}, up to {end}",
         Kind.STANDOFF: f"a {quantity.name}, as far as {end}",
         Kind.SHIFT: f"a {quantity.name}, up to {end}",
     }[quantity.kind]
-    if threshold.tried:
-        text += f" ({threshold.tried})"
-    if other is not None:
-        text += f": {_against(quantity, other)}"
-    return text + "."
 
 
 def _change(quantity: Quantity) -> str:

@@ -107,6 +107,7 @@ class Prober:
         self.work = work_for(setup.robot.n)
         self.spent_before = 0
         self.tick = tick or (lambda: None)
+        self.reach = setup.robot.reach
         self.suspects: list[int] = []
         """Cells that were hard to cover so far, the latest first."""
 
@@ -160,13 +161,16 @@ class Prober:
     def rule(
         self, problem: Problem, cell: int, boxes: int
     ) -> tuple[Ruling, NDArray[np.float64] | None]:
-        """Branch and bound on one cell with so many boxes.
+        """The reach bound on one cell, then branch and bound with so many boxes.
 
         Returns:
             The ruling; and, unless it is PROVED or OPEN, a configuration (n,) that Newton put onto
             the cell's fibre, None where it could not.
         """
         self.tick()
+        if self._beyond_reach(problem, cell):
+            self.suspect(cell)
+            return Ruling.PROVED, None
         ruling, q = rule(problem, self.work, cell, root_box(problem), boxes)
         if ruling is Ruling.PROVED:
             self.suspect(cell)
@@ -177,6 +181,15 @@ class Prober:
         row[cell] = _wound(problem, q)
         landed = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
         return ruling, row[cell] if landed else None
+
+    def _beyond_reach(self, problem: Problem, cell: int) -> bool:
+        """Is a cell further away than the arm reaches? Turning joints reach alike in any limits."""
+        slides = self.setup.robot.prismatic
+        longer = (problem.lower < self.problem.lower) | (problem.upper > self.problem.upper)
+        if (slides & longer).any():
+            return False
+        away = problem.points[cell] - self.setup.robot.model.jointPlacements[1].translation
+        return bool(np.linalg.norm(away) > self.reach + problem.tolerance)
 
     def attempt(
         self,

@@ -69,9 +69,11 @@ class Threshold:
         return abs(self.feasible.value - self.other.value)
 
     @property
-    def shift(self) -> float | None:
-        """How far (rad or m, >= 0) the feasible value is from the one given."""
-        return None if self.feasible is None else abs(self.feasible.value - self.quantity.given)
+    def ruled_out(self) -> bool:
+        """Is it proved that no value up to the end helps?"""
+        end = self.other is not None and self.other.value == self.quantity.end
+        proved = self.other is not None and self.other.evidence is Evidence.PROOF
+        return self.feasible is None and self.quantity.monotone and end and proved
 
 
 def last_true(holds: Callable[[int], bool], good: int, bad: int, gallop: bool = False) -> int:

@@ -141,9 +141,11 @@ class Turning:
             ruling, q = self.prober.rule(problem, cell, HINT_BOXES)
             if ruling is Ruling.PROVED:
                 return self._proof(k, cell)
-            if q is not None:
-                seeds[cell] = q
-        trial = self._search(k, seeds, deep=self.quantity.monotone)
+            if q is None:
+                break  # neither a proof nor a configuration: the next cell would tell no more
+            seeds[cell] = q
+        nowhere = not np.isfinite(seeds).any()
+        trial = self._search(k, seeds, deep=self.quantity.monotone or nowhere)
         return trial if trial.found else self._finding(Side(k, trial))
 
     # -- between the two -------------------------------------------------------------------------

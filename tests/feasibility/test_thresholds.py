@@ -1,0 +1,268 @@
+"""Thresholds: bisection, what is varied and how, and the cheap questions that lead to them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from dense_replay import tools
+from paper_cases import PAPER_CASES
+
+from feasibility import Task
+from feasibility.probing import NO_CELL, Prober, apart
+from feasibility.problem import problem_of
+from feasibility.proof import Ruling
+from feasibility.quantities import Kind, Quantity, Setup, quantities, shifted
+from feasibility.thresholds import last_true
+from feasibility.verdict import Answer, Evidence, Walk
+from robots import load_robot
+from surfaces import cylinder, plane, sphere
+
+PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
+SMALL = Setup(load_robot("ur5"), PLATE.cells(3, 3), Task(standoff=0.02, cone_deg=30))
+
+
+def paper(name: str) -> Setup:
+    case = PAPER_CASES[name]
+    return Setup(case.robot(), case.cells(), case.task())
+
+
+def prober_of(setup: Setup) -> Prober:
+    return Prober(setup, 0, np.inf)
+
+
+# -- bisection -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("gallop", [False, True])
+def test_bisection_finds_every_place_from_both_sides(gallop: bool) -> None:
+    for size in range(1, 40):
+        for turn in range(size):
+            up, down = [0], [0]
+
+            def holds_up(k: int, turn: int = turn, asked: list[int] = up, n: int = size) -> bool:
+                assert 0 < k < n
+                asked[0] += 1
+                return k <= turn
+
+            def holds_down(
+                k: int, turn: int = turn, asked: list[int] = down, n: int = size
+            ) -> bool:
+                assert -n < k < 0
+                asked[0] += 1
+                return k >= -turn
+
+            assert last_true(holds_up, 0, size, gallop) == turn
+            assert last_true(holds_down, 0, -size, gallop) == -turn
+            most = (2 if gallop else 1) * math.ceil(math.log2(size)) + 1
+            assert max(up[0], down[0]) <= most
+
+
+def test_bisection_ends_beside_a_failure_whatever_the_answers() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(300):
+        size = int(rng.integers(2, 60))
+        answers = rng.random(size + 1) < 0.7
+        for gallop in (False, True):
+            for good, bad in ((0, size), (size, 0)):
+                k = last_true(answers.__getitem__, good, bad, gallop)
+                step = 1 if bad > good else -1
+                assert k == good or answers[k]
+                assert k + step == bad or not answers[k + step]
+
+
+def test_galloping_stays_in_the_stretch_it_starts_in() -> None:
+    """A gap as wide as the way before it is never jumped."""
+    for edge in range(1, 60):
+        for size in (200, 500):
+            k = last_true(
+                {*range(edge + 1), *range(3 * edge + 4, size)}.__contains__, 0, size, True
+            )
+            assert k == edge
+
+
+# -- what is varied ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("widen", [False, True])
+def test_values_run_from_the_given_one_to_the_end_in_equal_steps(widen: bool) -> None:
+    asked = quantities(paper("4d"), widen)
+    assert len(asked) == 1 + 12 + 2 + 6
+    assert len({q.name for q in asked}) == len(asked)
+    for q in asked:
+        values = np.array([q.value(k) for k in range(q.last + 1)])
+        assert values[0] == pytest.approx(q.given, abs=1e-12)
+        assert values[-1] == q.end
+        steps = np.diff(values) * np.sign(q.end - q.given)
+        step = math.radians(q.step) if q.unit == "rad" else q.step
+        np.testing.assert_allclose(steps[:-1], step, rtol=1e-6)
+        assert 0.0 < steps[-1] <= step * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("widen", [False, True])
+def test_a_quantity_changes_itself_and_nothing_else(widen: bool) -> None:
+    setup = paper("4d")
+    for q in quantities(setup, widen):
+        robot, cells, task = q.applied(setup, 3)
+        value = q.value(3)
+        lower, upper = np.array(setup.robot.lower), np.array(setup.robot.upper)
+        expected = setup.task
+        shift = np.zeros(3)
+        if q.kind is Kind.CONE:
+            expected = replace(expected, cone_deg=round(math.degrees(value), 9))
+        elif q.kind is Kind.STANDOFF:
+            expected = replace(expected, standoff=value)
+        elif q.kind is Kind.SHIFT:
+            shift = value * np.array(q.axis)
+        else:
+            (lower if q.kind is Kind.LOWER else upper)[q.joint] = value
+            wider = (value < q.given) == (q.kind is Kind.LOWER)
+            assert wider == widen
+        np.testing.assert_array_equal(robot.lower, lower)
+        np.testing.assert_array_equal(robot.upper, upper)
+        assert (task.standoff, task.tolerance) == (expected.standoff, expected.tolerance)
+        assert task.cone_deg == expected.cone_deg
+        np.testing.assert_allclose(cells.centres, setup.cells.centres + shift, atol=1e-12)
+        assert q.applied(setup, 0) is setup
+
+
+def test_joints_that_turn_freely_have_no_limit_to_vary_and_slides_count_in_metres() -> None:
+    kinova = load_robot("kinova")
+    named = {
+        q.joint
+        for q in quantities(Setup(kinova, SMALL.cells, SMALL.task), True)
+        if q.kind in (Kind.LOWER, Kind.UPPER)
+    }
+    assert named == set(np.flatnonzero(np.isfinite(kinova.lower)).tolist())
+    assert 0 < len(named) < kinova.n
+
+
+def test_what_has_no_room_is_left_out() -> None:
+    setup = Setup(SMALL.robot, SMALL.cells, Task(standoff=0.0, cone_deg=180))
+    names = [q.name for q in quantities(setup, widen=True)]
+    assert "cone" not in names
+    assert "smaller standoff" not in names
+    assert "larger standoff" in names
+
+
+@pytest.mark.parametrize(
+    "surface", [sphere(1.0, (10, 90), (10, 180)), cylinder(0.5, (-60, 60), (0, 0.9))]
+)
+def test_shifted_cells_are_those_of_the_shifted_surface(surface) -> None:  # type: ignore[no-untyped-def]
+    shift = np.array([0.1, -0.2, 0.3])
+    moved = shifted(surface.cells(4, 5), shift)
+    fresh = surface.moved(np.eye(3), shift).cells(4, 5)
+    np.testing.assert_allclose(moved.centres, fresh.centres, atol=1e-12)
+    np.testing.assert_allclose(moved.normals, fresh.normals, atol=1e-12)
+    np.testing.assert_allclose(moved.areas, fresh.areas, atol=1e-12)
+    np.testing.assert_array_equal(moved.pairs, fresh.pairs)
+    for name in ("first", "cubics", "bends", "strays"):
+        np.testing.assert_allclose(
+            getattr(moved.courses, name), getattr(fresh.courses, name), atol=1e-9
+        )
+
+
+# -- cheap questions -----------------------------------------------------------------------------
+
+
+def test_a_problem_nearby_is_the_one_made_anew() -> None:
+    setup = paper("4c")
+    prober = prober_of(setup)
+    for q in quantities(setup, widen=False):
+        found, fresh = prober.problem_at(q, 7), problem_of(*q.applied(setup, 7))
+        for name, one, other in zip(found._fields, found, fresh, strict=True):
+            if name != "chain":
+                np.testing.assert_allclose(one, other, atol=1e-9, err_msg=f"{q.name}: {name}")
+
+
+def quantity(setup: Setup, name: str, widen: bool = False) -> Quantity:
+    return next(q for q in quantities(setup, widen) if q.name == name)
+
+
+@pytest.mark.parametrize(
+    "name", ["cone", "joint1 lower limit", "larger standoff", "shift along -y"]
+)
+def test_followed_configurations_lie_on_the_fibres(name: str) -> None:
+    """Pinocchio says where the tool is; the task says where it should be."""
+    setup = paper("4c")
+    prober = prober_of(setup)
+    nowhere = np.full((len(setup.cells), setup.robot.n), np.nan)
+    start = prober.others(24, 1)[0]
+    assert not np.isnan(start.q).any()
+    q = quantity(setup, name)
+    for k in (1, 10, 40):
+        cell, found = prober.follow(prober.problem_at(q, k), start.q)
+        assert cell == NO_CELL
+        robot, cells, task = q.applied(setup, k)
+        points, axes = tools(robot, found)
+        aims = task.targets(cells)
+        assert np.linalg.norm(points - aims.points, axis=1).max() <= 1e-3
+        cosine = np.clip((axes * aims.approaches).sum(axis=1), -1.0, 1.0)
+        assert np.degrees(np.arccos(cosine)).max() <= task.cone_deg + 1e-6
+        assert (found >= robot.lower).all()
+        assert (found <= robot.upper).all()
+    cell, _ = prober.follow(prober.problem, nowhere)
+    assert cell != NO_CELL  # NaN is never taken for a configuration
+
+
+def test_a_ruling_brings_a_proof_or_a_configuration() -> None:
+    setup = paper("4d")
+    prober = prober_of(setup)
+    points, approaches = setup.task.targets(setup.cells)
+    for cell in (0, 45, 89):
+        ruling, q = prober.rule(prober.problem, cell, 20_000)
+        if cell >= 60:
+            assert ruling is Ruling.PROVED
+            assert q is None
+            assert prober.suspects[0] == cell
+        else:
+            assert q is not None
+            point, axis = tools(setup.robot, q[None])
+            assert np.linalg.norm(point[0] - points[cell]) <= 1e-3
+            assert axis[0] @ approaches[cell] >= math.cos(setup.task.cone) - 1e-9
+
+
+def test_a_search_without_a_ration_finds_nothing_and_says_so() -> None:
+    setup = paper("4a")
+    prober = prober_of(setup)
+    nothing = np.full((90, 6), np.nan)
+    trial = prober.attempt(prober.problem, nothing, 10, deep=True)
+    assert not trial.found
+    assert (trial.answer, trial.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert prober.spent > 0
+    trial = prober.attempt(prober.problem, nothing, np.inf, deep=True)
+    assert trial.found
+
+
+def test_a_motion_that_the_replay_refuses_is_not_feasible() -> None:
+    prober = prober_of(SMALL)
+    trial = prober.attempt(prober.problem, np.full((9, 6), np.nan), np.inf, deep=True)
+    assert trial.walk is not None
+    assert prober.confirmed(SMALL, trial).answer is Answer.FEASIBLE
+    q = trial.walk.q.copy()
+    q[len(q) // 2] += 0.05
+    bent = replace(trial, walk=Walk(q, trial.walk.cell))
+    refused = prober.confirmed(SMALL, bent)
+    assert (refused.answer, refused.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert refused.walk is None
+    assert "refuses" in refused.detail
+
+
+def test_motions_from_other_postures_are_motions() -> None:
+    setup = paper("4a")
+    prober = prober_of(setup)
+    trials = prober.others(64, 4)
+    assert len(trials) >= 2
+    for trial in trials:
+        assert prober.confirmed(setup, trial).answer is Answer.FEASIBLE
+    first = np.array([trial.q[0] for trial in trials])
+    assert np.ptp(first, axis=0).max() > 0.5
+
+
+def test_rows_far_apart_are_chosen_first() -> None:
+    rows = np.array([[0.0], [0.01], [10.0], [4.0], [10.01]])
+    assert apart(rows, 3) == [0, 4, 3]
+    assert apart(rows, 99) == [0, 4, 3]  # the others are nearly the same
+    assert apart(rows[:0], 3) == []
