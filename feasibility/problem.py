@@ -16,6 +16,10 @@ from surfaces import Cells
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
 NEWTON_RIM = 1e-4  # [1] share of the cone that it costs, by way of the turning of the normal
+ORDINARY = 0.01  # [1] share of the rim that an ordinary course may stray
+# The replay takes the place on the course that is nearest to the tool point, up to twice `near`
+# from the one aimed at, and wants the cone to hold at the tool point's own foot.
+NEAR_COSTS = 3.0  # [1], times `near` and the turning of the normal: what that may cost of the rim
 
 # Why a motion stopped: the constraint that left no room.
 NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD = 0, 1, 2, 3, 4, 5
@@ -40,17 +44,18 @@ class Problem(NamedTuple):
     targets: NDArray[np.float64]
     """(P, 4, 6) cubics of target point and approach direction along each piece."""
     bends: NDArray[np.float64]
-    """(P, 2) largest second derivatives of both (m, 1) by t; inf where the offset folds."""
+    """(P, 3) largest second derivatives of both (m, 1) by t, inf where the offset folds; and how
+    fast the approach direction turns along the target surface (1/m)."""
+    strays: NDArray[np.float64]
+    """(M, 2) how far both may be from the surface's own on each course (m, 1)."""
     rim: float
     """2 sin(alpha / 2): the largest |a - b|; inf when every direction will do."""
     tolerance: float
     """m."""
-    leash: float
-    """m, what motions keep to: the tolerance less what courses stray from the surface."""
     inner_rim: float
-    """The rim less what the normals of courses stray, and less what follows from `near`."""
+    """What motions over one cell's centre keep to of the rim, less what follows from `near`."""
     turning: float
-    """1/m, how fast the approach direction turns along the target surface, at most."""
+    """1/m, how fast the approach direction turns next to the cells' centres, at most."""
     near: float
     """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_RIM."""
     scale: float
@@ -64,11 +69,11 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
     ways = target_courses(cells, task.standoff)
     chain = Chain.checked(robot)
     rim = np.inf if task.cone_deg >= 180.0 else float(2.0 * np.sin(0.5 * task.cone))
-    leash = max(float(tolerance - ways.stray_point), 0.0)
-    inner_rim = max(rim - ways.stray_approach, 0.0)
-    near = NEWTON * leash
-    if ways.turning > 0.0 and rim < np.inf:
-        near = min(near, NEWTON_RIM * inner_rim / ways.turning)
+    strays = ways.strays[:, 1]
+    ordinary = float(strays[strays <= ORDINARY * rim].max(initial=0.0)) if rim < np.inf else 0.0
+    near = NEWTON * tolerance
+    if ways.standing > 0.0 and rim < np.inf:
+        near = min(near, NEWTON_RIM * rim / ways.standing)
     return Problem(
         chain=chain,
         lower=np.array(robot.lower),
@@ -77,14 +82,12 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
         approaches=np.ascontiguousarray(targets.approaches),
         first_piece=ways.first,
         targets=ways.cubics,
-        bends=ways.bends,
+        bends=np.column_stack([ways.bends, ways.turning]),
+        strays=ways.strays,
         rim=rim,
         tolerance=float(tolerance),
-        leash=leash,
-        # The replay takes the place on the course that is nearest to the tool point, up to twice
-        # `near` from the one aimed at, and wants the cone to hold at the tool point's own foot.
-        inner_rim=float(inner_rim - 3.0 * ways.turning * near) if near > 0.0 else inner_rim,
-        turning=ways.turning,
+        inner_rim=float(rim - ordinary - NEAR_COSTS * ways.standing * near),
+        turning=ways.standing,
         near=float(near),
         # A gantry may have no links at all: its strokes are as good as any length then.
         scale=float(np.linalg.norm(chain.translations, axis=1).sum()) or 1.0,
@@ -123,8 +126,11 @@ class Work(NamedTuple):
     target: NDArray[np.float64]
     """(2, 3) target point and approach direction."""
     bend: NDArray[np.float64]
-    """(2,) largest second derivatives of target point and approach direction over the present
-    step, by its own parameter in 0..1; zero while the target stands still."""
+    """(3,) largest second derivatives of target point and approach direction over the present
+    step, by its own parameter in 0..1, zero while the target stands still; and how fast the
+    direction turns there (1/m)."""
+    room: NDArray[np.float64]
+    """(2,) what the present step keeps to of tolerance (m) and rim; 0 where it has no room."""
     counts: NDArray[np.int64]
     """(1,) forward kinematics evaluated."""
     blame: NDArray[np.int64]
@@ -148,7 +154,8 @@ def work_for(n: int) -> Work:
         held=np.zeros(n, dtype=np.bool_),
         trial=np.zeros(n),
         target=np.zeros((2, 3)),
-        bend=np.zeros(2),
+        bend=np.zeros(3),
+        room=np.zeros(2),
         counts=np.zeros(1, dtype=np.int64),
         blame=np.zeros(2, dtype=np.int64),
     )
@@ -169,10 +176,13 @@ def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def look_at(work, target, approach):  # type: ignore[no-untyped-def]
+def look_at(problem, work, target, approach):  # type: ignore[no-untyped-def]
     """Set `work.target`, and let it stand still."""
     work.bend[0] = 0.0
     work.bend[1] = 0.0
+    work.bend[2] = problem.turning
+    work.room[0] = problem.tolerance
+    work.room[1] = problem.inner_rim
     for k in range(3):
         work.target[0, k] = target[k]
         work.target[1, k] = approach[k]
@@ -209,16 +219,21 @@ def aim(problem, work, course, t):  # type: ignore[no-untyped-def]
 
 @kernel
 def bend_between(problem, work, course, t0, t1):  # type: ignore[no-untyped-def]
-    """Set `work.bend` for a step along a course from t0 to t1, either way."""
+    """Set `work.bend` and `work.room` for a step along a course from t0 to t1, either way."""
     first = problem.first_piece[course]
     count = problem.first_piece[course + 1] - first
     low = min(np.int64(min(t0, t1) * count), count - 1)
     high = min(np.int64(max(t0, t1) * count), count - 1)
-    for part in range(2):
+    for part in range(3):
         most = 0.0
         for piece in range(low, high + 1):
             most = max(most, problem.bends[first + piece, part])
-        work.bend[part] = most * (t1 - t0) ** 2
+        work.bend[part] = most * (t1 - t0) ** 2 if part < 2 else most
+    # No more room than over the centres, and no less on an ordinary course: every configuration
+    # that works over a cell can set out from it.
+    lost = problem.rim - problem.strays[course, 1] - NEAR_COSTS * work.bend[2] * problem.near
+    work.room[0] = max(problem.tolerance - problem.strays[course, 0], 0.0)
+    work.room[1] = max(min(problem.inner_rim, lost), 0.0)
 
 
 @kernel
