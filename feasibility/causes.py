@@ -68,7 +68,7 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
     best = np.inf
     q, step = np.empty(n), np.empty(n)
     square, pull = np.empty((4, 4)), np.empty(4)
-    look_at(work, problem.points[cell], problem.approaches[cell])
+    look_at(problem, work, problem.points[cell], problem.approaches[cell])
     for g in range(guesses.shape[0]):
         put(q, guesses[g])
         damping = 0.1
@@ -262,7 +262,7 @@ def disconnected(explorer: Explorer, cell: int) -> Cause:
         CONE: "the tool axis is stopped at the rim of the cone",
         SINGULAR: "the arm is stopped at a singularity",
         LONG: "the motion takes too many steps",
-        FOLD: "the offset surface folds: the standoff reaches the radius of curvature there",
+        FOLD: "the surface is creased, or its offset folds",
     }.get(code)
     detail = (
         f"reached by another motion only, which covers {int(roadmap.size[other])} of "

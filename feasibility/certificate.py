@@ -104,13 +104,14 @@ def second_derivatives(
     return total
 
 
-def _peaks(ends: NDArray[np.float64], most: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(m,) largest values along m segments of a norm with these values at their m + 1 ends.
+def _peaks(
+    a: NDArray[np.float64], b: NDArray[np.float64], most: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(m,) largest values along m segments of a norm with the values a and b (m,) at their ends.
 
     `most` (m,) bounds the second derivative, so the norm is at most
     (1 - s) a + s b + s (1 - s) most / 2, whose largest value this is. NaN comes out as NaN.
     """
-    a, b = ends[:-1], ends[1:]
     slope = np.abs(b - a)
     with np.errstate(divide="ignore", invalid="ignore"):
         inner = 0.5 * (a + b) + most / 8.0 + slope**2 / (2.0 * most)
@@ -170,14 +171,16 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     steps = np.abs(np.diff(walk.q, axis=0))
     bend = second_derivatives(steps, robot.prismatic, poses.levers, np.inf) + beside.bends[:, 0]
     turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0) + beside.bends[:, 1]
-    position = np.max(
-        _peaks(beside.error, bend) + beside.strays[:, 0], initial=np.max(beside.error, initial=0.0)
-    )
-    # At the tool point's own foot the normal is another than at its target.
-    chord = beside.chord + beside.turning * beside.error
+    error, chord, aside = beside.error, beside.chord, beside.bends[:, 2]
     with np.errstate(invalid="ignore"):  # a fold: inf * 0 is NaN, and refused
-        turn = turn + beside.turning * bend
-    worst = np.max(_peaks(chord, turn) + beside.strays[:, 1], initial=np.max(chord, initial=0.0))
+        turn = turn + aside * bend
+        # At the tool point's own foot the normal is another than at its target.
+        before, after = chord[:-1] + aside * error[:-1], chord[1:] + aside * error[1:]
+    strayed = _peaks(error[:-1], error[1:], bend) + beside.strays[:, 0]
+    tilted = _peaks(before, after, turn) + beside.strays[:, 1]
+    position = np.max(strayed, initial=np.max(error, initial=0.0))
+    alone = chord + beside.standing * error if len(chord) == 1 else chord
+    worst = np.max(tilted, initial=np.max(alone, initial=0.0))
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
         waypoints=len(walk.q),

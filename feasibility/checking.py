@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feasibility.search import Search
+from feasibility.target_courses import closed_courses
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from feasibility.verdict import Answer, Evidence, Verdict, Walk, deferred
 from robots import Robot
@@ -181,23 +182,9 @@ def _answer(
             "A cone of 0 degrees leaves a motion no room between samples, so none can be "
             "certified; allow a small angle.",
         )
-    folded = np.isinf(explorer.problem.bends).any(axis=1)
-    if folded.any():
-        return (
-            Answer.UNDECIDED,
-            Evidence.BUDGET,
-            "The offset surface folds: the standoff reaches the surface's radius of curvature on "
-            "its hollow side, so no motion can be certified there; use a smaller standoff.",
-        )
-    if not (explorer.problem.leash > 0.0 and explorer.problem.inner_rim > 0.0):
-        strays = explorer.cells.courses.strays.max(axis=0)
-        return (
-            Answer.UNDECIDED,
-            Evidence.BUDGET,
-            f"The surface is rougher than the task allows: it is known to {1e3 * strays[0]:.3g} mm "
-            f"and {np.degrees(strays[1]):.3g} deg only; use a finer or smoother mesh, a larger "
-            "tolerance or a wider cone.",
-        )
+    closed = closed_courses(explorer.cells, task)
+    if closed:
+        return (Answer.UNDECIDED, Evidence.BUDGET, closed)
     missed = int((~explorer.reached).sum())
     what = (
         f"{missed} cell{'s were' if missed > 1 else ' was'} never reached, without a proof"

@@ -70,8 +70,9 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
     size = span_of(problem, work, course, begin, end)
     aim(problem, work, course, begin)
     place(problem, work, HERE, q)
-    if not (work.error[0, 0] <= problem.leash and work.error[0, 1] <= problem.inner_rim):
-        work.blame[0] = SINGULAR
+    bend_between(problem, work, course, begin, begin)
+    if not (work.error[0, 0] <= work.room[0] and work.error[0, 1] <= work.room[1]):
+        work.blame[0] = SINGULAR if work.room[0] > 0.0 and work.room[1] > 0.0 else FOLD
         return -1
     t, dt, written = 0.0, 1.0, 0
     for _ in range(MOST_STEPS):
@@ -80,7 +81,7 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
             dt = 1.0 - t  # no sliver at the end
         here, there = begin + t * (end - begin), begin + (t + dt) * (end - begin)
         bend_between(problem, work, course, here, there)
-        if not work.bend[0] < np.inf:
+        if not (work.bend[0] < np.inf and work.room[0] > 0.0 and work.room[1] > 0.0):
             work.blame[0] = FOLD
             return -1
         aim(problem, work, course, there)

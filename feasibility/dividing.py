@@ -143,7 +143,7 @@ def _no_room(explorer: Explorer) -> str:
             "The offset surface folds: the standoff reaches the surface's radius of curvature on "
             "its hollow side, so no motion can be certified; use a smaller standoff."
         )
-    if not (problem.leash > 0.0 and problem.inner_rim > 0.0):
+    if len(problem.strays) and (problem.strays >= (problem.tolerance, problem.rim)).any(axis=1).all():
         return (
             "The surface is rougher than the task allows, so no motion can be certified; use a "
             "finer or smoother mesh, a larger tolerance or a wider cone."

@@ -76,7 +76,7 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
         one is `goal`.
     """
     n = q.shape[0]
-    look_at(work, target, approach)
+    look_at(problem, work, target, approach)
     place(problem, work, HERE, q)
     size, written = 0.3, 0
     left = 0.0
@@ -137,7 +137,7 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
 def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped-def]
     """Self-motion over one target that makes room: away from limits and the rim (q in place)."""
     n = q.shape[0]
-    look_at(work, target, approach)
+    look_at(problem, work, target, approach)
     place(problem, work, HERE, q)
     size = 0.3
     for _ in range(most):

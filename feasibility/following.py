@@ -35,12 +35,13 @@ class Following:
     chord: Array
     """(m,) |a - b| of tool axis and approach direction."""
     bends: Array
-    """(m - 1, 2) largest second derivatives of target point and approach direction along each
-    segment, by the segment's own parameter in 0..1."""
+    """(m - 1, 3) largest second derivatives of target point and approach direction along each
+    segment, by the segment's own parameter in 0..1; and how fast the direction turns along the
+    target surface there, 1/m."""
     strays: Array
     """(m - 1, 2) how far target point and approach direction are from the surface's own."""
-    turning: float
-    """1/m, how fast the approach direction turns along the target surface, at most."""
+    standing: float
+    """1/m, how fast the direction turns next to the cells' centres."""
     fault: str
     """What makes the walk no motion along courses; empty when nothing does."""
 
@@ -56,8 +57,8 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         axes: (m, 3) its approach axes.
     """
     m = len(points)
-    segments = np.zeros((max(m - 1, 0), 2))
-    nothing = Following(np.zeros(m), np.zeros(m), segments, segments, 0.0, "")
+    segments = np.zeros((max(m - 1, 0), 3))
+    nothing = Following(np.zeros(m), np.zeros(m), segments, segments[:, :2], 0.0, "")
     if m == 0:
         return nothing
     marks = np.flatnonzero(walk.cell >= 0)
@@ -94,7 +95,8 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     target[still], approach[still] = aims.points[over], aims.approaches[over]
     target[along], approach[along] = _at(ways, course[stretch[along]], places[along])
 
-    bends, strays = np.zeros((m - 1, 2)), np.zeros((m - 1, 2))
+    bends, strays = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
+    bends[:, 2] = ways.standing
     moves = np.flatnonzero(course[stretch] != STAYS)
     used, which = np.unique(course[stretch[moves]], return_inverse=True)
     bends[moves] = _bends(ways, course[stretch[moves]], t0[moves], t1[moves])
@@ -105,7 +107,7 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         chord=np.linalg.norm(axes - approach, axis=1),
         bends=bends,
         strays=strays,
-        turning=ways.turning,
+        standing=ways.standing,
         fault=fault,
     )
 
@@ -168,15 +170,17 @@ def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> A
 
 
 def _bends(ways: TargetCourses, course: NDArray[np.int64], t0: Array, t1: Array) -> Array:
-    """(k, 2) largest second derivatives along segments from t0 to t1, by their own parameter."""
+    """(k, 3) see `Following.bends`, of segments from t0 to t1 on courses."""
     low, _, _ = _pieces(ways, course, np.minimum(t0, t1))
     high, _, _ = _pieces(ways, course, np.maximum(t0, t1))
-    most = ways.bends[low].copy()
+    known = np.column_stack([ways.bends, ways.turning])
+    most = known[low]
     for ahead in range(1, int((high - low).max(initial=0)) + 1):
         piece = np.minimum(low + ahead, high)
-        most = np.maximum(most, ways.bends[piece])
+        most = np.maximum(most, known[piece])
     with np.errstate(invalid="ignore"):  # a fold, and no way at all: NaN, which is refused
-        return np.asarray(most * ((t1 - t0) ** 2)[:, None])
+        most[:, :2] *= ((t1 - t0) ** 2)[:, None]
+    return most
 
 
 def _strays(cells: Cells, standoff: float, used: NDArray[np.int64]) -> tuple[Array, str]:

@@ -138,7 +138,7 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
     when the tool point is at its target to `problem.near`, and the axis inside the cone.
     """
     n = q.shape[0]
-    inner = problem.inner_rim
+    inner = work.room[1]
     hard = inner * (1.0 - slack)
     last = np.inf
     for it in range(most):
@@ -191,7 +191,7 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
 @kernel
 def land(problem, work, cell, q, most):  # type: ignore[no-untyped-def]
     """Newton from a guess q (in place) onto the fibre over a cell's centre; True when it lands."""
-    look_at(work, problem.points[cell], problem.approaches[cell])
+    look_at(problem, work, problem.points[cell], problem.approaches[cell])
     place(problem, work, NEXT, q)
     for j in range(q.shape[0]):
         work.wish[j] = 0.0

@@ -168,7 +168,7 @@ class Prober:
             the cell's fibre, None where it could not.
         """
         self.tick()
-        if self._beyond_reach(problem, cell):
+        if self.beyond_reach(problem)[cell]:
             self.suspect(cell)
             return Ruling.PROVED, None
         ruling, q = rule(problem, self.work, cell, root_box(problem), boxes)
@@ -182,14 +182,18 @@ class Prober:
         landed = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
         return ruling, row[cell] if landed else None
 
-    def _beyond_reach(self, problem: Problem, cell: int) -> bool:
-        """Is a cell further away than the arm reaches? Turning joints reach alike in any limits."""
+    def beyond_reach(self, problem: Problem) -> NDArray[np.bool_]:
+        """(N,) cells that are further away than the arm reaches.
+
+        Turning joints reach alike in any limits; a slide that is longer than in the case as it
+        stands is not ruled out here.
+        """
         slides = self.setup.robot.prismatic
         longer = (problem.lower < self.problem.lower) | (problem.upper > self.problem.upper)
         if (slides & longer).any():
-            return False
-        away = problem.points[cell] - self.setup.robot.model.jointPlacements[1].translation
-        return bool(np.linalg.norm(away) > self.reach + problem.tolerance)
+            return np.zeros(len(problem.points), dtype=bool)
+        away = problem.points - self.setup.robot.model.jointPlacements[1].translation
+        return np.linalg.norm(away, axis=1) > self.reach + problem.tolerance
 
     def attempt(
         self,

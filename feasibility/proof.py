@@ -264,7 +264,7 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
     low, high = np.empty(n), np.empty(n)
     lever, sine, longest = np.empty(n), np.empty(n), np.empty(n)
     _static_levers(problem, longest)
-    look_at(work, target, approach)
+    look_at(problem, work, target, approach)
     for _ in range(most):
         if boxes.counts[0] == 0:
             return 1

@@ -21,7 +21,7 @@ stands still). So, with p - T and a - b as the vector functions,
 and |a - b| = 2 sin(angle / 2) compares with the cone exactly. The cone is to hold at the tool
 point's own foot, where the normal differs from the target's by at most kappa |p - T|, kappa the
 turning of the normal along the target surface: so M = Da + Tb + kappa (D + Tp). (What this adds at
-the ends is in `Problem.inner_rim`.) Limits are convex: the ends decide.
+the ends is in `Work.room`.) Limits are convex: the ends decide.
 """
 
 from __future__ import annotations
@@ -88,6 +88,6 @@ def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
     """
     total, total_axis = spread(problem, work, q0, q1)
     position = peak(work.error[0, 0], work.error[1, 0], total + work.bend[0])
-    aside = problem.turning * (total + work.bend[0])
+    aside = work.bend[2] * (total + work.bend[0])
     cone = peak(work.error[0, 1], work.error[1, 1], total_axis + work.bend[1] + aside)
-    return position / problem.leash, cone / problem.inner_rim
+    return position / work.room[0], cone / work.room[1]

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.task import DEFAULT_TOLERANCE, Task
 from surfaces import Cells
 
 ASIDE = 1.1  # [1] the normal may turn that much faster across the courses than along them
@@ -21,12 +22,12 @@ class TargetCourses(NamedTuple):
     """(P, 4, 6) coefficients of 1, s, s^2, s^3 of point (m) and direction; s in 0..1."""
     bends: NDArray[np.float64]
     """(P, 2) largest second derivatives of both by t in 0..1; inf where the offset folds."""
-    stray_point: float
-    """m, how far a target point may be from the target surface, at most."""
-    stray_approach: float
-    """How far an approach direction may be from the surface's own, at most."""
-    turning: float
-    """1/m, how fast the direction turns for each metre on the target surface, at most."""
+    turning: NDArray[np.float64]
+    """(P,) 1/m, how fast the direction turns for each metre on the target surface, at most."""
+    strays: NDArray[np.float64]
+    """(M, 2) how far target point (m) and direction may be from the surface's own, at most."""
+    standing: float
+    """1/m, the largest `turning` next to the cells' centres."""
     folded: NDArray[np.bool_]
     """(M,) courses where the offset surface folds, see `folded_courses`."""
 
@@ -54,13 +55,38 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
     bends = courses.bends.copy()
     bends[:, 0] += standoff * bends[:, 1]
     bends[np.repeat(folded, np.diff(courses.first))] = np.inf
-    stray, turned = courses.strays[~folded].max(axis=0, initial=0.0)
+    turning = ASIDE * courses.turning(height)
+    ends = np.concatenate([courses.first[:-1][~folded], courses.first[1:][~folded] - 1])
+    strays = courses.strays.copy()
+    strays[:, 0] += standoff * strays[:, 1]
     return TargetCourses(
         first=courses.first,
         cubics=cubics,
         bends=bends,
-        stray_point=float(stray + standoff * turned),
-        stray_approach=float(turned),
-        turning=ASIDE * courses.turning(height, ~folded),
+        turning=turning,
+        strays=strays,
+        standing=float(turning[ends].max(initial=0.0)),
         folded=folded,
     )
+
+
+def closed_courses(cells: Cells, task: Task) -> str:
+    """Why no motion can be certified between some neighbouring cells; empty where it can."""
+    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    ways = target_courses(cells, task.standoff)
+    some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
+    if ways.folded.any():
+        return (
+            f"The offset surface folds {some.format(int(ways.folded.sum()))}: the standoff reaches "
+            "the surface's radius of curvature on its hollow side, so no motion can be certified "
+            "there; use a smaller standoff."
+        )
+    rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
+    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim)
+    if rough.any():
+        return (
+            f"The surface is creased, or rougher than the task allows, "
+            f"{some.format(int(rough.sum()))}, so no motion can be certified there; use a finer or "
+            "smoother mesh, cut it along its creases, or allow a wider cone or a larger tolerance."
+        )
+    return ""

@@ -87,21 +87,19 @@ class Courses:
             folded |= ~(onward > STANDS * (foot**2).sum(axis=1))
         return np.logical_or.reduceat(folded, self.first[:-1]) if len(self) else folded
 
-    def turning(self, height: float, which: NDArray[np.bool_]) -> float:
-        """1/m, how fast the normal turns for each metre that the target travels, at most.
+    def turning(self, height: float) -> Array:
+        """(P,) 1/m, how fast the normal turns for each metre that the target travels, at most.
 
         Args:
             height: signed height of the target over the surface, m.
-            which: (M,) courses that count.
         """
-        fastest = 0.0
-        counts = np.repeat(which, np.diff(self.first))
+        fastest = np.zeros(len(self.cubics))
         for foot, normal in self._slopes_along():
-            foot, normal = foot[counts], normal[counts]
             way = np.linalg.norm(foot + height * normal, axis=1)
             turn = np.linalg.norm(normal, axis=1)
-            moves = way > 0.0
-            fastest = max(fastest, float(np.max(turn[moves] / way[moves], initial=0.0)))
+            none = np.where(turn > 0.0, np.inf, 0.0)  # it turns on the spot, or there is no way
+            rate = np.divide(turn, way, out=none, where=way > 0.0)
+            fastest = np.maximum(fastest, rate)
         return fastest
 
     def _slopes_along(self) -> Iterator[tuple[Array, Array]]:

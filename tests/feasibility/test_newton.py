@@ -17,7 +17,7 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 def solve(problem, work, target, approach, q, most=60):
     """Newton from q (in place) onto a target point, inside the cone about a direction."""
-    look_at(work, target, approach)
+    look_at(problem, work, target, approach)
     place(problem, work, 1, q)
     work.wish[:] = 0.0
     return correct(problem, work, q, SLACK, np.inf, most)
