@@ -1,0 +1,261 @@
+"""Coverage paths: every path replayed, its figures measured again, its choices against brute force."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise, product
+
+import networkx as nx
+import numpy as np
+import pytest
+from dense_replay import assert_motion, assert_over
+from path_cases import FEASIBLE, PATCHES, path_of, verdict_of
+from small_cases import paper_verdict, small_verdict
+
+from feasibility import joint_route as joint_routes
+from feasibility.certificate import replay
+from feasibility.coverage import coverage_path
+from feasibility.joint_route import joint_route, walk_of
+from feasibility.motion_net import MotionNet, joint_length
+from feasibility.path_figures import again
+from feasibility.problem import problem_of, work_for
+from feasibility.route import ORDERS, PathError, route
+from feasibility.verdict import Answer, Walk
+from robots.kinematics import Kinematics
+
+NAMES = (*FEASIBLE, *PATCHES)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("name", NAMES)
+def test_a_path_is_one_motion_through_every_cell_in_its_order(name, order):
+    verdict, path = verdict_of(name), path_of(name, order)
+    every = np.ones(len(verdict.cells), dtype=bool)
+    replayed = replay(verdict.robot, verdict.cells, verdict.task, path.walk, every)
+    assert replayed.accepted, replayed.refusal
+    assert replayed.certificate == path.certificate
+    firsts = list(dict.fromkeys(path.visits.tolist()))
+    assert sorted(firsts) == list(range(len(verdict.cells)))
+    if path.figures.revisited == 0.0 and order != "shortest":
+        assert firsts == route(verdict.cells, order).tolist()
+    marks = path.walk.cell >= 0
+    assert_over(verdict, path.walk.cell[marks], path.walk.q[marks])
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_path_holds_between_its_waypoints_by_formulas_of_its_own(name):
+    assert_motion(verdict_of(name), path_of(name).walk.q)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_best_order_revisits_little(name):
+    shares = [path_of(name, order).figures.revisited_share for order in ORDERS]
+    assert min(shares) <= 0.15
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_figures_of_a_path_measured_again(name):
+    verdict, path = verdict_of(name), path_of(name)
+    robot, walk, figures = verdict.robot, path.walk, path.figures
+    # Lengths: straight from foot to foot along a much denser walk.
+    t = np.arange(16)[:, None] / 16.0
+    dense = walk.q[:-1, None] * (1 - t) + walk.q[1:, None] * t
+    kinematics = Kinematics(robot)
+    points = np.array([kinematics.tool(q)[0] for q in [*dense.reshape(-1, robot.n), walk.q[-1]]])
+    foot = verdict.cells.surface.closest(points)
+    way = np.linalg.norm(np.diff(points - foot.height[:, None] * foot.normal, axis=0), axis=1)
+    assert figures.length == pytest.approx(way.sum(), rel=1e-3)
+    by_mark, seen, start = [0.0, 0.0], {int(walk.cell[0])}, 0
+    for k in np.flatnonzero(walk.cell >= 0)[1:].tolist():
+        by_mark[int(walk.cell[k]) in seen] += way[16 * start : 16 * k].sum()
+        seen.add(int(walk.cell[k]))
+        start = k
+    assert [figures.covered, figures.revisited] == pytest.approx(by_mark, rel=1e-3, abs=1e-9)
+    # A path through the centres is no shorter; this one passes them within the tolerance.
+    slack = 2 * 1e-3 * len(verdict.cells)
+    assert figures.length >= figures.least_length - slack
+    assert figures.travel == pytest.approx(np.abs(np.diff(walk.q, axis=0)).sum(axis=0))
+    margins = np.minimum(walk.q - robot.lower, robot.upper - walk.q)
+    assert figures.turn_margin == margins.min()
+    assert figures.slide_margin == np.inf
+    assert -1e-9 <= figures.cone_margin <= verdict.task.cone
+    assert figures.singular_value == pytest.approx(_singular_value(robot, walk.q), rel=1e-4)
+
+
+def _singular_value(robot, q, step=1e-6):
+    """The smallest of five singular values, by finite differences of the tool's place."""
+    kinematics, smallest = Kinematics(robot), np.inf
+    for row in q:
+        columns = []
+        for j in range(robot.n):
+            shift = step * np.eye(robot.n)[j]
+            ahead, behind = kinematics.tool(row + shift), kinematics.tool(row - shift)
+            columns.append([*(ahead[0] - behind[0]) / robot.reach, *(ahead[1] - behind[1])])
+        values = np.linalg.svd(np.array(columns).T / (2 * step), compute_uv=False)
+        smallest = min(smallest, float(values[4]))
+    return smallest
+
+
+def test_segments_that_lead_to_a_known_cell():
+    cell = np.array([0, -1, 1, -1, 0, 0, -1, 2])
+    walk = Walk(q=np.zeros((8, 2)), cell=cell)
+    assert again(walk).tolist() == [False, False, True, True, True, False, False]
+
+
+def test_cells_of_an_infeasible_surface_that_one_motion_covers():
+    verdict = paper_verdict("4d")
+    covered = np.flatnonzero(verdict.covered)
+    path = coverage_path(verdict, "rows", only=covered.tolist())
+    assert set(path.visits.tolist()) >= set(covered.tolist())
+    replayed = replay(verdict.robot, verdict.cells, verdict.task, path.walk, verdict.covered)
+    assert replayed.accepted, replayed.refusal
+    assert_motion(verdict, path.walk.q)
+
+
+def test_some_cells_only():
+    verdict = paper_verdict("4c")
+    wanted = [0, 1, 2, 12, 22, 88]
+    path = coverage_path(verdict, "shortest", only=wanted)
+    assert set(path.visits.tolist()) >= set(wanted)
+    assert len(path.visits) < 30
+    single = coverage_path(verdict, "rows", only=[7])
+    assert single.visits.tolist() == [7]
+    assert (single.figures.length, single.figures.revisited_share) == (0.0, 0.0)
+
+
+def test_the_same_question_has_the_same_path():
+    verdict = verdict_of("ur5")
+    first, second = coverage_path(verdict, "spiral"), coverage_path(verdict, "spiral")
+    assert np.array_equal(first.walk.q, second.walk.q)
+    assert np.array_equal(first.walk.cell, second.walk.cell)
+
+
+# -- the choice of nodes, on hand-made nets -----------------------------------------------------
+
+
+def hand_made(rng, cells, nodes, density):
+    """A net over cells in a row: some nodes over each, random motions between neighbours."""
+    verdict = small_verdict("plate")
+    problem = problem_of(verdict.robot, verdict.cells, verdict.task)
+    net = MotionNet(problem, work_for(2), {(k, k + 1): k for k in range(cells - 1)})
+    for cell in range(cells):
+        for _ in range(nodes):
+            net.node(cell, rng.random(2))
+    for a, b in product(range(cells * nodes), repeat=2):
+        if abs(net.cell[a] - net.cell[b]) <= 1 and a < b and rng.random() < density:
+            net.link(a, b, np.vstack([net.q[a], rng.random((1, 2)), net.q[b]]))
+    return net
+
+
+@pytest.fixture
+def stored_motions_only(monkeypatch):
+    """No new motions: what is known decides, so that brute force can know it too."""
+    monkeypatch.setattr(
+        joint_routes,
+        "step_to",
+        lambda net, x, cell: [y for y in net.links[x] if net.cell[y] == cell],
+    )
+    monkeypatch.setattr(joint_routes, "turn_at", lambda net, x: None)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_nodes_are_chosen_for_the_least_travel(seed, stored_motions_only):
+    net = hand_made(np.random.default_rng(seed), cells=5, nodes=3, density=1.0)
+    cells = small_verdict("plate").cells
+    nodes = joint_route(net, cells, np.arange(5))
+    assert [net.cell[x] for x in nodes] == list(range(5))
+    travel = sum(joint_length(net.links[x][y]) for x, y in pairwise(nodes))
+    choices = product(*(net.over[cell] for cell in range(5)))
+    least = min(sum(joint_length(net.links[x][y]) for x, y in pairwise(c)) for c in choices)
+    assert travel == pytest.approx(least, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_detours_go_through_known_motions_to_every_cell(seed, stored_motions_only):
+    rng = np.random.default_rng(seed)
+    net = hand_made(rng, cells=6, nodes=3, density=0.35)
+    order = rng.permutation(6)
+    graph = nx.Graph([(x, y) for x, near in enumerate(net.links) for y in near])
+    graph.add_nodes_from(range(len(net.cell)))
+    cells = small_verdict("plate").cells
+    # From any node over the first cell; what none of their components holds cannot be reached.
+    joined = [{net.cell[x] for x in part} for part in nx.connected_components(graph)]
+    try:
+        nodes = joint_route(net, cells, order)
+    except PathError as error:
+        assert "no known motion leads from" in str(error)
+        assert not all(len(part) == 6 for part in joined)
+        return
+    assert {net.cell[x] for x in nodes} == set(range(6))
+    assert net.cell[nodes[0]] == order[0]
+    assert all(y in net.links[x] for x, y in pairwise(nodes))
+    walk = walk_of(net, nodes)
+    assert walk.cell[walk.cell >= 0].tolist() == [net.cell[x] for x in nodes]
+    assert np.array_equal(walk.q[walk.cell >= 0], [net.q[x] for x in nodes])
+
+
+def test_a_detour_is_the_cheapest(stored_motions_only):
+    rng = np.random.default_rng(5)
+    cells = small_verdict("plate").cells
+    for _ in range(40):
+        net = hand_made(rng, cells=5, nodes=2, density=0.5)
+        graph = nx.Graph()
+        for x, near in enumerate(net.links):
+            for y, motion in near.items():
+                apart = np.linalg.norm(cells.centres[net.cell[x]] - cells.centres[net.cell[y]])
+                cost = joint_length(motion) + joint_routes.REVISIT * apart / net.problem.scale
+                graph.add_edge(x, y, weight=cost)
+        graph.add_nodes_from(range(len(net.cell)))
+        ways = [
+            nx.dijkstra_path_length(graph, x, y)
+            for x in net.over[0]
+            for y in net.over[4]
+            if nx.has_path(graph, x, y)
+        ]
+        if not ways:
+            continue
+        nodes = joint_route(net, cells, np.array([0, 4]))
+        assert nx.path_weight(graph, nodes, "weight") == pytest.approx(min(ways), rel=1e-12)
+
+
+# -- what cannot be asked -----------------------------------------------------------------------
+
+
+def test_a_path_of_an_infeasible_surface():
+    with pytest.raises(PathError, match="infeasible with 60 of 90 cells covered.*divide"):
+        coverage_path(paper_verdict("4d"))
+
+
+def test_a_path_of_an_undecided_surface():
+    verdict = replace_answer(paper_verdict("4d"), Answer.UNDECIDED)
+    with pytest.raises(PathError, match="the verdict is undecided"):
+        coverage_path(verdict)
+
+
+def replace_answer(verdict, answer):
+    """The same verdict with another answer."""
+    return replace(verdict, answer=answer, graph=None, causes=())
+
+
+def test_a_path_of_the_greedy_search():
+    with pytest.raises(PathError, match="greedy search.*method = 'complete'"):
+        coverage_path(small_verdict("greedy dome"))
+
+
+def test_a_path_of_no_cells():
+    with pytest.raises(PathError, match="no cells to cover"):
+        coverage_path(small_verdict("no cells"))
+    with pytest.raises(PathError, match="no cells are named"):
+        coverage_path(small_verdict("plate"), only=[])
+
+
+def test_cells_that_cannot_be_reached_and_cells_that_are_none():
+    verdict = paper_verdict("4d")
+    missed = int(np.flatnonzero(~verdict.covered)[0])
+    with pytest.raises(PathError, match="no cell -1, 90;.*0 to 89.*cell .*cannot be reached"):
+        coverage_path(verdict, only=[missed, -1, 90])
+
+
+def test_an_unknown_order():
+    with pytest.raises(PathError, match="'snake'.*rows, columns, spiral, shortest"):
+        coverage_path(small_verdict("plate"), "snake")
