@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -127,11 +129,13 @@ def key_times(motion: Motion) -> NDArray[np.float64]:
     return np.linspace(0.0, float(motion.seconds[-1]), min(KEY_FRAMES, 4 * len(motion.walk)))
 
 
-def animate(robot: Robot, motion: Motion, *, play: bool) -> threejs.Command:
-    """The animation of a motion: one track for each joint's group."""
+def animate(
+    robot: Robot, motion: Motion, *, play: bool, tracks: Sequence[dict[str, Any]] = ()
+) -> threejs.Command:
+    """The animation of a motion: one track for each joint's group, and what else moves with it."""
     times = key_times(motion)
     placements = joint_placements(robot, motion.at(times))
-    tracks = []
+    tracks = list(tracks)
     for joint, path in enumerate(joint_paths(robot)[1:]):
         if robot.prismatic[joint]:
             tracks.append(threejs.track(path, "position", times, placements[:, joint, :3, 3]))

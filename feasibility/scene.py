@@ -180,7 +180,7 @@ def _components(verdict: Verdict) -> Iterator[Layer]:
         yield Layer(commands, Entry(words, colour, path, shown=False), len(cells))
 
 
-def trail(verdict: Verdict, motion: Motion) -> Layer:
+def trail(cells: Cells, motion: Motion) -> Layer:
     """Where the tool goes in the motion that is played.
 
     A covering motion runs along most edges of G, so it is hidden until it is asked for.
@@ -189,7 +189,7 @@ def trail(verdict: Verdict, motion: Motion) -> Layer:
     shown = motion.there_and_back
     even = np.linspace(0.0, motion.seconds[-1], TRAIL_POINTS)
     line = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
-    size = cell_size(verdict.cells)
+    size = cell_size(cells)
     vertices, faces = tubes([line], 0.035 * size)
     commands = (
         threejs.mesh(path, vertices, faces, TRAIL, lit=False),

@@ -11,8 +11,10 @@ from __future__ import annotations
 import html
 import os
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,10 +23,11 @@ from feasibility import robot_visuals, threejs
 from feasibility.meshcat_server import LiveView
 from feasibility.motion import Motion, animate, motion_of
 from feasibility.page import Camera, Entry, Legend, page
-from feasibility.scene import layers, trail
+from feasibility.scene import Layer, layers, trail
 from feasibility.threejs import Command
 from feasibility.verdict import Verdict
 from robots import Robot
+from surfaces import Cells
 
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
 FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
@@ -99,25 +102,65 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
         ValueError: the verdict's own motions do not join.
     """
     motion = motion_of(verdict)
-    drawing = robot_visuals.draw(verdict.robot)
-    commands = _stage(verdict, drawing.lowest) + list(drawing.commands)
-    entries = [Entry(verdict.robot.name, ARM, robot_visuals.ROOT)]
-    for part in layers(verdict):
+    parts = layers(verdict)
+    if motion is not None:
+        parts.append(trail(verdict.cells, motion))
+    return compose(
+        verdict.robot,
+        verdict.cells,
+        _title(verdict, case),
+        _text(verdict),
+        parts,
+        motion,
+        resting=_resting(verdict),
+        play=play,
+        at=at,
+    )
+
+
+def compose(
+    robot: Robot,
+    cells: Cells,
+    title: str,
+    text: str,
+    parts: Sequence[Layer],
+    motion: Motion | None,
+    *,
+    resting: NDArray[np.float64],
+    tracks: Sequence[dict[str, Any]] = (),
+    play: bool = True,
+    at: float = 0.0,
+) -> View:
+    """Put arm, ground and parts into one picture.
+
+    Args:
+        robot: the arm.
+        cells: what it works on; the camera frames both.
+        title: of the legend.
+        text: below it.
+        parts: what is drawn, in the order of the legend.
+        motion: what the arm plays, or None.
+        resting: (n,) where it stands otherwise.
+        tracks: what else moves with it, see `threejs.track`.
+        play: start the motion when the page opens.
+        at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
+    """
+    drawing = robot_visuals.draw(robot)
+    commands = _stage(robot, cells, drawing.lowest) + list(drawing.commands)
+    entries = [Entry(robot.name, ARM, robot_visuals.ROOT)]
+    for part in parts:
         commands += part.commands
         entries.append(part.entry)
-    q = _resting(verdict)
+    q = resting
     if motion is not None:
-        tool_path = trail(verdict, motion)
-        commands += tool_path.commands
-        entries.append(tool_path.entry)
-        commands.append(animate(verdict.robot, motion, play=play))
+        commands.append(animate(robot, motion, play=play, tracks=tracks))
         q = motion.at(np.array([at * motion.seconds[-1]]))[0]
-    commands += robot_visuals.pose(verdict.robot, q)
+    commands += robot_visuals.pose(robot, q)
     return View(
-        robot=verdict.robot,
+        robot=robot,
         commands=tuple(commands),
-        legend=Legend(_title(verdict, case), _text(verdict, drawing.notes), tuple(entries)),
-        camera=_camera(verdict, q, drawing.lowest),
+        legend=Legend(title, " · ".join([text, *drawing.notes]), tuple(entries)),
+        camera=_camera(robot, cells, q, drawing.lowest),
         motion=motion,
         notes=drawing.notes,
     )
@@ -164,13 +207,12 @@ def _title(verdict: Verdict, case: str | None) -> str:
     return f"{name}{verdict.answer} ({verdict.evidence})"
 
 
-def _text(verdict: Verdict, notes: tuple[str, ...]) -> str:
+def _text(verdict: Verdict) -> str:
     """Arm, surface, and how much is covered."""
-    text = (
+    return (
         f"{verdict.robot.name}: {verdict.n_covered} of {len(verdict.cells)} cells in one "
         f"continuous motion ({verdict.method} search)"
     )
-    return " · ".join([text, *notes])
 
 
 def _resting(verdict: Verdict) -> NDArray[np.float64]:
@@ -184,10 +226,10 @@ def _resting(verdict: Verdict) -> NDArray[np.float64]:
     return np.clip(np.zeros(verdict.robot.n), verdict.robot.lower, verdict.robot.upper)
 
 
-def _stage(verdict: Verdict, floor: float) -> list[Command]:
+def _stage(robot: Robot, cells: Cells, floor: float) -> list[Command]:
     """Background, a ground grid at the height of the lowest thing, and the root frame's axes."""
-    box = _points(verdict)
-    size = max(verdict.robot.reach if np.isfinite(verdict.robot.reach) else 1.0, 0.2)
+    box = _points(cells)
+    size = max(robot.reach if np.isfinite(robot.reach) else 1.0, 0.2)
     spacing = _round_below(size / 5.0)
     extent = np.abs(box[:, :2]).max(initial=size)
     half = spacing * np.ceil(extent / spacing)
@@ -213,29 +255,29 @@ def _round_below(value: float) -> float:
     return float(max(step * power for step in (1.0, 2.5, 5.0) if step * power <= value))
 
 
-def _points(verdict: Verdict) -> NDArray[np.float64]:
+def _points(cells: Cells) -> NDArray[np.float64]:
     """Points (k, 3) m of the surface and the arm's base."""
     base = np.zeros((1, 3))
-    if len(verdict.cells) == 0:
+    if len(cells) == 0:
         return base
-    corners = verdict.cells.borders(1).reshape(-1, 3)
+    corners = cells.borders(1).reshape(-1, 3)
     return np.concatenate([base, corners])
 
 
-def _camera(verdict: Verdict, q: NDArray[np.float64], floor: float) -> Camera:
+def _camera(robot: Robot, cells: Cells, q: NDArray[np.float64], floor: float) -> Camera:
     """Look at arm and surface from the tool's side, a little from above."""
-    placements = robot_visuals.joint_placements(verdict.robot, q)[0]
+    placements = robot_visuals.joint_placements(robot, q)[0]
     place = np.eye(4)
     joints = []
     for step in placements:
         place = place @ step
         joints.append(place[:3, 3].copy())
-    points = np.concatenate([_points(verdict), joints, [[0.0, 0.0, floor]]])
+    points = np.concatenate([_points(cells), joints, [[0.0, 0.0, floor]]])
     target = (points.min(axis=0) + points.max(axis=0)) / 2.0
     radius = max(float(np.linalg.norm(points - target, axis=1).max()), 0.1)
     toward = np.zeros(3)
-    if len(verdict.cells):
-        toward = verdict.cells.surface.side_sign * verdict.cells.normals.mean(axis=0)
+    if len(cells):
+        toward = cells.surface.side_sign * cells.normals.mean(axis=0)
     heading = np.arctan2(toward[1], toward[0]) if np.hypot(*toward[:2]) > 0.1 else -np.pi / 3.0
     heading += np.radians(25.0)
     height = np.radians(24.0)
