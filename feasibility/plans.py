@@ -46,20 +46,28 @@ def plans(explorer: Explorer, task: Task) -> tuple[Plan, Plan]:
     """The plan with the fewest motions, and the one with connected patches (maybe the same)."""
     roots, covers = table_of(explorer)
     cover = fewest_patches(covers, np.ones(len(explorer.cells), dtype=bool), explorer.cells.pairs)
-    fewest = _plan(explorer, task, cover.fewest, roots, covers)
+    fewest = plan_of(explorer, task, cover.fewest, roots, covers)
     if cover.connected is cover.fewest:
         return fewest, fewest
-    return fewest, _plan(explorer, task, cover.connected, roots, covers)
+    return fewest, plan_of(explorer, task, cover.connected, roots, covers)
 
 
-def _plan(
+def plan_of(
     explorer: Explorer,
     task: Task,
     partition: Partition,
     roots: list[int],
     covers: NDArray[np.bool_],
 ) -> Plan:
-    """Walks for every patch, in the best order, each replayed."""
+    """Walks for every patch, in the best order, each replayed.
+
+    Args:
+        explorer: the search.
+        task: the task.
+        partition: the patches.
+        roots: the K components that `partition.rows` counts.
+        covers: (K, N) the cells that each covers.
+    """
     robot, cells = explorer.robot, explorer.cells
     if len(partition) == 0:
         return Plan((), (), partition.bound)

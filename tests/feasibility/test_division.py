@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise, permutations, product
 
@@ -21,9 +22,11 @@ from feasibility.complete import Explorer, explore
 from feasibility.dividing import divide
 from feasibility.division import Division, Plan
 from feasibility.division_report import answer_of, as_json, as_text
-from feasibility.gathering import tie
+from feasibility.gathering import table_of, tie
 from feasibility.labels import count_of
+from feasibility.partition import Partition
 from feasibility.patch_walk import links_of, patch_walk
+from feasibility.plans import plan_of
 from feasibility.problem import problem_of
 from feasibility.reconfigure import AS_GOOD, itinerary
 from feasibility.verdict import CauseKind, Walk
@@ -365,6 +368,33 @@ def test_text_of_a_division() -> None:
     assert order == ["patch", "move", "patch"]
     assert f"shoulder_pan_joint by {np.degrees(division.moves[0].moves[0]):+.1f} deg" in text
     assert max(map(len, lines)) <= 100
+
+
+def test_a_plan_of_connected_patches_beside_the_fewest() -> None:
+    """Three patches of one component: as a plan of their own, in JSON and in the text."""
+    division = divide(*load_case("paper/4c", []).build())
+    explorer = Explorer(
+        division.robot,
+        division.cells,
+        problem_of(division.robot, division.cells, division.task),
+        division.seed,
+    )
+    explore(explorer)
+    third = np.arange(90) // 30
+    made = Partition(rows=np.zeros(3), patch=third, pieces=3, bound=2)
+    roots, covers = table_of(explorer)
+    plan = plan_of(explorer, division.task, made, roots, covers)
+    assert (len(plan.patches), plan.optimal) == (3, False)
+    both = replace(division, connected=plan)
+    assert_division(both)
+    found = parsed(both)
+    assert len(found["patches"]) == 1
+    assert len(found["connected"]["patches"]) == 3
+    assert (found["connected"]["at_least"], found["connected"]["optimal"]) == (2, False)
+    lines = as_text(both, "paper/4c").splitlines()
+    head = lines.index("With patches that are each connected on the surface:")
+    steps = [line.split()[0] for line in lines[head + 1 :] if line[2:3].isalpha()]
+    assert steps == ["patch", "move", "patch", "move", "patch"]
 
 
 def test_text_of_cells_left_out() -> None:
