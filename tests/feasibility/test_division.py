@@ -31,7 +31,8 @@ from feasibility.problem import problem_of
 from feasibility.reconfigure import AS_GOOD, itinerary
 from feasibility.verdict import CauseKind, Walk
 from robots import Robot, load_robot
-from surfaces import cylinder, plane, sphere
+from surfaces import cylinder, mesh, plane, sphere
+from surfaces.triangles import TriangleMesh
 
 
 def assert_plan(plan: Plan, division: Division) -> None:
@@ -77,10 +78,13 @@ def assert_division(division: Division) -> None:
     assert division.whole == inside.all()
 
 
-def behind(pan_deg: tuple[float, float]) -> Division:
-    """A cylinder patch behind the UR5, 60 degrees wide; the other joints keep to one posture."""
-    ur5 = load_robot("ur5")
-    arm = ur5.with_limits(
+TASK = Task(0.01, cone_deg=30)
+BEHIND = cylinder(0.6, angle_deg=(150, 210), height=(0.1, 0.5), side="inside")
+
+
+def posed(pan_deg: tuple[float, float]) -> Robot:
+    """A UR5 whose joints, but the first one, keep to one posture."""
+    return load_robot("ur5").with_limits(
         {
             "shoulder_pan_joint": np.radians(pan_deg),
             "shoulder_lift_joint": np.radians([-90, 0]),
@@ -88,8 +92,11 @@ def behind(pan_deg: tuple[float, float]) -> Division:
             "wrist_1_joint": np.radians([-180, 180]),
         }
     )
-    patch = cylinder(0.6, angle_deg=(150, 210), height=(0.1, 0.5), side="inside")
-    return divide(arm, patch.cells(12, 6), Task(0.01, cone_deg=30))
+
+
+def behind(pan_deg: tuple[float, float]) -> Division:
+    """A cylinder patch behind the UR5, 60 degrees wide."""
+    return divide(posed(pan_deg), BEHIND.cells(12, 6), TASK)
 
 
 # what the issue asks for
@@ -126,6 +133,26 @@ def test_the_seam_of_joint_1_costs_a_patch_and_a_full_turn_removes_it() -> None:
     assert_division(free)
     assert len(free.patches) == 1
     assert free.whole
+
+
+def test_the_patch_behind_as_a_mesh() -> None:
+    """The same two patches and one, over triangles."""
+    u, v = np.meshgrid(np.linspace(*BEHIND.u_range, 60), np.linspace(0.1, 0.5, 40), indexing="ij")
+    k = np.arange(u.size).reshape(u.shape)
+    corners = [side.ravel() for side in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:])]
+    faces = np.vstack(
+        [np.stack([corners[i] for i in way], axis=1) for way in ((0, 1, 2), (0, 2, 3))]
+    )
+    cells = mesh(TriangleMesh(BEHIND.point(u, v).reshape(-1, 3), faces), side="inside").cells(72)
+    cut, free = divide(posed((-180, 180)), cells, TASK), divide(posed((0, 360)), cells, TASK)
+    for division, number in ((cut, 2), (free, 1)):
+        assert_division(division)
+        assert (len(division.patches), division.optimal, division.whole) == (number, True, True)
+        found = parsed(division)
+        assert sorted(k for patch in found["patches"] for (k,) in patch["cells"]) == list(range(72))
+        # Cells near the seam may go to either patch; together they are the cylinder's.
+        area = sum(patch.area for patch in division.patches)
+        assert area == pytest.approx(0.6 * np.radians(60) * 0.4, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["4a", "4f", "5b", "5e"])
