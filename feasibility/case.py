@@ -10,9 +10,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from feasibility.case_edits import as_read, make_absolute, override
-from feasibility.case_faults import CaseError, Fault, close, printable
+from feasibility.case_faults import BuildError, CaseError, Fault, alternatives, close, printable
 from feasibility.case_robot import RobotPart, read_robot
-from feasibility.case_surface import SurfacePart, read_surface
+from feasibility.case_surface import (
+    CHARTED,
+    SurfacePart,
+    faults_of_building,
+    named_file,
+    read_surface,
+)
 from feasibility.case_task import read_search, read_task
 from feasibility.files import FileError, read_regular, shown_path
 from feasibility.search import Search
@@ -65,15 +71,22 @@ class Case:
         """Load the arm and cut the surface.
 
         Raises:
-            CaseError: the robot cannot be loaded as asked.
+            CaseError: the robot cannot be loaded as asked, or the surface not be read or cut.
         """
         from robots import RobotError
 
+        faults, robot, cells = [], None, None
         try:
             robot = self.robot.build()
         except RobotError as error:
-            raise CaseError(self.name, [Fault("robot", str(error))]) from error
-        return Setup(robot, self.surface.build().cells(*self.surface.cells), self.task, self.search)
+            faults.append(Fault("robot", str(error)))
+        try:
+            cells = self.surface.cut()
+        except BuildError as error:
+            faults.append(error.fault)
+        if robot is None or cells is None:
+            raise CaseError(self.name, faults)
+        return Setup(robot, cells, self.task, self.search)
 
     def to_tables(self) -> Tables:
         """The case as the tables of its TOML; what is None is left out."""
@@ -208,11 +221,25 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     surface = read_surface(tables["surface"], faults) if "surface" in tables else None
     task = read_task(tables["task"], faults) if "task" in tables else None
     search = read_search(tables.get("search", {}), faults)
+    if surface and search and search.method == "greedy" and surface.kind not in CHARTED:
+        faults.append(_no_greedy(surface.kind))
     if faults and "robot" in tables:
         faults += _robot_faults(robot or _named_robot(tables["robot"]))
+    if faults and "surface" in tables:
+        part = surface or named_file(tables["surface"])
+        faults += faults_of_building(part) if part is not None else []
     if faults or robot is None or surface is None or task is None or search is None:
         raise CaseError(name, faults)
     return Case(robot, surface, task, search, name)
+
+
+def _no_greedy(kind: str) -> Fault:
+    """The greedy search is asked for a surface that it does not know."""
+    kinds = alternatives(CHARTED)
+    return Fault(
+        "search.method",
+        f'"greedy" works on {kinds} only, not on a surface of kind {kind}; use "complete"',
+    )
 
 
 def _named_robot(table: Any) -> RobotPart | None:

@@ -36,8 +36,7 @@ def override(tables: dict[str, Any], setting: str, faults: list[Fault]) -> None:
 
 def make_absolute(tables: dict[str, Any], base_dir: str | os.PathLike[str] | None) -> None:
     """Make the paths of a case file independent of the working directory, where they are paths."""
-    robot = tables.get("robot")
-    if base_dir is None or not isinstance(robot, dict):
+    if base_dir is None:
         return
 
     def absolute(value: Any) -> Any:
@@ -45,10 +44,17 @@ def make_absolute(tables: dict[str, Any], base_dir: str | os.PathLike[str] | Non
             return value
         return os.path.join(base_dir, os.path.expanduser(value))
 
-    if "urdf" in robot:
-        robot["urdf"] = absolute(robot["urdf"])
-    if isinstance(robot.get("package_dirs"), list):
-        robot["package_dirs"] = [absolute(folder) for folder in robot["package_dirs"]]
+    robot, surface = tables.get("robot"), tables.get("surface")
+    if isinstance(robot, dict):
+        if "urdf" in robot:
+            robot["urdf"] = absolute(robot["urdf"])
+        if isinstance(robot.get("package_dirs"), list):
+            robot["package_dirs"] = [absolute(folder) for folder in robot["package_dirs"]]
+    if isinstance(surface, dict):
+        pieces = surface.get("pieces")
+        for piece in (surface, *(pieces if isinstance(pieces, list) else ())):
+            if isinstance(piece, dict) and "file" in piece:
+                piece["file"] = absolute(piece["file"])
 
 
 def as_read(value: Any) -> Any:

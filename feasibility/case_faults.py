@@ -49,6 +49,19 @@ class CaseError(ValueError):
         return (CaseError, (self.source, self.faults))
 
 
+class BuildError(ValueError):
+    """One thing that came to light only when a part of a case was built, with its key."""
+
+    def __init__(self, fault: Fault) -> None:
+        """An error that carries `fault`."""
+        self.fault = fault
+        super().__init__(f"{fault.key}: {fault.message}")
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle as a call of the constructor."""
+        return (BuildError, (self.fault,))
+
+
 def shown(value: Any) -> str:
     """A value for a message: on one line, and short."""
     if isinstance(value, bool):
@@ -141,9 +154,11 @@ class Section:
             return None
         return value
 
-    def numbers(self, key: str, count: int, expected: str) -> tuple[float, ...] | None:
+    def numbers(
+        self, key: str, count: int, expected: str, *, required: bool = False
+    ) -> tuple[float, ...] | None:
         """An array of `count` finite numbers."""
-        if not self.wants(key, expected, required=False):
+        if not self.wants(key, expected, required):
             return None
         value = self.table[key]
         if not isinstance(value, list) or len(value) != count or not all(map(is_number, value)):

@@ -1,47 +1,38 @@
-"""The [surface] table of a case: which patch, where, and how it is cut into cells."""
+"""The [surface] table of a case: which surface, where, and how it is cut into cells."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from feasibility.case_faults import Fault, Pair, Section, alternatives, close, shown
+from feasibility.case_faults import BuildError, Fault, Section, alternatives, close, shown
+from feasibility.case_mesh import MESH_KEYS, build_mesh, cut_mesh, read_count, read_mesh_keys
+from feasibility.case_patches import (
+    DEG,
+    METRES,
+    PATCHES,
+    build_patch,
+    patch_keys,
+    read_grid,
+    read_patch,
+)
 
 if TYPE_CHECKING:
-    from surfaces import Patch
+    from surfaces import Cells, Patch, Surface
+    from surfaces.mesh import MeshSurface
 
 Triple = tuple[float, float, float]
 
 ORIGIN: Triple = (0.0, 0.0, 0.0)
-DEG = "degrees"
-METRES = "metres"
-MOST_CELLS = 1_000_000  # the graph of a verdict takes some kilobytes a cell
-
-
-@dataclass(frozen=True, slots=True)
-class Kind:
-    """How one kind of surface is written in a case, and built."""
-
-    lengths: Mapping[str, str]
-    """Key of each length (m) -> the argument of the constructor."""
-    u: tuple[str, str]
-    """Key of the first parameter's range, and the argument of the constructor."""
-    v: tuple[str, str]
-
-
-KINDS: Mapping[str, Kind] = MappingProxyType(
-    {
-        "sphere": Kind({"radius": "radius"}, ("u_deg", "polar_deg"), ("v_deg", "azimuth_deg")),
-        "cylinder": Kind({"radius": "radius"}, ("u_deg", "angle_deg"), ("v", "height")),
-        "hyperboloid": Kind(
-            {"radius": "waist", "flare": "flare"}, ("u_deg", "angle_deg"), ("v", "height")
-        ),
-        "plane": Kind({}, ("u", "width"), ("v", "length")),
-    }
-)
-LATER_KINDS = ("cone", "torus", "bspline", "piecewise", "mesh")
+OWN_KEYS: Mapping[str, tuple[str, ...]] = {
+    **{kind: patch_keys(kind) for kind in PATCHES},
+    "mesh": MESH_KEYS,
+}
+LATER_KINDS = ("piecewise",)
+CHARTED = ("sphere", "cylinder", "hyperboloid", "plane")
+"""The kinds that the greedy search knows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,99 +40,115 @@ class SurfacePart:
     """The [surface] table of a case."""
 
     kind: str
-    lengths: Mapping[str, float]
-    """The kind's own lengths by key, m."""
-    u: Pair
-    """Degrees or metres, as the kind's key says."""
-    v: Pair
-    cells: tuple[int, int]
+    values: Mapping[str, Any]
+    """The kind's own keys, in the units of the case; arrays as tuples, paths absolute."""
+    cells: tuple[int, int] | int | None
+    """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given."""
     side: Literal["inside", "outside"] = "inside"
     position: Triple = ORIGIN
     rpy_deg: Triple = ORIGIN
 
+    @property
+    def label(self) -> str:
+        """What the surface is called in notes: its file's name, or its kind."""
+        file = self.values.get("file")
+        return self.kind if file is None else os.path.basename(file)
+
+    @property
+    def counts(self) -> list[int]:
+        """The number of cells along u and v, or of all cells of a mesh; empty if not known yet."""
+        cells = self.cells
+        return [] if cells is None else [cells] if isinstance(cells, int) else list(cells)
+
     def table(self) -> dict[str, Any]:
-        """The keys of the [surface] table."""
-        kind = KINDS[self.kind]
+        """The keys of the [surface] table; what is None is not written."""
         return {
             "kind": self.kind,
-            **self.lengths,
-            kind.u[0]: self.u,
-            kind.v[0]: self.v,
+            **{key: self.values.get(key) for key in OWN_KEYS[self.kind]},
             "position": self.position,
             "rpy_deg": self.rpy_deg,
             "side": self.side,
             "cells": self.cells,
         }
 
-    def build(self) -> Patch:
-        """Build the surface.
+    def build(self) -> Surface:
+        """Build the surface; its file, if it has one, is read.
 
         Raises:
-            SurfaceError: the numbers describe no patch; its message speaks of the case's keys.
+            BuildError: the numbers or the file describe no surface.
         """
-        import surfaces
+        pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
+        if self.kind == "mesh":
+            return build_mesh(self.values, pose)
+        return build_patch(self.kind, self.values, pose)
 
-        kind = KINDS[self.kind]
-        lengths = {kind.lengths[key]: value for key, value in self.lengths.items()}
-        try:
-            made: Patch = getattr(surfaces, self.kind)(
-                **lengths,
-                **{kind.u[1]: self.u, kind.v[1]: self.v},
-                side=self.side,
-                position=self.position,
-                rpy_deg=self.rpy_deg,
-            )
-        except surfaces.SurfaceError as error:
-            message = str(error).removeprefix(f"{self.kind}: ")
-            for key, argument in (kind.u, kind.v, *kind.lengths.items()):
-                message = message.replace(argument, key)
-            raise surfaces.SurfaceError(message) from error
-        return made
+    def cut(self) -> Cells:
+        """Build the surface and cut it into its cells.
+
+        Raises:
+            BuildError: there is no such surface, or it cannot be cut so.
+        """
+        surface = self.build()
+        if self.kind == "mesh":
+            count = cast("int | None", self.cells)
+            return cut_mesh(cast("MeshSurface", surface), count, self.values.get("cell_size"))
+        return cast("Patch", surface).cells(*cast("tuple[int, int]", self.cells))
 
 
 def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
-    """Read the [surface] table, and try to build it; None where it has faults."""
+    """Read the [surface] table; None where it has faults.
+
+    What needs no file is built to try it; files are read by `SurfacePart.build` only.
+    """
     section = Section("surface", table, faults)
     before = len(faults)
-    name = _surface_kind(section)
+    kind = _kind(section)
     side = section.choice("side", ("inside", "outside"))
     position = section.numbers("position", 3, "three finite numbers (metres)")
     rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
-    if name is None:  # which other keys belong here is not known
+    if kind is None:  # which other keys belong here is not known
         return None
-    kind = KINDS[name]
-    lengths = {
-        key: section.positive(key, "a finite number > 0 (metres)", required=True)
-        for key in kind.lengths
-    }
-    u, v = (
-        section.interval(key, DEG if "_deg" in key else METRES) for key in (kind.u[0], kind.v[0])
-    )
-    cells = _cells(section)
-    section.done(_foreign_keys(name))
-    if len(faults) > before or u is None or v is None or cells is None:
+    values = read_mesh_keys(section) if kind == "mesh" else read_patch(section, kind)
+    cells = read_count(section) if kind == "mesh" else read_grid(section)
+    section.done(_foreign_keys(kind))
+    if len(faults) > before:
         return None
     part = SurfacePart(
-        kind=name,
-        lengths={key: value for key, value in lengths.items() if value is not None},
-        u=u,
-        v=v,
+        kind=kind,
+        values=values,
         cells=cells,
         side=cast(Literal["inside", "outside"], side or "inside"),
         position=cast("tuple[float, float, float]", position or ORIGIN),
         rpy_deg=cast("tuple[float, float, float]", rpy_deg or ORIGIN),
     )
+    if "file" not in values:
+        faults += faults_of_building(part)
+    return part if len(faults) == before else None
+
+
+def faults_of_building(part: SurfacePart) -> list[Fault]:
+    """What building the surface would say."""
     try:
         part.build()
-    except ValueError as error:
-        section.fault("", str(error))
+    except BuildError as error:
+        return [error.fault]
+    return []
+
+
+def named_file(table: Any) -> SurfacePart | None:
+    """The surface in the file that a faulty table names, if it names one."""
+    if not isinstance(table, Mapping) or table.get("kind") not in ("mesh", "bspline"):
         return None
-    return part
+    plain: dict[str, Any] = {"kind": table["kind"], "file": table.get("file"), "side": "outside"}
+    plain["cells"] = 1 if table["kind"] == "mesh" else [1, 1]
+    if table["kind"] == "mesh" and "scale" in table:
+        plain["scale"] = table["scale"]
+    return read_surface(plain, [])
 
 
-def _surface_kind(section: Section) -> str | None:
+def _kind(section: Section) -> str | None:
     """The kind, if it is one that can be built."""
-    kinds = tuple(KINDS)
+    kinds = tuple(OWN_KEYS)
     expected = alternatives([f'"{kind}"' for kind in kinds])
     if not section.wants("kind", expected, required=True):
         return None
@@ -149,7 +156,7 @@ def _surface_kind(section: Section) -> str | None:
     if kind in LATER_KINDS:
         section.fault("kind", f"{shown(kind)} is not supported yet; use {expected}")
         return None
-    if not isinstance(kind, str) or kind not in KINDS:
+    if not isinstance(kind, str) or kind not in OWN_KEYS:
         guess = close(kind, kinds)
         hint = f"; did you mean {guess}?" if guess else ""
         section.fault("kind", f"must be {expected}, got {shown(kind)}{hint}")
@@ -157,40 +164,26 @@ def _surface_kind(section: Section) -> str | None:
     return kind
 
 
-def _cells(section: Section) -> tuple[int, int] | None:
-    """Cells along u and v."""
-    expected = "two whole numbers, cells along u and along v, such as [9, 10]"
-    if not section.wants("cells", expected, required=True):
-        return None
-    value = section.table["cells"]
-    if (
-        not isinstance(value, list)
-        or len(value) != 2
-        or not all(isinstance(n, int) and not isinstance(n, bool) and n >= 0 for n in value)
-    ):
-        section.wrong("cells", expected)
-        return None
-    # An empty grid has no cells, but its sides are walked through all the same.
-    if max(value[0], 1) * max(value[1], 1) > MOST_CELLS:
-        section.fault(
-            "cells", f"makes more than {MOST_CELLS:,} cells ({shown(value)}); use a coarser grid"
-        )
-        return None
-    return value[0], value[1]
-
-
-def _foreign_keys(name: str) -> dict[str, str]:
+def _foreign_keys(kind: str) -> dict[str, str]:
     """What to say about keys that belong to other kinds of surface."""
-    own = KINDS[name]
-    hints = dict.fromkeys(
-        ("file", "scale", "cell_size"), "belongs to a mesh, which is not supported yet"
-    )
-    for kind, entry in KINDS.items():
-        for key in entry.lengths:
-            hints[key] = f"belongs to a {kind}, not to a {name}; leave it out"
-    for mine in (own.u[0], own.v[0]):
-        letter = mine[0]
-        other = letter if mine.endswith("_deg") else f"{letter}_deg"
-        unit = DEG if mine.endswith("_deg") else METRES
-        hints[other] = f"is not how a {name} is written; write {mine} in {unit}"
-    return {key: hint for key, hint in hints.items() if key not in own.lengths}
+    owners: dict[str, list[str]] = {}
+    for other, keys in OWN_KEYS.items():
+        for key in keys:
+            owners.setdefault(key, []).append(_a(other))
+    hints = {
+        key: f"belongs to {alternatives(names)}, not to {_a(kind)}; leave it out"
+        for key, names in owners.items()
+    }
+    for mine in ("u", "v", "u_deg", "v_deg"):
+        if mine in OWN_KEYS[kind]:
+            letter = mine[0]
+            other = letter if mine.endswith("_deg") else f"{letter}_deg"
+            unit = DEG if mine.endswith("_deg") else METRES
+            unit = "the numbers of the knots" if kind == "bspline" else unit
+            hints[other] = f"is not how {_a(kind)} is written; write {mine} in {unit}"
+    return {key: hint for key, hint in hints.items() if key not in OWN_KEYS[kind]}
+
+
+def _a(kind: str) -> str:
+    """The kind with its article."""
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"

@@ -26,6 +26,8 @@ def check(args: argparse.Namespace, began: float) -> int:
         setup = case.build()
         for note in setup.robot.notes:
             tell(f"note: {setup.robot.name}: {note}")
+        for note in getattr(setup.cells, "notes", setup.cells.surface.notes):
+            tell(f"note: {case.surface.label}: {note}")
         from feasibility.checking import check as run
         from feasibility.report import as_json, as_text, witness_csv
 

@@ -22,7 +22,7 @@ def case_rows() -> list[dict[str, Any]]:
             "position": list(case.surface.position),
             "cone_deg": case.task.cone_deg,
             "standoff": case.task.standoff,
-            "cells": list(case.surface.cells),
+            "cells": case.surface.counts,
             "description": case.description,
         }
         for name, case in builtin_cases().items()

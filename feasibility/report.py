@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from feasibility.case import Case
+from feasibility.case_surface import OWN_KEYS
 from feasibility.result import plain
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 from feasibility.version import version
@@ -209,9 +210,18 @@ def _hints(verdict: Verdict) -> list[str]:
     if CauseKind.ORIENTATION in kinds and verdict.task.cone_deg > 0.0:
         hints.append(f"--set task.cone_deg=... opens the cone ({verdict.task.cone_deg:g} now)")
     if CauseKind.DISCONNECTED in kinds:
-        hints.append("a narrower surface.u_deg or v_deg leaves out what needs a second motion")
+        hints.append(f"{_narrower(verdict)} leaves out what needs a second motion")
     hints.append("--html view.html shows which cells are missed")
     return hints
+
+
+def _narrower(verdict: Verdict) -> str:
+    """How a case says that less is to be covered."""
+    own = OWN_KEYS.get(verdict.cells.surface.kind, ())
+    ranges = [f"surface.{key}" for key in ("u_deg", "u", "v_deg", "v") if key in own]
+    if ranges:
+        return f"a narrower {' or '.join(ranges)}"
+    return "a part of the mesh (surface.box, cut, facing or faces)"
 
 
 def witness_csv(verdict: Verdict) -> str | None:

@@ -1,8 +1,8 @@
 """Result files: a verdict with its case in one file that loads again, without pickles.
 
 The file is a zip of .npy arrays and one `meta.json` (see `feasibility.archive`). The robot and the
-cells are not stored: they are built again from the case, and the robot is compared with numbers in
-the file, so that a result is never shown on another arm than the one it was found for.
+cells are not stored: they are built again from the case, and compared with numbers in the file, so
+that a result is never shown on another arm or surface than the ones it was found for.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from feasibility.archive import Archive, ArchiveError, write_archive
 from feasibility.case import Case, CaseError
 from feasibility.case_faults import shown
 from feasibility.files import FileError
+from feasibility.result_cells import check_cells, places
 from feasibility.result_fields import Fields
 from feasibility.result_graph import pack_graph, ragged, unpack_graph, unpack_ragged
 from feasibility.result_robot import check_robot, probes
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from robots import Robot
 
 FORMAT = "coverable-result"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 1 had no `places`, and no surfaces from files
 
 
 class ResultError(ValueError):
@@ -96,6 +97,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
     }
     arrays = {
         "probes": probes(verdict.robot),
+        "places": places(verdict.cells),
         "covered": np.flatnonzero(verdict.covered),
         **ragged("components", verdict.components),
         **pack_graph("graph", verdict.graph, n),
@@ -118,17 +120,19 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         path: a file written by `save_result`.
 
     Raises:
-        ResultError: it is no such file, is damaged, is of a newer format, or its robot is not to
-            be had here as it was.
+        ResultError: it is no such file, is damaged, is of a newer format, or its robot or
+            surface is not to be had here as it was.
     """
     try:
         archive = Archive(Path(path), "a result file of `coverable check --save`")
         fields = Fields(archive, archive.meta(), "")
-        _check_format(fields)
+        found = _format(fields)
         written = fields.text("version")
         case = _case(fields.table("case"), archive)
         setup = case.build()
         check_robot(setup.robot, fields.table("robot"), archive)
+        if found > 1 or "file" in case.surface.values:
+            check_cells(setup.cells, case.surface.label, archive)
         verdict = _verdict(fields, archive, setup.robot, setup.cells)
     except CaseError as error:
         raise ResultError(f"{os.fspath(path)!r}: its case cannot be used: {error}") from error
@@ -154,16 +158,17 @@ def plain(value: Any) -> Any:
     return str(value)
 
 
-def _check_format(fields: Fields) -> None:
-    """Refuse files of something else, or of a later coverable."""
+def _format(fields: Fields) -> int:
+    """The version of the format; files of something else, or of a later coverable, are refused."""
     if fields.entries.get("format") != FORMAT:
         raise fields.archive.error("is not a result file of `coverable check --save`")
     found = fields.get("format_version", int, "a whole number")
-    if found != FORMAT_VERSION:
+    if not 1 <= found <= FORMAT_VERSION:
         raise fields.archive.error(
             f"is of format {found}, written by coverable {shown(fields.entries.get('version'))}; "
-            f"coverable {version()} reads format {FORMAT_VERSION}"
+            f"coverable {version()} reads formats 1 to {FORMAT_VERSION}"
         )
+    return int(found)
 
 
 def _case(fields: Fields, archive: Archive) -> Case:

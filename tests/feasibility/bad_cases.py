@@ -53,6 +53,75 @@ def added(table, line, key, *words):
 
 
 PLANE = GOOD.replace('kind = "sphere"\nradius = 1.0\nu_deg = [10, 90]\nv_deg = [10, 180]\n', "{}")
+
+
+def surface(text, *changes):
+    """The good case with another surface; each change replaces a part of `text`, once."""
+    for old, new in changes:
+        if text.count(old) != 1:
+            raise ValueError(f"{old!r} is not once in the surface")
+        text = text.replace(old, new)
+    head, rest = GOOD.split("[surface]\n")
+    return f"{head}[surface]\n{text}\n[robot]{rest.split('[robot]')[1]}"
+
+
+# One good [surface] table of each kind that the paper does not have.
+SURFACES = {
+    "cone": """
+kind = "cone"
+radius = 0.2
+slope = -0.5
+u_deg = [0, 90]
+v = [0.0, 0.3]
+cells = [3, 4]
+""",
+    "torus": """
+kind = "torus"
+ring = 0.5
+tube = 0.125
+u_deg = [0, 90]
+v_deg = [-180, 180]
+cells = [3, 4]
+""",
+    "ellipsoid": """
+kind = "ellipsoid"
+semi_axes = [1.0, 0.8, 0.5]
+u_deg = [10, 90]
+v_deg = [0, 360]
+cells = [3, 4]
+""",
+    "revolution": """
+kind = "revolution"
+profile = [[0.2, 0.0], [0.3, 0.2], [0.1, 0.5]]
+v_deg = [0, 180]
+cells = [3, 4]
+""",
+    "bspline": """
+kind = "bspline"
+points = [[[0, 0, 0], [0, 1, 0], [0, 2, 0]], [[1, 0, 0.2], [1, 1, 0], [1, 2, 0]],
+          [[2, 0, 0], [2, 1, 0], [2, 2, 0]]]
+degree = [2, 2]
+cells = [3, 4]
+""",
+    "mesh": """
+kind = "mesh"
+file = "part.stl"
+side = "outside"
+cells = 12
+""",
+}
+
+
+def wrong(kind, old, new, key, *words):
+    """A good surface of another kind with one part replaced."""
+    return Bad(surface(SURFACES[kind], (old, new)), f"surface.{key}" if key else "surface", words)
+
+
+def more(kind, line, key, *words):
+    """A good surface of another kind with one line more."""
+    return Bad(surface(SURFACES[kind] + line), f"surface.{key}" if key else "surface", words)
+
+
 MORE = "must be [low, high] in "
 
 BAD_CASES = {
@@ -140,9 +209,10 @@ BAD_CASES = {
     "no kind": changed('kind = "sphere"\n', "", "surface.kind", "is missing", '"plane"'),
     "misspelt kind": changed('"sphere"', '"shpere"', "surface.kind", 'did you mean "sphere"?'),
     "kind is a list": changed('"sphere"', '["sphere"]', "surface.kind", "must be"),
-    "mesh": changed('"sphere"', '"mesh"', "surface.kind", "is not supported yet"),
-    "torus": changed('"sphere"', '"torus"', "surface.kind", "is not supported yet"),
-    "mesh key": added("surface", 'file = "part.stl"', "surface.file", "belongs to a mesh"),
+    "mesh key": added("surface", "cell_size = 0.1", "surface.cell_size", "belongs to a mesh"),
+    "file of nothing": added(
+        "surface", 'file = "part.stl"', "surface.file", "a bspline or a mesh, not to a sphere"
+    ),
     "key of another kind": added("surface", "flare = 1.0", "surface.flare", "belongs to a hyper"),
     "radius missing": changed("radius = 1.0\n", "", "surface.radius", "is missing", "metres"),
     "radius zero": changed("radius = 1.0", "radius = 0", "surface.radius", "> 0"),
@@ -187,6 +257,110 @@ BAD_CASES = {
     "too many cells": changed("[9, 10]", "[9000, 10000]", "surface.cells", "coarser grid"),
     "cells without end": changed(
         "[9, 10]", f"[0, 0x{'F' * 9000}]", "surface.cells", "coarser grid"
+    ),
+    "piecewise": changed('"sphere"', '"piecewise"', "surface.kind", "is not supported yet"),
+    # other kinds of surface
+    "slope missing": wrong("cone", "slope = -0.5\n", "", "slope", "is missing", "metres of radius"),
+    "slope beyond reason": wrong("cone", "-0.5", "1e7", "slope", "1e+06", "got 10000000.0"),
+    "slope is text": wrong("cone", "-0.5", '"steep"', "slope", "got 'steep'"),
+    "apex": wrong("cone", "[0.0, 0.3]", "[0.0, 0.5]", "", "v must end before the apex", "z = 0.4"),
+    "slope of a sphere": added("surface", "slope = 1", "surface.slope", "belongs to a cone"),
+    "tube too thick": wrong("torus", "0.125", "0.5", "", "tube must be less than ring"),
+    "tube missing": wrong("torus", "tube = 0.125\n", "", "tube", "is missing"),
+    "torus more than a turn": wrong("torus", "[-180, 180]", "[-180, 190]", "", "v_deg must span"),
+    "torus with a radius": more("torus", "radius = 1", "radius", "not to a torus"),
+    "two semi-axes": wrong("ellipsoid", "[1.0, 0.8, 0.5]", "[1.0, 0.8]", "semi_axes", "three"),
+    "semi-axis zero": wrong("ellipsoid", "0.8", "0", "semi_axes", "> 0"),
+    "ellipsoid beyond the pole": wrong("ellipsoid", "[10, 90]", "[10, 181]", "", "u_deg must lie"),
+    "flat ellipsoid": wrong("ellipsoid", "0.5]", "1e-9]", "", "semi_axes must lie in"),
+    "profile of one point": wrong(
+        "revolution", "[[0.2, 0.0], [0.3, 0.2], [0.1, 0.5]]", "[[0.2, 0.0]]", "", "profile must"
+    ),
+    "profile through the axis": wrong("revolution", "[0.3, 0.2]", "[-0.3, 0.2]", "", "profile"),
+    "profile with NaN": wrong("revolution", "[0.3, 0.2]", "[nan, 0]", "profile[1][0]", "got nan"),
+    "profile is ragged": wrong("revolution", "[0.3, 0.2]", "[0.3]", "profile", "rows of one"),
+    "profile is text": wrong(
+        "revolution", "[[0.2, 0.0], [0.3, 0.2], [0.1, 0.5]]", '"a.csv"', "profile", "got str"
+    ),
+    "revolution with u": more("revolution", "u = [0, 1]", "u", "belongs to", "not to a revolution"),
+    "no net": Bad(
+        surface('kind = "bspline"\ncells = [3, 4]'), "surface.points", ("is missing", "net.json")
+    ),
+    "net twice": more("bspline", 'file = "net.json"', "points", "contradicts surface.file"),
+    "net with a word": wrong("bspline", "0.2]", '"up"]', "points[1][0][2]", "got 'up'"),
+    "net is flat": wrong("bspline", "[[0, 0, 0], [0, 1, 0], [0, 2, 0]]", "3", "points[0]", "list"),
+    "net folds": wrong("bspline", "[1, 0, 0.2], [1, 1, 0]", "[9, 0, 0], [-9, 1, 0]", "", "patch"),
+    "degree of one": wrong("bspline", "[2, 2]\n", "[2]\n", "degree", "two whole numbers"),
+    "degree zero": wrong("bspline", "[2, 2]\n", "[0, 2]\n", "degree", "1 .. 9"),
+    "degree too high": wrong("bspline", "[2, 2]\n", "[3, 2]\n", "", "lower the degree"),
+    "knots of u only": more("bspline", "knots = [[0, 0, 0, 1, 1, 1]]", "knots", "two arrays"),
+    "knots that fall": more(
+        "bspline", "knots = [[0, 0, 0, 1, 0, 1], [0, 0, 0, 1, 1, 1]]", "", "must never fall"
+    ),
+    "knots with NaN": more(
+        "bspline", "knots = [[0, nan], [0, 0, 0, 1, 1, 1]]", "knots[0][1]", "got nan"
+    ),
+    "weights negative": more(
+        "bspline", "weights = [[1, 1, 1], [1, -1, 1], [1, 1, 1]]", "", "weights must be > 0"
+    ),
+    "weights are a number": more("bspline", "weights = 2", "weights", "must be a list"),
+    "range of no knots": more("bspline", "u = [0, 2]", "", "u must be a pair"),
+    "range of knots in degrees": more("bspline", "u_deg = [0, 1]", "u_deg", "write u in the num"),
+    "missing net": Bad(
+        surface('kind = "bspline"\nfile = "no/net.json"\ncells = [3, 4]'),
+        "surface.file",
+        ("no/net.json: cannot be read: no such file",),
+    ),
+    "net of a strange kind": Bad(
+        surface('kind = "bspline"\nfile = "net.npy"\ncells = [3, 4]'),
+        "surface.file",
+        (".json or a .csv",),
+    ),
+    "net is a device": Bad(
+        surface('kind = "bspline"\nfile = "/dev/zero"\ncells = [3, 4]'), "surface.file", (".csv",)
+    ),
+    # meshes
+    "mesh without a file": wrong("mesh", 'file = "part.stl"\n', "", "file", "is missing", "STL"),
+    "missing mesh": more("mesh", "", "file", "part.stl: there is no such file"),
+    "mesh of a strange kind": wrong("mesh", "part.stl", "case.toml", "file", "STL, OBJ"),
+    "mesh is a device": wrong("mesh", "part.stl", "/dev/zero", "file", "not a regular file"),
+    "mesh is a number": wrong("mesh", '"part.stl"', "3", "file", "must be the path of a mesh"),
+    "no side": wrong("mesh", 'side = "outside"\n', "", "side", "where the faces look to"),
+    "cells of a grid": wrong("mesh", "12", "[3, 4]", "cells", "one whole number", "cell_size"),
+    "cells of a mesh missing": wrong("mesh", "cells = 12\n", "", "cells", "or cell_size = 0.05"),
+    "no cell": wrong("mesh", "12", "0", "cells", "1 .. 20,000"),
+    "too many cells of a mesh": wrong("mesh", "12", "20_001", "cells", "1 .. 20,000"),
+    "cells of a mesh true": wrong("mesh", "12", "true", "cells", "got true"),
+    "cells and their size": more("mesh", "cell_size = 0.1", "cells", "contradicts"),
+    "size of cells zero": wrong("mesh", "cells = 12", "cell_size = 0", "cell_size", "> 0"),
+    "scale zero": more("mesh", "scale = 0", "scale", "0.001 for millimetres"),
+    "scale is text": more("mesh", 'scale = "mm"', "scale", "got 'mm'"),
+    "mesh with a radius": more("mesh", "radius = 1", "radius", "belongs to", "not to a mesh"),
+    "mesh with angles": more("mesh", "u_deg = [0, 1]", "u_deg", "belongs to", "not to a mesh"),
+    "box reversed": more("mesh", "box = [[0, 0, 0], [1, 0, 1]]", "box", "first below the second"),
+    "box of one corner": more("mesh", "box = [[0, 0, 0]]", "box", "[[x0, y0, z0], [x1, y1, z1]]"),
+    "box infinite": more("mesh", "box = [[0, 0, 0], [inf, 1, 1]]", "box", "got [["),
+    "cut is a list": more("mesh", "cut = [0, 0, 1]", "cut", "must be a table"),
+    "cut without a normal": more("mesh", "cut = { point = [0, 0, 0] }", "cut.normal", "missing"),
+    "cut along nothing": more(
+        "mesh", "cut = { point = [0, 0, 0], normal = [0, 0, 0] }", "cut.normal", "not all zero"
+    ),
+    "cut with a typo": more(
+        "mesh", "cut = { piont = [0, 0, 0], normal = [0, 0, 1] }", "cut.piont", 'mean "point"?'
+    ),
+    "facing too wide": more(
+        "mesh", "facing = { direction = [0, 0, 1], within_deg = 200 }", "facing.within_deg", "180"
+    ),
+    "facing without an angle": more(
+        "mesh", "facing = { direction = [0, 0, 1] }", "facing.within_deg", "is missing"
+    ),
+    "no faces": more("mesh", "faces = []", "faces", "an array of whole numbers"),
+    "faces negative": more("mesh", "faces = [0, -1]", "faces[1]", "got -1"),
+    "faces beyond reason": more("mesh", f"faces = [{2**70}]", "faces[0]", "whole number >= 0"),
+    "greedy on a mesh": Bad(
+        surface(SURFACES["mesh"]) + '[search]\nmethod = "greedy"\n',
+        "search.method",
+        ("hyperboloid or plane only", 'use "complete"'),
     ),
     # task
     "standoff missing": changed("standoff = 0.005\n", "", "task.standoff", "is missing"),

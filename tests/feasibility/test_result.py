@@ -140,7 +140,7 @@ DAMAGED = {
     "meta has NaN": (lambda m: {**m, "meta.json": b'{"seed": NaN}'}, "no JSON number"),
     "meta is deep": (lambda m: {**m, "meta.json": b"[" * 200_000}, "is not JSON"),
     "other format": (lambda m: meta(m, format="something"), "is not a result file"),
-    "later format": (lambda m: meta(m, format_version=2, version="9.1"), "'9.1'"),
+    "later format": (lambda m: meta(m, format_version=3, version="9.1"), "'9.1'"),
     "format true": (lambda m: meta(m, format_version=True), "not a whole number"),
     "no version": (lambda m: meta(m, version=...), "version is nothing, not text"),
     "no case": (lambda m: meta(m, case="x"), "case is 'x', not an object"),
@@ -162,7 +162,7 @@ DAMAGED = {
         lambda m: case_of(
             m, toml=small_case("plate").with_overrides(["surface.cells=[4, 4]"]).to_toml()
         ),
-        "'graph_nodes' does not hold every cell once",
+        "plane has 16 cells now, and had 12 then; run the check again",
     ),
     "unknown answer": (lambda m: meta(m, answer="perhaps"), "not one of feasible, infeasible"),
     "unknown cause": (lambda m: meta(m, causes=[{**ORIGIN, "kind": "rain"}]), "not one of"),
