@@ -146,6 +146,17 @@ def track(
     return {"path": path, "clip": {"fps": 1, "name": "default", "tracks": [keys]}}
 
 
+def appearing(path: str, when: float, end: float) -> dict[str, Any]:
+    """What is at `path` hidden until `when` (s), and shown from then to `end`."""
+    keys = {
+        "name": ".visible",
+        "type": "bool",
+        "times": _packed(np.array([0.0, when, max(end, when)]), "float32"),
+        "values": [False, True, True],
+    }
+    return {"path": path, "clip": {"fps": 1, "name": "default", "tracks": [keys]}}
+
+
 def animation(tracks: Sequence[dict[str, Any]], *, play: bool, there_and_back: bool) -> Command:
     """Play tracks together, for ever."""
     options = {
