@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.checking import check
-from feasibility.quantities import Setup, quantities
+from feasibility.quantities import Quantity, Setup, quantities
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.thresholds import Finding, Threshold
@@ -20,9 +20,9 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    from feasibility.probing import Trial
+    from feasibility.probing import Prober
 
-SHARE = 27  # verdicts' worth of evaluations that all thresholds together may take
+SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 2000, 32  # evaluations, and those for each cell, that any search should have
 LEAST = 100_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
@@ -96,61 +96,91 @@ def explain(
     Raises:
         ValueError: the method is the greedy one, whose "no" does not depend on the case alone.
         RobotError: the arm is no serial chain of one-dof joints.
+
+    Example:
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+        >>> found = explain(load_robot("ur5"), patch.cells(2, 2), Task(standoff=0.02, cone_deg=30))
+        >>> cone = found.thresholds[0]
+        >>> cone.quantity.name, f"{np.degrees(cone.feasible.value):.1f}"
+        ('cone', '3.0')
     """
     search = Search() if search is None else search
     if search.method != "complete":
         raise ValueError(
             f"explain asks the complete search: method must be 'complete', got {search.method!r}"
         )
-    verdict = check(robot, cells, task, search)
+
+    def first(done: int, total: int | None, text: str) -> None:
+        if progress is not None:
+            progress(0, None, text)
+
+    verdict = check(robot, cells, task, search, first)
     began = time.monotonic()
     if len(cells) == 0:
         return Explanation(verdict, (), (), None, 0, 0.0)
-    from feasibility.probing import Prober, Trial
-    from feasibility.turning import Turning
+    from feasibility.probing import Prober
 
     setup = Setup(robot, cells, task)
     asked = quantities(setup, widen=not verdict.feasible)
-    done = 0
+    done: list[Threshold] = []
 
     def tick() -> None:
         if progress is not None:
-            progress(done, len(asked), "looking for thresholds")
+            progress(len(done), len(asked), "looking for thresholds")
 
     deadline = np.inf if search.time_limit is None else began + PATIENCE * search.time_limit
     prober = Prober(setup, search.seed, deadline, tick)
-    # An early proof makes a verdict cheap, but the searches that follow are no cheaper for that.
-    cost = max(int(verdict.statistics["fk"]), FEW + EACH * len(cells))
-    total = max(SHARE * cost, LEAST)
     q = known_configurations(verdict)
-    here = Finding(0.0, verdict.answer, verdict.evidence, verdict.message)
-    angle = None if verdict.certificate is None else verdict.certificate.max_angle
-    start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
-    dropped, motions = None, [start] if verdict.feasible else []
-    if verdict.feasible:
-        motions += prober.others(GUESSES, POSTURES)
-    else:
-        covered = verdict.covered
-        rest = prober.attempt(prober.problem, q, 2 * cost, deep=False, needed=covered)
-        dropped = drop(verdict, prober.confirmed(setup, rest, covered))
-    thresholds: list[Threshold] = []
-    for done, quantity in enumerate(asked):
-        if time.monotonic() > deadline:
-            break
-        fair = (total - prober.spent) // (len(asked) - done)
-        turning = Turning(prober, quantity, cost, prober.spent + fair, motions)
-        if verdict.feasible:
-            thresholds.append(turning.tighten())
-        else:
-            thresholds.append(turning.widen(replace(here, value=quantity.given), q))
+    dropped = None if verdict.feasible else drop(prober, verdict, q)
+    for threshold in _thresholds(prober, verdict, q, asked):
+        done.append(threshold)
     return Explanation(
         verdict=verdict,
-        thresholds=tuple(thresholds),
-        left_out=tuple(quantity.name for quantity in asked[len(thresholds) :]),
+        thresholds=tuple(done),
+        left_out=tuple(quantity.name for quantity in asked[len(done) :]),
         dropped=dropped,
         evaluations=prober.spent,
         seconds=time.monotonic() - began,
     )
+
+
+def cost_of(verdict: Verdict) -> int:
+    """Evaluations of the arm that one verdict of the case is taken to cost.
+
+    An early proof makes a verdict cheap; the searches that follow are no cheaper for that.
+    """
+    return max(int(verdict.statistics["fk"]), FEW + EACH * len(verdict.cells))
+
+
+def _thresholds(
+    prober: Prober,
+    verdict: Verdict,
+    q: NDArray[np.float64],
+    asked: Sequence[Quantity],
+) -> Iterator[Threshold]:
+    """The thresholds one by one, each with a fair share of what is left; until the deadline."""
+    from feasibility.probing import Trial
+    from feasibility.turning import Turning
+
+    cost, motions = cost_of(verdict), []
+    total = max(SHARE * cost, LEAST)
+    if verdict.feasible and time.monotonic() < prober.deadline:
+        angle = None if verdict.certificate is None else verdict.certificate.max_angle
+        start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
+        motions = [start, *prober.others(GUESSES, POSTURES)]
+    for index, quantity in enumerate(asked):
+        if time.monotonic() > prober.deadline:
+            return
+        prober.tick()
+        fair = (total - prober.spent) // (len(asked) - index)
+        turning = Turning(prober, quantity, cost, prober.spent + fair, motions)
+        if verdict.feasible:
+            yield turning.tighten()
+        else:
+            here = Finding(quantity.given, verdict.answer, verdict.evidence, verdict.message)
+            yield turning.widen(here, q)
 
 
 def known_configurations(verdict: Verdict) -> NDArray[np.float64]:
@@ -166,10 +196,13 @@ def known_configurations(verdict: Verdict) -> NDArray[np.float64]:
     return q
 
 
-def drop(verdict: Verdict, rest: Trial) -> Dropped:
-    """What the best motion misses; `rest` is a search for a motion over all others."""
-    areas = verdict.cells.areas
-    cells = np.flatnonzero(~verdict.covered)
+def drop(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> Dropped:
+    """What the best motion misses, and whether one motion covers all the rest."""
+    covered, areas = verdict.covered, verdict.cells.areas
+    most = 2 * cost_of(verdict)
+    rest = prober.attempt(prober.problem, q, most, deep=False, needed=covered)
+    rest = prober.confirmed(prober.setup, rest, covered)
+    cells = np.flatnonzero(~covered)
     return Dropped(
         cells=cells,
         area=float(areas[cells].sum()),

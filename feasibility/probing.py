@@ -220,7 +220,9 @@ class Prober:
         robot, cells, _ = self.setup
         robot = robot.with_limits(np.column_stack([problem.lower, problem.upper]))
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
-        explorer = Rationed(robot, cells, problem, self.seed, deadline=self.deadline, most=most)
+        explorer = Rationed(
+            robot, cells, problem, self.seed, self.deadline, lambda *_: self.tick(), most=most
+        )
         ended = False
         try:
             self._plant(explorer, seeds)

@@ -26,7 +26,7 @@ HINT_BOXES = 1500  # for one cell, where a configuration is as welcome as a proo
 BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is looked for
 LOOKED_AT = 3  # cells asked for a proof before a search is made
 SCAN = 20  # values looked at on the way to the end of a quantity that is not monotone
-OVERDRAFT = 1  # verdicts' worth of evaluations past `stop` for halving a wide bracket
+HALVINGS = 3  # of a wide bracket, by searches, even when none should be begun any more
 TRIES = 2  # other motions that are searched for past the end of one
 SHORT = 1  # verdicts' worth of evaluations that a search from known configurations may take
 
@@ -136,6 +136,9 @@ class Turning:
         missed = np.flatnonzero(~np.isfinite(seeds).all(axis=1))
         spread = missed[np.linspace(0, len(missed) - 1, min(LOOKED_AT, len(missed))).astype(int)]
         hard = [cell for cell in self.prober.suspects if cell in missed]
+        far = self.prober.beyond_reach(problem)
+        if far.any():
+            return self._proof(k, int(far.argmax()))
         seeds = seeds.copy()
         for cell in list(dict.fromkeys([*hard, *spread.tolist()]))[:LOOKED_AT]:
             ruling, q = self.prober.rule(problem, cell, HINT_BOXES)
@@ -179,8 +182,9 @@ class Turning:
         way = 1 if far > good.k else -1
         bad, failed, other, trusted = far, NO_CELL, there, there is None
         good = self._slid(good, bad)
+        halved = 0
         while abs(bad - good.k) > 1:
-            if not trusted and self.prober.spent >= self.stop + OVERDRAFT * self.verdict_cost:
+            if halved >= HALVINGS and self.prober.spent >= self.stop:
                 break
             if trusted:
                 k, q, cell = self._reach(good, bad)
@@ -188,7 +192,7 @@ class Turning:
                     bad, failed, other = k + way, cell, None
                     break
             else:
-                k = (good.k + bad) // 2
+                k, halved = (good.k + bad) // 2, halved + 1
                 cell, q = self.prober.follow(self.prober.problem_at(self.quantity, k), good.trial.q)
                 if cell != NO_CELL:
                     bad, failed, other = k, cell, None
@@ -253,6 +257,8 @@ class Turning:
             k = edge.good.k + (1 if far > edge.good.k else -1)
             if q is not None:
                 seeds[edge.failed] = q
+        elif edge.other is not None and abs(edge.bad - edge.good.k) > 1:
+            return edge.other  # the ration ended the halving
         # This motion goes no further. Another one may, so the search begins afresh.
         problem, tries = self.prober.problem_at(self.quantity, k), 0
         for motion in self.motions:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+from arm_builds import bare, built, on_a_base
 from dense_replay import tools
 from paper_cases import PAPER_CASES
 
@@ -128,7 +130,20 @@ def test_a_quantity_changes_itself_and_nothing_else(widen: bool) -> None:
         assert q.applied(setup, 0) is setup
 
 
-def test_joints_that_turn_freely_have_no_limit_to_vary_and_slides_count_in_metres() -> None:
+def test_a_slide_counts_in_metres(tmp_path: Path) -> None:
+    arm = load_robot("puma560")
+    rail = on_a_base(bare(arm.urdf or ""), "prismatic", limits=(-0.3, 0.4))
+    robot = built(rail, tmp_path, arm)
+    (slide,) = np.flatnonzero(robot.prismatic)
+    setup = Setup(robot, SMALL.cells, SMALL.task)
+    for widen, ends in ((True, (-0.8, 0.9)), (False, (0.4, -0.3))):
+        limits = [q for q in quantities(setup, widen) if q.joint == slide]
+        assert [q.unit for q in limits] == ["m", "m"]
+        assert tuple(q.end for q in limits) == pytest.approx(ends)
+        assert limits[1].value(3) == pytest.approx(0.403 if widen else 0.397)
+
+
+def test_joints_that_turn_freely_have_no_limit_to_vary() -> None:
     kinova = load_robot("kinova")
     named = {
         q.joint
