@@ -1,20 +1,31 @@
-"""Triangles of E-cells: filled patches and marks at their centres."""
+"""What E-cells are drawn with: filled patches, borders, and marks at their centres."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.skin import skin_of
 from surfaces import Cells
 from surfaces.cells import Triangles
+from surfaces.mesh_cells import MeshCells
 
 FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as plain lines
 
 
 def patch(cells: Cells, which: NDArray[np.int64], inset: float = 0.0) -> Triangles:
     """Triangles that fill some cells, as fine as their number allows; see `Cells.triangles`."""
+    if isinstance(cells, MeshCells):
+        return skin_of(cells).fill(which, cells.centres, inset)
     pieces = int(np.clip(np.ceil(64 / max(*cells.shape, 1)), 2, 32))  # a cell's side, cut up
     return cells.triangles(which, 1 if len(cells) > FULL_DETAIL else pieces, inset)
+
+
+def borders(cells: Cells) -> NDArray[np.float64]:
+    """(k, 2, 3) m, ends of short lines along the borders of all cells; see `Cells.borders`."""
+    if isinstance(cells, MeshCells):
+        return skin_of(cells).borders()
+    return cells.borders(8 if len(cells) <= FULL_DETAIL else 1)
 
 
 def marks(

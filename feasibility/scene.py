@@ -6,14 +6,14 @@ show and hide each part; `feasibility.page` and `feasibility.meshcat_server` say
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility import threejs
-from feasibility.cell_shapes import FULL_DETAIL, cell_size, marks, patch
+from feasibility.cell_shapes import FULL_DETAIL, borders, cell_size, marks, patch
 from feasibility.meshes import tubes
 from feasibility.motion import Motion
 from feasibility.page import Entry
@@ -22,7 +22,7 @@ from feasibility.verdict import CauseKind, Verdict
 from surfaces import Cells
 
 SURFACE: Colour = (0.62, 0.71, 0.80)
-OUTLINES: Colour = (0.45, 0.50, 0.56)
+OUTLINES: Colour = (0.30, 0.35, 0.41)
 CENTRES: Colour = (0.25, 0.30, 0.36)
 EDGES: Colour = (0.05, 0.25, 0.85)
 START: Colour = (0.0, 0.62, 0.25)
@@ -41,6 +41,16 @@ COMPONENTS: tuple[Colour, ...] = (
     (0.80, 0.47, 0.65),
     (0.90, 0.60, 0.00),
 )
+PATCHES: tuple[Colour, ...] = (
+    (0.00, 0.45, 0.70),
+    (0.90, 0.60, 0.00),
+    (0.00, 0.62, 0.45),
+    (0.80, 0.47, 0.65),
+    (0.34, 0.71, 0.91),
+    (0.84, 0.37, 0.00),
+    (0.94, 0.86, 0.20),
+    (0.45, 0.35, 0.65),
+)
 TRAIL_POINTS = 2_000
 LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
 
@@ -57,13 +67,39 @@ class Layer:
 
 def layers(verdict: Verdict) -> list[Layer]:
     """Every part of the picture but the arm, in the order of the legend."""
-    parts = [_surface(verdict.cells), *_cell_marks(verdict.cells)]
+    parts = cells_layers(verdict.cells)
     if len(verdict.cells) == 0:
         return []
     parts += _graph(verdict)
     parts += _start(verdict)
     parts += _missed(verdict)
     parts += _components(verdict)
+    return parts
+
+
+def cells_layers(cells: Cells) -> list[Layer]:
+    """The surface, the borders of its cells, and their centres."""
+    return [_surface(cells), *_cell_marks(cells)]
+
+
+def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) -> list[Layer]:
+    """Cells filled with one colour for each label.
+
+    Args:
+        cells: the cells.
+        labels: (N,) which of `names` each cell belongs to; -1 for none.
+        names: one for each colour.
+    """
+    parts = []
+    for k, name in enumerate(names):
+        which = np.flatnonzero(labels == k)
+        if len(which) == 0:
+            continue
+        colour = PATCHES[k % len(PATCHES)]
+        path = f"/patches/{threejs.safe_name(name)}"
+        vertices, faces, _ = patch(cells, which, inset=0.06)
+        command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+        parts.append(Layer((command,), Entry(name, colour, path), len(which)))
     return parts
 
 
@@ -98,7 +134,7 @@ def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64
 
 
 def _surface(cells: Cells) -> Layer:
-    """The patch, shaded and half transparent."""
+    """The surface, shaded and half transparent."""
     path = "/surface/patch"
     commands: tuple[Command, ...] = ()
     if len(cells):
@@ -112,10 +148,11 @@ def _cell_marks(cells: Cells) -> Iterator[Layer]:
     if len(cells) == 0:
         return
     path = "/surface/cell outlines"
-    ends = cells.borders(8 if len(cells) <= FULL_DETAIL else 1).reshape(-1, 3)
-    lines = threejs.segments(path, ends, OUTLINES, opacity=0.8)
-    rows = " x ".join(str(part) for part in cells.shape)
-    yield Layer((lines,), Entry(f"{len(cells)} cells ({rows})", OUTLINES, path), len(cells))
+    lines = threejs.segments(path, borders(cells).reshape(-1, 3), OUTLINES)
+    words = counted(len(cells))
+    if len(cells.shape) > 1:
+        words += f" ({' x '.join(str(part) for part in cells.shape)})"
+    yield Layer((lines,), Entry(words, OUTLINES, path), len(cells))
     if len(cells) <= FULL_DETAIL:
         path = "/surface/cell centres"
         vertices, faces = marks(cells.centres, 0.035 * cell_size(cells))
@@ -156,12 +193,17 @@ def _start(verdict: Verdict) -> Iterator[Layer]:
 def _missed(verdict: Verdict) -> Iterator[Layer]:
     """Cells that are not covered, in the colour of their cause."""
     for kind, cells in missed_by_cause(verdict).items():
-        colour = MISSED if kind is None else CAUSES[kind]
-        words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
-        path = f"/cells/{words} ({len(cells)})"
-        vertices, faces, _ = patch(verdict.cells, cells, inset=0.06)
-        command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
-        yield Layer((command,), Entry(f"{words} ({len(cells)})", colour, path), len(cells))
+        yield missed_layer(verdict.cells, kind, cells)
+
+
+def missed_layer(cells: Cells, kind: CauseKind | None, which: NDArray[np.int64]) -> Layer:
+    """Some cells in the colour of the cause for which they are missed; None where it is unknown."""
+    colour = MISSED if kind is None else CAUSES[kind]
+    words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
+    path = f"/cells/{words} ({len(which)})"
+    vertices, faces, _ = patch(cells, which, inset=0.06)
+    command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+    return Layer((command,), Entry(f"{words} ({len(which)})", colour, path), len(which))
 
 
 def _components(verdict: Verdict) -> Iterator[Layer]:
@@ -170,7 +212,7 @@ def _components(verdict: Verdict) -> Iterator[Layer]:
         return
     for number, cells in enumerate(verdict.components[:LISTED_COMPONENTS], start=1):
         colour = COMPONENTS[(number - 1) % len(COMPONENTS)]
-        words = f"component {number} ({len(cells)} cells)"
+        words = f"component {number} ({counted(len(cells))})"
         path = f"/components/{words}"
         vertices, faces, _ = patch(verdict.cells, np.asarray(cells), inset=0.15)
         commands = (
@@ -203,3 +245,8 @@ def _edge_points(cells: Cells) -> int:
     if len(cells) > FULL_DETAIL:
         return 2
     return 9 if len(cells) <= 400 else 5
+
+
+def counted(number: int) -> str:
+    """'1 cell', '2 cells'."""
+    return f"{number} cell{'' if number == 1 else 's'}"

@@ -261,7 +261,7 @@ def _points(cells: Cells) -> NDArray[np.float64]:
     if len(cells) == 0:
         return base
     corners = cells.borders(1).reshape(-1, 3)
-    return np.concatenate([base, corners])
+    return np.concatenate([base, cells.centres, corners])
 
 
 def _camera(robot: Robot, cells: Cells, q: NDArray[np.float64], floor: float) -> Camera:
