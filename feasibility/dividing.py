@@ -64,22 +64,11 @@ def divide(
 
     called = time.monotonic()
     with compiling_notice():
-        from feasibility.complete import Explorer, OutOfTime, explore, problem_of
-        from feasibility.gathering import gather
         from feasibility.plans import plans
 
         warm_up()
     began = time.monotonic()
-    deadline = np.inf if search.time_limit is None else began + search.time_limit
-    problem = problem_of(robot, cells, task)
-    explorer = Explorer(robot, cells, problem, search.seed, deadline, progress)
-    ended = True
-    try:
-        explore(explorer)
-        gather(explorer)
-    except OutOfTime:
-        ended = False
-    explorer.deadline = np.inf
+    explorer, ended = _searched(robot, cells, task, search, progress)
     searched = time.monotonic()
     blocked = _no_room(explorer) if len(cells) else ""
     nothing = Plan((), (), 0)
@@ -105,14 +94,39 @@ def divide(
             "divide_s": done - searched,
             "total_s": done - called,
         },
-        statistics={
-            "fk": int(explorer.work.counts[0]),
-            "nodes": int(explorer.roadmap.counters[0]),
-            "components": len(explorer.roots()),
-            "boxes": explorer.boxes,
-            "rounds": explorer.rounds,
-        },
+        statistics=_statistics(explorer),
     )
+
+
+def _searched(
+    robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
+) -> tuple[Explorer, bool]:
+    """The search with all components that it found, and whether it ran to its end."""
+    from feasibility.complete import Explorer, OutOfTime, explore, problem_of
+    from feasibility.gathering import gather
+
+    deadline = np.inf if search.time_limit is None else time.monotonic() + search.time_limit
+    problem = problem_of(robot, cells, task)
+    explorer = Explorer(robot, cells, problem, search.seed, deadline, progress)
+    ended = True
+    try:
+        explore(explorer)
+        gather(explorer)
+    except OutOfTime:
+        ended = False
+    explorer.deadline = np.inf
+    return explorer, ended
+
+
+def _statistics(explorer: Explorer) -> dict[str, int]:
+    """Counts of the work done."""
+    return {
+        "fk": int(explorer.work.counts[0]),
+        "nodes": int(explorer.roadmap.counters[0]),
+        "components": len(explorer.roots()),
+        "boxes": explorer.boxes,
+        "rounds": explorer.rounds,
+    }
 
 
 def _causes(explorer: Explorer, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
@@ -143,7 +157,10 @@ def _no_room(explorer: Explorer) -> str:
             "The offset surface folds: the standoff reaches the surface's radius of curvature on "
             "its hollow side, so no motion can be certified; use a smaller standoff."
         )
-    if len(problem.strays) and (problem.strays >= (problem.tolerance, problem.rim)).any(axis=1).all():
+    if (
+        len(problem.strays)
+        and (problem.strays >= (problem.tolerance, problem.rim)).any(axis=1).all()
+    ):
         return (
             "The surface is rougher than the task allows, so no motion can be certified; use a "
             "finer or smoother mesh, a larger tolerance or a wider cone."
