@@ -92,6 +92,8 @@ def control_points(walk: Walk, shares: Array) -> Curve:
 def graded(first: float, last: float) -> Array:
     """Places in 0..1 from `first` to 1 - `last`, whose gaps grow from both ends by `GROWTH`.
 
+    In the middle, where what is left is shared out, two gaps may differ by twice that.
+
     Example:
         >>> graded(0.5, 0.5).tolist(), graded(0.125, 0.5).tolist()
         ([0.5], [0.125, 0.5])

@@ -66,7 +66,7 @@ class TimedCurve:
         past = time - self.time[i]
         rate = np.sqrt(self.x[i])
         k = np.clip(self.grid[i] + past * (rate + 0.5 * u * past), self.grid[i], self.grid[i + 1])
-        rate = np.maximum(rate + u * past, 0.0)[:, None]
+        rate = np.where(time < self.duration, np.maximum(rate + u * past, 0.0), 0.0)[:, None]
         spline = self.curve.spline()
         q, slope, bend = (spline.derivative(order)(k) for order in range(3))
         return q, slope * rate, bend * rate**2 + slope * u[:, None]

@@ -34,9 +34,15 @@ def as_yaml(trajectory: Trajectory) -> str:
         mark = f"cell {cell}, " if cell >= 0 else ""
         lines.append(f"- # {mark}tool_speed {float(trajectory.tool_speed[k])!r}")
         for name, row in zip(_ROWS, (trajectory.q, trajectory.dq, trajectory.ddq), strict=True):
-            lines.append(f"  {name}: {json.dumps(row[k].tolist(), allow_nan=False)}")
+            lines.append(f"  {name}: [{', '.join(map(_number, row[k].tolist()))}]")
         lines.append(f"  time_from_start: {{sec: {seconds}, nanosec: {rest}}}")
     return "\n".join(lines) + "\n"
+
+
+def _number(value: float) -> str:
+    """All digits of a number, with the point that YAML 1.1 wants: 1e-05 is text to it."""
+    text = repr(value)
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text
 
 
 def from_yaml(text: str) -> Trajectory:

@@ -150,5 +150,5 @@ def test_orders_of_a_mesh():
 
 
 def test_an_unknown_order_is_refused_with_the_known_ones():
-    with pytest.raises(PathError, match="'zigzag'.*rows, columns, spiral, shortest"):
+    with pytest.raises(PathError, match=r"'zigzag'.*rows, columns, spiral, shortest"):
         route(plane((0, 1), (0, 1)).cells(2, 2), "zigzag")
