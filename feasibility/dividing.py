@@ -76,7 +76,6 @@ def divide(
     folded = bool(_folds(explorer).any())
     missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
     causes = _causes(explorer, missing, ended)
-    done = time.monotonic()
     return Division(
         robot=robot,
         cells=cells,
@@ -88,12 +87,7 @@ def divide(
         unsettled=np.setdiff1d(missing, [cause.cell for cause in causes]),
         ended=ended and not blocked and not folded,
         message=blocked or _message(fewest, connected, len(missing), len(cells), ended, folded),
-        timing={
-            "load_s": began - called,
-            "search_s": searched - began,
-            "divide_s": done - searched,
-            "total_s": done - called,
-        },
+        timing=_timing(called, began, searched),
         statistics=_statistics(explorer),
     )
 
@@ -116,6 +110,17 @@ def _searched(
         ended = False
     explorer.deadline = np.inf
     return explorer, ended
+
+
+def _timing(called: float, began: float, searched: float) -> dict[str, float]:
+    """Seconds from the three times until now."""
+    done = time.monotonic()
+    return {
+        "load_s": began - called,
+        "search_s": searched - began,
+        "divide_s": done - searched,
+        "total_s": done - called,
+    }
 
 
 def _statistics(explorer: Explorer) -> dict[str, int]:

@@ -229,12 +229,19 @@ def run(args: argparse.Namespace, began: float) -> int:
 
     Returns:
         0 when every cell is in a patch, 1 when cells are left out, 3 when undecided.
+
+    Raises:
+        CaseError: the case cannot be used, or asks for the greedy search.
     """
     with interruptible() as settle:
         from feasibility.case import load_case
+        from feasibility.case_faults import CaseError, Fault
 
         case = load_case(args.case, args.settings)
         setup = case.build()
+        if setup.search.method != "complete":
+            fault = "a division needs 'complete', because the greedy search keeps one motion only"
+            raise CaseError(case.name, [Fault("search.method", fault)])
         for note in setup.robot.notes:
             tell(f"note: {setup.robot.name}: {note}")
         from feasibility.dividing import divide

@@ -88,7 +88,7 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
         for way in (1, -1)
     ]
     group = np.array([p for p, _ in options], dtype=np.int64)
-    costs = _costs(robot, [walk for _, walk in options], joint_scale(robot))
+    costs = _costs(robot, [walk for _, walk in options], _joint_scale(robot))
     if len(choices) <= MOST_EXACT:
         path = _least_path(costs.largest, group, np.maximum)
         most = max((costs.largest[a, b] for a, b in pairwise(path)), default=0.0)
@@ -104,7 +104,7 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
     return Itinerary(tuple(int(group[k]) for k in path), tuple(walks), moves)
 
 
-def joint_scale(robot: Robot) -> Floats:
+def _joint_scale(robot: Robot) -> Floats:
     """(n,) what turns joint moves into radians: a slide counts as the turn that sweeps it."""
     reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
     return np.where(robot.prismatic, 1.0 / reach, 1.0)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
+import time
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise, permutations, product
@@ -17,11 +19,12 @@ from random_cases import draw, draw_ur5
 
 from feasibility import Search, Task, check
 from feasibility.case import load_case
+from feasibility.case_faults import CaseError
 from feasibility.certificate import replay
 from feasibility.complete import Explorer, explore
 from feasibility.dividing import divide
 from feasibility.division import Division, Plan
-from feasibility.division_report import answer_of, as_json, as_text
+from feasibility.division_report import STATUS, answer_of, as_json, as_text, run
 from feasibility.gathering import table_of, tie
 from feasibility.labels import count_of
 from feasibility.partition import Partition
@@ -433,3 +436,31 @@ def test_text_of_cells_left_out() -> None:
     assert [row["cell"] for row in parsed(division)["left_out"]] == [
         [i, j] for i in range(6, 9) for j in range(10)
     ]
+
+
+@pytest.mark.parametrize(
+    ("case", "settings", "status"),
+    [
+        ("paper/4d", [], 1),
+        ("paper/4c", ["task.cone_deg=40"], 0),
+        ("paper/4d", ["task.cone_deg=0"], 3),
+    ],
+)
+def test_the_command(
+    case: str, settings: list[str], status: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One JSON object on stdout, and the status of what it says."""
+    for as_object in (True, False):
+        args = argparse.Namespace(case=case, settings=settings, json=as_object)
+        assert run(args, time.perf_counter()) == status
+        out = capsys.readouterr().out
+        if as_object:
+            assert STATUS[json.loads(out)["answer"]] == status
+        else:
+            assert f"  case        {case}" in out
+
+
+def test_the_command_refuses_the_greedy_search() -> None:
+    args = argparse.Namespace(case="paper/4d", settings=["search.method=greedy"], json=False)
+    with pytest.raises(CaseError, match=r"search\.method: a division needs 'complete'"):
+        run(args, time.perf_counter())
