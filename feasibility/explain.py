@@ -20,10 +20,11 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    from feasibility.probing import Prober
+    from feasibility.probing import Prober, Trial
 
 SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 2000, 32  # evaluations, and those for each cell, that any search should have
+EXTRA = 4  # the same, for margins that are still wide once the others have had their share
 LEAST = 100_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
@@ -134,8 +135,10 @@ def explain(
     prober = Prober(setup, search.seed, deadline, tick)
     q = known_configurations(verdict)
     dropped = None if verdict.feasible else drop(prober, verdict, q)
-    for threshold in _thresholds(prober, verdict, q, asked):
+    motions = _motions(prober, verdict, q) if verdict.feasible else []
+    for threshold in _thresholds(prober, verdict, q, motions, asked):
         done.append(threshold)
+    _refine(prober, verdict, motions, done)
     return Explanation(
         verdict=verdict,
         thresholds=tuple(done),
@@ -158,18 +161,14 @@ def _thresholds(
     prober: Prober,
     verdict: Verdict,
     q: NDArray[np.float64],
+    motions: Sequence[Trial],
     asked: Sequence[Quantity],
 ) -> Iterator[Threshold]:
     """The thresholds one by one, each with a fair share of what is left; until the deadline."""
-    from feasibility.probing import Trial
     from feasibility.turning import Turning
 
-    cost, motions = cost_of(verdict), []
+    cost = cost_of(verdict)
     total = max(SHARE * cost, LEAST)
-    if verdict.feasible and time.monotonic() < prober.deadline:
-        angle = None if verdict.certificate is None else verdict.certificate.max_angle
-        start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
-        motions = [start, *prober.others(GUESSES, POSTURES)]
     for index, quantity in enumerate(asked):
         if time.monotonic() > prober.deadline:
             return
@@ -181,6 +180,39 @@ def _thresholds(
         else:
             here = Finding(quantity.given, verdict.answer, verdict.evidence, verdict.message)
             yield turning.widen(here, q)
+
+
+def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[Trial]:
+    """The witness of a feasible case, and covering motions in other postures."""
+    from feasibility.probing import Trial
+
+    angle = None if verdict.certificate is None else verdict.certificate.max_angle
+    start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
+    if time.monotonic() > prober.deadline:
+        return [start]
+    return [start, *prober.others(GUESSES, POSTURES)]
+
+
+def _refine(
+    prober: Prober, verdict: Verdict, motions: Sequence[Trial], found: list[Threshold]
+) -> None:
+    """Spend what others left over on margins whose sides are still far apart, in place."""
+    from feasibility.turning import BEYOND, Turning
+
+    cost = cost_of(verdict)
+    left = (SHARE + EXTRA) * cost - prober.spent
+    wide = [k for k, t in enumerate(found) if verdict.feasible and t.steps_apart > max(BEYOND)]
+    if not wide or left < EXTRA * cost * len(wide) / 2:
+        return
+    for k in wide:
+        if time.monotonic() > prober.deadline:
+            return
+        turning = Turning(
+            prober, found[k].quantity, cost, prober.spent + left // len(wide), motions
+        )
+        again = turning.tighten()
+        if again.margin >= found[k].margin:
+            found[k] = again
 
 
 def known_configurations(verdict: Verdict) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -67,6 +68,19 @@ class Threshold:
         if self.feasible is None or self.other is None:
             return None
         return abs(self.feasible.value - self.other.value)
+
+    @property
+    def steps_apart(self) -> int:
+        """How many of the quantity's steps lie between the two sides; 0 with one side only."""
+        apart = self.resolution or 0.0
+        return round(
+            (math.degrees(apart) if self.quantity.unit == "rad" else apart) / self.quantity.step
+        )
+
+    @property
+    def margin(self) -> float:
+        """How far (rad or m, >= 0) the feasible value is from the one given; -1 without one."""
+        return -1.0 if self.feasible is None else abs(self.feasible.value - self.quantity.given)
 
     @property
     def ruled_out(self) -> bool:

@@ -268,8 +268,8 @@ def test_margins_run_from_the_case_as_it_stands_inwards(name: str) -> None:
         else:
             assert way * (found.other.value - found.feasible.value) > 0.0
             assert not found.other.feasible
-        if quantity.kind in (Kind.LOWER, Kind.UPPER):
-            assert quantity.monotone
+            assert found.steps_apart >= 1
+        assert found.margin == abs(found.feasible.value - quantity.given)
 
 
 def test_4a_may_lose_as_much_of_joint1_as_the_azimuth_leaves() -> None:
