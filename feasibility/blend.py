@@ -156,15 +156,21 @@ def _turned(robot: Robot, cells: Cells, task: Task, walk: Walk) -> tuple[Curve |
     """The accepted curve along a motion; or None, and the mark from which on it is refused."""
     shares = np.full(len(walk.q), WIDEST)
     marks = np.flatnonzero(walk.cell >= 0)
-    while True:
-        curve = control_points(walk, shares)
-        refused = _refused(robot, cells, task, curve, 0, len(marks) - 1)
-        if not refused:
-            return curve, -1
-        for k in refused:
-            shares[marks[k] : marks[k + 1] + 1] *= 0.5
-        if shares.min() < SHARPEST:
-            return None, refused[0]
+    last = len(marks) - 1
+    curve = control_points(walk, shares)
+    refused = _refused(robot, cells, task, curve, 0, last)
+    while refused:
+        while refused:
+            for k in refused:
+                shares[marks[k] : marks[k + 1] + 1] *= 0.5
+            if shares.min() < SHARPEST:
+                return None, refused[0]
+            curve = control_points(walk, shares)
+            # Only these and the ones next to them have changed; all are looked at again in the end.
+            changed = sorted({near for k in refused for near in (k - 1, k, k + 1)} - {-1, last})
+            refused = [k for k in changed if _refused(robot, cells, task, curve, k, k + 1)]
+        refused = _refused(robot, cells, task, curve, 0, last)
+    return curve, -1
 
 
 def _refused(

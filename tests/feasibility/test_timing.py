@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from dense_replay import assert_motion, assert_over
+from mesh_patches import bent
 from path_cases import FEASIBLE, PATCHES, SPEED, path_of, quintic, run_of, verdict_of
+from random_arms import question
 from small_cases import small_verdict
 
+from feasibility import Task, check
 from feasibility.blend import Curve, blended, control_points, graded, without_slivers
 from feasibility.certificate import replay
 from feasibility.coverage import coverage_path
@@ -22,6 +25,7 @@ from feasibility.trajectory import Trajectory
 from feasibility.verdict import Walk
 from robots import load_robot
 from robots.kinematics import Kinematics
+from surfaces.mesh import mesh
 
 NAMES = (*FEASIBLE, *PATCHES)
 ROUNDING = 1.0 + 1e-9
@@ -142,6 +146,37 @@ def test_a_single_cell_stands_still():
     run = trajectory(path)
     assert (len(run), run.duration, run.cell.tolist()) == (1, 0.0, [5])
     assert replay(path.robot, path.cells, path.task, run.walk, path.needed).accepted
+
+
+@pytest.mark.parametrize("name", ["ur5 on a rail", "puma, tube"])
+def test_other_arms_and_surfaces(name):
+    robot, cells, task = question(name)
+    path = coverage_path(check(robot, cells, task), "columns")
+    run = trajectory(path, 0.2, velocity=1.0, acceleration=3.0)
+    replayed = replay(robot, cells, task, run.walk, path.needed)
+    assert replayed.accepted, replayed.refusal
+    assert np.abs(run.dq).max() <= ROUNDING
+    assert np.abs(run.ddq).max() <= 3.0 * ROUNDING
+    assert run.tool_speed.max() <= 0.2 * ROUNDING
+    if robot.prismatic.any():
+        margins = np.minimum(path.walk.q - robot.lower, robot.upper - path.walk.q)
+        assert path.figures.slide_margin == margins[:, robot.prismatic].min()
+        assert path.figures.turn_margin == margins[:, ~robot.prismatic].min()
+
+
+def test_a_mesh():
+    hill = bent(
+        lambda u, v: (0.35 + 0.2 * u, -0.1 + 0.2 * v, 0.25 + 0.04 * np.sin(np.pi * u)), 16, 16
+    )
+    cells = mesh(hill, side="outside").cells(12)
+    task = Task(standoff=0.02, cone_deg=30)
+    path = coverage_path(check(load_robot("ur5"), cells, task), "shortest")
+    run = trajectory(path, SPEED)
+    every = np.ones(len(cells), dtype=bool)
+    replayed = replay(path.robot, cells, task, run.walk, every)
+    assert replayed.accepted, replayed.refusal
+    assert path.figures.revisited_share <= 0.15
+    assert run.tool_speed.max() <= SPEED * ROUNDING
 
 
 # -- the smooth curve ---------------------------------------------------------------------------
