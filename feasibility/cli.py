@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from feasibility import commands
+from feasibility.cli_jobs import add_case, add_jobs
 from feasibility.console import prepare, say, tell
 
 INTERRUPTED = 130
@@ -55,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     subcommands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_check(subcommands)
+    add_jobs(subcommands)
 
     listing = subcommands.add_parser("cases", help="list the built-in cases", allow_abbrev=False)
     listing.set_defaults(run=commands.cases)
@@ -90,22 +92,11 @@ def _add_check(subcommands: argparse._SubParsersAction) -> None:
         epilog=STATUSES,
         allow_abbrev=False,
     )
-    check.add_argument("case", metavar="CASE", help="a case file, or a built-in case")
-    check.add_argument("--json", action="store_true", help="print one JSON object")
+    add_case(check)
     check.add_argument(
         "--witness", metavar="FILE", help="write the covering motion as CSV (feasible only)"
     )
     check.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
-    check.add_argument("--html", metavar="FILE", help="write the view as one self-contained page")
-    check.add_argument(
-        "--set",
-        dest="settings",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        help="replace a key of the case, such as task.cone_deg=10; an empty value removes it; "
-        "can be given many times",
-    )
     check.set_defaults(run=commands.check)
 
 
@@ -167,6 +158,7 @@ def _expected() -> tuple[type[Exception], ...]:
     # An error of a module that was never imported cannot have been raised.
     for module, name in (
         ("feasibility.case_faults", "CaseError"),
+        ("feasibility.route", "PathError"),
         ("feasibility.result", "ResultError"),
         ("robots.robot", "RobotError"),
         ("surfaces.surface", "SurfaceError"),

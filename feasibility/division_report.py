@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import textwrap
-import time
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from feasibility.console import Bar, interruptible, say, tell
 from feasibility.division import Division, Plan, SubPatch
 from feasibility.reconfigure import Reconfiguration
 from feasibility.report import CAUSES, DETAILS, WIDTH
@@ -218,46 +214,3 @@ def _groups(division: Division) -> Iterator[str]:
             yield f"    {list(division.cells.unravel(cause.cell))} {cause.detail}".rstrip()
         if number > DETAILS:
             yield f"    ... and {number - DETAILS:,} more (--json lists all)"
-
-
-def run(args: argparse.Namespace, began: float) -> int:
-    """`coverable divide CASE`: divide the surface, and say how.
-
-    Args:
-        args: `case`, `settings` (a list of KEY=VALUE) and `json`, as of `coverable check`.
-        began: `time.perf_counter()` when the command began.
-
-    Returns:
-        0 when every cell is in a patch, 1 when cells are left out, 3 when undecided.
-
-    Raises:
-        CaseError: the case cannot be used, or asks for the greedy search.
-    """
-    with interruptible() as settle:
-        from feasibility.case import load_case
-        from feasibility.case_faults import CaseError, Fault
-
-        case = load_case(args.case, args.settings)
-        setup = case.build()
-        if setup.search.method != "complete":
-            fault = "a division needs 'complete', because the greedy search keeps one motion only"
-            raise CaseError(case.name, [Fault("search.method", fault)])
-        for note in setup.robot.notes:
-            tell(f"note: {setup.robot.name}: {note}")
-        from feasibility.dividing import divide
-
-        loaded = time.perf_counter() - began
-        with Bar() as bar:
-
-            def report(done: int, total: int | None, text: str) -> None:
-                settle()  # stop even if Python has dropped the Ctrl-C
-                if bar.callback is not None:
-                    bar(done, total, text)
-
-            division = divide(*setup, progress=report)
-        settle()
-    if args.json:
-        say(json.dumps(as_json(division, loaded), allow_nan=False, indent=2))
-    else:
-        say(as_text(division, f"{case.name}  {case.description}".rstrip(), loaded))
-    return STATUS[answer_of(division)]

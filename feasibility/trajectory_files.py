@@ -11,7 +11,6 @@ import io
 import json
 import math
 import os
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +36,15 @@ def save_trajectory(path: str | os.PathLike[str], trajectory: Trajectory) -> Pat
     return write_whole(path, lambda stream: stream.write(text.encode()))
 
 
+def check_ending(path: str | os.PathLike[str]) -> None:
+    """Refuse a file whose ending says no format.
+
+    Raises:
+        FileError: another ending than .csv, .json, .yaml or .yml.
+    """
+    _of_ending(path, {"csv": None, "json": None, "yaml": None})
+
+
 def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     """Read a trajectory that `save_trajectory` wrote.
 
@@ -53,7 +61,7 @@ def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
         raise FileError(f"{shown_path(path)}: {error}") from error
 
 
-def _of_ending(path: str | os.PathLike[str], known: dict[str, Callable[..., Any]]) -> Any:
+def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:
     """What belongs to a file's ending."""
     ending = Path(path).suffix.lower().lstrip(".")
     ending = "yaml" if ending == "yml" else ending

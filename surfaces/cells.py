@@ -75,6 +75,11 @@ class Cells(ABC):
         return len(self.centres)
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about the surface and its cells; one sentence each."""
+        return self.surface.notes
+
+    @property
     @abstractmethod
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
@@ -97,6 +102,11 @@ class Cells(ABC):
         from surfaces.courses import courses_of
 
         return courses_of(self)
+
+    @cached_property
+    def sharpness(self) -> NDArray[np.float64]:
+        """(N,) 1/m; see `Surface.sharpness`."""
+        return self.surface.sharpness(self)
 
     def graph(self) -> nx.Graph:
         """Adjacency as a graph: nodes are flat indices, edges are `pairs`."""

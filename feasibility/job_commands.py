@@ -1,0 +1,121 @@
+"""From verdict to work, on the command line: `path`, `divide` and `explain`."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from feasibility.asking import asked
+from feasibility.commands import STATUS, check_outputs, json_text, write_view
+from feasibility.console import say, tell
+from feasibility.files import shown_path
+
+if TYPE_CHECKING:
+    from feasibility.explain import Explanation
+    from feasibility.route import Order
+    from feasibility.viewer import View
+
+WHY_COMPLETE = {
+    "path": "a path needs 'complete', because the greedy search does not visit the cells' centres",
+    "divide": "a division needs 'complete', because the greedy search keeps one motion only",
+    "explain": "thresholds need 'complete', because the greedy search's no depends on its start",
+}
+
+
+def path(args: argparse.Namespace, began: float) -> int:
+    """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
+    outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
+
+    def check_first() -> None:
+        from feasibility.trajectory_files import check_ending
+
+        check_outputs(outputs)
+        for out in args.out:
+            check_ending(out)
+
+    with asked(
+        args, began, check_first=check_first, only_complete=WHY_COMPLETE["path"]
+    ) as question:
+        from feasibility.checking import check
+        from feasibility.coverage import coverage_path
+        from feasibility.path_report import as_json, as_text
+        from feasibility.timing import trajectory
+
+        verdict = check(*question.setup, progress=question.progress)
+        if not verdict.feasible:
+            tell(f"coverable path: {question.case.name}: no path covers this surface. {verdict!r}")
+            tell("`coverable explain` says what would help, `coverable divide` how to split it.")
+            return STATUS[str(verdict.answer)]
+        question.progress(0, None, "laying the path")
+        order: Order = args.order or ("rows" if len(verdict.cells.shape) == 2 else "shortest")
+        found = coverage_path(verdict, order)
+        question.progress(0, None, "timing the path")
+        run = trajectory(found, args.speed, acceleration=args.acceleration, period=args.period)
+    say(json_text(as_json(found, run)) if args.json else as_text(found, run))
+    for out in args.out:
+        from feasibility.trajectory_files import save_trajectory
+
+        save_trajectory(out, run)
+        tell(f"trajectory: {shown_path(out)}")
+    if args.html is not None:
+        from feasibility.job_view import view_path
+
+        write_view(view_path(found, run, question.case.name), args.html)
+    return 0
+
+
+def divide(args: argparse.Namespace, began: float) -> int:
+    """`coverable divide CASE`: the fewest sub-patches, each covered by one continuous motion."""
+    with asked(
+        args,
+        began,
+        check_first=lambda: check_outputs({"--html": args.html}),
+        only_complete=WHY_COMPLETE["divide"],
+    ) as question:
+        from feasibility.dividing import divide as run
+        from feasibility.division_report import STATUS as DIVIDED
+        from feasibility.division_report import answer_of, as_json, as_text
+
+        loaded = question.so_far()
+        division = run(*question.setup, progress=question.progress)
+    if args.json:
+        say(json_text(as_json(division, loaded)))
+    else:
+        say(as_text(division, question.case.name, loaded))
+    if args.html is not None:
+        from feasibility.job_view import view_division
+
+        write_view(view_division(division, question.case.name), args.html)
+    return DIVIDED[answer_of(division)]
+
+
+def explain(args: argparse.Namespace, began: float) -> int:
+    """`coverable explain CASE`: what would make it feasible, or how far it may be tightened."""
+    with asked(
+        args,
+        began,
+        check_first=lambda: check_outputs({"--html": args.html}),
+        only_complete=WHY_COMPLETE["explain"],
+    ) as question:
+        from feasibility.explain import explain as run
+        from feasibility.explain_report import as_json, as_text
+
+        explanation = run(*question.setup, progress=question.progress)
+    name = question.case.name
+    say(json_text(as_json(explanation, name)) if args.json else as_text(explanation, name))
+    if args.html is not None:
+        write_view(_explained(explanation, name), args.html)
+    return STATUS[str(explanation.verdict.answer)]
+
+
+def _explained(explanation: Explanation, name: str) -> View:
+    """The verdict's picture, with what helps beside it."""
+    from feasibility.explain_report import sentence
+    from feasibility.viewer import view
+
+    drawn = view(explanation.verdict, name)
+    feasible = explanation.verdict.feasible
+    helps = [sentence(t, feasible) for t in explanation.thresholds if t.feasible is not None]
+    text = " · ".join([drawn.legend.text, *helps])
+    return replace(drawn, legend=replace(drawn.legend, text=text))
