@@ -96,7 +96,7 @@ def graded(first: float, last: float) -> Array:
 
     Example:
         >>> graded(0.5, 0.5).tolist(), graded(0.125, 0.5).tolist()
-        ([0.5], [0.125, 0.5])
+        ([0.5], [0.125, 0.3125, 0.5])
     """
     low, high = [first], [1.0 - last]
     steps = [first, last]

@@ -7,6 +7,7 @@ replayed like any witness, and measured (`path_figures`).
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -134,7 +135,10 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
         if total == 0:
             raise PathError("there are no cells to cover")
         return np.ones(total, dtype=bool)
-    asked = np.array(sorted(set(only)), dtype=np.int64)
+    try:
+        asked = np.array(sorted({operator.index(cell) for cell in only}), dtype=np.int64)
+    except (TypeError, OverflowError) as error:
+        raise PathError("cells to visit must be whole numbers, their flat indices") from error
     beyond = asked[(asked < 0) | (asked >= total)]
     within = asked[(asked >= 0) & (asked < total)]
     missed = within[~verdict.covered[within]]

@@ -74,7 +74,7 @@ def motion_limits(
         ([3.0, 3.0, 3.0, 3.0, 3.0, 3.0], [6.0, 6.0, 6.0, 6.0, 6.0, 6.0])
     """
     faults = []
-    speed = _number(tool_speed)
+    speed = number(tool_speed)
     if not 0.0 < speed <= MOST:
         faults.append(
             f"the tool speed must be a positive number of metres per second, got {tool_speed!r}"
@@ -99,7 +99,7 @@ def motion_limits(
     return MotionLimits(fastest, quickest, speed)
 
 
-def _number(value: object) -> float:
+def number(value: object) -> float:
     """A float, nan where it is none."""
     try:
         return float(value) if not isinstance(value, bool) else math.nan  # type: ignore[arg-type]

@@ -23,6 +23,7 @@ from feasibility.speed_limits import (
     MotionLimits,
     fine_grid,
     motion_limits,
+    number,
     squared_speeds,
     tool_slopes,
 )
@@ -37,6 +38,7 @@ DEFAULT_PERIOD = 0.02  # [s] between samples
 ALLOWED = 0.999  # [1] share of an acceleration limit that toppra is given
 TRIES = 4  # runs of toppra, each slower where the one before was over an acceleration limit
 MOST_OVER = 4.0  # [1] share of an acceleration limit that running slower altogether may mend
+SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be asked for
 FINER = 4  # times that the period may be halved
 CROWDED = 0.2  # [1] share of the period; samples nearer to a passage of a centre are left out
 
@@ -110,8 +112,8 @@ def trajectory(
     """
     robot, cells, task = path.robot, path.cells, path.task
     limits = motion_limits(robot, speed, velocity, acceleration)
-    if not (isinstance(period, int | float) and 1e-4 <= period <= 10.0):
-        raise PathError(f"the period must be 0.0001 to 10 seconds, got {period!r}")
+    if not SHORTEST <= number(period) <= LONGEST:
+        raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
     if len(np.unique(path.walk.q, axis=0)) == 1:
         return _standing(robot, path.walk)
     timed = timed_curve(robot, blended(robot, cells, task, path.walk), limits)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from dense_replay import assert_motion, assert_over
 from path_cases import FEASIBLE, PATCHES, path_of, verdict_of
-from small_cases import paper_verdict, small_verdict
+from small_cases import paper_verdict, small_case, small_verdict
 
 from feasibility import joint_route as joint_routes
 from feasibility.certificate import replay
@@ -19,6 +19,7 @@ from feasibility.joint_route import joint_route, walk_of
 from feasibility.motion_net import MotionNet, joint_length
 from feasibility.path_figures import again
 from feasibility.problem import problem_of, work_for
+from feasibility.result import load_result, save_result
 from feasibility.route import ORDERS, PathError, route
 from feasibility.verdict import Answer, Walk
 from robots.kinematics import Kinematics
@@ -255,6 +256,21 @@ def test_cells_that_cannot_be_reached_and_cells_that_are_none():
     missed = int(np.flatnonzero(~verdict.covered)[0])
     with pytest.raises(PathError, match=r"no cell -1, 90;.*0 to 89.*cell .*cannot be reached"):
         coverage_path(verdict, only=[missed, -1, 90])
+
+
+@pytest.mark.parametrize("only", [[1.5], ["0"], [None], [10**30]])
+def test_cells_that_are_no_indices(only):
+    with pytest.raises(PathError, match="must be whole numbers"):
+        coverage_path(small_verdict("plate"), only=only)
+
+
+def test_a_verdict_from_a_file_has_the_same_path(tmp_path):
+    verdict = small_verdict("plate")
+    file = save_result(verdict, small_case("plate"), tmp_path / "plate.cover")
+    loaded = load_result(file).verdict
+    for order in ORDERS:
+        first, second = coverage_path(verdict, order), coverage_path(loaded, order)
+        assert np.array_equal(first.walk.q, second.walk.q)
 
 
 def test_an_unknown_order():
