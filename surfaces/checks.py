@@ -64,9 +64,9 @@ class Checks:
 
     def side(self, value: Any) -> Side:
         """'inside' or 'outside'."""
-        if value == "inside":
+        if isinstance(value, str) and value == "inside":
             return "inside"
-        if value != "outside":
+        if not (isinstance(value, str) and value == "outside"):
             self.faults.append(f"side must be 'inside' or 'outside', got {value!r}")
         return "outside"
 

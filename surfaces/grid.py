@@ -145,9 +145,17 @@ class GridCells(Cells):
     def locate(self, points: ArrayLike) -> NDArray[np.int64]:
         """See `Cells.locate`."""
         foot = self.surface.closest(points)
-        row = _bin(foot.u, self.surface.u_range, self.shape[0])
-        column = _bin(foot.v, self.surface.v_range, self.shape[1])
-        return np.where(foot.inside, row * self.shape[1] + column, -1)
+        return np.where(foot.inside, self.at(foot.u, foot.v), -1)
+
+    def at(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.int64]:
+        """The cells at some parameters; -1 where these are NaN, or where there are no cells.
+
+        Parameters beyond the ranges count as the nearest ones within.
+        """
+        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
+        row = _bin(u, self.surface.u_range, self.shape[0])
+        column = _bin(v, self.surface.v_range, self.shape[1])
+        return np.where((row >= 0) & (column >= 0), row * self.shape[1] + column, -1)
 
     def triangles(
         self, which: NDArray[np.int64], samples: int = 8, inset: float = 0.0
@@ -184,8 +192,8 @@ class GridCells(Cells):
             outlines=tuple(centres[:, None] + corners),
             labels=(f"v{words[1]}", f"u{words[0]}"),
             turns=(
-                360.0 if surface.v_closed else np.inf,
-                360.0 if surface.u_closed else np.inf,
+                np.ptp(surface.v_range) * degrees[1] if surface.v_closed else np.inf,
+                np.ptp(surface.u_range) * degrees[0] if surface.u_closed else np.inf,
             ),
         )
 
@@ -219,9 +227,10 @@ def charted_grid(cells: Cells) -> GridCells:
 
 
 def _bin(values: NDArray[np.float64], limits: tuple[float, float], count: int) -> NDArray[np.int64]:
-    """Which of `count` equal parts of a range each value falls in."""
+    """Which of `count` equal parts of a range each value falls in; -1 for NaN, and of none."""
     share = (values - limits[0]) / (limits[1] - limits[0])
-    return np.clip(np.floor(share * count), 0, count - 1).astype(np.int64)
+    part = np.clip(np.floor(share * count), 0, count - 1)
+    return np.where(np.isnan(part), -1, part).astype(np.int64)
 
 
 def _count(name: str, value: Any) -> int:

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from surfaces.cells import Cells
     from surfaces.grid import GridCells
 
+DIFFERENCE = 1e-4  # [1], share of a patch: step of differences
+
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Patch(Surface):
@@ -107,6 +109,24 @@ class Patch(Surface):
         us[over], vs[over] = _over_a_pole(self, cells, pairs[over], t)
         return self.point(us, vs), self.normal(us, vs)
 
+    def sharpness(self, cells: Cells) -> NDArray[np.float64]:
+        """See `Surface.sharpness`: the larger principal curvature, by central differences."""
+        places = cells.u, cells.v  # type: ignore[attr-defined]  # of a grid
+        slopes, turns = [], []
+        for axis, (low, high) in enumerate((self.u_range, self.v_range)):
+            step = np.zeros((2, 1))
+            step[axis] = min(DIFFERENCE, 0.25 / cells.shape[axis]) * (high - low)
+            ahead, behind = np.add(places, step), np.subtract(places, step)
+            slopes.append(self.point(*ahead) - self.point(*behind))
+            turns.append(self.normal(*ahead) - self.normal(*behind))
+        (e, f, g), (a, b, c) = map(_products, (slopes, turns))
+        # The eigenvalues of inv([[e, f], [f, g]]) @ [[a, b], [b, c]] are the squared curvatures.
+        area = e * g - f * f
+        half = 0.5 * (a * g - 2.0 * b * f + c * e) / area
+        product = (a * c - b * b) / area
+        largest = half + np.sqrt(np.maximum(half * half - product, 0.0))
+        return np.asarray(np.sqrt(np.maximum(largest, 0.0)))
+
     def cells(self, nu: int, nv: int) -> GridCells:
         """Cut the patch into nu x nv E-cells of equal parameter steps.
 
@@ -134,6 +154,14 @@ class Patch(Surface):
                 ranges.append(f"{name}=({low:g}, {high:g})")
         parts = [lengths, *ranges, f"side={self.side!r}", f"position={self.position.tolist()}"]
         return f"{self.kind}({', '.join(part for part in parts if part)})"
+
+
+def _products(
+    pair: list[NDArray[np.float64]],
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Products (N,) of two vectors (N, 3): first by first, first by second, second by second."""
+    x, y = pair
+    return (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
 
 
 def _over_a_pole(

@@ -124,6 +124,17 @@ class Surface(ABC):
         foot = self.closest(points)
         return points - foot.height[..., None] * foot.normal, foot.normal
 
+    def smoothed(self, cells: Cells, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(m,) where ways are smoother than the surface, so that `beneath` tells how far off."""
+        return np.full(len(pairs), self.grain > 0.0)
+
+    def sharpness(self, cells: Cells) -> NDArray[np.float64]:
+        """(N,) 1/m, how fast the normal turns at each centre in the sharpest direction.
+
+        0 where that is not known, because ways are measured by `beneath` anyway.
+        """
+        return np.zeros(len(cells))
+
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
         """The same surface after the rigid motion x -> rotation x + translation."""
         turn = np.asarray(rotation, dtype=float)

@@ -29,18 +29,6 @@ PATCHES = {
 }
 
 
-def sharpest(patch):
-    """1/m, how fast the normal turns per metre in any direction, from fine differences."""
-    u, v = (np.linspace(*ends, 400) for ends in (patch.u_range, patch.v_range))
-    points, normals = (f(u[:, None], v[None, :]) for f in (patch.point, patch.normal))
-    turns = [
-        np.linalg.norm(np.diff(normals, axis=axis), axis=-1)
-        / np.maximum(np.linalg.norm(np.diff(points, axis=axis), axis=-1), 1e-9)
-        for axis in (0, 1)
-    ]
-    return 1.2 * max(turn.max() for turn in turns)
-
-
 @pytest.mark.parametrize("name", PATCHES, ids=str)
 def test_courses_run_on_the_surface_and_the_short_way(name):
     patch = PATCHES[name]
@@ -53,8 +41,8 @@ def test_courses_run_on_the_surface_and_the_short_way(name):
     assert on.inside.all()
     assert (np.abs(on.height) <= courses.strays[pair, 0] + 1e-12).all()
     # The foot's own normal may lie across the course, where the surface bends more than along it.
-    apart = courses.strays[pair, 1] + sharpest(patch) * courses.strays[pair, 0]
-    assert (np.linalg.norm(normal - on.normal, axis=1) <= apart + 1e-12).all()
+    apart = np.linalg.norm(normal - on.normal, axis=1)
+    assert (apart <= courses.strays[pair, 1] + 1e-12).all()
     assert courses.strays.max() < 2e-5
     ends = foot.reshape(-1, 21, 3)
     assert ends[:, 0] == pytest.approx(cells.centres[cells.pairs[:, 0]], abs=1e-14)
