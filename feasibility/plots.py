@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 DOTS_PER_INCH = 110
+BORDERS = (0.72, 0.75, 0.78)
 
 
 class Plot(Figure):
@@ -44,6 +45,10 @@ def plot_graph(verdict: Verdict, title: str | None = None) -> Plot:
     from matplotlib.collections import LineCollection
 
     figure, axes = _over_parameters(verdict, title)
+    if len(verdict.cells.shape) == 1:  # not a grid, whose borders one can guess
+        outlines = verdict.cells.unrolled().outlines
+        borders = LineCollection(outlines, colors=[BORDERS], linewidths=0.6, zorder=1)
+        axes.add_collection(borders)
     lines = unrolled_edges(verdict)
     axes.add_collection(LineCollection(lines, colors=[EDGES], linewidths=1.0, zorder=2))
     centres, covered = verdict.cells.unrolled().centres, verdict.covered
@@ -168,13 +173,20 @@ def unrolled_edges(verdict: Verdict) -> list[NDArray[np.float64]]:
 
 
 def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
-    """A figure over the parameters: v to the right, u down, as cells are numbered."""
+    """A figure over the parameters: v to the right, u down, as cells are numbered.
+
+    A mesh has none; it is seen from outside, as large one way as the other.
+    """
     surface = verdict.cells.surface
     figure = Plot(figsize=(6.4, 5.2), layout="constrained")
     axes = figure.add_subplot()
     flat = verdict.cells.unrolled()
     if flat.outlines:
         corners = np.concatenate(flat.outlines)
+        if len(verdict.cells.shape) == 1:
+            axes.set_aspect("equal")
+            width, height = np.ptp(corners, axis=0)
+            figure.set_figheight(float(np.clip(5.6 * height / width + 1.3, 2.8, 7.0)))
         axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
         axes.set_ylim(corners[:, 1].max(), corners[:, 1].min())
     axes.set_xlabel(flat.labels[0])

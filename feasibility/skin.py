@@ -19,7 +19,7 @@ from surfaces.mesh_cells import MeshCells
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-BUDGET = 60_000  # triangles
+BUDGET = 30_000  # triangles
 COARSER = 1.25  # from one spacing to the next
 WIDEST = 0.3  # [1] of a cell's width, beyond which no vertices are merged
 DEGREE = 57.0  # [1/rad] normals that agree to about a degree are one
