@@ -24,8 +24,9 @@ from feasibility.certificate import replay
 from feasibility.complete import Explorer, explore
 from feasibility.dividing import divide
 from feasibility.division import Division, Plan
-from feasibility.division_report import STATUS, answer_of, as_json, as_text, run
+from feasibility.division_report import STATUS, answer_of, as_json, as_text
 from feasibility.gathering import table_of, tie
+from feasibility.job_commands import divide as run
 from feasibility.labels import count_of
 from feasibility.partition import Partition
 from feasibility.patch_walk import links_of, patch_walk
@@ -451,7 +452,7 @@ def test_the_command(
 ) -> None:
     """One JSON object on stdout, and the status of what it says."""
     for as_object in (True, False):
-        args = argparse.Namespace(case=case, settings=settings, json=as_object)
+        args = argparse.Namespace(case=case, settings=settings, json=as_object, html=None)
         assert run(args, time.perf_counter()) == status
         out = capsys.readouterr().out
         if as_object:
@@ -461,6 +462,8 @@ def test_the_command(
 
 
 def test_the_command_refuses_the_greedy_search() -> None:
-    args = argparse.Namespace(case="paper/4d", settings=["search.method=greedy"], json=False)
+    args = argparse.Namespace(
+        case="paper/4d", settings=["search.method=greedy"], json=False, html=None
+    )
     with pytest.raises(CaseError, match=r"search\.method: a division needs 'complete'"):
         run(args, time.perf_counter())
