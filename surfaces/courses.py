@@ -34,6 +34,7 @@ FACETED_FOOT = 0.01  # [1], share of a mesh's edges that a course may stray from
 STANDS = 1e-3  # [1] a parallel curve that is so much shorter stands still
 PLACES = 3  # along a piece, where its slopes are looked at
 BETWEEN = 1.5  # [1], on what was measured at samples: for what lies between them
+SHARPER = 1.5  # [1], on curvatures at the two centres: for what lies between them
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on bends
 HALVES = (slice(0, 3), slice(3, 6))  # of a cubic's values: foot, normal
 BLOCK = 5_000  # courses fitted at once: what the processor's caches hold
@@ -168,16 +169,20 @@ def _fit(cells: Cells, pairs: NDArray[np.int64], count: int, parts: int) -> tupl
     fit, evaluate = _maps(count, parts)
     cubics = fit @ values[::2].reshape(parts + 1, -1)
     off = (evaluate @ cubics).reshape(values.shape)
-    if cells.surface.grain:
+    smoothed = np.flatnonzero(cells.surface.smoothed(cells, pairs))
+    if len(smoothed):
         # Least squares also cut corners along the facets, which takes nothing off the surface.
-        places, normals = cells.surface.beneath(cells, pairs, off[..., :3].swapaxes(0, 1))
-        values = np.concatenate([places, normals], axis=2).swapaxes(0, 1)
+        feet = off[:, smoothed, :3].swapaxes(0, 1)
+        places, normals = cells.surface.beneath(cells, pairs[smoothed], feet)
+        values[:, smoothed] = np.concatenate([places, normals], axis=2).swapaxes(0, 1)
     off = off - values
     stray = [np.sqrt((off[..., half] ** 2).sum(axis=2)).max(axis=0) for half in HALVES]
-    # The surface's own normal is the one at the nearest point, which is not the sample.
+    # The surface's own normal is the one at the nearest point, which is not the sample, and may lie
+    # to the side, where the surface bends more than along the course.
     moves = [np.sqrt((np.diff(values[..., half], axis=0) ** 2).sum(axis=2)) for half in HALVES]
     turning = np.divide(moves[1], moves[0], out=np.zeros_like(moves[0]), where=moves[0] > 0.0)
-    stray[1] = stray[1] + turning.max(axis=0) * stray[0]
+    sharpest = SHARPER * cells.sharpness[pairs].max(axis=1)
+    stray[1] = stray[1] + np.maximum(turning.max(axis=0), sharpest) * stray[0]
     by_course = cubics.reshape(count, 4, len(pairs), 6).transpose(2, 0, 1, 3)
     return by_course, BETWEEN * np.stack(stray, axis=1)
 

@@ -52,3 +52,38 @@ def test_courses_run_on_the_surface_and_the_short_way(name):
     chord = np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
     assert (travel <= math.pi / 2 * chord).all()
     assert not courses.folds(0.005 * patch.side_sign).any()
+
+
+@pytest.mark.parametrize("name", ["cone", "torus", "hood"])
+@pytest.mark.parametrize("shape", [(1, 14), (14, 1)], ids=str)
+def test_a_single_row_counts_the_bend_to_its_side(name, shape):
+    """No other course shows how sharply the surface bends across these."""
+    patch = PATCHES[name]
+    courses = courses_of(patch.cells(*shape))
+    pair = np.repeat(np.arange(len(courses)), 21)
+    foot, normal = courses.at(pair, np.tile(np.linspace(0, 1, 21), len(courses)))
+    on = patch.closest(foot)
+    assert on.inside.all()
+    assert (np.abs(on.height) <= courses.strays[pair, 0] + 1e-12).all()
+    apart = np.linalg.norm(normal - on.normal, axis=1)
+    assert (apart <= courses.strays[pair, 1] + 1e-12).all()
+
+
+@pytest.mark.parametrize("name", PATCHES, ids=str)
+def test_sharpness_is_the_largest_of_many_directions(name):
+    """Of 90 short steps in all directions from each centre."""
+    patch = PATCHES[name]
+    cells = patch.cells(4, 5)
+    way = np.linspace(0.0, math.pi, 90, endpoint=False)
+    widths = [np.ptp(patch.u_range), np.ptp(patch.v_range)]
+    best = np.zeros(len(cells))
+    for scale in (0.1, 1.0, 10.0):  # of parameters, whose units differ
+        du = 1e-5 * widths[0] * np.cos(way) * scale
+        dv = 1e-5 * widths[1] * np.sin(way)
+        u, v = cells.u[:, None], cells.v[:, None]
+        turn = patch.normal(u + du, v + dv) - patch.normal(u - du, v - dv)
+        step = patch.point(u + du, v + dv) - patch.point(u - du, v - dv)
+        rates = np.linalg.norm(turn, axis=2) / np.linalg.norm(step, axis=2)
+        best = np.maximum(best, rates.max(axis=1))
+    assert (best <= cells.sharpness * (1 + 1e-3) + 1e-6).all()
+    assert (best >= cells.sharpness * 0.97 - 1e-6).all()
