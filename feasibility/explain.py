@@ -20,16 +20,18 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    from feasibility.probing import Prober, Trial
+    from feasibility.probing import Prober
+    from feasibility.trials import Trial
 
 SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 2000, 32  # evaluations, and those for each cell, that any search should have
-EXTRA = 4  # the same, for margins that are still wide once the others have had their share
+EXTRA = 2  # the same, for margins that are still wide once the others have had their share
 LEAST = 100_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
 PATIENCE = 20.0  # times the time limit of the verdict
 
+AS_IS = "asking about the case as it stands"
 Progress = Callable[[int, int | None, str], None]
 
 
@@ -103,9 +105,8 @@ def explain(
         >>> from surfaces import plane
         >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
         >>> found = explain(load_robot("ur5"), patch.cells(2, 2), Task(standoff=0.02, cone_deg=30))
-        >>> cone = found.thresholds[0]
-        >>> cone.quantity.name, f"{np.degrees(cone.feasible.value):.1f}"
-        ('cone', '3.0')
+        >>> f"{np.degrees(found.thresholds[0].feasible.value):.1f}"
+        '3.0'
     """
     search = Search() if search is None else search
     if search.method != "complete":
@@ -113,11 +114,7 @@ def explain(
             f"explain asks the complete search: method must be 'complete', got {search.method!r}"
         )
 
-    def first(done: int, total: int | None, text: str) -> None:
-        if progress is not None:
-            progress(0, None, text)
-
-    verdict = check(robot, cells, task, search, first)
+    verdict = check(robot, cells, task, search, progress and (lambda *_: progress(0, None, AS_IS)))
     began = time.monotonic()
     if len(cells) == 0:
         return Explanation(verdict, (), (), None, 0, 0.0)
@@ -137,7 +134,7 @@ def explain(
     dropped = None if verdict.feasible else drop(prober, verdict, q)
     motions = _motions(prober, verdict, q) if verdict.feasible else []
     for threshold in _thresholds(prober, verdict, q, motions, asked):
-        done.append(threshold)
+        done.append(threshold)  # one by one: `tick` counts them
     _refine(prober, verdict, motions, done)
     return Explanation(
         verdict=verdict,
@@ -184,7 +181,7 @@ def _thresholds(
 
 def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[Trial]:
     """The witness of a feasible case, and covering motions in other postures."""
-    from feasibility.probing import Trial
+    from feasibility.trials import Trial
 
     angle = None if verdict.certificate is None else verdict.certificate.max_angle
     start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)

@@ -9,7 +9,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +23,8 @@ from feasibility.newton import land
 from feasibility.problem import HERE, Problem, place, problem_of, work_for
 from feasibility.proof import Ruling, root_box, rule
 from feasibility.quantities import Kind, Quantity, Setup
-from feasibility.roadmap import NODES
-from feasibility.verdict import Answer, Evidence, Walk
+from feasibility.trials import Rationed, Trial, certifiable, configurations
+from feasibility.verdict import Answer, Evidence
 from feasibility.walk import covering_walk
 
 FOLLOW_STEPS = np.int64(15)  # Newton steps that put a neighbour's configuration onto the fibre
@@ -47,49 +47,6 @@ def follow_all(problem, work, order, q):  # type: ignore[no-untyped-def]
         if not land(problem, work, order[k], row, FOLLOW_STEPS):
             return k
     return order.shape[0]
-
-
-@dataclass
-class Rationed(Explorer):
-    """An exploration that stops after a number of evaluations of the arm, whatever the clock."""
-
-    most: float = np.inf
-
-    def tick(self, text: str) -> None:
-        """Stop when the ration is used up.
-
-        Raises:
-            OutOfTime: it is, or the deadline has passed.
-        """
-        super().tick(text)
-        if self.work.counts[0] > self.most:
-            raise OutOfTime
-
-    def plant(self, cell: int, guesses: NDArray[np.float64]) -> int:
-        """Plant, unless the ration is used up; see `Explorer.plant`."""
-        self.tick("looking for configurations")
-        return super().plant(cell, guesses)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Trial:
-    """What a search came to."""
-
-    answer: Answer
-    evidence: Evidence
-    detail: str
-    q: NDArray[np.float64]
-    """(N, n) a configuration of the best component over each cell; NaN where it has none."""
-    walk: Walk | None
-    """A covering motion; None unless feasible."""
-    angle: float | None = None
-    """rad, the replay's bound on the angle between tool axis and approach direction along the walk;
-    None until the replay has seen it. Until then the trial leads on, and is not told to anyone."""
-
-    @property
-    def found(self) -> bool:
-        """True with a covering motion."""
-        return self.walk is not None
 
 
 class Prober:
@@ -315,30 +272,6 @@ def _wound(problem: Problem, q: NDArray[np.float64]) -> NDArray[np.float64]:
     turn = np.where(problem.chain.prismatic, 0.0, 2.0 * np.pi)
     q = q + turn * np.ceil(np.maximum(problem.lower - q, 0.0) / (2.0 * np.pi))
     return q - turn * np.ceil(np.maximum(q - problem.upper, 0.0) / (2.0 * np.pi))
-
-
-def configurations(explorer: Explorer) -> NDArray[np.float64]:
-    """(N, n) a configuration of the best component over each cell; NaN where it has none."""
-    roadmap = explorer.roadmap
-    q = np.full((len(explorer.cells), explorer.robot.n), np.nan)
-    nodes = np.arange(roadmap.counters[NODES])[::-1]  # the first one over a cell is written last
-    root = roadmap.component[nodes]
-    while not np.array_equal(roadmap.parent[root], root):
-        root = roadmap.parent[root]
-    mine = nodes[np.equal(root, explorer.best)]
-    q[roadmap.cell[mine]] = roadmap.q[mine]
-    return q
-
-
-def certifiable(problem: Problem) -> bool:
-    """Could a motion be certified everywhere, if there were one?
-
-    Not in a cone of 0 degrees, where the offset surface folds, or where the surface is known less
-    well than the task asks for.
-    """
-    smooth = bool(np.isfinite(problem.bends).all())
-    known = bool((problem.strays < (problem.tolerance, problem.rim)).all())
-    return smooth and known and problem.rim > 0.0
 
 
 def apart(features: NDArray[np.float64], most: int) -> list[int]:

@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.probing import NO_CELL, Prober, Trial
+from feasibility.probing import NO_CELL, Prober
 from feasibility.proof import Ruling
 from feasibility.quantities import Kind, Quantity
 from feasibility.thresholds import Finding, Span, Threshold, last_true
+from feasibility.trials import Trial
 from feasibility.verdict import Answer, Evidence
 
 PROOF_BOXES = 3000  # for one cell
