@@ -11,14 +11,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from feasibility.case_edits import as_read, make_absolute, override
 from feasibility.case_faults import BuildError, CaseError, Fault, alternatives, close, printable
+from feasibility.case_kinds import CHARTED
 from feasibility.case_robot import RobotPart, read_robot
-from feasibility.case_surface import (
-    CHARTED,
-    SurfacePart,
-    faults_of_building,
-    named_file,
-    read_surface,
-)
+from feasibility.case_surface import SurfacePart, faults_of_building, named_file, read_surface
 from feasibility.case_task import read_search, read_task
 from feasibility.files import FileError, read_regular, shown_path
 from feasibility.search import Search

@@ -82,7 +82,7 @@ def _points(section: Section, key: str) -> Any:
     expected = "rows of points [x, y, z] in metres"
     if section.has("file"):
         if section.has(key):
-            section.fault(key, "contradicts surface.file; give one of the two")
+            section.fault(key, f"contradicts {section.name}.file; give one of the two")
         return None
     expected_here = f'{expected}, or file = "net.json" or "net.csv"'
     if not section.wants(key, expected_here, required=True):
@@ -216,13 +216,16 @@ def read_grid(section: Section) -> tuple[int, int] | None:
     return value[0], value[1]
 
 
-def build_patch(kind: str, values: Mapping[str, Any], pose: Mapping[str, Any]) -> Patch:
+def build_patch(
+    kind: str, values: Mapping[str, Any], pose: Mapping[str, Any], place: str = "surface"
+) -> Patch:
     """Build a patch; a control net is read from its file.
 
     Args:
         kind: one of `PATCHES`.
         values: of the keys of that kind.
         pose: `side`, `position` and `rpy_deg`.
+        place: where in the case, for messages.
 
     Raises:
         BuildError: the values describe no patch; its message speaks of the case's keys.
@@ -241,11 +244,11 @@ def build_patch(kind: str, values: Mapping[str, Any], pose: Mapping[str, Any]) -
     except surfaces.SurfaceError as error:
         message = str(error).removeprefix(f"{kind}: ")
         if file is not None:
-            raise BuildError(Fault("surface.file", of_file(file, message))) from error
+            raise BuildError(Fault(f"{place}.file", of_file(file, message))) from error
         for key, entry in keys.items():
             if entry.argument != key:
                 message = re.sub(rf"\b{entry.argument}\b", key, message)
-        raise BuildError(Fault("surface", message)) from error
+        raise BuildError(Fault(place, message)) from error
     return made
 
 

@@ -7,32 +7,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from feasibility.case_faults import BuildError, Fault, Section, alternatives, close, shown
-from feasibility.case_mesh import MESH_KEYS, build_mesh, cut_mesh, read_count, read_mesh_keys
-from feasibility.case_patches import (
-    DEG,
-    METRES,
-    PATCHES,
-    build_patch,
-    patch_keys,
-    read_grid,
-    read_patch,
-)
+from feasibility.case_faults import BuildError, Fault, Section
+from feasibility.case_kinds import OWN_KEYS, foreign_keys, read_kind
+from feasibility.case_mesh import build_mesh, cut_mesh, read_count, read_mesh_keys
+from feasibility.case_patches import PATCHES, build_patch, read_grid, read_patch
+from feasibility.case_pieces import PiecePart, build_pieces, cut_pieces, read_pieces
 
 if TYPE_CHECKING:
     from surfaces import Cells, Patch, Surface
     from surfaces.mesh import MeshSurface
+    from surfaces.piecewise import Piecewise
 
 Triple = tuple[float, float, float]
 
 ORIGIN: Triple = (0.0, 0.0, 0.0)
-OWN_KEYS: Mapping[str, tuple[str, ...]] = {
-    **{kind: patch_keys(kind) for kind in PATCHES},
-    "mesh": MESH_KEYS,
-}
-LATER_KINDS = ("piecewise",)
-CHARTED = ("sphere", "cylinder", "hyperboloid", "plane")
-"""The kinds that the greedy search knows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +31,8 @@ class SurfacePart:
     values: Mapping[str, Any]
     """The kind's own keys, in the units of the case; arrays as tuples, paths absolute."""
     cells: tuple[int, int] | int | None
-    """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given."""
+    """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given; None
+    for pieces, which have their own."""
     side: Literal["inside", "outside"] = "inside"
     position: Triple = ORIGIN
     rpy_deg: Triple = ORIGIN
@@ -64,7 +53,7 @@ class SurfacePart:
         """The keys of the [surface] table; what is None is not written."""
         return {
             "kind": self.kind,
-            **{key: self.values.get(key) for key in OWN_KEYS[self.kind]},
+            **{key: _written(self.values.get(key)) for key in OWN_KEYS[self.kind]},
             "position": self.position,
             "rpy_deg": self.rpy_deg,
             "side": self.side,
@@ -80,6 +69,8 @@ class SurfacePart:
         pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
         if self.kind == "mesh":
             return build_mesh(self.values, pose)
+        if self.kind == "piecewise":
+            return build_pieces(self.values, pose)
         return build_patch(self.kind, self.values, pose)
 
     def cut(self) -> Cells:
@@ -92,25 +83,27 @@ class SurfacePart:
         if self.kind == "mesh":
             count = cast("int | None", self.cells)
             return cut_mesh(cast("MeshSurface", surface), count, self.values.get("cell_size"))
+        if self.kind == "piecewise":
+            return cut_pieces(cast("Piecewise", surface), self.values)
         return cast("Patch", surface).cells(*cast("tuple[int, int]", self.cells))
 
 
 def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
     """Read the [surface] table; None where it has faults.
 
-    What needs no file is built to try it; files are read by `SurfacePart.build` only.
+    Patches that need no file are built to try them; files are read, and pieces joined, by
+    `SurfacePart.build` only.
     """
     section = Section("surface", table, faults)
     before = len(faults)
-    kind = _kind(section)
+    kind = read_kind(section, OWN_KEYS)
     side = section.choice("side", ("inside", "outside"))
     position = section.numbers("position", 3, "three finite numbers (metres)")
     rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
     if kind is None:  # which other keys belong here is not known
         return None
-    values = read_mesh_keys(section) if kind == "mesh" else read_patch(section, kind)
-    cells = read_count(section) if kind == "mesh" else read_grid(section)
-    section.done(_foreign_keys(kind))
+    values, cells = _values(section, kind)
+    section.done(_hints(kind))
     if len(faults) > before:
         return None
     part = SurfacePart(
@@ -121,7 +114,7 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
         position=cast("tuple[float, float, float]", position or ORIGIN),
         rpy_deg=cast("tuple[float, float, float]", rpy_deg or ORIGIN),
     )
-    if "file" not in values:
+    if kind in PATCHES and "file" not in values:
         faults += faults_of_building(part)
     return part if len(faults) == before else None
 
@@ -146,44 +139,25 @@ def named_file(table: Any) -> SurfacePart | None:
     return read_surface(plain, [])
 
 
-def _kind(section: Section) -> str | None:
-    """The kind, if it is one that can be built."""
-    kinds = tuple(OWN_KEYS)
-    expected = alternatives([f'"{kind}"' for kind in kinds])
-    if not section.wants("kind", expected, required=True):
-        return None
-    kind = section.table["kind"]
-    if kind in LATER_KINDS:
-        section.fault("kind", f"{shown(kind)} is not supported yet; use {expected}")
-        return None
-    if not isinstance(kind, str) or kind not in OWN_KEYS:
-        guess = close(kind, kinds)
-        hint = f"; did you mean {guess}?" if guess else ""
-        section.fault("kind", f"must be {expected}, got {shown(kind)}{hint}")
-        return None
-    return kind
+def _values(section: Section, kind: str) -> tuple[dict[str, Any], tuple[int, int] | int | None]:
+    """What the kind's own keys say, and how many cells there are."""
+    if kind == "mesh":
+        return read_mesh_keys(section), read_count(section)
+    if kind == "piecewise":
+        return read_pieces(section), None
+    return read_patch(section, kind), read_grid(section)
 
 
-def _foreign_keys(kind: str) -> dict[str, str]:
-    """What to say about keys that belong to other kinds of surface."""
-    owners: dict[str, list[str]] = {}
-    for other, keys in OWN_KEYS.items():
-        for key in keys:
-            owners.setdefault(key, []).append(_a(other))
-    hints = {
-        key: f"belongs to {alternatives(names)}, not to {_a(kind)}; leave it out"
-        for key, names in owners.items()
-    }
-    for mine in ("u", "v", "u_deg", "v_deg"):
-        if mine in OWN_KEYS[kind]:
-            letter = mine[0]
-            other = letter if mine.endswith("_deg") else f"{letter}_deg"
-            unit = DEG if mine.endswith("_deg") else METRES
-            unit = "the numbers of the knots" if kind == "bspline" else unit
-            hints[other] = f"is not how {_a(kind)} is written; write {mine} in {unit}"
-    return {key: hint for key, hint in hints.items() if key not in OWN_KEYS[kind]}
+def _hints(kind: str) -> dict[str, str]:
+    """What to say about keys that belong elsewhere."""
+    hints = foreign_keys(kind)
+    if kind == "piecewise":
+        hints["cells"] = "is given for each piece; write cells = [3, 4] in each of surface.pieces"
+    return hints
 
 
-def _a(kind: str) -> str:
-    """The kind with its article."""
-    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+def _written(value: Any) -> Any:
+    """A value as TOML has it."""
+    if isinstance(value, PiecePart):
+        return value.table()
+    return tuple(map(_written, value)) if isinstance(value, tuple) else value

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from feasibility.case import Case
-from feasibility.case_surface import OWN_KEYS
+from feasibility.case_kinds import OWN_KEYS
 from feasibility.result import plain
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 from feasibility.version import version
@@ -217,10 +217,13 @@ def _hints(verdict: Verdict) -> list[str]:
 
 def _narrower(verdict: Verdict) -> str:
     """How a case says that less is to be covered."""
-    own = OWN_KEYS.get(verdict.cells.surface.kind, ())
+    kind = verdict.cells.surface.kind
+    own = OWN_KEYS.get(kind, ())
     ranges = [f"surface.{key}" for key in ("u_deg", "u", "v_deg", "v") if key in own]
     if ranges:
         return f"a narrower {' or '.join(ranges)}"
+    if kind == "piecewise":
+        return "a narrower or smaller choice of surface.pieces"
     return "a part of the mesh (surface.box, cut, facing or faces)"
 
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from feasibility.archive import Archive, ArchiveError, write_archive
 from feasibility.case import Case, CaseError
 from feasibility.case_faults import shown
+from feasibility.case_kinds import CHARTED
 from feasibility.files import FileError
 from feasibility.result_cells import check_cells, places
 from feasibility.result_fields import Fields
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from robots import Robot
 
 FORMAT = "coverable-result"
-FORMAT_VERSION = 2  # 1 had no `places`, and no surfaces from files
+FORMAT_VERSION = 2  # 1 had no `places`, and the kinds `CHARTED` alone
 
 
 class ResultError(ValueError):
@@ -131,7 +132,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         case = _case(fields.table("case"), archive)
         setup = case.build()
         check_robot(setup.robot, fields.table("robot"), archive)
-        if found > 1 or "file" in case.surface.values:
+        if found > 1 or case.surface.kind not in CHARTED:
             check_cells(setup.cells, case.surface.label, archive)
         verdict = _verdict(fields, archive, setup.robot, setup.cells)
     except CaseError as error:

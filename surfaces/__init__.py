@@ -7,6 +7,7 @@ from surfaces.mesh import MeshSurface, mesh
 from surfaces.net_file import read_net
 from surfaces.parametric import cylinder, hyperboloid, plane, sphere
 from surfaces.patch import Patch
+from surfaces.piecewise import Piecewise, piecewise
 from surfaces.revolution import revolution
 from surfaces.spline import bspline
 from surfaces.surface import Surface, SurfaceError
@@ -16,6 +17,7 @@ __all__ = [
     "Cells",
     "MeshSurface",
     "Patch",
+    "Piecewise",
     "Surface",
     "SurfaceError",
     "bspline",
@@ -24,6 +26,7 @@ __all__ = [
     "ellipsoid",
     "hyperboloid",
     "mesh",
+    "piecewise",
     "plane",
     "read_net",
     "revolution",

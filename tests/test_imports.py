@@ -18,8 +18,9 @@ PACKAGES = ("robots", "surfaces", "feasibility")
 WORDS = "search target_courses task verdict version"
 SEARCHES = ""
 ASKING = "checking"
-STORED = """archive case case_edits case_faults case_mesh case_patches case_robot case_surface
-    case_task files result result_cells result_fields result_graph result_robot toml_text"""
+STORED = """archive case case_edits case_faults case_kinds case_mesh case_patches case_pieces
+    case_robot case_surface case_task files result result_cells result_fields result_graph
+    result_robot toml_text"""
 EDGE = """cell_shapes cli commands console listing meshcat_server meshes motion page plots report
     robot_visuals scene threejs viewer"""
 LAYERS = tuple(names.split() for names in (WORDS, SEARCHES, ASKING, STORED, EDGE))

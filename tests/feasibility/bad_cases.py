@@ -103,6 +103,13 @@ points = [[[0, 0, 0], [0, 1, 0], [0, 2, 0]], [[1, 0, 0.2], [1, 1, 0], [1, 2, 0]]
 degree = [2, 2]
 cells = [3, 4]
 """,
+    "piecewise": """
+kind = "piecewise"
+pieces = [
+  { kind = "plane", u = [0, 1], v = [0, 1], cells = [2, 3] },
+  { kind = "plane", u = [0, 1], v = [0, 1], position = [1, 0, 0], cells = [2, 3] },
+]
+""",
     "mesh": """
 kind = "mesh"
 file = "part.stl"
@@ -258,7 +265,6 @@ BAD_CASES = {
     "cells without end": changed(
         "[9, 10]", f"[0, 0x{'F' * 9000}]", "surface.cells", "coarser grid"
     ),
-    "piecewise": changed('"sphere"', '"piecewise"', "surface.kind", "is not supported yet"),
     # other kinds of surface
     "slope missing": wrong("cone", "slope = -0.5\n", "", "slope", "is missing", "metres of radius"),
     "slope beyond reason": wrong("cone", "-0.5", "1e7", "slope", "1e+06", "got 10000000.0"),
@@ -318,6 +324,76 @@ BAD_CASES = {
     ),
     "net is a device": Bad(
         surface('kind = "bspline"\nfile = "/dev/zero"\ncells = [3, 4]'), "surface.file", (".csv",)
+    ),
+    # pieces
+    "no pieces": Bad(surface('kind = "piecewise"'), "surface.pieces", ("is missing", "a patch")),
+    "pieces are a table": Bad(
+        surface('kind = "piecewise"\npieces = { a = 1 }'),
+        "surface.pieces",
+        ("1 to 200 tables [[surface.pieces]]",),
+    ),
+    "pieces without end": Bad(
+        surface(f'kind = "piecewise"\npieces = [{"{}, " * 300}]'), "surface.pieces", ("to 200",)
+    ),
+    "piece is a number": Bad(
+        surface('kind = "piecewise"\npieces = [3]'), "surface.pieces[0]", ("must be a table",)
+    ),
+    "piece of no kind": Bad(
+        surface('kind = "piecewise"\npieces = [{ cells = [1, 1] }]'),
+        "surface.pieces[0].kind",
+        ("is missing",),
+    ),
+    "piece is a mesh": Bad(
+        surface('kind = "piecewise"\npieces = [{ kind = "mesh" }]'),
+        "surface.pieces[0].kind",
+        ('"bspline", got',),
+    ),
+    "piece with a side": wrong(
+        "piecewise",
+        "position = [1, 0, 0]",
+        'side = "inside"',
+        "pieces[1].side",
+        "is that of the whole",
+    ),
+    "piece without cells": wrong(
+        "piecewise", "[1, 0, 0], cells = [2, 3]", "[1, 0, 0]", "pieces[1].cells", "is missing"
+    ),
+    "piece with a radius": wrong(
+        "piecewise", "position = [1, 0, 0]", "radius = 1", "pieces[1].radius", "not to a plane"
+    ),
+    "piece of a missing net": Bad(
+        surface(
+            'kind = "piecewise"\npieces = [{ kind = "bspline", file = "n.json", cells = [1, 1] }]'
+        ),
+        "surface.pieces[0].file",
+        ("n.json: cannot be read",),
+    ),
+    "piece beyond the pole": Bad(
+        surface(
+            'kind = "piecewise"\npieces = [{ kind = "sphere", radius = 1, u_deg = [0, 181], '
+            "v_deg = [0, 9], cells = [1, 1] }]"
+        ),
+        "surface.pieces[0]",
+        ("u_deg must lie in",),
+    ),
+    "cells of the whole": more("piecewise", "cells = [2, 3]", "cells", "in each of surface.pieces"),
+    "gap": more("piecewise", "gap = 0", "gap", "> 0"),
+    "gap too wide": more("piecewise", "gap = 0.5", "", "gap must be at most a fiftieth"),
+    "pieces of a sphere": added("surface", "pieces = []", "surface.pieces", "a piecewise surface"),
+    "too many cells in all": wrong(
+        "piecewise",
+        "[1, 0, 0], cells = [2, 3]",
+        "[1, 0, 0], cells = [1000, 1000]",
+        "pieces",
+        "coarser grids",
+    ),
+    "three pieces at one seam": wrong(
+        "piecewise",
+        "position = [1, 0, 0], cells = [2, 3] },",
+        'position = [1, 0, 0], cells = [2, 3] },\n  { kind = "plane", u = [0, 1], v = [0, 1], '
+        "position = [1, 0, 0], rpy_deg = [0, 45, 0], cells = [2, 3] },",
+        "",
+        "share one seam",
     ),
     # meshes
     "mesh without a file": wrong("mesh", 'file = "part.stl"\n', "", "file", "is missing", "STL"),

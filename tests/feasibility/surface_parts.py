@@ -7,11 +7,12 @@ import os
 from hypothesis import strategies as st
 
 from feasibility.case_mesh import MESH_KEYS
+from feasibility.case_pieces import PiecePart
 from feasibility.case_surface import SurfacePart
 
 lengths = st.floats(0.01, 100)
 triples = st.tuples(*[st.floats(-1e6, 1e6)] * 3)
-grids = st.tuples(st.integers(0, 999), st.integers(0, 999))
+grids = st.tuples(st.integers(0, 500), st.integers(0, 500))
 paths = st.text("abc/é ._-", min_size=1, max_size=9).map(lambda name: os.path.abspath(f"x{name}"))
 PROFILES = (
     ((0.2, 0.0), (0.3, 0.2), (0.1, 0.5)),
@@ -106,15 +107,33 @@ def meshes(draw):
 
 
 @st.composite
+def pieces(draw):
+    """The values of a piecewise surface; whether its pieces touch is not looked at in reading."""
+    found = []
+    for _ in range(draw(st.integers(1, 3))):
+        kind = draw(st.sampled_from(list(PATCHES)))
+        found.append(
+            PiecePart(kind, draw(values_of(kind)), draw(grids), draw(triples), draw(triples))
+        )
+    return {"pieces": tuple(found), **({"gap": draw(lengths)} if draw(st.booleans()) else {})}
+
+
+def values_of(kind):
+    """The own keys of a kind of patch."""
+    keys = PATCHES[kind]
+    return st.fixed_dictionaries(keys) if isinstance(keys, dict) else keys
+
+
+@st.composite
 def surfaces(draw):
     """A valid part of any kind."""
-    kind = draw(st.sampled_from([*PATCHES, "mesh"]))
+    kind = draw(st.sampled_from([*PATCHES, "piecewise", "mesh"]))
     if kind == "mesh":
         values, cells = draw(meshes())
+    elif kind == "piecewise":
+        values, cells = draw(pieces()), None
     else:
-        keys = PATCHES[kind]
-        values = draw(st.fixed_dictionaries(keys) if isinstance(keys, dict) else keys)
-        cells = draw(grids)
+        values, cells = draw(values_of(kind)), draw(grids)
     return SurfacePart(
         kind,
         values,

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from surface_parts import pairs, surfaces, triples
 
 from feasibility.case import Case, CaseError, builtin_cases, load_case
+from feasibility.case_kinds import CHARTED
 from feasibility.case_patches import MOST_CELLS
 from feasibility.case_robot import RobotPart
-from feasibility.case_surface import CHARTED, SurfacePart
+from feasibility.case_surface import SurfacePart
 from feasibility.search import Search
 from feasibility.task import Task
 
