@@ -18,12 +18,14 @@ PACKAGES = ("robots", "surfaces", "feasibility")
 WORDS = "search target_courses task verdict version"
 SEARCHES = ""
 ASKING = "checking"
+USING = "explain"
 STORED = """archive case case_edits case_faults case_kinds case_mesh case_patches case_pieces
     case_robot case_surface case_task files result result_cells result_fields result_graph
-    result_robot toml_text"""
-EDGE = """cell_shapes cli commands console listing meshcat_server meshes motion page plots report
-    robot_visuals scene threejs viewer"""
-LAYERS = tuple(names.split() for names in (WORDS, SEARCHES, ASKING, STORED, EDGE))
+    result_robot toml_text trajectory_files"""
+EDGE = """asking cell_shapes cli cli_jobs commands console division_report explain_report job_commands
+    job_view listing meshcat_server meshes motion page path_report plots report robot_visuals scene
+    threejs viewer"""
+LAYERS = tuple(names.split() for names in (WORDS, SEARCHES, ASKING, USING, STORED, EDGE))
 
 HEAVY = {"matplotlib", "meshcat", "rich", "trimesh", "yourdfpy"}
 
