@@ -1,0 +1,228 @@
+"""What a study keeps of one verdict: plain numbers and words, worked out where the task runs."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.case import Case
+from feasibility.case_robot import RobotPart
+from feasibility.toml_text import toml_document
+
+if TYPE_CHECKING:
+    from feasibility.verdict import Verdict
+    from robots import Robot
+
+EXAMINED = 6  # missed cells of one verdict whose causes are looked for; the others take the nearest
+ROBOTS_KEPT = 32  # arms that one worker keeps
+
+Tables = dict[str, Any]
+Outcome = dict[str, Any]
+
+
+def evaluate(tables: Tables) -> Outcome:
+    """Decide one case.
+
+    The outcome depends on the tables alone, as long as the search has no time limit.
+
+    Args:
+        tables: a case, as `Case.to_tables` gives it.
+
+    Returns:
+        See `outcome_of`.
+
+    Raises:
+        CaseError: the case cannot be used.
+    """
+    from feasibility.checking import check
+
+    case = Case.from_toml(toml_document(tables))
+    verdict = check(arm_of(case), case.surface.cut(), case.task, case.search)
+    return outcome_of(verdict)
+
+
+def arm_of(case: Case) -> Robot:
+    """The arm of a case, loaded once."""
+    robots = _Kept(toml_document({"robot": case.robot.table()}), case.robot)
+    return _load(robots)
+
+
+class _Kept:
+    """An arm's table as text, by which it is told from others, and how to load it."""
+
+    def __init__(self, text: str, part: RobotPart) -> None:
+        self.text, self.part = text, part
+
+    def __hash__(self) -> int:
+        return hash(self.text)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Kept) and self.text == other.text
+
+
+@lru_cache(maxsize=ROBOTS_KEPT)
+def _load(kept: _Kept) -> Robot:
+    """Load an arm."""
+    return kept.part.build()
+
+
+def outcome_of(verdict: Verdict) -> Outcome:
+    """A verdict as JSON values; no timing, so that the same case always has the same outcome.
+
+    Returns:
+        verdict, evidence, message: as in `Verdict`; method, seed.
+        cells, covered, share: how many, how many the best motion covers, and the share of the area
+            (0..1) that it covers.
+        edges, pairs: neighbouring cells that a motion joins, and all of them.
+        causes: missed cells by cause, the most frequent first; `examined` says how many of them
+            were looked at, the others counting as the nearest of these.
+        components: the sets of cells that single motions cover, none within another, the best
+            first, as hexadecimal bits (see `cells_of`).
+        margins: what the covering motion leaves (see `margins_of`), None unless feasible.
+        certificate: what the replay measured, None unless feasible.
+        fk: evaluations of the arm.
+    """
+    areas = np.asarray(verdict.cells.areas)
+    whole = float(areas.sum())
+    causes, examined = _causes(verdict)
+    return {
+        "verdict": str(verdict.answer),
+        "evidence": str(verdict.evidence),
+        "message": verdict.message,
+        "method": verdict.method,
+        "seed": int(verdict.seed),
+        "cells": len(verdict.cells),
+        "covered": verdict.n_covered,
+        "share": float(areas[verdict.covered].sum()) / whole if whole > 0.0 else 1.0,
+        "edges": int(verdict.n_edges),
+        "pairs": len(verdict.cells.pairs),
+        "causes": causes,
+        "examined": examined,
+        "components": [bits_of(cells) for cells in _largest(verdict)],
+        "margins": margins_of(verdict),
+        "certificate": _certificate(verdict),
+        "fk": int(verdict.statistics.get("fk", 0)),
+    }
+
+
+def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
+    """What the covering motion keeps from every bound; None where no motion is certified.
+
+    Returns:
+        limit_deg, limit_m: least distance of a turning (a sliding) joint from its limits, None
+            where no such joint has one.
+        cone_deg: by how much the tool axis stays inside the cone.
+        reach_m: by how much the furthest target is nearer than the arm's reach; None without one.
+    """
+    certificate, robot, task = verdict.certificate, verdict.robot, verdict.task
+    if certificate is None or not verdict.feasible or len(verdict.cells) == 0:
+        return None
+    turning = sliding = math.inf
+    if verdict.witness is not None:
+        q = verdict.witness.q
+        least = np.minimum(q - robot.lower, robot.upper - q).min(axis=0, initial=np.inf)
+        turning = math.degrees(float(least[~robot.prismatic].min(initial=np.inf)))
+        sliding = float(least[robot.prismatic].min(initial=np.inf))
+    points = task.targets(verdict.cells).points
+    first = robot.model.jointPlacements[1].translation
+    away = float(np.linalg.norm(points - first, axis=1).max())
+    return {
+        "limit_deg": finite(turning),
+        "limit_m": finite(sliding),
+        "cone_deg": task.cone_deg - math.degrees(float(certificate.max_angle)),
+        "reach_m": finite(robot.reach - away),
+    }
+
+
+def finite(value: float) -> float | None:
+    """JSON has neither inf nor NaN."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _certificate(verdict: Verdict) -> dict[str, Any] | None:
+    """What the replay measured."""
+    certificate = verdict.certificate
+    if certificate is None:
+        return None
+    return {
+        "waypoints": int(certificate.waypoints),
+        "max_position_error_m": finite(certificate.max_position_error),
+        "max_angle_deg": finite(math.degrees(certificate.max_angle)),
+    }
+
+
+def _largest(verdict: Verdict) -> list[NDArray[np.bool_]]:
+    """Components (N,) that lie in no other one, in their order."""
+    kept: list[NDArray[np.bool_]] = []
+    for cells in sorted(verdict.components, key=len, reverse=True):
+        cover = np.zeros(len(verdict.cells), dtype=bool)
+        cover[cells] = True
+        if len(cells) and not any((cover <= other).all() for other in kept):
+            kept.append(cover)
+    return kept
+
+
+def bits_of(cover: NDArray[np.bool_]) -> str:
+    """Cells (N,) as hexadecimal bits, the first cell first.
+
+    Example:
+        >>> bits_of(np.array([True, False, False, True, True]))
+        '98'
+    """
+    return np.packbits(cover).tobytes().hex()
+
+
+def cells_of(bits: str, n: int) -> NDArray[np.bool_]:
+    """(n,) the cells that `bits_of` wrote.
+
+    Example:
+        >>> cells_of("98", 5).tolist()
+        [True, False, False, True, True]
+
+    Raises:
+        ValueError: they are no bits of n cells.
+    """
+    data = np.frombuffer(bytes.fromhex(bits), dtype=np.uint8)
+    if len(data) != (n + 7) // 8:
+        raise ValueError(f"{len(data)} bytes do not hold the bits of {n} cells")
+    return np.unpackbits(data, count=n).astype(bool)
+
+
+def _causes(verdict: Verdict) -> tuple[dict[str, int], int]:
+    """How many cells are missed for each cause, and how many were examined for it."""
+    missed = np.flatnonzero(~verdict.covered)
+    if len(missed) == 0:
+        return {}, 0
+    if verdict.method == "greedy":
+        kinds = [str(cause.kind) for cause in verdict.causes]
+        return _counted(kinds), len(kinds)
+    from feasibility.causes import diagnose
+    from feasibility.complete import Explorer, problem_of
+    from feasibility.verdict import CauseKind
+
+    reached = np.zeros(len(verdict.cells), dtype=bool)
+    for cells in verdict.components:
+        reached[cells] = True
+    kinds = [str(CauseKind.DISCONNECTED)] * int(reached[missed].sum())
+    lost = missed[~reached[missed]]
+    if len(lost) == 0:
+        return _counted(kinds), 0
+    # A fresh explorer: what is asked of it are Newton's method and random starts alone.
+    problem = problem_of(verdict.robot, verdict.cells, verdict.task)
+    explorer = Explorer(verdict.robot, verdict.cells, problem, verdict.seed)
+    few = np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(int))
+    examined = [diagnose(explorer, int(cell)) for cell in lost[few]]
+    centres = verdict.cells.centres
+    away = np.linalg.norm(centres[lost][:, None] - centres[lost[few]][None], axis=2)  # (L, E)
+    kinds += [str(examined[int(k)].kind) for k in away.argmin(axis=1)]
+    return _counted(kinds), len(examined)
+
+
+def _counted(kinds: list[str]) -> dict[str, int]:
+    """Causes with their number of cells, the most frequent first."""
+    return dict(sorted(Counter(kinds).items(), key=lambda entry: (-entry[1], entry[0])))
