@@ -136,14 +136,9 @@ def explain(
     for threshold in _thresholds(prober, verdict, q, motions, asked):
         done.append(threshold)  # one by one: `tick` counts them
     _refine(prober, verdict, motions, done)
-    return Explanation(
-        verdict=verdict,
-        thresholds=tuple(done),
-        left_out=tuple(quantity.name for quantity in asked[len(done) :]),
-        dropped=dropped,
-        evaluations=prober.spent,
-        seconds=time.monotonic() - began,
-    )
+    left_out = tuple(quantity.name for quantity in asked[len(done) :])
+    seconds = time.monotonic() - began
+    return Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds)
 
 
 def cost_of(verdict: Verdict) -> int:
