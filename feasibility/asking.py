@@ -53,13 +53,15 @@ def asked(
     with interruptible() as settle:
         from feasibility.case import load_case
         from feasibility.case_faults import CaseError, Fault
+        from feasibility.warmup import compiling_notice
 
         case = load_case(args.case, args.settings)
         if check_first is not None:
             check_first()
         if only_complete and case.search.method != "complete":
             raise CaseError(case.name, [Fault("search.method", only_complete)])
-        setup = case.build()
+        with compiling_notice():  # cutting a mesh has kernels of its own
+            setup = case.build()
         for note in setup.robot.notes:
             tell(f"note: {setup.robot.name}: {note}")
         for note in setup.cells.notes:
