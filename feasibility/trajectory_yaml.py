@@ -27,7 +27,10 @@ _POINT = re.compile(
 def as_yaml(trajectory: Trajectory) -> str:
     """The fields of a `trajectory_msgs/JointTrajectory`; times are rounded to nanoseconds."""
     lines = ["# trajectory_msgs/JointTrajectory, in radians, metres and seconds"]
-    lines += [f"joint_names: {json.dumps(list(trajectory.joint_names))}", "points:"]
+    lines += [
+        f"joint_names: {json.dumps(list(trajectory.joint_names), ensure_ascii=False)}",
+        "points:",
+    ]
     for k, cell in enumerate(trajectory.cell.tolist()):
         nanoseconds = round(float(trajectory.time[k]) * 1e9)
         seconds, rest = divmod(nanoseconds, 10**9)
