@@ -16,12 +16,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from PIL import Image
 
 from feasibility import Task, check
 from feasibility.viewer import View, view
 from robots import load_robot
-from surfaces import sphere
+from surfaces import bspline, mesh, sphere
 
 HERE = Path(__file__).parent
 SIZE = (900, 650)  # [pixel]
@@ -40,7 +41,20 @@ def paper_4a() -> View:
     return view(verdict, "paper/4a", play=False, at=0.62)
 
 
-PICTURES: dict[str, Callable[[], View]] = {"paper-4a": paper_4a}
+def mesh_hood() -> View:
+    """A UR5 over a sheet like the hood of a car, which comes as triangles."""
+    x, y = np.meshgrid(np.linspace(-0.3, 0.3, 5), np.linspace(-0.35, 0.35, 6), indexing="ij")
+    crown = 0.12 * (1 - (x / 0.4) ** 2) * (1 - 0.6 * (y / 0.45) ** 2)
+    bulge = 0.04 * np.exp(-((y / 0.12) ** 2))
+    sheet = bspline(np.stack([x, y, crown + bulge], axis=-1))
+    drawn = sheet.cells(40, 48).triangles(np.arange(40 * 48), samples=1)
+    upward = drawn.faces[:, ::-1]
+    part = mesh(trimesh.Trimesh(drawn.vertices, upward), position=(0.5, 0, 0))
+    verdict = check(load_robot("ur5"), part.cells(count=120), Task(standoff=0.02, cone_deg=20))
+    return view(verdict, "hood of a car, a mesh", play=False, at=0.6)
+
+
+PICTURES: dict[str, Callable[[], View]] = {"paper-4a": paper_4a, "mesh-hood": mesh_hood}
 
 
 def photograph(page: Path, picture: Path) -> None:

@@ -17,7 +17,8 @@ def patch(cells: Cells, which: NDArray[np.int64], inset: float = 0.0) -> Triangl
     """Triangles that fill some cells, as fine as their number allows; see `Cells.triangles`."""
     if isinstance(cells, MeshCells):
         return skin_of(cells).fill(which, cells.centres, inset)
-    pieces = int(np.clip(np.ceil(64 / max(*cells.shape, 1)), 2, 32))  # a cell's side, cut up
+    along = max(*cells.shape, 1) if len(cells.shape) > 1 else np.sqrt(len(cells))
+    pieces = int(np.clip(np.ceil(64 / along), 2, 32))  # a cell's side, cut up
     return cells.triangles(which, 1 if len(cells) > FULL_DETAIL else pieces, inset)
 
 

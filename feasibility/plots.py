@@ -183,7 +183,7 @@ def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
     flat = verdict.cells.unrolled()
     if flat.outlines:
         corners = np.concatenate(flat.outlines)
-        if len(verdict.cells.shape) == 1:
+        if len(verdict.cells.shape) == 1 and all("(m)" in label for label in flat.labels):
             axes.set_aspect("equal")
             width, height = np.ptp(corners, axis=0)
             figure.set_figheight(float(np.clip(5.6 * height / width + 1.3, 2.8, 7.0)))
