@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.checks import Checks, _number
+from surfaces.checks import Checks
 from surfaces.patch import Patch
 from surfaces.piece_feet import PieceFeet, nearest_places
+from surfaces.piece_overlaps import on_each_other
 from surfaces.seams import Seam, sides_of, survey
 from surfaces.surface import Foot, Side, Surface, SurfaceError, points_of
 
@@ -27,6 +28,7 @@ Ints = NDArray[np.int64]
 _ORIGIN = (0.0, 0.0, 0.0)
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
 SHARE = 1e-3  # [1], and the same as a share of the shortest border
+WIDEST = 0.02  # [1], what may be asked for, as a share of the shortest border
 CREASE = math.radians(2.0)  # seams that bend by more are told of
 MOST_PIECES = 200
 
@@ -191,8 +193,8 @@ def piecewise(
 
     Borders are found by geometry: wherever two of different pieces run along each other, on their
     whole length or a part of it. The first piece of each joined group says where outward is; others
-    are turned over where they say otherwise, and `notes` tells which. That pieces do not cut
-    through each other is not checked.
+    are turned over where they say otherwise, and `notes` tells which. Pieces that lie on each other
+    are refused; that they do not cut through each other is not checked.
 
     Args:
         pieces: patches of any kinds, placed in the frame of the whole. Their own `side` says
@@ -204,8 +206,9 @@ def piecewise(
             thousandth of the shortest border.
 
     Raises:
-        SurfaceError: one or more of the arguments are wrong, all are named; or three pieces share
-            one seam; or no choice of outward sides is consistent, as on a Moebius strip.
+        SurfaceError: one or more of the arguments are wrong, all are named; or pieces lie on each
+            other, or three share one seam; or no choice of outward sides is consistent, as on a
+            Moebius strip.
 
     Example:
         >>> from surfaces import sphere
@@ -216,10 +219,16 @@ def piecewise(
     """
     check = Checks("piecewise")
     patches = _patches(pieces, check.faults)
-    width = _gap(gap, patches, check.faults)
+    width = _gap(gap, patches, check)
     chosen, place = check.side(side), check.vector("position", position, "metres")
     rotation = check.rotation("rpy_deg", rpy_deg)
     check.done()
+    sheets = on_each_other(patches, width)
+    if sheets:
+        raise SurfaceError(
+            f"piecewise: pieces[{sheets[0]}] and pieces[{sheets[1]}] lie on each other, at least "
+            "in part; leave one of them out, or cut it back to the seam"
+        )
     found = survey(patches, width)
     if found.crowded:
         names = ", ".join(f"pieces[{k}]" for k in found.crowded)
@@ -247,19 +256,16 @@ def _patches(pieces: Any, faults: list[str]) -> tuple[Patch, ...]:
     return () if wrong else tuple(pieces)
 
 
-def _gap(gap: Any, patches: tuple[Patch, ...], faults: list[str]) -> float:
+def _gap(gap: Any, patches: tuple[Patch, ...], check: Checks) -> float:
     """m, how far apart borders of a seam may be."""
     shortest = min((side.length for side in sides_of(patches, 1e-7)), default=math.inf)
     if gap is None:
         return min(GAP, SHARE * shortest)
-    width = _number(gap)
-    if not (math.isfinite(width) and width > 0.0):
-        faults.append(f"gap must be a finite number > 0 (metres), got {gap!r}")
-        return GAP
-    if width > 0.02 * shortest:
-        faults.append(
-            f"gap must be at most a fiftieth of the shortest border, {0.02 * shortest:.3g} m, got "
-            f"{gap!r}"
+    width = check.positive("gap", gap)
+    if patches and width > WIDEST * shortest:
+        check.faults.append(
+            f"gap must be at most a fiftieth of the shortest border, {WIDEST * shortest:.3g} m, "
+            f"got {gap!r}"
         )
     return width
 

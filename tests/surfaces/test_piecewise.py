@@ -274,6 +274,20 @@ def test_three_pieces_on_one_seam_are_refused():
         corner(40.0, 90.0)
 
 
+@pytest.mark.parametrize("name", WHOLE, ids=str)
+def test_pieces_on_each_other_are_refused(name):
+    """The same patch twice, and pieces beside the whole."""
+    whole, pieces, _ = WHOLE[name]
+    for some in ([whole, whole], [*pieces, pieces[0]], [pieces[1], whole]):
+        with pytest.raises(SurfaceError, match="lie on each other"):
+            piecewise(some)
+
+
+def test_pieces_that_overlap_by_a_tenth_are_refused():
+    with pytest.raises(SurfaceError, match=r"pieces\[1\] and pieces\[2\] lie on each other"):
+        piecewise([plane((0, 1), (0, 1)), plane((1, 2), (0, 1)), plane((1.9, 3), (0, 1))])
+
+
 def test_a_full_turn_stacked_on_a_full_turn():
     """Closed borders that begin at different angles."""
     surface = piecewise(
