@@ -8,17 +8,21 @@ import numpy as np
 import pytest
 import surface_parts
 from bad_cases import GOOD, SURFACES, surface, write
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from small_cases import small_case, small_verdict
 from surface_files import MESH, NET, POINTS, cube, mesh_case, net_case, sheet, write_stl
 
 import surfaces
 from feasibility import check
 from feasibility.case import Case, CaseError, load_case
+from feasibility.case_edits import as_read
 from feasibility.case_faults import BuildError, Fault
 from feasibility.case_kinds import CHARTED, OWN_KEYS
 from feasibility.case_mesh import MOST_MESH_CELLS
 from feasibility.case_patches import PATCHES, STEEPEST
 from feasibility.case_pieces import MOST_PIECES
+from feasibility.case_surface import read_surface
 from feasibility.result import ResultError, load_result, save_result
 from surfaces import bspline, cone, ellipsoid, mesh, piecewise, plane, revolution, torus
 from surfaces.mesh_file import read_mesh
@@ -334,6 +338,56 @@ def test_a_search_that_does_not_know_the_surface(tmp_path):
             load_case(write(tmp_path, text), ["search.method=greedy"])
         assert "search.method" in [fault.key for fault in caught.value.faults]
     assert Case.from_toml(GOOD, overrides=["search.method=greedy"]).search.method == "greedy"
+
+
+scalars = (
+    st.integers(-(2**70), 2**70)
+    | st.floats()
+    | st.booleans()
+    | st.sampled_from(["inside", "outside", "part.stl", "/dev/null", "", "\0", "\ud800", *OWN_KEYS])
+)
+junk = st.recursive(
+    scalars,
+    lambda inner: (
+        st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner, max_size=3)
+    ),
+    max_leaves=12,
+)
+ALL_KEYS = sorted(
+    {key for keys in OWN_KEYS.values() for key in keys} | {"cells", "side", "nonsense"}
+)
+
+
+@st.composite
+def spoiled(draw):
+    """A valid [surface] table with some keys replaced, added or removed."""
+    table = {
+        key: as_read(value)
+        for key, value in draw(surface_parts.surfaces()).table().items()
+        if value is not None
+    }
+    for key in draw(st.lists(st.sampled_from([*ALL_KEYS, *table]), min_size=1, max_size=3)):
+        if draw(st.booleans()):
+            table[key] = draw(junk)
+        else:
+            table.pop(key, None)
+    if "pieces" in table and isinstance(table["pieces"], list) and draw(st.booleans()):
+        table["pieces"] = [*table["pieces"], draw(junk)]
+    return table
+
+
+@given(spoiled())
+@settings(max_examples=400, deadline=None)
+def test_whatever_a_table_holds_it_is_read_or_refused_with_places(table):
+    faults = []
+    part = read_surface(table, faults)
+    assert (part is None) == bool(faults)
+    assert all(fault.key.split(".")[0] == "surface" for fault in faults)
+    assert all(fault.message and fault.message.isprintable() for fault in faults)
+    if part is not None:  # then it is written and read as itself
+        again = {key: as_read(v) for key, v in part.table().items() if v is not None}
+        assert read_surface(again, faults) == part
+        assert faults == []
 
 
 # results
