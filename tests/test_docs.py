@@ -86,7 +86,8 @@ def test_exhausted_means_what_the_readme_says() -> None:
 
 def table_of_cases() -> dict[str, dict[str, str]]:
     """The README's table of the twelve cases, by case and by column."""
-    rows = re.findall(r"^\| (.*) \|$", README[README.index("## The paper's twelve") :], re.M)
+    section = README[README.index("## The paper's twelve") :].split("\n## ")[0]
+    rows = re.findall(r"^\| (.*) \|$", section, re.M)
     head, *body = [row.split(" | ") for row in rows]
     return {row[0]: dict(zip(head, row, strict=True)) for row in body}
 
