@@ -15,6 +15,7 @@ from surfaces.checks import Checks
 from surfaces.patch import Patch
 from surfaces.piece_feet import PieceFeet, nearest_places
 from surfaces.piece_overlaps import on_each_other
+from surfaces.piece_sides import groups_of, turned_pieces
 from surfaces.seams import Seam, sides_of, survey
 from surfaces.surface import Foot, Side, Surface, SurfaceError, points_of
 
@@ -79,7 +80,7 @@ class Piecewise(Surface):
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """The pieces that hang together, each group in order."""
-        return _groups(len(self.pieces), self.seams)
+        return groups_of(len(self.pieces), self.seams)
 
     @cached_property
     def placed(self) -> tuple[Patch, ...]:
@@ -237,7 +238,13 @@ def piecewise(
             "one of them out"
         )
     return Piecewise(
-        rotation, place, chosen, patches, _turned(len(patches), found.seams), width, found.seams
+        rotation,
+        place,
+        chosen,
+        patches,
+        turned_pieces(len(patches), found.seams),
+        width,
+        found.seams,
     )
 
 
@@ -277,43 +284,3 @@ def _own(cells: Cells) -> PieceCells:
     if not isinstance(cells, PieceCells):
         raise TypeError("the cells are not of a piecewise surface")
     return cells
-
-
-def _groups(count: int, seams: Sequence[Seam]) -> tuple[tuple[int, ...], ...]:
-    """Which of `count` pieces hang together."""
-    group = list(range(count))
-    for seam in seams:
-        a, b = (group[k] for k in seam.pieces)
-        group = [min(a, b) if g in (a, b) else g for g in group]
-    return tuple(tuple(k for k in range(count) if group[k] == g) for g in sorted(set(group)))
-
-
-def _turned(count: int, seams: Sequence[Seam]) -> tuple[bool, ...]:
-    """Which pieces to turn over, so that all agree with the first of their group.
-
-    Raises:
-        SurfaceError: there is no such choice.
-    """
-    turned: dict[int, bool] = {}
-    for first in range(count):
-        if first in turned:
-            continue
-        turned[first] = False
-        waiting = [first]
-        while waiting:
-            k = waiting.pop()
-            for seam in seams:
-                if k not in seam.pieces:
-                    continue
-                other = seam.pieces[1] if seam.pieces[0] == k else seam.pieces[0]
-                wanted = turned[k] if seam.agree else not turned[k]
-                if other not in turned:
-                    turned[other] = wanted
-                    waiting.append(other)
-                elif turned[other] != wanted:
-                    raise SurfaceError(
-                        f"piecewise: pieces[{min(k, other)}] and pieces[{max(k, other)}] cannot be "
-                        "joined: going around the pieces, outward becomes inward, as on a Moebius "
-                        "strip; leave one piece out, or cut the strip open"
-                    )
-    return tuple(turned[k] for k in range(count))

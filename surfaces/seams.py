@@ -74,8 +74,12 @@ class Side:
         """m."""
         return float(np.linalg.norm(np.diff(self.vertices, axis=0), axis=1).sum())
 
-    def nearest(self, points: Array) -> tuple[Array, Array]:
-        """s (k,) of the places nearest to points (k, 3) m, and the distances (k,) m."""
+    def touching(self, points: Array, gap: float) -> tuple[Ints, Array]:
+        """Which of points (k, 3) m lie within `gap` (m) of the side, and s of their places."""
+        some = np.flatnonzero(self._to_chords(points) <= gap + self._sag)
+        if len(some) == 0:
+            return some, np.empty(0)
+        points = points[some]
         away = np.linalg.norm(points[:, None] - self.vertices, axis=2)
         s = np.argmin(away, axis=1) / (VERTICES - 1.0)
         for _ in range(REFINEMENTS):
@@ -85,7 +89,22 @@ class Side:
             step = ((points - self.point(s)) * slope).sum(axis=1) / square
             s = s + np.clip(step, -1.0 / VERTICES, 1.0 / VERTICES)
             s = np.mod(s, 1.0) if self.closed else np.clip(s, 0.0, 1.0)
-        return s, np.linalg.norm(points - self.point(s), axis=1)
+        near = np.linalg.norm(points - self.point(s), axis=1) <= gap
+        return some[near], s[near]
+
+    @cached_property
+    def _sag(self) -> float:
+        """m, how far the side may be from the chords between its vertices, at most."""
+        # An arc of length h and curvature k sags by h^2 k / 8, and h^2 k is a second difference.
+        return 0.5 * float(np.linalg.norm(np.diff(self.vertices, n=2, axis=0), axis=1).max())
+
+    def _to_chords(self, points: Array) -> Array:
+        """(k,) m, distances from the chords between vertices."""
+        start, chord = self.vertices[:-1], np.diff(self.vertices, axis=0)
+        square = np.maximum((chord**2).sum(axis=1), 1e-300)
+        away = points[:, None] - start  # (k, VERTICES - 1, 3)
+        share = np.clip((away * chord).sum(axis=2) / square, 0.0, 1.0)
+        return np.asarray(np.linalg.norm(away - share[..., None] * chord, axis=2).min(axis=1))
 
 
 class Contact(NamedTuple):
@@ -137,14 +156,13 @@ def contacts(sides: Sequence[Side], marks: Sequence[Array], gap: float) -> Itera
     pieces = np.array([side.piece for side in sides])
     for a, (side, s) in enumerate(zip(sides, marks, strict=True)):
         points = side.point(s)
-        # Between its vertices a side may leave their box, by less than a few steps.
-        margin = (gap + 4.0 / VERTICES * (lengths + lengths[a]))[:, None]
+        # Between its vertices a side may leave their box, by less than a step.
+        margin = (gap + (lengths + lengths[a]) / VERTICES)[:, None]
         near = ((low - margin <= high[a]) & (low[a] <= high + margin)).all(axis=1)
         for b in np.flatnonzero(near & (pieces != side.piece)).tolist():
-            there, distance = sides[b].nearest(points)
-            some = np.flatnonzero(distance <= gap)
+            some, there = sides[b].touching(points, gap)
             if len(some):
-                yield Contact(a, b, some, there[some])
+                yield Contact(a, b, some, there)
 
 
 class Survey(NamedTuple):
