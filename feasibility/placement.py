@@ -379,12 +379,13 @@ def _told(
 ) -> Placements:  # fmt: skip
     """The answer of a search."""
     trials = sorted(hunt.trials, key=lambda trial: trial.rank, reverse=True)
+    failed = [trial for trial in trials if trial.stage is Stage.FAILED]
     stages = Counter(trial.stage for trial in trials)
     looked = stages[Stage.SEARCH] + stages[Stage.CHECK]
     tried = (
         f"{hunt.drawn} placements were drawn: {hunt.bound} have a target out of reach, "
         f"{stages[Stage.PROBE]} failed a few Newton starts, {looked} were searched"
-    )
+    ) + (f", {len(failed)} could not be tried ({failed[0].message})" if failed else "")
     causes: dict[str, int] = {}
     cause = None
     if found:
@@ -394,7 +395,8 @@ def _told(
             f"motion; the best leaves a margin of {found[0].margin:.3f}. {tried}."
         )
     else:
-        undecided = hunt.late or any(t.answer is Answer.UNDECIDED for t in trials)
+        undecided = hunt.late or bool(failed)
+        undecided |= any(trial.answer is Answer.UNDECIDED for trial in trials)
         answer = Answer.UNDECIDED if undecided else Answer.INFEASIBLE
         evidence = Evidence.BUDGET if undecided else Evidence.EXHAUSTED
         causes = next((dict(t.causes) for t in trials if t.causes), {})

@@ -19,6 +19,7 @@ Triple = tuple[float, float, float]
 
 AXES = ("x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg")
 FURTHEST = 1e3  # [m] and [deg]: nothing sensible lies beyond
+DIGITS = 6  # of the numbers of a pose that is tried
 UPRIGHT = 1e-9  # [1], cosine of the pitch below which roll and yaw turn about one axis
 
 
@@ -156,14 +157,18 @@ class Region:
 
     def samples(self, count: int, seed: int) -> Array:
         """(k, 6) poses, the middle first, then spread evenly by a Sobol sequence; k >= count."""
-        return np.vstack([0.5 * (self.low + self.high), self._spread(count, seed)])
+        return self._rounded(np.vstack([0.5 * (self.low + self.high), self._spread(count, seed)]))
 
     def near(self, values: Array, share: float, count: int, seed: int) -> Array:
         """(k, 6) poses within `share` of the region's widths of a pose (6,); k >= count."""
         half = 0.5 * share * (self.high - self.low)
         centre = np.clip(values, self.low + half, self.high - half)
         inner = Region(tuple(zip((centre - half).tolist(), (centre + half).tolist(), strict=True)))
-        return np.clip(inner._spread(count, seed), self.low, self.high)
+        return self._rounded(inner._spread(count, seed))
+
+    def _rounded(self, values: Array) -> Array:
+        """Poses that people can write down, inside the region still."""
+        return np.clip(np.round(values, DIGITS), self.low, self.high)
 
     def _spread(self, count: int, seed: int) -> Array:
         """(k, 6) the first points of a scrambled Sobol sequence; k is a power of two >= count."""

@@ -73,6 +73,8 @@ class Stage(StrEnum):
     """A short search was run."""
     CHECK = "check"
     """The full search was run, and its motion replayed."""
+    FAILED = "failed"
+    """Nobody came to an end with it; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
