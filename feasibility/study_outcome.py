@@ -3,23 +3,30 @@
 from __future__ import annotations
 
 import math
+import os
 from collections import Counter
+from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.case import Case
-from feasibility.case_robot import RobotPart
-from feasibility.toml_text import toml_document
+from feasibility.case_robot import read_robot
+from feasibility.case_surface import read_surface
+from feasibility.toml_text import parse_toml, toml_document
 
 if TYPE_CHECKING:
     from feasibility.verdict import Verdict
     from robots import Robot
+    from surfaces import Cells
+    from surfaces.mesh_cells import MeshCells
 
 EXAMINED = 6  # missed cells of one verdict whose causes are looked for; the others take the nearest
 ROBOTS_KEPT = 32  # arms that one worker keeps
+MESHES_KEPT = 4
+HOME = {"position": (0.0, 0.0, 0.0), "rpy_deg": (0.0, 0.0, 0.0)}
 
 Tables = dict[str, Any]
 Outcome = dict[str, Any]
@@ -42,33 +49,57 @@ def evaluate(tables: Tables) -> Outcome:
     from feasibility.checking import check
 
     case = Case.from_toml(toml_document(tables))
-    verdict = check(arm_of(case), case.surface.cut(), case.task, case.search)
+    verdict = check(arm_of(case), cut_of(case), case.task, case.search)
     return outcome_of(verdict)
 
 
 def arm_of(case: Case) -> Robot:
-    """The arm of a case, loaded once."""
-    robots = _Kept(toml_document({"robot": case.robot.table()}), case.robot)
-    return _load(robots)
+    """The arm of a case, loaded once.
 
-
-class _Kept:
-    """An arm's table as text, by which it is told from others, and how to load it."""
-
-    def __init__(self, text: str, part: RobotPart) -> None:
-        self.text, self.part = text, part
-
-    def __hash__(self) -> int:
-        return hash(self.text)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Kept) and self.text == other.text
+    Raises:
+        RobotError: it cannot be loaded as asked.
+    """
+    return _load(toml_document({"robot": case.robot.table()}))
 
 
 @lru_cache(maxsize=ROBOTS_KEPT)
-def _load(kept: _Kept) -> Robot:
-    """Load an arm."""
-    return kept.part.build()
+def _load(table: str) -> Robot:
+    """The arm of a [robot] table, written as a document."""
+    part = read_robot(parse_toml(table)["robot"], [])
+    if part is None:
+        raise ValueError("the table of a robot that was read before cannot be read again")
+    return part.build()
+
+
+def cut_of(case: Case) -> Cells:
+    """The cells of a case; a mesh is read and cut once, and then placed.
+
+    Raises:
+        BuildError: there is no such surface, or it cannot be cut so.
+    """
+    from surfaces.mesh_cells import MeshCells
+    from surfaces.surface import rotation_from_rpy
+
+    if case.surface.kind != "mesh":
+        return case.surface.cut()
+    table = {key: value for key, value in case.surface.table().items() if value is not None}
+    file = os.stat(table["file"])
+    home = _cut(toml_document({"surface": table | HOME}), file.st_mtime_ns, file.st_size)
+    placed = replace(
+        home.surface,
+        rotation=rotation_from_rpy(*np.radians(case.surface.rpy_deg)),
+        position=np.array(case.surface.position),
+    )
+    return MeshCells.of(placed, home.labels)
+
+
+@lru_cache(maxsize=MESHES_KEPT)
+def _cut(table: str, changed: int, size: int) -> MeshCells:
+    """The cells of the mesh of a [surface] table, written as a document."""
+    part = read_surface(parse_toml(table)["surface"], [])
+    if part is None:
+        raise ValueError("the table of a surface that was read before cannot be read again")
+    return cast("MeshCells", part.cut())
 
 
 def outcome_of(verdict: Verdict) -> Outcome:

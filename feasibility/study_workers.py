@@ -20,7 +20,7 @@ CONNECT = 10.0  # [s] for a Dask scheduler to answer
 GATHER = 60.0  # [s] for its first worker to be there
 
 
-class WorkersError(RuntimeError):
+class WorkersError(ValueError):
     """Workers that cannot be had, or were lost for good; what would do."""
 
 

@@ -1,0 +1,106 @@
+"""Many cases on the command line: `study` and `compare`."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from feasibility.commands import check_outputs, json_text
+from feasibility.console import Bar, interruptible, say, tell
+from feasibility.files import shown_path, write_whole
+
+UNDECIDED = 3
+
+Progress = Callable[[int, int | None, str], None]
+
+
+def study(args: argparse.Namespace, began: float) -> int:
+    """`coverable study FILE --out OUT`: every case of a study, kept as they come.
+
+    Args:
+        args: file, out, workers, dask, json, csv.
+        began: `time.perf_counter()` when the command began.
+
+    Returns:
+        0; 3 where some cases failed.
+    """
+    from feasibility.study import run_tasks
+    from feasibility.study_file import load_study
+    from feasibility.study_report import as_csv, as_json, as_text
+    from feasibility.study_store import Store
+    from feasibility.study_workers import open_workers
+
+    check_outputs({"--out": args.out, "--csv": args.csv})
+    asked = load_study(args.file)
+    with Store(args.out) as store:
+        before = len(store)
+        if before:
+            tell(f"{shown_path(args.out)} holds {before} finished cases; going on from there")
+        try:
+            with _shown("deciding cases") as progress, open_workers(args.workers, args.dask) as by:
+                rows = run_tasks(asked.tasks, by, store, progress)
+        except KeyboardInterrupt:
+            tell(f"{len(store)} cases are kept in {shown_path(args.out)}; run again to go on")
+            raise
+    say(json_text(as_json(asked, rows)) if args.json else as_text(asked, rows))
+    _write(args.csv, as_csv(asked, rows), "table")
+    return UNDECIDED if any(row.status == "failed" for row in rows) else 0
+
+
+def compare(args: argparse.Namespace, began: float) -> int:
+    """`coverable compare CASE --robots a,b,c`: one case, one arm after the other.
+
+    Args:
+        args: case, settings, robots, critical, workers, dask, json, csv, html.
+        began: `time.perf_counter()` when the command began.
+    """
+    from feasibility.case import load_case
+    from feasibility.comparison import compare as run
+    from feasibility.comparison_report import as_csv, as_html, as_json, as_text
+    from feasibility.study_workers import open_workers
+
+    check_outputs({"--csv": args.csv, "--html": args.html})
+    case = load_case(args.case, args.settings)
+    robots = [name.strip() for name in args.robots.split(",") if name.strip()]
+    with _shown("comparing robots") as progress, open_workers(args.workers, args.dask) as by:
+        found = run(case, robots, by, critical=args.critical, progress=progress)
+    say(json_text(as_json(found)) if args.json else as_text(found))
+    _write(args.csv, as_csv(found), "table")
+    _write(args.html, as_html(found), "page")
+    return 0
+
+
+def _write(path: str | None, text: str, what: str) -> None:
+    """Write a file that was asked for, and say so."""
+    if path is not None:
+        write_whole(path, lambda stream: stream.write(text.encode()))
+        tell(f"{what}: {shown_path(path)}")
+
+
+@contextmanager
+def _shown(what: str) -> Iterator[Progress]:
+    """A progress bar with rate and time left, and a Ctrl-C that is never lost."""
+    began, first = time.monotonic(), -1
+    with interruptible() as settle, Bar() as bar:
+
+        def report(done: int, total: int | None, text: str) -> None:
+            nonlocal first
+            settle()
+            first = done if first < 0 else first  # what an earlier run has done says no rate
+            if bar.callback is not None:
+                bar(done, total, f"{what}{_pace(done - first, done, total, began)}")
+
+        yield report
+        settle()
+
+
+def _pace(here: int, done: int, total: int | None, began: float) -> str:
+    """', 12.3/s, 2 min left'; empty until something is done."""
+    took = time.monotonic() - began
+    if here <= 0 or total is None or took <= 0.0:
+        return ""
+    left = (total - done) * took / here
+    words = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"
+    return f", {here / took:.1f}/s, {words} left"
