@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.target_courses import TargetCourses, target_courses
-from feasibility.task import Task
+from feasibility.task import DEFAULT_TOLERANCE, Task
 from feasibility.verdict import Walk
 from surfaces import Cells
 
@@ -23,6 +23,7 @@ GUESSES = 4  # places tried first on each piece of a course
 REFINEMENTS = 4  # Newton steps from the best of them
 BLOCK = 4096  # waypoints at once, to bound the memory
 LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
+ARRIVED = 0.02  # [1] share of the tolerance: a tool point so near to a centre is at it
 STAYS = -1  # in place of a course
 
 
@@ -80,6 +81,7 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     inner = np.flatnonzero(walk.cell < 0)
     along = inner[course[stretch[inner]] != STAYS]
     places[along] = _nearest(ways, course[stretch[along]], points[along])
+    places[along] = _at_ends(ways, course[stretch[along]], places[along], points[along], task)
     t0, t1 = places[:-1].copy(), places[1:].copy()
     t0[marks[:-1]] = backwards[marks[:-1]]
     t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
@@ -97,7 +99,9 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
 
     bends, strays = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
     bends[:, 2] = ways.standing
-    moves = np.flatnonzero(course[stretch] != STAYS)
+    # A motion over one centre, at the end of a course, is none along it.
+    stands = (t0 == t1) & ((t0 == 0.0) | (t0 == 1.0))
+    moves = np.flatnonzero((course[stretch] != STAYS) & ~stands)
     used, which = np.unique(course[stretch[moves]], return_inverse=True)
     bends[moves] = _bends(ways, course[stretch[moves]], t0[moves], t1[moves])
     found, fault = _strays(cells, task.standoff, used)
@@ -166,6 +170,17 @@ def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> A
         step = np.divide((off * slope).sum(axis=1), square, out=np.zeros(len(t)), where=square > 0)
         widest = 1.0 / (GUESSES * count)
         t = np.clip(t - np.clip(step, -widest, widest), 0.0, 1.0)
+    return t
+
+
+def _at_ends(
+    ways: TargetCourses, course: NDArray[np.int64], t: Array, points: Array, task: Task
+) -> Array:
+    """The places t (k,), but the end of the course where a point is at a cell's centre already."""
+    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    for end in (0.0, 1.0):
+        centre, _ = _at(ways, course, np.full(len(t), end))
+        t = np.where(np.linalg.norm(points - centre, axis=1) <= ARRIVED * tolerance, end, t)
     return t
 
 

@@ -19,6 +19,7 @@ NEWTON_RIM = 1e-4  # [1] share of the cone that it costs, by way of the turning 
 ORDINARY = 0.01  # [1] share of the rim that an ordinary course may stray
 # The replay takes the place on the course that is nearest to the tool point, up to twice `near`
 # from the one aimed at, and wants the cone to hold at the tool point's own foot.
+ASIDE = 0.05  # [1] share of a piece by which that nearest place may lie off the one aimed at
 NEAR_COSTS = 3.0  # [1], times `near` and the turning of the normal: what that may cost of the rim
 
 # Why a motion stopped: the constraint that left no room.
@@ -126,9 +127,9 @@ class Work(NamedTuple):
     target: NDArray[np.float64]
     """(2, 3) target point and approach direction."""
     bend: NDArray[np.float64]
-    """(3,) largest second derivatives of target point and approach direction over the present
-    step, by its own parameter in 0..1, zero while the target stands still; and how fast the
-    direction turns there (1/m)."""
+    """(4,) largest second derivatives of target point and approach direction over the present
+    step, by its own parameter in 0..1, zero while the target stands still; how fast the direction
+    turns there (1/m); and how far the target goes (m)."""
     room: NDArray[np.float64]
     """(2,) what the present step keeps to of tolerance (m) and rim; 0 where it has no room."""
     counts: NDArray[np.int64]
@@ -154,7 +155,7 @@ def work_for(n: int) -> Work:
         held=np.zeros(n, dtype=np.bool_),
         trial=np.zeros(n),
         target=np.zeros((2, 3)),
-        bend=np.zeros(3),
+        bend=np.zeros(4),
         room=np.zeros(2),
         counts=np.zeros(1, dtype=np.int64),
         blame=np.zeros(2, dtype=np.int64),
@@ -181,6 +182,7 @@ def look_at(problem, work, target, approach):  # type: ignore[no-untyped-def]
     work.bend[0] = 0.0
     work.bend[1] = 0.0
     work.bend[2] = problem.turning
+    work.bend[3] = 0.0
     work.room[0] = problem.tolerance
     work.room[1] = problem.inner_rim
     for k in range(3):
@@ -222,13 +224,17 @@ def bend_between(problem, work, course, t0, t1):  # type: ignore[no-untyped-def]
     """Set `work.bend` and `work.room` for a step along a course from t0 to t1, either way."""
     first = problem.first_piece[course]
     count = problem.first_piece[course + 1] - first
-    low = min(np.int64(min(t0, t1) * count), count - 1)
-    high = min(np.int64(max(t0, t1) * count), count - 1)
+    low = min(np.int64(max(min(t0, t1) * count - ASIDE, 0.0)), count - 1)
+    high = min(np.int64(max(t0, t1) * count + ASIDE), count - 1)
     for part in range(3):
         most = 0.0
         for piece in range(low, high + 1):
             most = max(most, problem.bends[first + piece, part])
         work.bend[part] = most * (t1 - t0) ** 2 if part < 2 else most
+    way = 0.0
+    for k in range(3):
+        way += problem.targets[first + low, 1, k] ** 2
+    work.bend[3] = np.sqrt(way) * count * abs(t1 - t0)
     # No more room than over the centres, and no less on an ordinary course: every configuration
     # that works over a cell can set out from it.
     lost = problem.rim - problem.strays[course, 1] - NEAR_COSTS * work.bend[2] * problem.near

@@ -87,7 +87,12 @@ def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
     certifies.
     """
     total, total_axis = spread(problem, work, q0, q1)
-    position = peak(work.error[0, 0], work.error[1, 0], total + work.bend[0])
-    aside = work.bend[2] * (total + work.bend[0])
-    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + work.bend[1] + aside)
+    # The replay takes the nearest places of the course, up to twice the errors from those aimed at.
+    longer = 1.0
+    if work.bend[3] > 0.0:
+        longer += 2.0 * (work.error[0, 0] + work.error[1, 0]) / work.bend[3]
+    way, turn = longer * longer * work.bend[0], longer * longer * work.bend[1]
+    position = peak(work.error[0, 0], work.error[1, 0], total + way)
+    aside = work.bend[2] * (total + way)
+    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + turn + aside)
     return position / work.room[0], cone / work.room[1]
