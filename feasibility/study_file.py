@@ -243,24 +243,26 @@ def _case_of(tables: Tables) -> Case:
 
 def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
     """Keep the faults of every value, each tried with the first value of everything else."""
-    first = copy.deepcopy(base)
     entries: list[tuple[Axis | Range, tuple[Any, ...]]] = [
         *((axis, axis.values) for axis in varied.axes),
         *((span, (span.low, span.high)) for span in varied.ranges),
     ]
-    for entry, values in entries:
-        _put(first, entry.path, copy.deepcopy(values[0]))
-    known = _faults_of(first)
+
+    def tried(changed: int, value: Any) -> list[Fault]:
+        tables = copy.deepcopy(base)
+        for k, (entry, values) in enumerate(entries):
+            _put(tables, entry.path, copy.deepcopy(value if k == changed else values[0]))
+        return _faults_of(tables)
+
+    known = tried(-1, None)
     for key, message in known:
         places = [f"{e.place}[0]" for e, _ in entries if _covers(e.path, key)]
         faults.append(Fault(_join(places[0], key) if places else f"base.{key}", message))
-    for entry, values in entries:
+    for n, (entry, values) in enumerate(entries):
         for k, value in enumerate(values[1:], start=1):
-            tables = copy.deepcopy(first)
-            _put(tables, entry.path, copy.deepcopy(value))
             faults += [
                 Fault(_join(f"{entry.place}[{k}]", key), message)
-                for key, message in _faults_of(tables)
+                for key, message in tried(n, value)
                 if (key, message) not in known
             ]
 
@@ -349,8 +351,7 @@ class _Frames:
         frame = checked[name]
         if frame is None:
             return None
-        surface = {key: as_read(value) for key, value in frame["surface"].items()}
-        tables = {**frame, "surface": surface}
+        tables = {**frame, "surface": copy.deepcopy(frame["surface"])}
         for entry, value in entries:
             if entry.is_pose:
                 numbers = list(map(float, value)) if isinstance(value, list) else float(value)
