@@ -1,0 +1,147 @@
+"""`coverable place CASE`: where in a region may the surface stand?"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import os
+import time
+from typing import TYPE_CHECKING, Any
+
+from feasibility.console import Bar, interruptible, say, tell
+from feasibility.files import FileError, check_writable, shown_path, write_whole
+
+if TYPE_CHECKING:
+    from feasibility.placement import Judge, Placements, Progress
+    from feasibility.placement_map import PlacementMap
+    from feasibility.stations import Stations
+
+STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
+PICTURES = (".png", ".svg", ".pdf")
+
+
+def run_place(args: argparse.Namespace, began: float) -> int:
+    """`coverable place CASE`: search a region for placements, and say which will do.
+
+    Args:
+        args: `case`, `settings` (a list of KEY=VALUE); `x`, `y`, `z`, `roll`, `pitch`, `yaw`, each
+            two numbers or None; `count` or None; `workers` or None, `dask` or None; `stations`,
+            `json`; `csv`, `map`, `out`, files or None; `time_limit` or None.
+        began: `time.perf_counter()` when the command began.
+
+    Returns:
+        0 when a placement is feasible, 1 when none was found, 3 when undecided.
+
+    Raises:
+        PlacementError, CaseError, FileError, WorkersError: the input cannot be used.
+    """
+    with interruptible() as settle:
+        from feasibility.case import load_case
+        from feasibility.placement import COUNT, place
+        from feasibility.placement_map import map_around_best
+        from feasibility.placement_region import Pose, Region
+        from feasibility.placement_study import StudyJudge, trial_table
+        from feasibility.stations import stations_of
+        from feasibility.study_store import Store
+        from feasibility.study_workers import open_workers
+
+        _check_outputs(args)
+        case = load_case(args.case, args.settings)
+        held = Pose.of_values([*case.surface.position, *case.surface.rpy_deg])
+        region = Region.around(held, _ranges(args))
+        setup = case.build()
+        for note in (*setup.robot.notes, *setup.cells.surface.notes):
+            tell(f"note: {note}")
+        with contextlib.ExitStack() as stack:
+            bar = stack.enter_context(Bar())
+            progress = _reporting(bar, settle)
+            store = None if args.out is None else stack.enter_context(Store(args.out))
+            workers = stack.enter_context(open_workers(args.workers, args.dask))
+            judge: Judge = StudyJudge(case, workers, store, lambda *rest: settle())
+            placements = place(
+                *setup[:3], region, setup.search, judge=judge, progress=progress,
+                count=COUNT if args.count is None else args.count, time_limit=args.time_limit,
+            )  # fmt: skip
+            chart: PlacementMap | None = None
+            if args.map is not None:
+                chart = map_around_best(placements, judge, progress)
+        stations: Stations | None = None
+        if args.stations and not placements.found:
+            stations = stations_of([trial_table(trial) for trial in placements.trials])
+        settle()
+    placements.timing["command_s"] = time.perf_counter() - began
+    _say(args, placements, case.name, stations, chart)
+    return STATUS[str(placements.answer)]
+
+
+def _ranges(args: argparse.Namespace) -> dict[str, Any]:
+    """The ranges given, by the names of the region's axes."""
+    names = {"x": "x", "y": "y", "z": "z", "roll_deg": "roll", "pitch_deg": "pitch"}
+    names["yaw_deg"] = "yaw"
+    given = {axis: getattr(args, name) for axis, name in names.items()}
+    return {axis: value for axis, value in given.items() if value is not None}
+
+
+def _reporting(bar: Bar, settle: Any) -> Progress:
+    """What the search reports to: the bar, and a look for a dropped Ctrl-C."""
+
+    def report(done: int, total: int | None, text: str) -> None:
+        settle()
+        if bar.callback is not None:
+            bar(done, total, text)
+
+    return report
+
+
+def _check_outputs(args: argparse.Namespace) -> None:
+    """Refuse outputs that could not be written, before the search and not after it."""
+    faults = []
+    taken: dict[str, str] = {}
+    for flag in ("csv", "map", "out"):
+        path = getattr(args, flag)
+        if path is None:
+            continue
+        try:
+            if flag != "out" or not os.path.exists(path):  # the store says itself what it refuses
+                check_writable(path)
+        except FileError as error:
+            faults.append(f"--{flag} {error}")
+        place = os.path.realpath(path)
+        if place in taken:
+            faults.append(f"--{flag} {shown_path(path)}: is the file of --{taken[place]} too")
+        taken[place] = flag
+    if args.map is not None and not str(args.map).lower().endswith(PICTURES):
+        faults.append(
+            f"--map {shown_path(args.map)}: is no kind of picture; expected a name that ends in "
+            f"{', '.join(PICTURES)}"
+        )
+    if faults:
+        raise FileError("\n  ".join(faults))
+
+
+def _say(
+    args: argparse.Namespace,
+    placements: Placements,
+    name: str,
+    stations: Stations | None,
+    chart: PlacementMap | None,
+) -> None:
+    """Print the answer, and write what was asked for."""
+    from feasibility.placement_report import as_csv, as_json, as_text
+
+    if args.json:
+        say(json.dumps(as_json(placements, stations, chart), allow_nan=False, indent=2))
+    else:
+        say(as_text(placements, name, stations))
+    if args.csv is not None:
+        text = as_csv(placements)
+        write_whole(args.csv, lambda stream: stream.write(text.encode()))
+        tell(f"table: {shown_path(args.csv)}")
+    if chart is not None:
+        from feasibility.placement_plot import plot_map
+
+        figure = plot_map(chart, placements, title=name)
+        kind = str(args.map).rsplit(".", 1)[-1].lower()
+        write_whole(args.map, lambda stream: figure.savefig(stream, format=kind, dpi=150))
+        tell(f"map: {shown_path(args.map)}")

@@ -1,0 +1,213 @@
+"""Placements as one JSON object, as text for people, and as a table of all that were tried."""
+
+from __future__ import annotations
+
+import csv
+import io
+import textwrap
+from collections.abc import Sequence
+from typing import Any
+
+from feasibility.placement import Placements
+from feasibility.placement_map import PlacementMap
+from feasibility.placement_region import AXES, Pose
+from feasibility.placement_study import trial_table
+from feasibility.placement_trial import Trial
+from feasibility.report import CAUSES, EVIDENCE, WIDTH
+from feasibility.stations import Stations
+from feasibility.verdict import Answer, CauseKind
+from feasibility.version import version
+
+SENTENCES = {
+    Answer.FEASIBLE: "feasible: the surface can be covered in one motion from placements below.",
+    Answer.INFEASIBLE: "none in the region: no placement there was found to be feasible.",
+    Answer.UNDECIDED: "undecided: the search for a placement was stopped.",
+}
+PROVED = "none in the region: no placement there is feasible."
+COLUMNS = (*AXES, "stage", "in_reach", "probed", "share", "margin", "limits", "cone", "reach",
+           "verdict")  # fmt: skip
+
+
+def settings_of(pose: Pose) -> list[str]:
+    """What `--set` takes to put a case's surface there."""
+    position, rpy = (", ".join(repr(v) for v in part) for part in pose)
+    return [f"surface.position=[{position}]", f"surface.rpy_deg=[{rpy}]"]
+
+
+def as_json(
+    placements: Placements, stations: Stations | None = None, chart: PlacementMap | None = None
+) -> dict[str, Any]:
+    """Placements as the object that `coverable place --json` prints.
+
+    Args:
+        placements: the answer.
+        stations: the fewest stations, where that was asked.
+        chart: the map, where that was asked.
+    """
+    best = placements.best
+    return {
+        "answer": str(placements.answer),
+        "evidence": str(placements.evidence),
+        "message": placements.message,
+        "region": {
+            name: list(pair) for name, pair in zip(AXES, placements.region.ranges, strict=True)
+        },
+        "placements": [_found_json(trial) for trial in placements.found],
+        "best": None if best is None else _found_json(best),
+        "share": placements.share,
+        "cause": None if placements.cause is None else str(placements.cause),
+        "causes": dict(placements.causes),
+        "stations": None if stations is None else _stations_json(placements, stations),
+        "map": None if chart is None else _map_json(chart),
+        "statistics": dict(placements.statistics),
+        "timing": {key: round(value, 6) for key, value in placements.timing.items()},
+        "robot": placements.robot.name,
+        "version": version(),
+    }
+
+
+def _found_json(trial: Trial) -> dict[str, Any]:
+    """One placement, without its components."""
+    table = trial_table(trial)
+    del table["components"], table["fk"]
+    return table
+
+
+def _stations_json(placements: Placements, stations: Stations) -> dict[str, Any]:
+    """The stations and their cells; cells as flat indices."""
+    return {
+        "optimal": stations.optimal,
+        "at_least": stations.bound,
+        "left_out": stations.left_out.tolist(),
+        "stations": [
+            {
+                "position": list(placements.trials[station.row].pose.position),
+                "rpy_deg": list(placements.trials[station.row].pose.rpy_deg),
+                "cells": station.cells.tolist(),
+            }
+            for station in stations.stations
+        ],
+    }
+
+
+def _map_json(chart: PlacementMap) -> dict[str, Any]:
+    """The map; null where no search was run."""
+    nothing = ~chart.known
+    return {
+        "axes": list(chart.axes),
+        "ticks": [ticks.tolist() for ticks in chart.ticks],
+        "held": dict(zip(AXES, chart.held.values.tolist(), strict=True)),
+        "share": _nulled(chart.share, nothing),
+        "margin": _nulled(chart.margin, nothing),
+    }
+
+
+def _nulled(values: Any, nothing: Any) -> Any:
+    """Nested lists with None where there is nothing."""
+    plain = values.astype(object)
+    plain[nothing] = None
+    return plain.tolist()
+
+
+def as_text(placements: Placements, case: str = "", stations: Stations | None = None) -> str:
+    """Placements for people: the answer, where the surface may stand, or what stands against it."""
+    proved = placements.answer is Answer.INFEASIBLE and placements.evidence == "proof"
+    ranges = [
+        f"{name} {low:g} .. {high:g}"
+        for name, (low, high) in zip(AXES, placements.region.ranges, strict=True)
+        if low < high
+    ]
+    evidence = EVIDENCE[placements.evidence]
+    if placements.answer is Answer.INFEASIBLE:
+        evidence = (
+            "the reach bound, over the whole region"
+            if proved
+            else "placements spread over the region and refined; one between them may do"
+        )
+    rows = [
+        ("case", case),
+        ("region", ", ".join(ranges)),
+        ("evidence", f"{placements.evidence}: {evidence}"),
+        ("found", placements.message),
+        ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
+        ("missed", _causes_text(placements)),
+        ("time", f"{placements.timing['total_s']:.2f} s"),
+    ]
+    lines = [PROVED if proved else SENTENCES[placements.answer], ""]
+    lines += [_row(name, text) for name, text in rows if text]
+    if placements.found:
+        lines += ["", *_table(placements.found)]
+        put = " ".join(f"--set '{setting}'" for setting in settings_of(placements.found[0].pose))
+        lines += ["", f"the best as a case: {put}"]
+    elif placements.best is not None:
+        lines += ["", "the best of them:", *_table([placements.best])]
+    if stations is not None:
+        lines += ["", *_stations_text(placements, stations)]
+    return "\n".join(lines)
+
+
+def _causes_text(placements: Placements) -> str:
+    """Missed cells of the best placement by cause."""
+    return "; ".join(
+        f"{count} cell{'s' if count > 1 else ''}: {CAUSES[CauseKind(kind)]}"
+        for kind, count in placements.causes.items()
+    )
+
+
+def _row(name: str, text: str) -> str:
+    """A name and its text, wrapped."""
+    return textwrap.fill(
+        text, WIDTH, initial_indent=f"  {name:<10}", subsequent_indent=" " * 12,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def _table(trials: Sequence[Trial]) -> list[str]:
+    """Placements as aligned lines."""
+    lines = [
+        "       x       y       z    roll   pitch     yaw   share  margin  limits    cone   reach"
+    ]
+    for trial in trials:
+        numbers = [f"{v:8.3f}" for v in trial.pose.position]
+        numbers += [f"{v:8.2f}" for v in trial.pose.rpy_deg]
+        numbers += [f"{100.0 * trial.share:7.1f}%"]
+        margins = trial.margins
+        if margins is not None:
+            shares = (margins.least, margins.limits, margins.cone, margins.reach)
+            numbers += [f"{v:8.3f}" for v in shares]
+        lines.append("".join(numbers))
+    return lines
+
+
+def _stations_text(placements: Placements, stations: Stations) -> list[str]:
+    """The stations, one a line."""
+    number = len(stations)
+    plural = "" if number == 1 else "s"
+    proof = "proved fewest of what was found" if stations.optimal else f"at least {stations.bound}"
+    lines = [f"{number} station{plural} ({proof}):"]
+    for station in stations.stations:
+        pose = placements.trials[station.row].pose
+        lines.append(
+            f"  {len(station.cells):5d} cells at {', '.join(f'{v:.3f}' for v in pose.position)} m, "
+            f"{', '.join(f'{v:.2f}' for v in pose.rpy_deg)} deg"
+        )
+    if len(stations.left_out):
+        lines.append(f"  {len(stations.left_out):5d} cells are covered from no placement tried")
+    return lines
+
+
+def as_csv(placements: Placements) -> str:
+    """All placements tried, the best first; m and degrees."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for trial in placements.trials:
+        margins = trial.margins
+        shares = ("", "", "") if margins is None else (margins.limits, margins.cone, margins.reach)
+        writer.writerow(
+            [
+                *trial.pose.values.tolist(), trial.stage, trial.in_reach, trial.probed,
+                trial.share, trial.margin, *shares, trial.answer or "",
+            ]
+        )  # fmt: skip
+    return stream.getvalue()
