@@ -160,7 +160,8 @@ def _share(which: NDArray[np.bool_]) -> str:
     """'12 of 200 cells (6 %) are'."""
     number = int(which.sum())
     percent = 100.0 * number / len(which)
-    return f"{number} of {len(which)} cells ({percent:.2g} %) {'is' if number == 1 else 'are'}"
+    figure = f"{percent:.0f}" if percent >= 9.5 else f"{percent:.2g}"
+    return f"{number} of {len(which)} cells ({figure} %) {'is' if number == 1 else 'are'}"
 
 
 def _round_up(number: float) -> int:

@@ -173,11 +173,14 @@ class GridCells(Cells):
             [np.column_stack([corner, right, up + 1]), np.column_stack([corner, up + 1, up])]
         )
         starts = np.arange(len(which)) * (samples + 1) ** 2
-        return Triangles(
-            vertices=self.surface.point(u, v).reshape(-1, 3),
-            faces=(starts[:, None, None] + one).reshape(-1, 3),
-            normals=self.surface.normal(u, v).reshape(-1, 3),
-        )
+        faces = (starts[:, None, None] + one).reshape(-1, 3)
+        vertices = self.surface.point(u, v).reshape(-1, 3)
+        normals = self.surface.normal(u, v).reshape(-1, 3)
+        corners = vertices[faces]
+        looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        if (looks * normals[faces[:, 0]]).sum() < 0.0:  # counterclockwise seen from outside
+            faces = faces[:, ::-1]
+        return Triangles(vertices, faces, normals)
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: v to the right and u down, as cells are numbered."""

@@ -153,7 +153,10 @@ class MeshCells(Cells):
         flat = np.column_stack([right, -np.cross(up, right)])  # y runs down
         middle = self.centres.mean(axis=0)
         rotation, position = self.surface.rotation, self.surface.position
-        loops = [max(self.figures.outlines.of(k), key=_length) for k in range(len(self))]
+        none = np.empty((0, 3))  # of a cell that is a whole closed surface
+        loops = [
+            max(self.figures.outlines.of(k), key=_length, default=none) for k in range(len(self))
+        ]
         return Unrolled(
             centres=(self.centres - middle) @ flat,
             outlines=tuple((loop @ rotation.T + position - middle) @ flat for loop in loops),

@@ -6,8 +6,6 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from surfaces.surface import SurfaceError
 
@@ -166,6 +164,9 @@ def half_edge_ends(faces: Ints, halves: Ints) -> Ints:
 
 def components(pairs: Ints, count: int) -> Ints:
     """(count,) number of the connected component of each of `count` things joined by pairs."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     joined = coo_array((np.ones(len(pairs), bool), pairs.T.reshape(2, -1)), shape=(count, count))
     return connected_components(joined, directed=False)[1].astype(np.int64)
 

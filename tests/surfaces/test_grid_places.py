@@ -9,6 +9,7 @@ from spline_nets import TURN_KNOTS, full_turn, hood, turned
 from surfaces.parametric import cylinder, plane, sphere
 from surfaces.spline import bspline
 from surfaces.surface import SurfaceError
+from surfaces.torus import torus
 
 
 def pipe():
@@ -60,3 +61,24 @@ def test_once_around_is_the_range_in_the_units_of_the_picture():
 def test_a_side_that_is_no_word_is_a_fault_like_others(side):
     with pytest.raises(SurfaceError, match="side must be 'inside' or 'outside'"):
         plane((0, 1), (0, 1), side=side)
+
+
+@pytest.mark.parametrize(
+    "patch",
+    [
+        sphere(1.0, (10, 90), (10, 180)),
+        cylinder(0.3, (0, 200), (0, 1), side="outside"),
+        plane((0, 1), (0, 2)),
+        torus(0.5, 0.1, (0, 90), (0, 360)),
+    ],
+    ids=lambda patch: patch.kind,
+)
+def test_triangles_face_outwards_and_fill_the_cells(patch):
+    """Counterclockwise seen from outside, with the area of the cells as they get finer."""
+    cells = patch.cells(3, 4)
+    drawn = cells.triangles(np.arange(12), samples=24)
+    corners = drawn.vertices[drawn.faces]
+    looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert ((looks * drawn.normals[drawn.faces[:, 0]]).sum(axis=1) >= 0.0).all()
+    area = 0.5 * np.linalg.norm(looks, axis=1).sum()
+    assert area == pytest.approx(cells.areas.sum(), rel=5e-3)
