@@ -30,6 +30,8 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         return f"{case_name}: there are no cells to cover, so there is nothing to explain."
     helps = [t for t in explanation.thresholds if t.feasible is not None]
     others = [t for t in explanation.thresholds if t.feasible is None]
+    if not verdict.feasible:
+        helps.sort(key=_effort)
     for threshold in helps:
         lines += _item(sentence(threshold, verdict.feasible), "- ")
     if not helps:
@@ -47,6 +49,13 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         names = ", ".join(explanation.left_out)
         lines += ["", *_item(f"The time limit left no time for: {names}.")]
     return "\n".join(lines)
+
+
+def _effort(threshold: Threshold) -> float:
+    """How far along its range a change has to go: the smallest is told first."""
+    quantity, found = threshold.quantity, threshold.feasible
+    way = abs(quantity.end - quantity.given)
+    return abs(found.value - quantity.given) / way if found is not None and way > 0.0 else 1.0
 
 
 def _item(text: str, mark: str = "") -> list[str]:
