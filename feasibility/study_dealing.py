@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
@@ -32,18 +33,18 @@ class Answer:
     seconds: float
 
 
-def work_through(work: Work, tables: Sequence[Tables]) -> list[tuple[Any, str, float]]:
+def work_through(work: Work, tables: Sequence[Tables]) -> list[tuple[str | None, str, float]]:
     """In a worker: do some tasks one after the other.
 
     Returns:
-        For each: its result or None, why it failed, the seconds that it took.
+        For each: its result as JSON or None, why it failed, the seconds that it took.
     """
-    answers: list[tuple[Any, str, float]] = []
+    answers: list[tuple[str | None, str, float]] = []
     for table in tables:
         began = time.perf_counter()
         result, failure = None, ""
         try:
-            result = work(table)
+            result = json.dumps(work(table), allow_nan=False)
         except Exception as error:  # noqa: BLE001 - one bad task must not end a study
             failure = f"{type(error).__name__}: {' '.join(str(error).split())}"
         answers.append((result, failure, time.perf_counter() - began))
@@ -155,7 +156,8 @@ class _Dealer:
                     "to continue"
                 ) from error
             else:
-                for index, (result, failure, seconds) in zip(indices, results, strict=True):
+                for index, (text, failure, seconds) in zip(indices, results, strict=True):
+                    result = None if text is None else json.loads(text)
                     self.pace += 0.2 * (max(seconds, 1e-6) - self.pace)
                     answers.append(Answer(index, result, failure, seconds))
         self.receive(answers)

@@ -19,6 +19,8 @@ from feasibility.files import FileError, check_writable, reason, shown_path
 
 APPLICATION = 0x434F5642  # "COVB", in the header of every store
 SCHEMA = 1
+MAGIC = b"SQLite format 3\0"
+FOREIGN = "is not a study file; give another name, or remove the file"
 PATIENCE = 5.0  # [s] that another process may hold the file
 
 TABLE = """
@@ -110,7 +112,14 @@ class Store:
         if not stat.S_ISREG(status.st_mode):
             what = "a folder" if stat.S_ISDIR(status.st_mode) else "not a regular file"
             raise StoreError(f"{self._name}: is {what}; give the name of a file for the study")
-        return status.st_size == 0
+        try:
+            with open(self.path, "rb") as stream:
+                head = stream.read(len(MAGIC))
+        except OSError as error:
+            raise StoreError(f"{self._name}: cannot be opened: {reason(error)}") from error
+        if head not in (b"", MAGIC):  # SQLite would take a shorter file for an empty one
+            raise StoreError(f"{self._name}: {FOREIGN}")
+        return not head
 
     def _prepare(self, fresh: bool) -> None:
         """Make the table, or see that it is there and whole."""
@@ -225,7 +234,7 @@ class Store:
         if primary == sqlite3.SQLITE_FULL:
             text = "the disk is full; what was kept before stays: make room and run again"
         elif primary == sqlite3.SQLITE_NOTADB:
-            text = "is not a study file; give another name, or remove the file"
+            text = FOREIGN
         elif primary == sqlite3.SQLITE_CORRUPT:
             text = f"is damaged ({error}); remove it to start anew"
         elif primary in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):

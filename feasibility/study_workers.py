@@ -49,13 +49,16 @@ class Workers(Protocol):
 
 
 @contextmanager
-def open_workers(count: int | None = None, address: str | None = None) -> Iterator[Workers]:
+def open_workers(
+    count: int | None = None, address: str | None = None, *, warm: bool = True
+) -> Iterator[Workers]:
     """Workers for `feasibility.study.run_tasks`, until the block ends.
 
     Args:
         count: processes on this machine; None for one on each processor, 0 for none: then tasks
             run in this process.
         address: of a Dask scheduler, such as "tcp://127.0.0.1:8786", instead of processes.
+        warm: load the kernels of the search into each process before its first task.
 
     Raises:
         WorkersError: there is no such scheduler, or both are given.
@@ -74,7 +77,9 @@ def open_workers(count: int | None = None, address: str | None = None) -> Iterat
     if address is not None:
         workers = DaskWorkers(address)
     else:
-        workers = Here() if count == 0 else Processes(processors() if count is None else count)
+        workers = (
+            Here() if count == 0 else Processes(processors() if count is None else count, warm)
+        )
     try:
         yield workers
     except BaseException:
@@ -125,9 +130,9 @@ class Processes:
     patience = 3
     shared_fate = True
 
-    def __init__(self, count: int) -> None:
-        """Start `count` processes, as they are needed."""
-        self.width = count
+    def __init__(self, count: int, warm: bool) -> None:
+        """Start `count` processes, as they are needed; see `open_workers`."""
+        self.width, self._warm = count, warm
         self._start()
 
     def _start(self) -> None:
@@ -138,7 +143,7 @@ class Processes:
         context = get_context("spawn")
         self._end, self._leash = context.Pipe(duplex=False)
         self._pool: Executor = ProcessPoolExecutor(
-            self.width, mp_context=context, initializer=_begin, initargs=(self._end,)
+            self.width, mp_context=context, initializer=_begin, initargs=(self._end, self._warm)
         )
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
@@ -179,7 +184,7 @@ class Processes:
         self._end.close()
 
 
-def _begin(leash: Connection) -> None:
+def _begin(leash: Connection, warm: bool) -> None:
     """In a new worker: watch the leash, load the kernels."""
 
     def watch() -> None:
@@ -187,9 +192,10 @@ def _begin(leash: Connection) -> None:
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-    from feasibility.warmup import warm_up
+    if warm:
+        from feasibility.warmup import warm_up
 
-    warm_up()
+        warm_up()
 
 
 class DaskWorkers:

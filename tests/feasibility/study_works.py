@@ -45,3 +45,39 @@ def fail_odd(tables):
 def not_json(tables):
     """A result that cannot be kept."""
     return {"verdict": float("nan")}
+
+
+def slow_verdict(tables):
+    """A verdict that takes its time, so that a run can be interrupted."""
+    from feasibility.study_outcome import evaluate
+
+    time.sleep(0.02)
+    return evaluate(tables)
+
+
+def plates():
+    """60 small plates about a ur5: near ones, far ones and some in between."""
+    from small_cases import small_case
+
+    from feasibility.case_edits import as_read
+    from feasibility.study import StudyTask
+
+    base = {title: as_read(table) for title, table in small_case("plate").to_tables().items()}
+    tasks = []
+    for i in range(10):
+        for j in range(6):
+            position = [0.09 * i, 0.0, 0.15 * j - 0.1]
+            surface = {**base["surface"], "cells": [2, 2], "position": position}
+            task = StudyTask({**base, "surface": surface}, {"i": i, "j": j}, slow_verdict)
+            tasks.append(task)
+    return tasks
+
+
+def run_plates(store_path, count):
+    """What the test's own process runs, and others that are killed."""
+    from feasibility.study import run_tasks
+    from feasibility.study_store import Store
+    from feasibility.study_workers import open_workers
+
+    with Store(store_path) as store, open_workers(count) as workers:
+        return run_tasks(plates(), workers, store)

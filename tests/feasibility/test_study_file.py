@@ -259,11 +259,13 @@ def test_every_fault_is_told_with_its_place(text: str) -> None:
 
 
 def test_combinations_that_make_no_case_are_told() -> None:
-    """Each value is good by itself with the first of the other; the last two together are not."""
-    with pytest.raises(CaseError, match=r"robot = 'ur5'.*set-2.*no limit set 'set-2'"):
+    """Each value is good with the first of the other; the two last ones together are not."""
+    with pytest.raises(CaseError, match=r"robot = 'ur5'.*joint1.*: robot: .*no free joint"):
         read_study(
-            'base.case = "paper/4a"\nvary.robots = ["puma560", "ur5"]\n'
-            'vary."robot.limits" = ["set-2"]'
+            'base.case = "paper/4a"\nbase.robot.name = "puma560"\n'
+            'vary.robots = ["puma560", "ur5"]\nvary."robot.limits_deg" = ['
+            "[[-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90]], "
+            "{ joint1 = [-90, 90] }]"
         )
 
 

@@ -1,0 +1,64 @@
+"""Studies on a Dask cluster of this machine: the same table, also when a worker is killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+
+import pytest
+import study_works
+
+from feasibility.study import StudyTask, run_tasks
+from feasibility.study_workers import WorkersError, open_workers
+
+distributed = pytest.importorskip("distributed")
+
+pytestmark = pytest.mark.filterwarnings("ignore")  # what Dask says of its own threads and ports
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Two workers of one thread each, heard on this machine alone."""
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+    ) as made:
+        yield made
+
+
+def facts(rows):
+    return [(dict(row.parameters), row.status, row.result) for row in rows]
+
+
+def test_the_same_table_on_dask(cluster) -> None:
+    tasks = study_works.plates()[::3]
+    with open_workers(0) as here, open_workers(address=cluster.scheduler_address) as there:
+        assert there.width == 2
+        assert facts(run_tasks(tasks, there)) == facts(run_tasks(tasks, here))
+        failed = [StudyTask({"number": k}, {}, study_works.fail_odd) for k in range(4)]
+        assert [row.status for row in run_tasks(failed, there)] == ["done", "failed"] * 2
+
+
+def test_a_dask_worker_killed_in_the_middle(cluster) -> None:
+    tasks = [
+        StudyTask({"number": k, "wait": 0.02}, {"k": k}, study_works.double) for k in range(150)
+    ]
+    killed = []
+
+    def blow(done, total, text) -> None:
+        if done > 20 and not killed:
+            victim = next(iter(cluster.workers.values()))
+            killed.append(victim.pid)
+            threading.Thread(target=os.kill, args=(victim.pid, signal.SIGKILL)).start()
+
+    with open_workers(address=cluster.scheduler_address) as there:
+        rows = run_tasks(tasks, there, progress=blow)
+    assert killed
+    assert [row.result["double"] for row in rows] == [2 * k for k in range(150)]
+
+
+def test_no_scheduler(monkeypatch) -> None:
+    monkeypatch.setattr("feasibility.study_workers.CONNECT", 0.3)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x", "", "127.0.0.1"):
+        with pytest.raises(WorkersError, match="Dask scheduler"), open_workers(address=address):
+            pass
