@@ -115,6 +115,8 @@ def step_lengths(cells: Cells, pairs: NDArray[np.int64]) -> csr_array:
 
 def route_length(steps: csr_array, order: NDArray[np.int64]) -> float:
     """m, length of the shortest way that visits cells in this order; inf where there is none."""
+    if len(order) < 2:
+        return 0.0
     direct = np.asarray(steps[order[:-1], order[1:]]).reshape(-1)
     total = float(direct.sum())
     for k in np.flatnonzero(direct == 0.0):

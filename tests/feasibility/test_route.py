@@ -127,6 +127,13 @@ def test_the_length_of_a_route_goes_round_what_does_not_touch():
 
 
 @pytest.mark.parametrize("order", ORDERS)
+def test_one_cell_is_an_order_of_its_own(order):
+    cells = plane((0.0, 0.1), (0.0, 0.1)).cells(1, 1)
+    assert route(cells, order).tolist() == [0]
+    assert route_length(step_lengths(cells, cells.pairs), np.array([0])) == 0.0
+
+
+@pytest.mark.parametrize("order", ORDERS)
 def test_only_needed_cells_are_visited(order):
     cells = cylinder(0.5, (-60, 60), (0.0, 0.9)).cells(4, 5)
     needed = np.random.default_rng(3).random(20) < 0.5
