@@ -258,7 +258,7 @@ class Placer:
             if probed < 1.0:
                 fk = int(explorer.work.counts[0])
                 return Trial(pose, Stage.PROBE, in_reach, probed, fk=fk)
-        _skim(explorer)
+        _skim(explorer, early)
         return self.trial_of(explorer, pose, in_reach, probed)
 
     def check_at(self, pose: Pose, causes: bool = False) -> Trial:
@@ -377,8 +377,11 @@ def covers_of(explorer: Explorer) -> NDArray[np.bool_]:
     return np.asarray(covers[undominated(covers)][:MOST_COVERS])
 
 
-def _skim(explorer: Explorer) -> None:
-    """A short search: the middle cell, some that it leaves unreached, some stirring at borders."""
+def _skim(explorer: Explorer, early: bool) -> None:
+    """A short search: the middle cell, some that it leaves unreached, some stirring at borders.
+
+    With `early` it ends at a cell over which nothing is found: no motion will cover that one.
+    """
     pivot = explorer.cells.middle
     guesses = explorer.guesses(PIVOT_SEEDS)
     room = roomy(explorer.problem, explorer.work, pivot, guesses)
@@ -391,8 +394,8 @@ def _skim(explorer: Explorer) -> None:
         missed = np.flatnonzero(~explorer.covered)
         lost = missed[~explorer.reached[missed]]
         some = lost if len(lost) else missed
-        explorer.plant(int(explorer.rng.choice(some)), explorer.guesses(PIVOT_SEEDS))
-        if explorer.complete:
+        found = explorer.plant(int(explorer.rng.choice(some)), explorer.guesses(STARTS))
+        if explorer.complete or (early and len(lost) and not found):
             return
     for _ in range(STIRS):
         for root in explorer.roots()[:2]:

@@ -334,7 +334,7 @@ def test_what_a_short_search_covers_is_one_motion() -> None:
         setup = case.build()
         placer, pose = Placer(*setup), moved_away(case, seed)
         explorer = Explorer(setup.robot, setup.cells, placer.problem_at(pose), 0)
-        placement_trial._skim(explorer)
+        placement_trial._skim(explorer, False)
         covers = covers_of(explorer)
         assert 0 < len(covers) <= placement_trial.MOST_COVERS
         roots = {explorer.roadmap.cover[r].astype(bool).tobytes(): r for r in explorer.roots()}
@@ -391,10 +391,9 @@ def test_who_tries_placements_changes_nothing_and_a_store_saves_the_work(tmp_pat
             counts.append(len(store))
         assert [trial_table(trial) for trial in kept.trials] == expected
     assert counts[0] == counts[1] > 8
-    with Store(path) as store:
-        with open_workers(0) as workers:
-            judge = StudyJudge(case, Refusing(workers), store)
-            again = place(*setup[:3], region, setup.search, judge=judge, **ask)
+    with Store(path) as store, open_workers(0) as workers:
+        judge = StudyJudge(case, Refusing(workers), store)
+        again = place(*setup[:3], region, setup.search, judge=judge, **ask)
     assert [trial_table(trial) for trial in again.trials] == expected
 
 
