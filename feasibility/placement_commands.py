@@ -42,6 +42,7 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         from feasibility.placement_map import map_around_best
         from feasibility.placement_region import Pose, Region
         from feasibility.placement_study import StudyJudge, trial_table
+        from feasibility.placement_trial import Placer
         from feasibility.stations import stations_of
         from feasibility.study_store import Store
         from feasibility.study_workers import open_workers
@@ -67,11 +68,18 @@ def run_place(args: argparse.Namespace, began: float) -> int:
             if args.map is not None:
                 chart = map_around_best(placements, judge, progress)
         stations: Stations | None = None
-        if args.stations and not placements.found:
+        refusals: list[str] = []
+        if args.stations and not placements.found and placements.statistics["search"]:
             stations = stations_of([trial_table(trial) for trial in placements.trials])
+            # What a search covers is an answer only once its motion is replayed.
+            placer = Placer(*setup)
+            refusals = [
+                placer.replayed(placements.trials[station.row], station.component)
+                for station in stations.stations
+            ]
         settle()
     placements.timing["command_s"] = time.perf_counter() - began
-    _say(args, placements, case.name, stations, chart)
+    _say(args, placements, case.name, stations, refusals, chart)
     return STATUS[str(placements.answer)]
 
 
@@ -125,15 +133,16 @@ def _say(
     placements: Placements,
     name: str,
     stations: Stations | None,
+    refusals: list[str],
     chart: PlacementMap | None,
 ) -> None:
     """Print the answer, and write what was asked for."""
     from feasibility.placement_report import as_csv, as_json, as_text
 
     if args.json:
-        say(json.dumps(as_json(placements, stations, chart), allow_nan=False, indent=2))
+        say(json.dumps(as_json(placements, stations, refusals, chart), allow_nan=False, indent=2))
     else:
-        say(as_text(placements, name, stations))
+        say(as_text(placements, name, stations, refusals))
     if args.csv is not None:
         text = as_csv(placements)
         write_whole(args.csv, lambda stream: stream.write(text.encode()))

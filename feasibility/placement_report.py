@@ -35,13 +35,17 @@ def settings_of(pose: Pose) -> list[str]:
 
 
 def as_json(
-    placements: Placements, stations: Stations | None = None, chart: PlacementMap | None = None
+    placements: Placements,
+    stations: Stations | None = None,
+    refusals: Sequence[str] = (),
+    chart: PlacementMap | None = None,
 ) -> dict[str, Any]:
     """Placements as the object that `coverable place --json` prints.
 
     Args:
         placements: the answer.
         stations: the fewest stations, where that was asked.
+        refusals: for each station why the replay refuses its motion; empty where it accepts it.
         chart: the map, where that was asked.
     """
     best = placements.best
@@ -57,7 +61,7 @@ def as_json(
         "share": placements.share,
         "cause": None if placements.cause is None else str(placements.cause),
         "causes": dict(placements.causes),
-        "stations": None if stations is None else _stations_json(placements, stations),
+        "stations": None if stations is None else _stations_json(placements, stations, refusals),
         "map": None if chart is None else _map_json(chart),
         "statistics": dict(placements.statistics),
         "timing": {key: round(value, 6) for key, value in placements.timing.items()},
@@ -69,11 +73,14 @@ def as_json(
 def _found_json(trial: Trial) -> dict[str, Any]:
     """One placement, without its components."""
     table = trial_table(trial)
-    del table["components"], table["fk"]
+    for key in ("components", "early", "fk"):
+        del table[key]
     return table
 
 
-def _stations_json(placements: Placements, stations: Stations) -> dict[str, Any]:
+def _stations_json(
+    placements: Placements, stations: Stations, refusals: Sequence[str]
+) -> dict[str, Any]:
     """The stations and their cells; cells as flat indices."""
     return {
         "optimal": stations.optimal,
@@ -84,8 +91,9 @@ def _stations_json(placements: Placements, stations: Stations) -> dict[str, Any]
                 "position": list(placements.trials[station.row].pose.position),
                 "rpy_deg": list(placements.trials[station.row].pose.rpy_deg),
                 "cells": station.cells.tolist(),
+                "certified": not refusal,
             }
-            for station in stations.stations
+            for station, refusal in zip(stations.stations, refusals, strict=True)
         ],
     }
 
@@ -109,7 +117,12 @@ def _nulled(values: Any, nothing: Any) -> Any:
     return plain.tolist()
 
 
-def as_text(placements: Placements, case: str = "", stations: Stations | None = None) -> str:
+def as_text(
+    placements: Placements,
+    case: str = "",
+    stations: Stations | None = None,
+    refusals: Sequence[str] = (),
+) -> str:
     """Placements for people: the answer, where the surface may stand, or what stands against it."""
     proved = placements.answer is Answer.INFEASIBLE and placements.evidence == "proof"
     ranges = [
@@ -142,7 +155,7 @@ def as_text(placements: Placements, case: str = "", stations: Stations | None = 
     elif placements.best is not None:
         lines += ["", "the best of them:", *_table([placements.best])]
     if stations is not None:
-        lines += ["", *_stations_text(placements, stations)]
+        lines += ["", *_stations_text(placements, stations, refusals)]
     return "\n".join(lines)
 
 
@@ -179,17 +192,20 @@ def _table(trials: Sequence[Trial]) -> list[str]:
     return lines
 
 
-def _stations_text(placements: Placements, stations: Stations) -> list[str]:
+def _stations_text(
+    placements: Placements, stations: Stations, refusals: Sequence[str]
+) -> list[str]:
     """The stations, one a line."""
     number = len(stations)
     plural = "" if number == 1 else "s"
     proof = "proved fewest of what was found" if stations.optimal else f"at least {stations.bound}"
     lines = [f"{number} station{plural} ({proof}):"]
-    for station in stations.stations:
+    for station, refusal in zip(stations.stations, refusals, strict=True):
         pose = placements.trials[station.row].pose
         lines.append(
             f"  {len(station.cells):5d} cells at {', '.join(f'{v:.3f}' for v in pose.position)} m, "
             f"{', '.join(f'{v:.2f}' for v in pose.rpy_deg)} deg"
+            + (f" (not certified: {refusal})" if refusal else "")
         )
     if len(stations.left_out):
         lines.append(f"  {len(stations.left_out):5d} cells are covered from no placement tried")

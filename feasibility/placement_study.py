@@ -114,6 +114,7 @@ def trial_table(trial: Trial) -> Tables:
         "evidence": None if trial.evidence is None else str(trial.evidence),
         "message": trial.message,
         "causes": dict(trial.causes),
+        "early": trial.early,
         "fk": trial.fk,
     }
 
@@ -135,5 +136,6 @@ def trial_from(table: Any) -> Trial:
         evidence=None if table["evidence"] is None else Evidence(table["evidence"]),
         message=str(table["message"]),
         causes=dict(table["causes"]),
+        early=bool(table["early"]),
         fk=int(table["fk"]),
     )

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
@@ -29,7 +29,7 @@ from feasibility.fibre import NEWTON_STEPS, RIM_SLACK, roomy, wish_for_room
 from feasibility.kernels import kernel, put
 from feasibility.newton import LANDING_STEPS, correct, land, linearise
 from feasibility.placement_bounds import Reach
-from feasibility.placement_region import Pose, moved_cells
+from feasibility.placement_region import Array, Pose, moved_cells
 from feasibility.problem import (
     HERE,
     NEXT,
@@ -114,6 +114,8 @@ class Trial:
     """Its sentences."""
     causes: Mapping[str, int] = field(default_factory=dict)
     """Missed cells by cause, the most frequent first; only where it was asked for."""
+    early: bool = False
+    """Whether probes came before its search, and could end it."""
     fk: int = 0
     """Evaluations of the arm."""
 
@@ -247,19 +249,53 @@ class Placer:
         if early and distances.max() > self.reach.reach + self.reach.tolerance:
             return Trial(pose, Stage.BOUND, in_reach)
         explorer = Explorer(self.robot, self.cells, self.problem_at(pose), self.search.seed)
-        probed = 1.0
+        probed = self._searched(explorer, distances, early)
+        if probed < 1.0:
+            fk = int(explorer.work.counts[0])
+            return Trial(pose, Stage.PROBE, in_reach, probed, fk=fk)
+        return replace(self.trial_of(explorer, pose, in_reach, probed), early=early)
+
+    def _searched(self, explorer: Explorer, distances: Array, early: bool) -> float:
+        """Probe and search; returns the share of probed cells that were reached."""
         if early:
             ends = [int(distances.argmax()), int(distances.argmin())]
             some = np.array(list(dict.fromkeys([*ends, *self.probes])), dtype=np.int64)
             hits = np.zeros(len(some), dtype=np.int64)
             guesses = explorer.guesses(STARTS)
             _probe(explorer.problem, explorer.work, some, guesses, hits)
-            probed = float(hits.mean())
-            if probed < 1.0:
-                fk = int(explorer.work.counts[0])
-                return Trial(pose, Stage.PROBE, in_reach, probed, fk=fk)
+            if not hits.all():
+                return float(hits.mean())
         _skim(explorer, early)
-        return self.trial_of(explorer, pose, in_reach, probed)
+        return 1.0
+
+    def replayed(self, trial: Trial, component: int) -> str:
+        """Replay the motion behind one of a trial's `covers`, which is found again for that.
+
+        Returns:
+            Empty where the independent replay accepts one continuous motion over these cells;
+            otherwise why it does not.
+        """
+        from feasibility.certificate import replay
+        from feasibility.complete import explore
+        from feasibility.walk import covering_walk
+
+        cells = moved_cells(self.cells, trial.pose)
+        if trial.stage is Stage.CHECK:
+            problem = problem_of(self.robot, cells, self.task)
+            explorer = Explorer(self.robot, cells, problem, self.search.seed)
+            explore(explorer)
+        else:
+            problem = self.problem_at(trial.pose)
+            explorer = Explorer(self.robot, self.cells, problem, self.search.seed)
+            distances = self.reach.distances(trial.pose.values[None])[0]
+            self._searched(explorer, distances, trial.early)
+        cover = trial.covers[component]
+        for root in explorer.roots():
+            if (explorer.covers(root) >= cover).all():
+                walk = covering_walk(explorer.roadmap, root)
+                told = replay(self.robot, cells, self.task, walk, explorer.covers(root))
+                return "" if told.accepted else told.refusal
+        return "the search did not find this motion again"
 
     def check_at(self, pose: Pose, causes: bool = False) -> Trial:
         """Ask `feasibility.check` about one placement.

@@ -548,17 +548,28 @@ def test_stations_where_no_single_placement_will_do() -> None:
     )
     placements = place(setup.robot, shell, setup.task, region, count=24, around=1)
     assert placements.answer is Answer.INFEASIBLE
-    tables = [trial_table(trial) for trial in placements.trials]
-    stations = stations_of(tables)
+    # As they come back from a store.
+    trials = [trial_from(trial_table(trial)) for trial in placements.trials]
+    stations = stations_of([trial_table(trial) for trial in trials])
     assert stations.optimal
     assert len(stations) >= 2
     covered = sum(len(station.cells) for station in stations.stations)
     assert covered + len(stations.left_out) == len(shell)
-    everything = np.vstack([trial.covers for trial in placements.trials if trial.covers.size])
+    everything = np.vstack([trial.covers for trial in trials if trial.covers.size])
     assert stations.left_out.tolist() == np.flatnonzero(~everything.any(axis=0)).tolist()
-    text = as_text(placements, stations=stations)
+    placer = Placer(setup.robot, shell, setup.task, Search())
+    refusals = [placer.replayed(trials[s.row], s.component) for s in stations.stations]
+    assert refusals == [""] * len(stations)
+    checked = next(trial for trial in trials if trial.stage is Stage.CHECK)
+    assert placer.replayed(checked, 0) == ""
+    lying = Trial(checked.pose, Stage.SEARCH, 1.0, covers=np.ones((1, len(shell)), dtype=bool))
+    assert "did not find" in placer.replayed(lying, 0)
+    text = as_text(placements, "", stations, refusals)
     assert f"{len(stations)} stations" in text
-    assert as_json(placements, stations)["stations"]["at_least"] == len(stations)
+    assert "not certified" not in text
+    told = as_json(placements, stations, refusals)["stations"]
+    assert told["at_least"] == len(stations) == len(told["stations"])
+    assert all(station["certified"] for station in told["stations"])
 
 
 def arguments(**given: object) -> argparse.Namespace:
