@@ -128,7 +128,7 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
     if only is None:
         if verdict.answer is not Answer.FEASIBLE:
             raise PathError(
-                f"no path covers this surface: the verdict is {verdict.answer} with "
+                f"no path over this surface is known: the verdict is {verdict.answer} with "
                 f"{verdict.n_covered} of {total} cells covered by the best single motion; "
                 "divide the surface, or name the cells to visit"
             )

@@ -40,11 +40,15 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.checking import check
         from feasibility.coverage import coverage_path
         from feasibility.path_report import as_json, as_text
+        from feasibility.speed_limits import motion_limits
         from feasibility.timing import trajectory
 
+        robot = question.setup.robot
+        limits = motion_limits(robot, args.speed, acceleration=args.acceleration)
         verdict = check(*question.setup, progress=question.progress)
         if not verdict.feasible:
-            tell(f"coverable path: {question.case.name}: no path covers this surface. {verdict!r}")
+            reason = f"no path over this surface is known. {verdict!r}"
+            tell(f"coverable path: {question.case.name}: {reason}")
             tell("`coverable explain` says what would help, `coverable divide` how to split it.")
             return STATUS[str(verdict.answer)]
         question.progress(0, None, "laying the path")
@@ -52,7 +56,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         found = coverage_path(verdict, order)
         question.progress(0, None, "timing the path")
         run = trajectory(found, args.speed, acceleration=args.acceleration, period=args.period)
-    say(json_text(as_json(found, run)) if args.json else as_text(found, run))
+    say(json_text(as_json(found, run, limits)) if args.json else as_text(found, run, limits))
     for out in args.out:
         from feasibility.trajectory_files import save_trajectory
 

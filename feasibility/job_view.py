@@ -57,7 +57,7 @@ def view_path(
     title = f"{case}: " if case else ""
     text = (
         f"{robot.name}: {int(path.needed.sum())} cells in order {path.order}, "
-        f"{figures.length:.2f} m, {100.0 * figures.revisited_share:.0f} % of it twice, {speed}"
+        f"{figures.length:.2f} m, {figures.revisited:.2f} m of it again, {speed}"
     )
     return compose(
         robot, cells, f"{title}coverage path", text, [*cells_layers(cells), strokes], motion,

@@ -137,7 +137,8 @@ def _length_text(figures: PathFigures) -> str:
     """Length, what is gone over again, and the least there could be."""
     text = f"{figures.length:.4g} m on the surface"
     if figures.revisited > 0.0:
-        text += f", {figures.revisited:.3g} m of it again ({100 * figures.revisited_share:.2g} %)"
+        share = f"{100 * figures.revisited_share:.2g} % of the rest"
+        text += f", {figures.revisited:.3g} m of it again ({share})"
     if figures.least_length > 0.0:
         text += (
             f"; no path through all centres is shorter than {figures.least_length:.4g} m "

@@ -33,6 +33,12 @@ def test_a_path_is_written_in_three_formats_that_replay(tmp_path, capsys):
     assert told["order"] == "rows"
     assert told["cells"] == 90
     assert told["revisited_share"] <= 0.15
+    timing = told["trajectory"]
+    assert timing["limits"]["tool_speed"] == 0.25
+    for most in ("velocity", "acceleration"):
+        found = timing[f"max_{most}"]
+        assert found.keys() == timing["limits"][most].keys()
+        assert all(found[j] <= timing["limits"][most][j] * (1 + 1e-9) for j in found)
     robot, cells, task, _ = load_case("paper/4e").build()
     for file in files:
         trajectory = load_trajectory(file)
@@ -51,7 +57,7 @@ def test_a_path_of_what_is_not_feasible_is_refused_with_the_reason(settings, sta
     found, out, err = run(capsys, "path", "paper/4d", *settings)
     assert found == status
     assert out == ""
-    assert "no path covers this surface" in err
+    assert "no path over this surface is known" in err
     assert "coverable explain" in err
 
 
