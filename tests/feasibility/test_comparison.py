@@ -102,26 +102,24 @@ def test_an_arm_whose_worker_dies_is_undecided(strip, monkeypatch) -> None:
     assert "KeyError" in arm.message
 
 
-@pytest.mark.parametrize("name", ["puma560", "ur3"])
-def test_the_critical_cone_is_where_the_verdict_turns(strip, name) -> None:
+@pytest.mark.parametrize("given", [12.0, 30.0, 95.25])
+@pytest.mark.parametrize(("name", "z", "turns"), [("puma560", 0.2, 3), ("ur3", 0.4, 19)])
+def test_the_critical_cone_is_where_the_verdict_turns(strip, name, z, turns, given) -> None:
     """At the cone that is named there is a motion; a step below none is found."""
-    case = strip.with_overrides([f"robot.name={name}", "robot.limits=", "surface.u=[0.3, 0.5]"])
-    case = case.with_overrides(["surface.cells=[2, 1]", "surface.v=[-0.05, 0.05]"])
+    settings = [f"robot.name={name}", "robot.limits=", "surface.u=[0.3, 0.5]",
+                "surface.v=[-0.05, 0.05]", "surface.cells=[2, 1]", f"task.cone_deg={given}",
+                f"surface.position=[0, 0, {z}]"]  # fmt: skip
+    case = strip.with_overrides(settings)
     robot, cells, task, search = case.build()
-    for given in (12.0, 30.0, 95.25):
-        here = replace(task, cone_deg=given)
-        known = check(robot, cells, here, search).feasible
-        case_here = case.with_overrides([f"task.cone_deg={given}"])
-        cone = critical_cone(robot, cells, case_here, known)
-        if cone is None:
-            wide = replace(task, cone_deg=180.0)
-            assert not check(robot, cells, wide, search).feasible
-            continue
-        assert (cone <= given) == known
-        assert check(robot, cells, replace(task, cone_deg=cone), search).feasible
-        if cone > 3.0:
-            below = replace(task, cone_deg=cone - CONE_STEP_DEG)
-            assert not check(robot, cells, below, search).feasible
+    known = check(robot, cells, task, search).feasible
+    cone = critical_cone(robot, cells, case, known)
+    assert cone is not None
+    assert known == (cone <= given)
+    assert cone == pytest.approx(turns, abs=1.0)
+    assert check(robot, cells, replace(task, cone_deg=cone), search).feasible
+    if cone > 3.0:
+        below = replace(task, cone_deg=cone - CONE_STEP_DEG)
+        assert not check(robot, cells, below, search).feasible
 
 
 def test_a_cone_that_no_width_helps() -> None:
