@@ -13,7 +13,8 @@ from feasibility.console import Bar, interruptible, say, tell
 from feasibility.files import FileError, check_writable, shown_path, write_whole
 
 if TYPE_CHECKING:
-    from feasibility.placement import Judge, Placements, Progress
+    from feasibility.placement import Placements
+    from feasibility.placement_hunt import Judge, Progress
     from feasibility.placement_map import PlacementMap
     from feasibility.stations import Stations
 
@@ -42,7 +43,7 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         from feasibility.placement_map import map_around_best
         from feasibility.placement_region import Pose, Region
         from feasibility.placement_study import StudyJudge, trial_table
-        from feasibility.placement_trial import Placer
+        from feasibility.placer import Placer
         from feasibility.stations import stations_of
         from feasibility.study_store import Store
         from feasibility.study_workers import open_workers

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.placement import BATCH, Judge, Placements, Progress
+from feasibility.placement import Placements
+from feasibility.placement_hunt import BATCH, Judge, Progress
 from feasibility.placement_region import AXES, Array, PlacementError, Pose, Region
 from feasibility.placement_trial import Stage
 
@@ -28,7 +29,7 @@ class PlacementMap:
     share: Array
     """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
     margin: Array
-    """Likewise the margin, see `placement_trial`; 0 where not every cell is covered."""
+    """Likewise the margin, see `placement_room`; 0 where not every cell is covered."""
     known: NDArray[np.bool_]
     """Likewise, where a search was run; elsewhere share and margin are NaN."""
 

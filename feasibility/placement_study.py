@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from feasibility.case import TABLES, Case
-from feasibility.placement import Progress
+from feasibility.placement_hunt import Progress
 from feasibility.placement_region import Pose
-from feasibility.placement_trial import Margins, Placer, Stage, Trial
+from feasibility.placement_trial import Margins, Stage, Trial
+from feasibility.placer import Placer
 from feasibility.study import StudyTask, run_tasks
 from feasibility.study_outcome import bits_of, cells_of
 from feasibility.study_store import Store
@@ -75,7 +76,7 @@ def try_placement(tables: Tables) -> Tables:
 
     Args:
         tables: a case, as `Case.to_tables` gives it, and `placement`: `pose`, six numbers, and
-            either `early`, see `Placer.try_at`, or `causes`, see `Placer.check_at`.
+            either `early`, see `placer.Placer.try_at`, or `causes`, see `placer.Placer.check_at`.
 
     Returns:
         See `trial_table`.

@@ -8,7 +8,8 @@ from feasibility.case import load_case
 from feasibility.placement import Local, place
 from feasibility.placement_bounds import Reach
 from feasibility.placement_region import Pose, Region
-from feasibility.placement_trial import Placer, Stage
+from feasibility.placement_trial import Stage
+from feasibility.placer import Placer
 
 REGIONS = {
     "within 0.3 m, 40 deg": {

@@ -27,8 +27,10 @@ from feasibility.placement_map import PlacementMap, axes_of, placement_map
 from feasibility.placement_plot import plot_map
 from feasibility.placement_region import AXES, PlacementError, Pose, Region, moved_cells
 from feasibility.placement_report import as_csv, as_json, as_text, settings_of
+from feasibility.placement_skim import MOST_COVERS, covers_of, skim
 from feasibility.placement_study import StudyJudge, trial_from, trial_table
-from feasibility.placement_trial import Placer, Stage, Trial, covers_of
+from feasibility.placement_trial import Stage, Trial
+from feasibility.placer import Placer
 from feasibility.problem import problem_of
 from feasibility.search import Search
 from feasibility.stations import stations_of
@@ -326,17 +328,15 @@ def test_the_margin_can_be_kept_over_every_cell() -> None:
 
 def test_what_a_short_search_covers_is_one_motion() -> None:
     """Every component of an infeasible placement is replayed over the moved cells."""
-    from feasibility import placement_trial
-
     several = 0
     for name, seed in MOVED[::2]:
         case = placement_case(name)
         setup = case.build()
         placer, pose = Placer(*setup), moved_away(case, seed)
         explorer = Explorer(setup.robot, setup.cells, placer.problem_at(pose), 0)
-        placement_trial._skim(explorer, False)
+        skim(explorer, False)
         covers = covers_of(explorer)
-        assert 0 < len(covers) <= placement_trial.MOST_COVERS
+        assert 0 < len(covers) <= MOST_COVERS
         roots = {explorer.roadmap.cover[r].astype(bool).tobytes(): r for r in explorer.roots()}
         cells = moved_cells(setup.cells, pose)
         for cover in covers:
