@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from dataclasses import dataclass, field
 from typing import Any
 
-from feasibility.study_workers import Workers, WorkersError
+from feasibility.study_workers import LOST, Workers, WorkersError
 
 AHEAD = 2  # handfuls in flight for each worker: one at work, one waiting
 HANDFUL_S = 0.2  # [s] that a handful should take: the rest of its way takes about a millisecond
@@ -151,9 +151,12 @@ class _Dealer:
                 whole = False
                 answers += self._lost(indices, error)
             except CancelledError as error:
+                raise WorkersError(LOST) from error
+            except Exception as error:  # what the tasks themselves raise comes as an answer
+                said = " ".join(str(error).split())
                 raise WorkersError(
-                    "the connection to the workers was lost; what was finished is kept, run again "
-                    "to continue"
+                    f"the workers cannot run the tasks ({type(error).__name__}: {said}); what was "
+                    "finished is kept: see that they have the same coverable installed"
                 ) from error
             else:
                 for index, (text, failure, seconds) in zip(indices, results, strict=True):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import contextmanager
@@ -17,6 +18,8 @@ from typing import Any, Protocol
 
 ATTEMPTS = 3  # to start worker processes anew
 CONNECT = 10.0  # [s] for a Dask scheduler to answer
+ASK = 2.0  # [s] between two questions about how many workers there are
+LOST = "the connection to the workers was lost; what was finished is kept, run again to continue"
 GATHER = 60.0  # [s] for its first worker to be there
 
 
@@ -231,13 +234,25 @@ class DaskWorkers:
             raise WorkersError(
                 f"the Dask scheduler at {address!r} has no workers; start some with `dask worker`"
             ) from error
+        self._width, self._asked = 1, -ASK
         # Not pure: a task that is submitted again is run again.
         self._pool: Executor = self._client.get_executor(pure=False)
 
     @property
     def width(self) -> int:
-        """Threads of all workers; at least 1, for while they are replaced."""
-        return max(sum(self._client.nthreads().values()), 1)
+        """Threads of all workers, as of late; at least 1, for while they are replaced.
+
+        Raises:
+            WorkersError: the scheduler is gone.
+        """
+        now = time.monotonic()
+        if now > self._asked + ASK:
+            try:
+                self._width = max(sum(self._client.nthreads().values()), 1)
+            except OSError as error:
+                raise WorkersError(LOST) from error
+            self._asked = now
+        return self._width
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Run it on the cluster."""
@@ -250,7 +265,7 @@ class DaskWorkers:
         """Leave the cluster; it goes on without us."""
         try:
             self._pool.shutdown(wait=not at_once)
-        except CancelledError:
+        except (CancelledError, OSError):  # nobody is there to be told
             pass
         finally:
             self._client.close()

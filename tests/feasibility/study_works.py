@@ -35,6 +35,11 @@ def _new(mark):
     return True
 
 
+def die_at_once(*arguments):
+    """In the place of what a worker begins with."""
+    os._exit(3)
+
+
 def fail_odd(tables):
     """Refuse odd numbers."""
     if tables["number"] % 2:

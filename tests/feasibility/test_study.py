@@ -372,3 +372,15 @@ def test_workers_that_cannot_be_had() -> None:
         pass
     with pytest.raises(ValueError, match=">= 0"), open_workers(-1):
         pass
+
+
+def test_work_that_no_worker_can_be_told(pool) -> None:
+    with pytest.raises(WorkersError, match="cannot run the tasks"):
+        run_tasks([StudyTask({}, {}, lambda tables: {})], pool)
+
+
+def test_workers_that_die_while_starting(monkeypatch) -> None:
+    """A study does not go on starting them for ever."""
+    monkeypatch.setattr("feasibility.study_workers._begin", study_works.die_at_once)
+    with pytest.raises(WorkersError, match="died while starting"), open_workers(1) as workers:
+        run_tasks(numbers(3), workers)

@@ -10,6 +10,7 @@ import pytest
 import study_works
 
 from feasibility.study import StudyTask, run_tasks
+from feasibility.study_store import Store
 from feasibility.study_workers import WorkersError, open_workers
 
 distributed = pytest.importorskip("distributed")
@@ -62,3 +63,28 @@ def test_no_scheduler(monkeypatch) -> None:
     for address in ("tcp://127.0.0.1:9", "nonsense://x", "", "127.0.0.1"):
         with pytest.raises(WorkersError, match="Dask scheduler"), open_workers(address=address):
             pass
+
+
+def test_a_scheduler_that_is_lost() -> None:
+    """One clear message, and what was finished is kept."""
+    tasks = [
+        StudyTask({"number": k, "wait": 0.05}, {"k": k}, study_works.double) for k in range(400)
+    ]
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+    ) as made:
+        closed: list[threading.Thread] = []
+
+        def close(done, total, text) -> None:
+            if done > 5 and not closed:
+                closed.append(threading.Thread(target=made.close))
+                closed[0].start()
+
+        with Store(":memory:") as store:
+            with (
+                pytest.raises(WorkersError, match=r"was lost|same coverable"),
+                open_workers(address=made.scheduler_address) as there,
+            ):
+                run_tasks(tasks, there, store, close)
+            assert 5 < len(store) < 400
+        closed[0].join()
