@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from feasibility.placement import Placements
     from feasibility.placement_hunt import Judge, Progress
     from feasibility.placement_map import PlacementMap
-    from feasibility.stations import Stations
+    from feasibility.placement_stations import StationPlan
 
 STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
 PICTURES = (".png", ".svg", ".pdf")
@@ -42,9 +42,8 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         from feasibility.placement import COUNT, place
         from feasibility.placement_map import map_around_best
         from feasibility.placement_region import Pose, Region
-        from feasibility.placement_study import StudyJudge, trial_table
-        from feasibility.placer import Placer
-        from feasibility.stations import stations_of
+        from feasibility.placement_stations import station_plan
+        from feasibility.placement_study import StudyJudge
         from feasibility.study_store import Store
         from feasibility.study_workers import open_workers
 
@@ -58,29 +57,23 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         with contextlib.ExitStack() as stack:
             bar = stack.enter_context(Bar())
             progress = _reporting(bar, settle)
+            count = COUNT if args.count is None else args.count
             store = None if args.out is None else stack.enter_context(Store(args.out))
             workers = stack.enter_context(open_workers(args.workers, args.dask))
             judge: Judge = StudyJudge(case, workers, store, lambda *rest: settle())
             placements = place(
                 *setup[:3], region, setup.search, judge=judge, progress=progress,
-                count=COUNT if args.count is None else args.count, time_limit=args.time_limit,
+                count=count, time_limit=args.time_limit,
             )  # fmt: skip
+            plan: StationPlan | None = None
+            if args.stations and not placements.found:
+                plan = station_plan(placements, judge, setup.search, count, progress)
             chart: PlacementMap | None = None
             if args.map is not None:
                 chart = map_around_best(placements, judge, progress)
-        stations: Stations | None = None
-        refusals: list[str] = []
-        if args.stations and not placements.found and placements.statistics["search"]:
-            stations = stations_of([trial_table(trial) for trial in placements.trials])
-            # What a search covers is an answer only once its motion is replayed.
-            placer = Placer(*setup)
-            refusals = [
-                placer.replayed(placements.trials[station.row], station.component)
-                for station in stations.stations
-            ]
         settle()
     placements.timing["command_s"] = time.perf_counter() - began
-    _say(args, placements, case.name, stations, refusals, chart)
+    _say(args, placements, case.name, plan, chart)
     return STATUS[str(placements.answer)]
 
 
@@ -133,17 +126,16 @@ def _say(
     args: argparse.Namespace,
     placements: Placements,
     name: str,
-    stations: Stations | None,
-    refusals: list[str],
+    plan: StationPlan | None,
     chart: PlacementMap | None,
 ) -> None:
     """Print the answer, and write what was asked for."""
     from feasibility.placement_report import as_csv, as_json, as_text
 
     if args.json:
-        say(json.dumps(as_json(placements, stations, refusals, chart), allow_nan=False, indent=2))
+        say(json.dumps(as_json(placements, plan, chart), allow_nan=False, indent=2))
     else:
-        say(as_text(placements, name, stations, refusals))
+        say(as_text(placements, name, plan))
     if args.csv is not None:
         text = as_csv(placements)
         write_whole(args.csv, lambda stream: stream.write(text.encode()))

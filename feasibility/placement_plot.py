@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -12,11 +13,11 @@ from feasibility.placement_region import AXES, Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-    from feasibility.plots import Plot
+    from matplotlib.figure import Figure
 
 BEST, OTHERS = "#d62728", "white"
 UNKNOWN = "0.85"
+DOTS_PER_INCH = 110
 
 
 def plot_map(
@@ -24,7 +25,7 @@ def plot_map(
     placements: Placements | None = None,
     value: Literal["share", "margin"] = "share",
     title: str | None = None,
-) -> Plot:
+) -> Figure:
     """Covered share, or margin, over two axes; one panel for each place along a third.
 
     Args:
@@ -33,11 +34,9 @@ def plot_map(
         value: what the colours tell.
         title: above the figure.
     """
-    from feasibility.plots import Plot
-
     values = getattr(charted, value).reshape(*charted.share.shape[:2], -1)
     panels = charted.ticks[2] if len(charted.ticks) > 2 else np.zeros(1)
-    figure = Plot(figsize=(1.2 + 3.4 * len(panels), 3.6), layout="constrained")
+    figure = _figure(1.2 + 3.4 * len(panels), 3.6)
     grid = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
     most = 1.0 if value == "share" else max(float(np.nanmax(values, initial=0.0)), 1e-9)
     fields = []
@@ -59,6 +58,19 @@ def plot_map(
     if title:
         figure.suptitle(title)
     return figure
+
+
+def _figure(width: float, height: float) -> Figure:
+    """A figure (inches) that notebooks show without being told how."""
+    from matplotlib.figure import Figure
+
+    class Plot(Figure):
+        def _repr_png_(self) -> bytes:
+            stream = io.BytesIO()
+            self.savefig(stream, format="png", dpi=DOTS_PER_INCH)
+            return stream.getvalue()
+
+    return Plot(figsize=(width, height), layout="constrained")
 
 
 def _mark(grid: Array, charted: PlacementMap, placements: Placements) -> None:

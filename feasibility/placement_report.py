@@ -11,10 +11,10 @@ from typing import Any
 from feasibility.placement import Placements
 from feasibility.placement_map import PlacementMap
 from feasibility.placement_region import AXES, Pose
+from feasibility.placement_stations import StationPlan
 from feasibility.placement_study import trial_table
 from feasibility.placement_trial import Trial
 from feasibility.report import CAUSES, EVIDENCE, WIDTH
-from feasibility.stations import Stations
 from feasibility.verdict import Answer, CauseKind
 from feasibility.version import version
 
@@ -36,16 +36,14 @@ def settings_of(pose: Pose) -> list[str]:
 
 def as_json(
     placements: Placements,
-    stations: Stations | None = None,
-    refusals: Sequence[str] = (),
+    plan: StationPlan | None = None,
     chart: PlacementMap | None = None,
 ) -> dict[str, Any]:
     """Placements as the object that `coverable place --json` prints.
 
     Args:
         placements: the answer.
-        stations: the fewest stations, where that was asked.
-        refusals: for each station why the replay refuses its motion; empty where it accepts it.
+        plan: the fewest stations, where that was asked.
         chart: the map, where that was asked.
     """
     best = placements.best
@@ -61,7 +59,7 @@ def as_json(
         "share": placements.share,
         "cause": None if placements.cause is None else str(placements.cause),
         "causes": dict(placements.causes),
-        "stations": None if stations is None else _stations_json(placements, stations, refusals),
+        "stations": None if plan is None else _stations_json(plan),
         "map": None if chart is None else _map_json(chart),
         "statistics": dict(placements.statistics),
         "timing": {key: round(value, 6) for key, value in placements.timing.items()},
@@ -78,22 +76,23 @@ def _found_json(trial: Trial) -> dict[str, Any]:
     return table
 
 
-def _stations_json(
-    placements: Placements, stations: Stations, refusals: Sequence[str]
-) -> dict[str, Any]:
+def _stations_json(plan: StationPlan) -> dict[str, Any]:
     """The stations and their cells; cells as flat indices."""
+    stations = plan.stations
     return {
         "optimal": stations.optimal,
         "at_least": stations.bound,
         "left_out": stations.left_out.tolist(),
         "stations": [
             {
-                "position": list(placements.trials[station.row].pose.position),
-                "rpy_deg": list(placements.trials[station.row].pose.rpy_deg),
+                "position": list(trial.pose.position),
+                "rpy_deg": list(trial.pose.rpy_deg),
                 "cells": station.cells.tolist(),
                 "certified": not refusal,
             }
-            for station, refusal in zip(stations.stations, refusals, strict=True)
+            for station, trial, refusal in zip(
+                stations.stations, plan.trials, plan.refusals, strict=True
+            )
         ],
     }
 
@@ -120,8 +119,7 @@ def _nulled(values: Any, nothing: Any) -> Any:
 def as_text(
     placements: Placements,
     case: str = "",
-    stations: Stations | None = None,
-    refusals: Sequence[str] = (),
+    plan: StationPlan | None = None,
 ) -> str:
     """Placements for people: the answer, where the surface may stand, or what stands against it."""
     proved = placements.answer is Answer.INFEASIBLE and placements.evidence == "proof"
@@ -144,6 +142,7 @@ def as_text(
         ("found", placements.message),
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
         ("missed", _causes_text(placements)),
+        ("check", "" if placements.found else _checked_text(placements)),
         ("time", f"{placements.timing['total_s']:.2f} s"),
     ]
     lines = [PROVED if proved else SENTENCES[placements.answer], ""]
@@ -154,9 +153,14 @@ def as_text(
         lines += ["", f"the best as a case: {put}"]
     elif placements.best is not None:
         lines += ["", "the best of them:", *_table([placements.best])]
-    if stations is not None:
-        lines += ["", *_stations_text(placements, stations, refusals)]
+    if plan is not None:
+        lines += ["", *_stations_text(plan)]
     return "\n".join(lines)
+
+
+def _checked_text(placements: Placements) -> str:
+    """What the full search says of the best placement."""
+    return next((f"of the best: {t.message}" for t in placements.trials[:1] if t.message), "")
 
 
 def _causes_text(placements: Placements) -> str:
@@ -192,19 +196,19 @@ def _table(trials: Sequence[Trial]) -> list[str]:
     return lines
 
 
-def _stations_text(
-    placements: Placements, stations: Stations, refusals: Sequence[str]
-) -> list[str]:
+def _stations_text(plan: StationPlan) -> list[str]:
     """The stations, one a line."""
-    number = len(stations)
+    stations, number = plan.stations, len(plan.stations)
+    if number == 0:
+        return ["no stations: no motion found covers any cell"]
     plural = "" if number == 1 else "s"
     proof = "proved fewest of what was found" if stations.optimal else f"at least {stations.bound}"
     lines = [f"{number} station{plural} ({proof}):"]
-    for station, refusal in zip(stations.stations, refusals, strict=True):
-        pose = placements.trials[station.row].pose
+    for station, trial, refusal in zip(stations.stations, plan.trials, plan.refusals, strict=True):
         lines.append(
-            f"  {len(station.cells):5d} cells at {', '.join(f'{v:.3f}' for v in pose.position)} m, "
-            f"{', '.join(f'{v:.2f}' for v in pose.rpy_deg)} deg"
+            f"  {len(station.cells):5d} cells at "
+            f"{', '.join(f'{v:.3f}' for v in trial.pose.position)} m, "
+            f"{', '.join(f'{v:.2f}' for v in trial.pose.rpy_deg)} deg"
             + (f" (not certified: {refusal})" if refusal else "")
         )
     if len(stations.left_out):

@@ -8,6 +8,7 @@ import io
 import json
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -28,6 +29,7 @@ from feasibility.placement_plot import plot_map
 from feasibility.placement_region import AXES, PlacementError, Pose, Region, moved_cells
 from feasibility.placement_report import as_csv, as_json, as_text, settings_of
 from feasibility.placement_skim import MOST_COVERS, covers_of, skim
+from feasibility.placement_stations import station_plan
 from feasibility.placement_study import StudyJudge, trial_from, trial_table
 from feasibility.placement_trial import Stage, Trial
 from feasibility.placer import Placer
@@ -510,6 +512,7 @@ def test_a_map_tells_what_single_placements_tell() -> None:
         figure = plot_map(chart, placements, value)
         panels = [axes for axes in figure.axes if axes.get_title()]
         assert len(panels) == 2
+        assert figure._repr_png_().startswith(b"\x89PNG")
         stars = [line for axes in panels for line in axes.lines if line.get_marker() == "*"]
         assert len(stars) == 1
         where = [float(stars[0].get_xdata()[0]), float(stars[0].get_ydata()[0])]
@@ -548,26 +551,30 @@ def test_stations_where_no_single_placement_will_do() -> None:
     )
     placements = place(setup.robot, shell, setup.task, region, count=24, around=1)
     assert placements.answer is Answer.INFEASIBLE
-    # As they come back from a store.
-    trials = [trial_from(trial_table(trial)) for trial in placements.trials]
-    stations = stations_of([trial_table(trial) for trial in trials])
+    judge = Local(setup.robot, shell, setup.task, Search())
+    plan = station_plan(placements, judge, count=32)
+    stations = plan.stations
     assert stations.optimal
     assert len(stations) >= 2
+    assert plan.certified
     covered = sum(len(station.cells) for station in stations.stations)
     assert covered + len(stations.left_out) == len(shell)
-    everything = np.vstack([trial.covers for trial in trials if trial.covers.size])
-    assert stations.left_out.tolist() == np.flatnonzero(~everything.any(axis=0)).tolist()
-    placer = Placer(setup.robot, shell, setup.task, Search())
-    refusals = [placer.replayed(trials[s.row], s.component) for s in stations.stations]
-    assert refusals == [""] * len(stations)
-    checked = next(trial for trial in trials if trial.stage is Stage.CHECK)
+    for trial, station in zip(plan.trials, stations.stations, strict=True):
+        assert (trial.covers[station.component] == station.covers).all()
+    placer = judge.placer
+    checked = next(trial for trial in placements.trials if trial.stage is Stage.CHECK)
     assert placer.replayed(checked, 0) == ""
     lying = Trial(checked.pose, Stage.SEARCH, 1.0, covers=np.ones((1, len(shell)), dtype=bool))
     assert "did not find" in placer.replayed(lying, 0)
-    text = as_text(placements, "", stations, refusals)
+    # From any table of motions, no fewer.
+    tables = [trial_table(trial) for trial in placements.trials]
+    assert len(stations_of(tables).left_out) >= len(stations.left_out)
+    text = as_text(placements, "", plan)
     assert f"{len(stations)} stations" in text
     assert "not certified" not in text
-    told = as_json(placements, stations, refusals)["stations"]
+    refused = replace(plan, refusals=("because", *plan.refusals[1:]))
+    assert "(not certified: because)" in as_text(placements, "", refused)
+    told = as_json(placements, plan)["stations"]
     assert told["at_least"] == len(stations) == len(told["stations"])
     assert all(station["certified"] for station in told["stations"])
 
