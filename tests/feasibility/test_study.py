@@ -23,7 +23,7 @@ from feasibility.case import Case
 from feasibility.case_edits import as_read
 from feasibility.study import StudyTask, run_tasks
 from feasibility.study_outcome import arm_of, bits_of, cells_of, cut_of, evaluate, outcome_of
-from feasibility.study_store import Store
+from feasibility.study_store import Store, StoreError
 from feasibility.study_workers import WorkersError, open_workers
 
 SHARED = Path(__file__).parent
@@ -362,6 +362,20 @@ def test_ctrl_c_stores_and_leaves_no_worker(tmp_path) -> None:
     assert len(children) >= 2
     wait_for(lambda: not any(map(alive, children)), patience=10.0)
     assert 0 < stored(path) <= 60
+
+
+def test_a_full_disk_ends_a_study_and_loses_nothing(undisturbed, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("feasibility.study.KEEP_S", 0.0)
+    path = tmp_path / "a.study"
+    with Store(path) as store:
+        store._base.execute("PRAGMA max_page_count = 9")  # SQLite's own full disk
+        with pytest.raises(StoreError, match="disk is full"), open_workers(0) as workers:
+            run_tasks(study_works.plates(), workers, store)
+        held = len(store)
+    assert 0 < held < 60
+    rows = study_works.run_plates(path, 0)
+    assert facts(rows) == undisturbed
+    assert stored(path) == 60
 
 
 # -- workers that cannot be had ---------------------------------------------------------------
