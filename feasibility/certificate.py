@@ -172,7 +172,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     bend = second_derivatives(steps, robot.prismatic, poses.levers, np.inf) + beside.bends[:, 0]
     turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0) + beside.bends[:, 1]
     error, chord, aside = beside.error, beside.chord, beside.bends[:, 2]
-    with np.errstate(invalid="ignore"):  # a fold: inf * 0 is NaN, and refused
+    with np.errstate(invalid="ignore", over="ignore"):  # a fold: inf * 0 is NaN, and refused
         turn = turn + aside * bend
         # At the tool point's own foot the normal is another than at its target.
         before, after = chord[:-1] + aside * error[:-1], chord[1:] + aside * error[1:]

@@ -23,6 +23,8 @@ GUESSES = 4  # places tried first on each piece of a course
 REFINEMENTS = 4  # Newton steps from the best of them
 BLOCK = 4096  # waypoints at once, to bound the memory
 LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
+MOST_LOOKS = 400  # times that many places on a course over a mesh
+CLEAR = 1.0  # [1] times the tolerance by which a target may be nearer to a mesh than the standoff
 ARRIVED = 0.02  # [1] share of the tolerance: a tool point so near to a centre is at it
 STAYS = -1  # in place of a course
 
@@ -81,7 +83,13 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     inner = np.flatnonzero(walk.cell < 0)
     along = inner[course[stretch[inner]] != STAYS]
     places[along] = _nearest(ways, course[stretch[along]], points[along])
-    places[along] = _at_ends(ways, course[stretch[along]], places[along], points[along], task)
+    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    arrived = walk.cell >= 0
+    for place in (0.0, 1.0):
+        centre, _ = _at(ways, course[stretch[along]], np.full(len(along), place))
+        there = np.linalg.norm(points[along] - centre, axis=1) <= ARRIVED * tolerance
+        places[along[there]] = place
+        arrived[along[there]] = True
     t0, t1 = places[:-1].copy(), places[1:].copy()
     t0[marks[:-1]] = backwards[marks[:-1]]
     t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
@@ -100,11 +108,11 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     bends, strays = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
     bends[:, 2] = ways.standing
     # A motion over one centre, at the end of a course, is none along it.
-    stands = (t0 == t1) & ((t0 == 0.0) | (t0 == 1.0))
+    stands = (t0 == t1) & arrived[:-1] & arrived[1:]
     moves = np.flatnonzero((course[stretch] != STAYS) & ~stands)
     used, which = np.unique(course[stretch[moves]], return_inverse=True)
     bends[moves] = _bends(ways, course[stretch[moves]], t0[moves], t1[moves])
-    found, fault = _strays(cells, task.standoff, used)
+    found, fault = _strays(cells, task.standoff, used, tolerance)
     strays[moves] = found[which]
     return Following(
         error=np.linalg.norm(points - target, axis=1),
@@ -173,17 +181,6 @@ def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> A
     return t
 
 
-def _at_ends(
-    ways: TargetCourses, course: NDArray[np.int64], t: Array, points: Array, task: Task
-) -> Array:
-    """The places t (k,), but the end of the course where a point is at a cell's centre already."""
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
-    for end in (0.0, 1.0):
-        centre, _ = _at(ways, course, np.full(len(t), end))
-        t = np.where(np.linalg.norm(points - centre, axis=1) <= ARRIVED * tolerance, end, t)
-    return t
-
-
 def _bends(ways: TargetCourses, course: NDArray[np.int64], t0: Array, t1: Array) -> Array:
     """(k, 3) see `Following.bends`, of segments from t0 to t1 on courses."""
     low, _, _ = _pieces(ways, course, np.minimum(t0, t1))
@@ -198,18 +195,18 @@ def _bends(ways: TargetCourses, course: NDArray[np.int64], t0: Array, t1: Array)
     return most
 
 
-def _strays(cells: Cells, standoff: float, used: NDArray[np.int64]) -> tuple[Array, str]:
+def _strays(
+    cells: Cells, standoff: float, used: NDArray[np.int64], tolerance: float
+) -> tuple[Array, str]:
     """How far target points and directions of courses are from the surface's, and a fault.
 
     The surface itself is asked for its nearest points, at places that the fit of the courses did
-    not look at; what the courses say of themselves counts where it is more.
+    not look at; what the courses say of themselves counts where it is more. On a mesh the places
+    are half a tolerance apart, and the targets are looked at too: a thorn beside the course, or
+    another part of the mesh, may be nearer to them than the standoff.
     """
     courses, surface = cells.courses, cells.surface
-    count = np.diff(courses.first)[used]
-    owner = np.repeat(np.arange(len(used)), count)
-    piece = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    t = ((piece[:, None] + LOOKS) / count[owner][:, None]).reshape(-1)
-    owner = np.repeat(owner, len(LOOKS))
+    owner, t = _looks(cells, used, 0.5 * tolerance)
     foot, normal = courses.at(used[owner], t)
     found = surface.closest(foot)
     strays = courses.strays[used].copy()
@@ -219,4 +216,29 @@ def _strays(cells: Cells, standoff: float, used: NDArray[np.int64]) -> tuple[Arr
         return strays, "a course between two cells is not known"
     if not found.inside.all():
         return strays, "a course between two cells leaves the surface"
-    return np.column_stack([strays[:, 0] + standoff * strays[:, 1], strays[:, 1]]), ""
+    strays[:, 0] += standoff * strays[:, 1]
+    if surface.grain > 0.0 and standoff > 0.0:
+        away = np.abs(surface.closest(foot + surface.side_sign * standoff * normal).height)
+        nearer = standoff - away - strays[owner, 0]
+        if not nearer.max(initial=0.0) <= CLEAR * tolerance:
+            return strays, (
+                f"on its way the tool point would come within {1e3 * away.min():.3g} mm of the "
+                f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something stands out "
+                "of it there"
+            )
+    return strays, ""
+
+
+def _looks(cells: Cells, used: NDArray[np.int64], apart: float) -> tuple[NDArray[np.int64], Array]:
+    """Places (k,) to look at: which of the used courses, and t on it."""
+    courses = cells.courses
+    count = np.diff(courses.first)[used]
+    if cells.surface.grain > 0.0:
+        ends = cells.centres[cells.pairs[used]]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        fine = np.ceil(length / apart / len(LOOKS)).astype(np.int64)
+        count = np.maximum(count, np.minimum(fine, MOST_LOOKS))
+    owner = np.repeat(np.arange(len(used)), count)
+    part = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    t = ((part[:, None] + LOOKS) / count[owner][:, None]).reshape(-1)
+    return np.repeat(owner, len(LOOKS)), t

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from surfaces import Cells
 
-ASIDE = 1.1  # [1] the normal may turn that much faster across the courses than along them
+ASIDE = 1.1  # [1] the normal may turn that much faster between the places looked at
 
 
 class TargetCourses(NamedTuple):
@@ -55,7 +55,10 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
     bends = courses.bends.copy()
     bends[:, 0] += standoff * bends[:, 1]
     bends[np.repeat(folded, np.diff(courses.first))] = np.inf
-    turning = ASIDE * courses.turning(height)
+    # To the side of a course the normal may turn faster than along it.
+    across = cells.surface.sharpness(cells, height)[cells.pairs].max(axis=1)
+    turning = np.maximum(courses.turning(height), np.repeat(across, np.diff(courses.first)))
+    turning *= ASIDE
     ends = np.concatenate([courses.first[:-1][~folded], courses.first[1:][~folded] - 1])
     strays = courses.strays.copy()
     strays[:, 0] += standoff * strays[:, 1]

@@ -182,6 +182,7 @@ def _fit(cells: Cells, pairs: NDArray[np.int64], count: int, parts: int) -> tupl
     moves = [np.sqrt((np.diff(values[..., half], axis=0) ** 2).sum(axis=2)) for half in HALVES]
     turning = np.divide(moves[1], moves[0], out=np.zeros_like(moves[0]), where=moves[0] > 0.0)
     sharpest = SHARPER * cells.sharpness[pairs].max(axis=1)
+    sharpest[smoothed] = 0.0  # measured, to the side too
     stray[1] = stray[1] + np.maximum(turning.max(axis=0), sharpest) * stray[0]
     by_course = cubics.reshape(count, 4, len(pairs), 6).transpose(2, 0, 1, 3)
     return by_course, BETWEEN * np.stack(stray, axis=1)

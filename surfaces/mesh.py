@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.checks import Checks
 from surfaces.mesh_normals import blended, carried, corner_normals, unit
-from surfaces.surface import Foot, Side, Surface, points_of
+from surfaces.surface import Foot, Side, Surface, points_of, sharpest_turn
 from surfaces.triangles import TriangleMesh
 
 if TYPE_CHECKING:
@@ -129,6 +129,20 @@ class MeshSurface(Surface):
         found = np.einsum("mkc,mkci->mki", weights, corners) @ self.rotation.T + self.position
         return found, self.normals_at(faces, weights)
 
+    def sharpness(self, cells: Cells, height: float = 0.0) -> Array:
+        """See `Surface.sharpness`: of the face of each cell where the normal turns fastest."""
+        from surfaces.mesh_cells import MeshCells
+
+        if not isinstance(cells, MeshCells):
+            raise TypeError("the cells are not of a mesh")
+        corners = self.mesh.vertices[self.mesh.faces]
+        turns = self.corner_normals[:, 1:] - self.corner_normals[:, :1]  # along two sides
+        slopes = corners[:, 1:] - corners[:, :1] + height * turns
+        face = sharpest_turn(*(_products(sides) for sides in (slopes, turns)))
+        sharpest = np.zeros(len(cells))
+        np.maximum.at(sharpest, cells.labels, face)
+        return sharpest
+
     def cells(self, count: int | None = None, size: float | None = None) -> MeshCells:
         """Cut the mesh into connected cells of even area.
 
@@ -205,6 +219,12 @@ class MeshSurface(Surface):
     def __repr__(self) -> str:
         """One line."""
         return f"mesh({self.mesh!r}, side={self.side!r}, position={self.position.tolist()})"
+
+
+def _products(sides: Array) -> tuple[Array, Array, Array]:
+    """x.x, x.y and y.y of two vectors each (k, 2, 3)."""
+    x, y = sides[:, 0], sides[:, 1]
+    return (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
 
 
 def _bent_lines(start: Array, middle: Array, end: Array, t: Array) -> Array:

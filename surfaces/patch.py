@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.surface import TURN_TOLERANCE, Surface
+from surfaces.surface import TURN_TOLERANCE, Surface, sharpest_turn
 
 if TYPE_CHECKING:
     from surfaces.cells import Cells
@@ -109,7 +109,7 @@ class Patch(Surface):
         us[over], vs[over] = _over_a_pole(self, cells, pairs[over], t)
         return self.point(us, vs), self.normal(us, vs)
 
-    def sharpness(self, cells: Cells) -> NDArray[np.float64]:
+    def sharpness(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
         """See `Surface.sharpness`: the larger principal curvature, by central differences."""
         places = cells.u, cells.v  # type: ignore[attr-defined]  # of a grid
         slopes, turns = [], []
@@ -117,15 +117,10 @@ class Patch(Surface):
             step = np.zeros((2, 1))
             step[axis] = min(DIFFERENCE, 0.25 / cells.shape[axis]) * (high - low)
             ahead, behind = np.add(places, step), np.subtract(places, step)
-            slopes.append(self.point(*ahead) - self.point(*behind))
             turns.append(self.normal(*ahead) - self.normal(*behind))
+            slopes.append(self.point(*ahead) - self.point(*behind) + height * turns[-1])
         (e, f, g), (a, b, c) = map(_products, (slopes, turns))
-        # The eigenvalues of inv([[e, f], [f, g]]) @ [[a, b], [b, c]] are the squared curvatures.
-        area = e * g - f * f
-        half = 0.5 * (a * g - 2.0 * b * f + c * e) / area
-        product = (a * c - b * b) / area
-        largest = half + np.sqrt(np.maximum(half * half - product, 0.0))
-        return np.asarray(np.sqrt(np.maximum(largest, 0.0)))
+        return sharpest_turn((e, f, g), (a, b, c))
 
     def cells(self, nu: int, nv: int) -> GridCells:
         """Cut the patch into nu x nv E-cells of equal parameter steps.

@@ -147,10 +147,10 @@ class Piecewise(Surface):
         creased[creased] = cells.joints.of(pairs[creased]).creases > SMOOTH
         return creased
 
-    def sharpness(self, cells: Cells) -> Array:
+    def sharpness(self, cells: Cells, height: float = 0.0) -> Array:
         """See `Surface.sharpness`."""
         cells = _own(cells)
-        return np.concatenate([grid.sharpness for grid in cells.grids])
+        return np.concatenate([grid.surface.sharpness(grid, height) for grid in cells.grids])
 
     def cells(self, counts: Any) -> PieceCells:
         """Cut every piece into a grid of cells.

@@ -128,12 +128,14 @@ class Surface(ABC):
         """(m,) where ways are smoother than the surface, so that `beneath` tells how far off."""
         return np.full(len(pairs), self.grain > 0.0)
 
-    def sharpness(self, cells: Cells) -> NDArray[np.float64]:
-        """(N,) 1/m, how fast the normal turns at each centre in the sharpest direction.
+    @abstractmethod
+    def sharpness(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
+        """(N,) 1/m, how fast the normal turns in each cell, in the sharpest direction.
 
-        0 where that is not known, because ways are measured by `beneath` anyway.
+        Args:
+            cells: cells of this surface.
+            height: signed height (m) of the parallel surface whose metres are meant.
         """
-        return np.zeros(len(cells))
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
         """The same surface after the rigid motion x -> rotation x + translation."""
@@ -152,6 +154,25 @@ def points_of(points: ArrayLike) -> NDArray[np.float64]:
     if array.shape[-1:] != (3,):
         raise ValueError(f"points must have shape (..., 3), got {array.shape}")
     return array
+
+
+def sharpest_turn(
+    slopes: tuple[NDArray[np.float64], ...], turns: tuple[NDArray[np.float64], ...]
+) -> NDArray[np.float64]:
+    """(k,) how fast a normal turns, at most, for each metre of the surface that it belongs to.
+
+    Args:
+        slopes: e, f, g: products x.x, x.y, y.y of two steps x and y on the surface, (k,) each.
+        turns: a, b, c: the same products of what the normal changes by along these steps.
+
+    The square of what is wanted is the larger eigenvalue of [[e, f], [f, g]]^-1 [[a, b], [b, c]].
+    """
+    (e, f, g), (a, b, c) = slopes, turns
+    area = np.maximum(e * g - f * f, 1e-300)
+    half = 0.5 * (a * g - 2.0 * b * f + c * e) / area
+    product = (a * c - b * b) / area
+    largest = half + np.sqrt(np.maximum(half * half - product, 0.0))
+    return np.asarray(np.sqrt(np.maximum(largest, 0.0)))
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:

@@ -223,9 +223,6 @@ THIN = [
 ]
 
 
-@pytest.mark.xfail(
-    strict=True, reason="the turning of the normal across a course is not in the bound"
-)
 @pytest.mark.parametrize("case", THIN)
 def test_the_cone_holds_along_a_thin_rod_where_the_tool_point_is(case):
     """A rod bends across the way only; a tool point to the side of it meets another normal."""
@@ -266,7 +263,6 @@ def thorny_plate():
 THORN = (0.08069597657662232, 0.21995366749323075)
 
 
-@pytest.mark.xfail(strict=True, reason="places on courses are looked at too far apart")
 def test_no_motion_is_certified_through_a_thorn():
     """The tool point keeps its distance from everything, also from what is thin."""
     vertices, faces = thorny_plate()
