@@ -15,6 +15,7 @@ from typing import NoReturn
 
 from feasibility import commands
 from feasibility.cli_jobs import add_case, add_jobs
+from feasibility.cli_studies import add_studies
 from feasibility.console import prepare, say, tell
 
 INTERRUPTED = 130
@@ -57,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     subcommands = parser.add_subparsers(metavar="COMMAND", required=True)
     _add_check(subcommands)
     add_jobs(subcommands)
+    add_studies(subcommands, add_case)
 
     listing = subcommands.add_parser("cases", help="list the built-in cases", allow_abbrev=False)
     listing.set_defaults(run=commands.cases)
@@ -159,6 +161,8 @@ def _expected() -> tuple[type[Exception], ...]:
     for module, name in (
         ("feasibility.case_faults", "CaseError"),
         ("feasibility.route", "PathError"),
+        ("feasibility.placement_region", "PlacementError"),
+        ("feasibility.study_workers", "WorkersError"),
         ("feasibility.result", "ResultError"),
         ("robots.robot", "RobotError"),
         ("surfaces.surface", "SurfaceError"),

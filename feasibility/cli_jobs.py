@@ -11,11 +11,12 @@ STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a
 left out, 3 undecided"""
 
 
-def add_case(parser: argparse.ArgumentParser) -> None:
+def add_case(parser: argparse.ArgumentParser, *, html: bool = True) -> None:
     """The arguments that every command about one case has."""
     parser.add_argument("case", metavar="CASE", help="a case file, or a built-in case")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
-    parser.add_argument("--html", metavar="FILE", help="write the view as one self-contained page")
+    if html:
+        parser.add_argument("--html", metavar="FILE", help="write one self-contained page")
     parser.add_argument(
         "--set",
         dest="settings",
@@ -42,16 +43,20 @@ def add_jobs(subcommands: argparse._SubParsersAction) -> None:
         "--order", choices=ORDERS, help="default: rows on a grid of cells, shortest on others"
     )
     path.add_argument(
-        "--speed", type=_positive, default=0.1, metavar="M_PER_S",
+        "--speed", type=positive, default=0.1, metavar="M_PER_S",
         help="largest speed of the tool point, m/s (default 0.1)",
     )  # fmt: skip
     path.add_argument(
-        "--acceleration", type=_positive, metavar="RAD_PER_S2",
+        "--velocity", type=positive, metavar="RAD_PER_S",
+        help="largest velocity of every joint, rad/s or m/s (default: the URDF's limits)",
+    )  # fmt: skip
+    path.add_argument(
+        "--acceleration", type=positive, metavar="RAD_PER_S2",
         help="largest acceleration of every joint, rad/s^2 or m/s^2 (default: what takes a joint "
         "to its largest velocity in half a second)",
     )  # fmt: skip
     path.add_argument(
-        "--period", type=_positive, default=0.02, metavar="S",
+        "--period", type=positive, default=0.02, metavar="S",
         help="time between samples, seconds (default 0.02)",
     )  # fmt: skip
     path.add_argument(
@@ -95,7 +100,7 @@ def _run(name: str) -> Callable[[argparse.Namespace, float], int]:
     return run
 
 
-def _positive(text: str) -> float:
+def positive(text: str) -> float:
     """A finite number > 0."""
     try:
         number = float(text)

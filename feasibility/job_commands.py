@@ -44,7 +44,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.timing import trajectory
 
         robot = question.setup.robot
-        limits = motion_limits(robot, args.speed, acceleration=args.acceleration)
+        limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
         verdict = check(*question.setup, progress=question.progress)
         if not verdict.feasible:
             reason = f"no path over this surface is known. {verdict!r}"
@@ -55,7 +55,13 @@ def path(args: argparse.Namespace, began: float) -> int:
         order: Order = args.order or ("rows" if len(verdict.cells.shape) == 2 else "shortest")
         found = coverage_path(verdict, order)
         question.progress(0, None, "timing the path")
-        run = trajectory(found, args.speed, acceleration=args.acceleration, period=args.period)
+        run = trajectory(
+            found,
+            args.speed,
+            velocity=args.velocity,
+            acceleration=args.acceleration,
+            period=args.period,
+        )
     say(json_text(as_json(found, run, limits)) if args.json else as_text(found, run, limits))
     for out in args.out:
         from feasibility.trajectory_files import save_trajectory

@@ -169,10 +169,11 @@ def sharpest_turn(
     """
     (e, f, g), (a, b, c) = slopes, turns
     area = np.maximum(e * g - f * f, 1e-300)
-    half = 0.5 * (a * g - 2.0 * b * f + c * e) / area
-    product = (a * c - b * b) / area
-    largest = half + np.sqrt(np.maximum(half * half - product, 0.0))
-    return np.asarray(np.sqrt(np.maximum(largest, 0.0)))
+    with np.errstate(over="ignore", invalid="ignore"):  # a surface that stands still
+        half = 0.5 * (a * g - 2.0 * b * f + c * e) / area
+        product = (a * c - b * b) / area
+        largest = half + np.sqrt(np.maximum(half * half - product, 0.0))
+    return np.where(np.isfinite(largest), np.sqrt(np.maximum(largest, 0.0)), np.inf)
 
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:

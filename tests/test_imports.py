@@ -18,14 +18,17 @@ PACKAGES = ("robots", "surfaces", "feasibility")
 WORDS = "search target_courses task verdict version"
 SEARCHES = ""
 ASKING = "checking"
-USING = "explain"
+USING = "explain placement placer"
 STORED = """archive case case_edits case_faults case_kinds case_mesh case_patches case_pieces
     case_robot case_surface case_task files result result_cells result_fields result_graph
     result_robot toml_text trajectory_files"""
-EDGE = """asking cell_shapes cli cli_jobs commands console division_report explain_report job_commands
-    job_view listing meshcat_server meshes motion page path_report plots report robot_visuals scene
-    threejs viewer"""
-LAYERS = tuple(names.split() for names in (WORDS, SEARCHES, ASKING, USING, STORED, EDGE))
+STUDIES = """comparison placement_stations placement_study stations study study_axes study_dealing
+    study_file study_frames study_outcome study_store study_workers"""
+EDGE = """asking cell_shapes cli cli_jobs cli_studies commands comparison_report console
+    division_report explain_report job_commands job_view listing meshcat_server meshes motion page
+    path_report placement_commands placement_plot placement_report plots report robot_visuals scene
+    skin study_commands study_report threejs viewer"""
+LAYERS = tuple(names.split() for names in (WORDS, SEARCHES, ASKING, USING, STORED, STUDIES, EDGE))
 
 HEAVY = {"matplotlib", "meshcat", "rich", "trimesh", "yourdfpy"}
 

@@ -1,0 +1,96 @@
+"""The arguments of the commands that ask many questions: `study`, `compare`, `place`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+from feasibility.cli_jobs import positive
+
+AXES = {
+    "x": "m", "y": "m", "z": "m", "roll": "degrees", "pitch": "degrees", "yaw": "degrees"
+}  # fmt: skip
+
+
+def add_studies(subcommands: argparse._SubParsersAction, add_case: Callable[..., None]) -> None:
+    """Add the three commands.
+
+    Args:
+        subcommands: of the command line.
+        add_case: adds the arguments of a command about one case.
+    """
+    study = subcommands.add_parser(
+        "study",
+        help="many cases at once, kept as they come",
+        description="Decide every case of a study file. What is finished is kept in one file; run "
+        "the command again after an interruption, and it goes on from there.",
+        epilog="exit status: 0; 3 where some cases failed; 2 bad input, 130 interrupted",
+        allow_abbrev=False,
+    )
+    study.add_argument("file", metavar="FILE", help="a study file (TOML)")
+    study.add_argument("--out", metavar="FILE", required=True, help="where finished cases are kept")
+    study.add_argument("--json", action="store_true", help="print one JSON object")
+    study.add_argument("--csv", metavar="FILE", help="write the table")
+    _add_workers(study)
+    study.set_defaults(run=_run("study_commands", "study"))
+
+    compare = subcommands.add_parser(
+        "compare",
+        help="one case, several arms side by side",
+        description="Put the same question to several arms.",
+        allow_abbrev=False,
+    )
+    add_case(compare)
+    compare.add_argument(
+        "--robots", metavar="NAMES", required=True, help="names of arms, such as ur5,panda,kinova"
+    )
+    compare.add_argument(
+        "--critical", action="store_true", help="find the smallest cone of each arm too (slow)"
+    )
+    compare.add_argument("--csv", metavar="FILE", help="write the table")
+    _add_workers(compare)
+    compare.set_defaults(run=_run("study_commands", "compare"))
+
+    place = subcommands.add_parser(
+        "place",
+        help="where the surface may stand",
+        description="Search a region of positions and orientations of the surface (in the frame of "
+        "the URDF's root link) for placements that one continuous motion covers.",
+        epilog="exit status: 0 a placement is feasible, 1 none was found, 3 undecided",
+        allow_abbrev=False,
+    )
+    add_case(place, html=False)
+    for name, unit in AXES.items():
+        place.add_argument(
+            f"--{name}", nargs=2, type=float, metavar=("FROM", "TO"),
+            help=f"range of the surface's {name}, {unit} (default: as in the case)",
+        )  # fmt: skip
+    place.add_argument("--count", type=int, metavar="N", help="placements that are tried first")
+    place.add_argument(
+        "--stations", action="store_true",
+        help="where no placement will do alone: the fewest that together cover the surface",
+    )  # fmt: skip
+    place.add_argument("--csv", metavar="FILE", help="write the placements as a table")
+    place.add_argument("--map", metavar="FILE", help="draw the share covered over the region")
+    place.add_argument("--out", metavar="FILE", help="keep finished placements, to go on from them")
+    place.add_argument("--time-limit", type=positive, metavar="S", help="seconds")
+    _add_workers(place)
+    place.set_defaults(run=_run("placement_commands", "run_place"))
+
+
+def _add_workers(parser: argparse.ArgumentParser) -> None:
+    """Who does the work."""
+    who = parser.add_mutually_exclusive_group()
+    who.add_argument("--workers", type=int, metavar="N", help="processes (default: one a core)")
+    who.add_argument("--dask", metavar="ADDRESS", help="a Dask scheduler, such as tcp://host:8786")
+
+
+def _run(module: str, name: str) -> Callable[[argparse.Namespace, float], int]:
+    """A command that is loaded when it runs, so that `--help` is quick."""
+
+    def run(args: argparse.Namespace, began: float) -> int:
+        from importlib import import_module
+
+        return int(getattr(import_module(f"feasibility.{module}"), name)(args, began))
+
+    return run
