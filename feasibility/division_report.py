@@ -11,9 +11,8 @@ import numpy as np
 
 from feasibility.division import Division, Plan, SubPatch
 from feasibility.reconfigure import Reconfiguration
-from feasibility.report import CAUSES, DETAILS, WIDTH
+from feasibility.report import WIDTH, causes_listed
 from feasibility.result import plain
-from feasibility.verdict import Cause, CauseKind
 from feasibility.version import version
 from surfaces import Cells
 
@@ -150,7 +149,7 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
         lines += ["", "With patches that are each connected on the surface:"]
         lines += _steps(division.connected, division)
     if division.left_out:
-        lines += ["", "Left out:", *_groups(division)]
+        lines += ["", "Left out:", *causes_listed(division.left_out, division.cells)]
     if len(division.unsettled):
         open_cells = f"{len(division.unsettled):,} cells: the time limit ran out before they were"
         lines += ["", "Not settled:", f"  {open_cells}"]
@@ -199,18 +198,3 @@ def _middle(patch: SubPatch, cells: Cells) -> list[int]:
     centres = cells.centres[patch.cells]
     away = np.linalg.norm(centres - centres.mean(axis=0), axis=1)
     return list(cells.unravel(int(patch.cells[np.argmin(away)])))
-
-
-def _groups(division: Division) -> Iterator[str]:
-    """Causes grouped by kind, the largest group first, with the first few details."""
-    groups: dict[tuple[CauseKind, bool], list[Cause]] = {}
-    for cause in division.left_out:
-        groups.setdefault((cause.kind, cause.proved), []).append(cause)
-    for (kind, proved), causes in sorted(groups.items(), key=lambda item: -len(item[1])):
-        number = len(causes)
-        cells = "1 cell" if number == 1 else f"{number:,} cells"
-        yield f"  {cells}: {CAUSES[kind]}{', proved' if proved else ''}"
-        for cause in causes[:DETAILS]:
-            yield f"    {list(division.cells.unravel(cause.cell))} {cause.detail}".rstrip()
-        if number > DETAILS:
-            yield f"    ... and {number - DETAILS:,} more (--json lists all)"

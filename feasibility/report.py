@@ -6,7 +6,7 @@ import csv
 import io
 import math
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from feasibility.case_kinds import OWN_KEYS
 from feasibility.result import plain
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 from feasibility.version import version
+from surfaces import Cells
 
 WIDTH = 100  # columns
 DETAILS = 3  # cells of one group whose details are told
@@ -117,7 +118,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("time", _time_text(_seconds(verdict, before_s))),
     ]
     lines = [head, "", *(_row(name, text) for name, text in rows if text)]
-    groups = list(_groups(verdict))
+    groups = list(causes_listed(verdict.causes, verdict.cells))
     if groups:
         lines += ["", "Not covered:", *groups]
     hints = _hints(verdict)
@@ -174,17 +175,17 @@ def _seconds(verdict: Verdict, before_s: float) -> dict[str, float]:
     return seconds | {key: seconds[key] + before_s for key in ("load_s", "total_s")}
 
 
-def _groups(verdict: Verdict) -> Iterator[str]:
+def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:
     """Causes grouped by kind, the largest group first, with the first few details."""
     groups: dict[tuple[CauseKind, bool], list[Cause]] = {}
-    for cause in verdict.causes:
+    for cause in missed:
         groups.setdefault((cause.kind, cause.proved), []).append(cause)
     for (kind, proved), causes in sorted(groups.items(), key=lambda item: -len(item[1])):
         number = len(causes)
-        cells = "1 cell" if number == 1 else f"{number:,} cells"
-        yield f"  {cells}: {CAUSES[kind]}{', proved' if proved else ''}"
+        counted = "1 cell" if number == 1 else f"{number:,} cells"
+        yield f"  {counted}: {CAUSES[kind]}{', proved' if proved else ''}"
         for cause in causes[:DETAILS]:
-            yield f"    {list(verdict.cells.unravel(cause.cell))} {cause.detail}".rstrip()
+            yield f"    {list(cells.unravel(cause.cell))} {cause.detail}".rstrip()
         if number > DETAILS:
             yield f"    ... and {number - DETAILS:,} more (--json lists all)"
 

@@ -18,7 +18,7 @@ PACKAGES = ("robots", "surfaces", "feasibility")
 WORDS = "search target_courses task verdict version"
 SEARCHES = ""
 ASKING = "checking"
-USING = "explain placement placer"
+USING = "explain placement placement_map placer"
 STORED = """archive case case_edits case_faults case_kinds case_mesh case_patches case_pieces
     case_robot case_surface case_task files result result_cells result_fields result_graph
     result_robot toml_text trajectory_files"""
