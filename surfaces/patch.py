@@ -115,7 +115,7 @@ class Patch(Surface):
         slopes, turns = [], []
         for axis, (low, high) in enumerate((self.u_range, self.v_range)):
             step = np.zeros((2, 1))
-            step[axis] = min(DIFFERENCE, 0.25 / cells.shape[axis]) * (high - low)
+            step[axis] = min(DIFFERENCE, 0.25 / max(cells.shape[axis], 1)) * (high - low)
             ahead, behind = np.add(places, step), np.subtract(places, step)
             turns.append(self.normal(*ahead) - self.normal(*behind))
             slopes.append(self.point(*ahead) - self.point(*behind) + height * turns[-1])
