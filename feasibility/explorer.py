@@ -138,6 +138,10 @@ class Explorer:
         if time.monotonic() > self.deadline:
             raise OutOfTime
 
+    def before_next_look(self) -> int:
+        """Evaluations of the arm that compiled loops may take before they come back to `tick`."""
+        return BUDGET
+
     def guesses(self, k: int) -> NDArray[np.float64]:
         """(k, n) random configurations inside the limits."""
         return self.rng.uniform(self.low, self.high, (k, self.robot.n))
@@ -152,7 +156,7 @@ class Explorer:
                 self.indptr,
                 self.indices,
                 self.links,
-                BUDGET,
+                self.before_next_look(),
             )
             if status == COVERED:
                 return True
@@ -232,7 +236,8 @@ class Explorer:
         """Branch and bound on one cell; a configuration that it finds is planted."""
         ruling, looked = Ruling.OPEN, int(boxes.counts[1])
         while ruling is Ruling.OPEN and boxes.counts[1] < most:
-            ruling, q = rule(self.problem, self.work, cell, boxes, min(most, BUDGET))
+            budget = min(most, self.before_next_look())
+            ruling, q = rule(self.problem, self.work, cell, boxes, budget)
             self.tick("proving cells out of reach")
         self.boxes += int(boxes.counts[1]) - looked
         self.rulings[cell] = ruling

@@ -3,8 +3,10 @@
 The path's straight lines are blended into a smooth curve (`blend`); toppra finds the largest speed
 along it that velocities, accelerations and the tool's speed allow (`parameterisation`). Velocities
 hold by construction (`speed_limits`). What accelerations are over, from toppra's own rounding, is
-taken back by running everything a little slower. So all limits hold between samples, too. The
-samples at last are replayed like any witness, as a motion of straight lines.
+taken back by running everything a little slower. So all limits hold along the curve, between
+samples too. (A controller that puts curves of its own through the samples may pass accelerations
+for a moment; sample more densely where that matters.) The samples at last are replayed like any
+witness, as a motion of straight lines.
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ from feasibility.problem import Problem
 from feasibility.roadmap import NODES
 from feasibility.verdict import Answer, Evidence, Walk
 
+LEAST = 100  # evaluations between two looks at the ration
+
 
 @dataclass
 class Rationed(Explorer):
@@ -28,6 +30,11 @@ class Rationed(Explorer):
         super().tick(text)
         if self.work.counts[0] > self.most:
             raise OutOfTime
+
+    def before_next_look(self) -> int:
+        """No more than is left of the ration; see `Explorer.before_next_look`."""
+        left = self.most - float(self.work.counts[0])
+        return int(min(super().before_next_look(), max(left, LEAST)))
 
     def plant(self, cell: int, guesses: NDArray[np.float64]) -> int:
         """Plant, unless the ration is used up; see `Explorer.plant`."""
