@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,9 @@ def folded_courses(cells: Cells, height: float) -> NDArray[np.bool_]:
     return np.asarray(cell[cells.pairs].any(axis=1))
 
 
+@lru_cache(
+    maxsize=2
+)  # search and replay ask for the same; cells are values, told apart by identity
 def target_courses(cells: Cells, standoff: float) -> TargetCourses:
     """Offset the courses of `cells` to the tool's side by `standoff` (m)."""
     courses, sign = cells.courses, cells.surface.side_sign
@@ -62,6 +66,8 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
     ends = np.concatenate([courses.first[:-1][~folded], courses.first[1:][~folded] - 1])
     strays = courses.strays.copy()
     strays[:, 0] += standoff * strays[:, 1]
+    for array in (cubics, bends, turning, strays, folded):
+        array.flags.writeable = False
     return TargetCourses(
         first=courses.first,
         cubics=cubics,
