@@ -75,7 +75,7 @@ def open_workers(
     if address is not None and count is not None:
         raise WorkersError("give a number of worker processes or the address of Dask, not both")
     if count is not None and count < 0:
-        raise ValueError(f"the number of workers must be >= 0, got {count}")
+        raise WorkersError(f"the number of workers must be >= 0, got {count}")
     workers: Workers
     if address is not None:
         workers = DaskWorkers(address)
