@@ -85,9 +85,13 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     places[along] = _nearest(ways, course[stretch[along]], points[along])
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     arrived = walk.cell >= 0
+    # Taken to be at the centre, a tool point is off by that way; beside the course it strays.
+    off = ways.standing * ARRIVED * tolerance
+    pays = ways.strays[course[stretch[along]], 1] > off
     for place in (0.0, 1.0):
         centre, _ = _at(ways, course[stretch[along]], np.full(len(along), place))
         there = np.linalg.norm(points[along] - centre, axis=1) <= ARRIVED * tolerance
+        there &= pays
         places[along[there]] = place
         arrived[along[there]] = True
     t0, t1 = places[:-1].copy(), places[1:].copy()

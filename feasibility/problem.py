@@ -20,6 +20,7 @@ ORDINARY = 0.01  # [1] share of the rim that an ordinary course may stray
 # The replay takes the place on the course that is nearest to the tool point, up to twice `near`
 # from the one aimed at, and wants the cone to hold at the tool point's own foot.
 ASIDE = 0.05  # [1] share of a piece by which that nearest place may lie off the one aimed at
+STANDING = 0.999  # [1] share of the tolerance that motions over a centre may use: courses stray too
 NEAR_COSTS = 3.0  # [1], times `near` and the turning of the normal: what that may cost of the rim
 
 # Why a motion stopped: the constraint that left no room.
@@ -183,7 +184,7 @@ def look_at(problem, work, target, approach):  # type: ignore[no-untyped-def]
     work.bend[1] = 0.0
     work.bend[2] = problem.turning
     work.bend[3] = 0.0
-    work.room[0] = problem.tolerance
+    work.room[0] = STANDING * problem.tolerance
     work.room[1] = problem.inner_rim
     for k in range(3):
         work.target[0, k] = target[k]
