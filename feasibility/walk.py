@@ -52,104 +52,126 @@ def _filled(size, value):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _longer(route):  # type: ignore[no-untyped-def]
-    """The same route with twice the room."""
-    result = np.empty(2 * route.shape[0], dtype=np.int64)
-    for k in range(route.shape[0]):
-        result[k] = route[k]
-    return result
+def _appended(route, length, links):  # type: ignore[no-untyped-def]
+    """The route with more signed edges behind its first `length`, in an array with room for it."""
+    more = links.shape[0]
+    if length + more > route.shape[0]:
+        wider = np.empty(2 * (length + more), dtype=np.int64)
+        for k in range(length):
+            wider[k] = route[k]
+        route = wider
+    for k in range(more):
+        route[length + k] = links[k]
+    return route
+
+
+@kernel
+def _next_node(roadmap, indptr, links, seen, here):  # type: ignore[no-untyped-def]
+    """The link to the neighbour over an unseen cell that has fewest unseen ones itself; or -1.
+
+    Warnsdorff's rule: so that corners are not left behind.
+    """
+    best, fewest = -1, 1 << 60
+    for k in range(indptr[here], indptr[here + 1]):
+        y = links[k, 0]
+        if seen[roadmap.cell[y]]:
+            continue
+        open_ends = 0
+        for i in range(indptr[y], indptr[y + 1]):
+            if not seen[roadmap.cell[links[i, 0]]]:
+                open_ends += 1
+        if open_ends < fewest:
+            best, fewest = k, open_ends
+    return best
+
+
+@kernel
+def _to_nearest_unseen(roadmap, indptr, links, seen, here, turn, search):  # type: ignore[no-untyped-def]
+    """Signed edges of a shortest path to a node over an unseen cell, and that node.
+
+    Args:
+        roadmap: the `Roadmap`.
+        indptr: see `_adjacency`.
+        links: the same.
+        seen: (N,) cells.
+        here: where the path begins.
+        turn: another number for each search, from 1 on.
+        search: (nodes, 4) for each node the last search that met it, zero at first, the link by
+            which it was met and the node before it; and the queue.
+
+    Returns:
+        No edges and -1 where there is no such node.
+    """
+    stamp, came, before, queue = search[:, 0], search[:, 1], search[:, 2], search[:, 3]
+    head, tail, found = 0, 1, -1
+    queue[0] = here
+    stamp[here] = turn
+    while head < tail and found < 0:
+        x = queue[head]
+        head += 1
+        for k in range(indptr[x], indptr[x + 1]):
+            y = links[k, 0]
+            if stamp[y] == turn:
+                continue
+            stamp[y], came[y], before[y] = turn, k, x
+            if not seen[roadmap.cell[y]]:
+                found = y
+                break
+            queue[tail] = y
+            tail += 1
+    steps = 0
+    x = found
+    while found >= 0 and x != here:
+        steps += 1
+        x = before[x]
+    path = np.empty(steps, dtype=np.int64)
+    x = found
+    for k in range(steps):
+        path[steps - 1 - k] = links[came[x], 1]
+        x = before[x]
+    return path, found
 
 
 @kernel
 def _route(roadmap, component):  # type: ignore[no-untyped-def]
     """Signed edges of a walk that visits every cell of a component, and the node it starts at.
 
-    Steps to the unvisited neighbour that has the fewest unvisited neighbours itself (Warnsdorff's
-    rule, so that corners are not left behind); from a dead end, along a shortest path to the
-    nearest node over an unvisited cell.
+    Steps to a neighbour over an unvisited cell while there is one; from a dead end, along a
+    shortest path to the nearest node over such a cell.
     """
     inside, indptr, links = _adjacency(roadmap, component)
     nodes = inside.shape[0]
     seen = np.empty(roadmap.first_node.shape[0], dtype=np.bool_)
     remaining = 0
     for k in range(seen.shape[0]):
-        seen[k] = False
-        if roadmap.cover[component, k]:
+        seen[k] = not roadmap.cover[component, k]
+        if not seen[k]:
             remaining += 1
     # Start where there is least room: at a node of smallest degree.
     start, fewest = -1, 1 << 60
     for x in range(nodes):
         if inside[x] and indptr[x + 1] - indptr[x] < fewest:
             start, fewest = x, indptr[x + 1] - indptr[x]
-    route = np.empty(4 * nodes + 16, dtype=np.int64)
-    length = 0
-    came = _filled(nodes, NONE)
-    stamp = _filled(nodes, ZERO)
-    queue = np.empty(nodes, dtype=np.int64)
-    here, turn = start, 0
+    search = np.zeros((nodes, 4), dtype=np.int64)
+    route, length = np.empty(4 * nodes + 16, dtype=np.int64), 0
+    here = start
     seen[roadmap.cell[here]] = True
     remaining -= 1
     while remaining > 0:
-        best, best_link, fewest = -1, -1, 1 << 60
-        for k in range(indptr[here], indptr[here + 1]):
-            y = links[k, 0]
-            if seen[roadmap.cell[y]]:
-                continue
-            open_ends = 0
-            for i in range(indptr[y], indptr[y + 1]):
-                if not seen[roadmap.cell[links[i, 0]]]:
-                    open_ends += 1
-            if open_ends < fewest:
-                best, best_link, fewest = y, k, open_ends
-        if best >= 0:
-            path_first = length
+        link = _next_node(roadmap, indptr, links, seen, here)
+        if link >= 0:
+            route = _appended(route, length, links[link : link + 1, 1])
             length += 1
-            if length >= route.shape[0]:
-                route = _longer(route)
-            route[path_first] = links[best_link, 1]
-            here = best
+            here = links[link, 0]
         else:
-            turn += 1
-            head, tail, found = 0, 1, -1
-            queue[0] = here
-            stamp[here] = turn
-            while head < tail and found < 0:
-                x = queue[head]
-                head += 1
-                for k in range(indptr[x], indptr[x + 1]):
-                    y = links[k, 0]
-                    if stamp[y] == turn:
-                        continue
-                    stamp[y] = turn
-                    came[y] = k
-                    if not seen[roadmap.cell[y]]:
-                        found = y
-                        break
-                    queue[tail] = y
-                    tail += 1
-            if found < 0:
+            # The cells left are another number each time.
+            path, here = _to_nearest_unseen(roadmap, indptr, links, seen, here, remaining, search)
+            if here < 0:
                 return start, route[:0]  # not connected: an error of the caller's
-            steps = 0
-            x = found
-            while x != here:
-                steps += 1
-                k = came[x]
-                # The link k leaves its owner; the owner is the other end of the edge.
-                e = abs(links[k, 1]) - 1
-                x = roadmap.ends[e, 0] if links[k, 1] > 0 else roadmap.ends[e, 1]
-            while length + steps >= route.shape[0]:
-                route = _longer(route)
-            x = found
-            for i in range(steps):
-                k = came[x]
-                route[length + steps - 1 - i] = links[k, 1]
-                e = abs(links[k, 1]) - 1
-                x = roadmap.ends[e, 0] if links[k, 1] > 0 else roadmap.ends[e, 1]
-            length += steps
-            here = found
-        if not seen[roadmap.cell[here]]:
-            seen[roadmap.cell[here]] = True
-            remaining -= 1
+            route = _appended(route, length, path)
+            length += path.shape[0]
+        seen[roadmap.cell[here]] = True
+        remaining -= 1
     return start, route[:length]
 
 

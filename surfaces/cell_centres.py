@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from surfaces.face_graph import sum_by
+from surfaces.mesh_feet import nearest_on_triangle
 
 kernel = njit(cache=True, error_model="numpy")
 
@@ -63,54 +64,6 @@ def centre_places(
 
 
 @kernel
-def nearest_on_triangle(corners, p, weights):  # type: ignore[no-untyped-def]
-    """Barycentric coordinates of the point of a triangle nearest to p.
-
-    After Ericson, Real-Time Collision Detection (2005), 5.1.5: by the region p lies over.
-
-    Args:
-        corners: (3, 3) m.
-        p: (3,) m.
-        weights: (3,) written.
-
-    Returns:
-        The squared distance, m^2.
-    """
-    a, b, c = corners[0], corners[1], corners[2]
-    d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(3):
-        ab, ac = b[k] - a[k], c[k] - a[k]
-        d1 += ab * (p[k] - a[k])
-        d2 += ac * (p[k] - a[k])
-        d3 += ab * (p[k] - b[k])
-        d4 += ac * (p[k] - b[k])
-        d5 += ab * (p[k] - c[k])
-        d6 += ac * (p[k] - c[k])
-    va, vb, vc = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-    v, w = 0.0, 0.0
-    if d1 <= 0.0 and d2 <= 0.0:  # corner a
-        pass
-    elif d3 >= 0.0 and d4 <= d3:  # corner b
-        v = 1.0
-    elif d6 >= 0.0 and d5 <= d6:  # corner c
-        w = 1.0
-    elif vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:  # edge a-b
-        v = d1 / (d1 - d3)
-    elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:  # edge a-c
-        w = d2 / (d2 - d6)
-    elif va <= 0.0 and d4 >= d3 and d5 >= d6:  # edge b-c
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        v = 1.0 - w
-    else:
-        v, w = vb / (va + vb + vc), vc / (va + vb + vc)
-    weights[0], weights[1], weights[2] = 1.0 - v - w, v, w
-    square = 0.0
-    for k in range(3):
-        square += (weights[0] * a[k] + v * b[k] + w * c[k] - p[k]) ** 2
-    return square
-
-
-@kernel
 def _to_segment(p, a, b):  # type: ignore[no-untyped-def]
     """The squared distance of p from the segment a-b, m^2."""
     along, length = 0.0, 0.0
@@ -146,7 +99,12 @@ def _choose(corners, middles, border, order, indptr, centroids, total, chosen, w
         resolution = 1e-12 * total[n]  # of squared distances: the first of equal ones is taken
         nearest = math.inf
         for face in members:
-            square = nearest_on_triangle(corners[face], centroids[n], here)
+            a, b, c = corners[face, 0], corners[face, 1], corners[face, 2]
+            here[0], here[1], here[2] = nearest_on_triangle(a, b, c, centroids[n])
+            square = 0.0
+            for k in range(3):
+                at = here[0] * a[k] + here[1] * b[k] + here[2] * c[k]
+                square += (at - centroids[n, k]) ** 2
             if square < nearest - resolution:
                 nearest, chosen[n] = square, face
                 weights[n] = here

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.surface import TURN_TOLERANCE, Side, SurfaceError, rotation_from_rpy
+from surfaces.tables import real
 
 LARGEST_RATIO = 1e6  # of two lengths of one surface
 
@@ -24,7 +25,7 @@ class Checks:
 
     def positive(self, name: str, value: Any) -> float:
         """A finite length > 0 (m)."""
-        number = _number(value)
+        number = real(value)
         if not (math.isfinite(number) and number > 0.0):
             self.faults.append(f"{name} must be a finite number > 0 (metres), got {value!r}")
             return 1.0
@@ -110,20 +111,10 @@ class Checks:
         return low, high
 
 
-def _number(value: Any) -> float:
-    """The value as a float, or NaN if it is not a real number."""
-    if isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool):
-        try:
-            return float(value)
-        except OverflowError:
-            return math.inf
-    return math.nan
-
-
 def _numbers(value: Any) -> list[float]:
     """The values of a sequence as floats; an empty list if it is not a sequence of numbers."""
     if isinstance(value, np.ndarray):
         value = value.tolist()
     if not isinstance(value, Sequence) or isinstance(value, (str, bytes)):
         return []
-    return [_number(item) for item in value]
+    return [real(item) for item in value]
