@@ -77,23 +77,14 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
 
     # Each segment, and each waypoint between marks, belongs to one stretch from mark to mark.
     stretch = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
-    t0, t1 = np.zeros(m - 1), np.zeros(m - 1)
     backwards = (start > end)[stretch]
-    places = np.zeros(m)
     inner = np.flatnonzero(walk.cell < 0)
     along = inner[course[stretch[inner]] != STAYS]
-    places[along] = _nearest(ways, course[stretch[along]], points[along])
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
-    arrived = walk.cell >= 0
-    # Taken to be at the centre, a tool point is off by that way; beside the course it strays.
-    off = ways.standing * ARRIVED * tolerance
-    pays = ways.strays[course[stretch[along]], 1] > off
-    for place in (0.0, 1.0):
-        centre, _ = _at(ways, course[stretch[along]], np.full(len(along), place))
-        there = np.linalg.norm(points[along] - centre, axis=1) <= ARRIVED * tolerance
-        there &= pays
-        places[along[there]] = place
-        arrived[along[there]] = True
+    places, arrived = np.zeros(m), walk.cell >= 0
+    places[along], arrived[along] = _places(
+        ways, course[stretch[along]], points[along], ARRIVED * tolerance
+    )
     t0, t1 = places[:-1].copy(), places[1:].copy()
     t0[marks[:-1]] = backwards[marks[:-1]]
     t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
@@ -158,6 +149,24 @@ def _at(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> tuple[Array
     piece, s, _ = _pieces(ways, course, t)
     values = np.einsum("kp,kpd->kd", np.vander(s, 4, increasing=True), ways.cubics[piece])
     return values[:, :3], values[:, 3:]
+
+
+def _places(
+    ways: TargetCourses, course: NDArray[np.int64], points: Array, near: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """(k,) t on each course for a tool point, and whether that is at one of its centres.
+
+    A tool point so `near` (m) to a centre is taken to be there, which puts it off by that way;
+    only where that is less than what it strays beside the course.
+    """
+    t = _nearest(ways, course, points)
+    arrived = np.zeros(len(course), dtype=bool)
+    pays = ways.strays[course, 1] > ways.standing * near
+    for place in (0.0, 1.0):
+        centre, _ = _at(ways, course, np.full(len(course), place))
+        there = pays & (np.linalg.norm(points - centre, axis=1) <= near)
+        t[there], arrived[there] = place, True
+    return t, arrived
 
 
 def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> Array:

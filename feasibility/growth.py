@@ -263,6 +263,26 @@ def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untype
 
 
 @kernel
+def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
+    """The two nodes of a component over cells i and j that are nearest to each other; or -1, -1."""
+    best_x, best_y, nearest = -1, -1, np.inf
+    x = roadmap.first_node[i]
+    while x >= 0:
+        if root_of(roadmap, roadmap.component[x]) == component:
+            y = roadmap.first_node[j]
+            while y >= 0:
+                if root_of(roadmap, roadmap.component[y]) == component:
+                    distance = 0.0
+                    for k in range(roadmap.q.shape[1]):
+                        distance += (roadmap.q[x, k] - roadmap.q[y, k]) ** 2
+                    if distance < nearest:
+                        best_x, best_y, nearest = x, y, distance
+                y = roadmap.following[y]
+        x = roadmap.following[x]
+    return best_x, best_y
+
+
+@kernel
 def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # type: ignore[no-untyped-def]
     """Try to join every neighbouring pair of cells inside one component by a motion of its own.
 
@@ -293,20 +313,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                 return FULL
             if count[TAIL] + 2 > len(roadmap.queue):
                 return FULL
-            best_x, best_y, nearest = -1, -1, np.inf
-            x = roadmap.first_node[pairs[k, 0]]
-            while x >= 0:
-                if root_of(roadmap, roadmap.component[x]) == component:
-                    y = roadmap.first_node[pairs[k, 1]]
-                    while y >= 0:
-                        if root_of(roadmap, roadmap.component[y]) == component:
-                            distance = 0.0
-                            for j in range(q.shape[0]):
-                                distance += (roadmap.q[x, j] - roadmap.q[y, j]) ** 2
-                            if distance < nearest:
-                                best_x, best_y, nearest = x, y, distance
-                        y = roadmap.following[y]
-                x = roadmap.following[x]
+            best_x, best_y = _nearest_nodes(roadmap, pairs[k, 0], pairs[k, 1], component)
             state[k] = 2
             if best_x >= 0:
                 for attempt in range(4):
