@@ -194,15 +194,24 @@ def _hints(verdict: Verdict) -> list[str]:
     """What to try next."""
     if verdict.answer is Answer.FEASIBLE:
         walk = ["--witness walk.csv writes the motion"] if verdict.witness is not None else []
-        return [*walk, "--html view.html shows it"]
+        more = [
+            "coverable path, with the same case, puts the cells in order and times the motion",
+            "coverable explain says how much may change before it breaks",
+        ]
+        whole = walk and len(verdict.cells)
+        return [*walk, "--html view.html shows it", *(more if whole else [])]
     hints = []
     if not verdict.task.cone_deg > 0.0:
         hints.append("--set task.cone_deg=1 leaves a motion some room")
-    elif verdict.answer is Answer.UNDECIDED:
+    elif verdict.answer is Answer.UNDECIDED and "time limit" in verdict.message:
         hints.append("--set search.time_limit=... gives the search more time")
     elif verdict.method == "greedy":
         hints.append("--set search.method=complete searches all postures of the arm")
         hints.append("--set search.moves=all lets several joints move at once")
+    if verdict.method == "complete" and verdict.answer is Answer.INFEASIBLE:
+        hints.append("coverable explain, with the same case, says what would make it feasible")
+        if verdict.covered.any():
+            hints.append("coverable divide finds the fewest motions that cover what can be covered")
     kinds = {cause.kind for cause in verdict.causes}
     if kinds & {CauseKind.OUT_OF_REACH, CauseKind.JOINT_LIMITS}:
         hints.append("--set 'surface.position=[x, y, z]' moves the surface nearer to the arm")

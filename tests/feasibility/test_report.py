@@ -12,6 +12,7 @@ from schema import CHECK, conforms
 from small_cases import TEXTS, paper_verdict, small_case, small_verdict
 
 from feasibility.case import load_case
+from feasibility.checking import check
 from feasibility.report import as_json, as_text, witness_csv
 from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
 from robots import Robot, load_robot
@@ -159,10 +160,29 @@ def test_the_no_of_the_greedy_search_is_its_own():
     assert "search.method=complete" in text
 
 
-def test_undecided_asks_for_time():
-    text = as_text(verdict_of(Answer.UNDECIDED, Evidence.BUDGET), small_case("plate"))
+def test_undecided_asks_for_time_where_time_ran_out():
+    late = load_case("paper/4d", ["search.time_limit=1e-6"])
+    text = as_text(check(*late.build()), late)
     assert text.startswith("undecided: ")
     assert "search.time_limit" in text
+    stiff = load_case("paper/4a", ["task.cone_deg=0"])
+    text = as_text(check(*stiff.build()), stiff)
+    assert text.startswith("undecided: ")
+    assert "search.time_limit" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "offered", "others"),
+    [
+        ("paper/4a", ["coverable path", "coverable explain"], ["coverable divide"]),
+        ("paper/4d", ["coverable explain", "coverable divide"], ["coverable path"]),
+    ],
+)
+def test_the_next_commands(name, offered, others):
+    case = load_case(name)
+    text = as_text(check(*case.build()), case)
+    assert all(command in text for command in offered)
+    assert not any(command in text for command in others)
 
 
 def rows_of(text):
