@@ -60,10 +60,14 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
     bends[:, 0] += standoff * bends[:, 1]
     bends[np.repeat(folded, np.diff(courses.first))] = np.inf
     # To the side of a course the normal may turn faster than along it.
-    across = cells.surface.sharpness(cells, height)[cells.pairs].max(axis=1)
+    sharpness = cells.surface.sharpness(cells, height)
+    across = sharpness[cells.pairs].max(axis=1)
     turning = np.maximum(courses.turning(height), np.repeat(across, np.diff(courses.first)))
     turning *= ASIDE
     ends = np.concatenate([courses.first[:-1][~folded], courses.first[1:][~folded] - 1])
+    standing = turning[ends].max(initial=0.0)
+    if len(cells.pairs) == 0:  # a single cell: the normal turns beside its centre too
+        standing = ASIDE * sharpness[np.isfinite(sharpness)].max(initial=0.0)
     strays = courses.strays.copy()
     strays[:, 0] += standoff * strays[:, 1]
     for array in (cubics, bends, turning, strays, folded):
@@ -74,7 +78,7 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
         bends=bends,
         turning=turning,
         strays=strays,
-        standing=float(turning[ends].max(initial=0.0)),
+        standing=float(standing),
         folded=folded,
     )
 
