@@ -31,6 +31,7 @@ def add_studies(subcommands: argparse._SubParsersAction, add_case: Callable[...,
     study.add_argument("--out", metavar="FILE", required=True, help="where finished cases are kept")
     study.add_argument("--json", action="store_true", help="print one JSON object")
     study.add_argument("--csv", metavar="FILE", help="write the table")
+    study.add_argument("--html", metavar="FILE", help="write one page with tables, charts, poses")
     _add_workers(study)
     study.set_defaults(run=_run("study_commands", "study"))
 
@@ -72,6 +73,7 @@ def add_studies(subcommands: argparse._SubParsersAction, add_case: Callable[...,
     )  # fmt: skip
     place.add_argument("--csv", metavar="FILE", help="write the placements as a table")
     place.add_argument("--map", metavar="FILE", help="draw the share covered over the region")
+    place.add_argument("--html", metavar="FILE", help="write a view of all placements tried")
     place.add_argument("--out", metavar="FILE", help="keep finished placements, to go on from them")
     place.add_argument("--time-limit", type=positive, metavar="S", help="seconds")
     _add_workers(place)

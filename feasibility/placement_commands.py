@@ -5,18 +5,21 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
-import os
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from feasibility.commands import write_view
 from feasibility.console import Bar, interruptible, say, tell
-from feasibility.files import FileError, check_writable, shown_path, write_whole
+from feasibility.files import FileError, shown_path, write_whole
+from feasibility.study_commands import check_files
 
 if TYPE_CHECKING:
     from feasibility.placement import Placements
     from feasibility.placement_hunt import Judge, Progress
     from feasibility.placement_map import PlacementMap
     from feasibility.placement_stations import StationPlan
+    from feasibility.viewer import View
 
 STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
 PICTURES = (".png", ".svg", ".pdf")
@@ -28,7 +31,8 @@ def run_place(args: argparse.Namespace, began: float) -> int:
     Args:
         args: `case`, `settings` (a list of KEY=VALUE); `x`, `y`, `z`, `roll`, `pitch`, `yaw`, each
             two numbers or None; `count` or None; `workers` or None, `dask` or None; `stations`,
-            `json`; `csv`, `map`, `out`, files or None; `time_limit` or None.
+            `json`; `csv`, `map`, `out`, files or None; `html`, a file or None, which may be left
+            out; `time_limit` or None.
         began: `time.perf_counter()` when the command began.
 
     Returns:
@@ -47,7 +51,9 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         from feasibility.study_store import Store
         from feasibility.study_workers import open_workers
 
-        _check_outputs(args)
+        html = vars(args).get("html")
+        outputs = {"--csv": args.csv, "--map": args.map, "--out": args.out, "--html": html}
+        _check_outputs(args.case, outputs)
         case = load_case(args.case, args.settings)
         held = Pose.of_values([*case.surface.position, *case.surface.rpy_deg])
         region = Region.around(held, _ranges(args))
@@ -68,12 +74,21 @@ def run_place(args: argparse.Namespace, began: float) -> int:
             plan: StationPlan | None = None
             if args.stations and not placements.found:
                 plan = station_plan(placements, judge, setup.search, count, progress)
+            drawn: View | None = None
+            if html is not None:
+                from feasibility.placement_view import view_placements
+
+                drawn = view_placements(
+                    placements, setup.search, case.name, plan, progress=progress
+                )
             chart: PlacementMap | None = None
             if args.map is not None:
                 chart = map_around_best(placements, judge, progress)
         settle()
     placements.timing["command_s"] = time.perf_counter() - began
     _say(args, placements, case.name, plan, chart)
+    if drawn is not None and html is not None:
+        write_view(drawn, html)
     return STATUS[str(placements.answer)]
 
 
@@ -96,26 +111,17 @@ def _reporting(bar: Bar, settle: Any) -> Progress:
     return report
 
 
-def _check_outputs(args: argparse.Namespace) -> None:
+def _check_outputs(given: str, outputs: Mapping[str, str | None]) -> None:
     """Refuse outputs that could not be written, before the search and not after it."""
     faults = []
-    taken: dict[str, str] = {}
-    for flag in ("csv", "map", "out"):
-        path = getattr(args, flag)
-        if path is None:
-            continue
-        try:
-            if flag != "out" or not os.path.exists(path):  # the store says itself what it refuses
-                check_writable(path)
-        except FileError as error:
-            faults.append(f"--{flag} {error}")
-        place = os.path.realpath(path)
-        if place in taken:
-            faults.append(f"--{flag} {shown_path(path)}: is the file of --{taken[place]} too")
-        taken[place] = flag
-    if args.map is not None and not str(args.map).lower().endswith(PICTURES):
+    try:
+        check_files(given, outputs)
+    except FileError as error:
+        faults.append(str(error))
+    picture = outputs["--map"]
+    if picture is not None and not picture.lower().endswith(PICTURES):
         faults.append(
-            f"--map {shown_path(args.map)}: is no kind of picture; expected a name that ends in "
+            f"--map {shown_path(picture)}: is no kind of picture; expected a name that ends in "
             f"{', '.join(PICTURES)}"
         )
     if faults:

@@ -13,9 +13,9 @@ from feasibility.placement_map import PlacementMap
 from feasibility.placement_region import AXES, Pose
 from feasibility.placement_stations import StationPlan
 from feasibility.placement_study import trial_table
-from feasibility.placement_trial import Trial
+from feasibility.placement_trial import Stage, Trial
 from feasibility.report import CAUSES, EVIDENCE, WIDTH
-from feasibility.verdict import Answer, CauseKind
+from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version
 
 SENTENCES = {
@@ -56,7 +56,7 @@ def as_json(
         },
         "placements": [_found_json(trial) for trial in placements.found],
         "best": None if best is None else _found_json(best),
-        "share": placements.share,
+        "share": placements.share if _searched(best) else None,
         "cause": None if placements.cause is None else str(placements.cause),
         "causes": dict(placements.causes),
         "stations": None if plan is None else _stations_json(plan),
@@ -124,7 +124,7 @@ def as_text(
     """Placements for people: the answer, where the surface may stand, or what stands against it."""
     proved = placements.answer is Answer.INFEASIBLE and placements.evidence == "proof"
     ranges = [
-        f"{name} {low:g} .. {high:g}"
+        f"{name.removesuffix('_deg')} {low:g} .. {high:g} {'deg' if name.endswith('_deg') else 'm'}"
         for name, (low, high) in zip(AXES, placements.region.ranges, strict=True)
         if low < high
     ]
@@ -142,6 +142,7 @@ def as_text(
         ("found", placements.message),
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
         ("missed", _causes_text(placements)),
+        ("searched", "" if _searched(placements.best) else _unsearched_text(placements)),
         ("check", "" if placements.found else _checked_text(placements)),
         ("time", f"{placements.timing['total_s']:.2f} s"),
     ]
@@ -151,11 +152,23 @@ def as_text(
         lines += ["", *_table(placements.found)]
         put = " ".join(f"--set '{setting}'" for setting in settings_of(placements.found[0].pose))
         lines += ["", f"the best as a case: {put}"]
-    elif placements.best is not None:
+    elif placements.best is not None and _searched(placements.best):
         lines += ["", "the best of them:", *_table([placements.best])]
     if plan is not None:
         lines += ["", *_stations_text(plan)]
     return "\n".join(lines)
+
+
+def _searched(trial: Trial | None) -> bool:
+    """Was a covering motion looked for at a placement? Else its share is unknown, not 0."""
+    return trial is not None and trial.stage in (Stage.SEARCH, Stage.CHECK)
+
+
+def _unsearched_text(placements: Placements) -> str:
+    """Why no placement was searched."""
+    if placements.evidence is Evidence.PROOF:
+        return "no placement: as each has a target out of reach, none can cover the whole surface"
+    return "no placement; so what share could be covered is not known"
 
 
 def _checked_text(placements: Placements) -> str:
@@ -180,20 +193,23 @@ def _row(name: str, text: str) -> str:
 
 
 def _table(trials: Sequence[Trial]) -> list[str]:
-    """Placements as aligned lines."""
-    lines = [
-        "       x       y       z    roll   pitch     yaw   share  margin  limits    cone   reach"
-    ]
+    """Placements as aligned lines; the margins only where there are some."""
+    heads = ["x (m)", "y (m)", "z (m)", "roll", "pitch", "yaw (deg)", "share"]
+    with_margins = any(trial.margins is not None for trial in trials)
+    rows = [heads + (["margin", "limits", "cone", "reach"] if with_margins else [])]
     for trial in trials:
-        numbers = [f"{v:8.3f}" for v in trial.pose.position]
-        numbers += [f"{v:8.2f}" for v in trial.pose.rpy_deg]
-        numbers += [f"{100.0 * trial.share:7.1f}%"]
+        row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
+        row.append(f"{100.0 * trial.share:.1f} %")
         margins = trial.margins
         if margins is not None:
             shares = (margins.least, margins.limits, margins.cone, margins.reach)
-            numbers += [f"{v:8.3f}" for v in shares]
-        lines.append("".join(numbers))
-    return lines
+            row += [f"{v:.3f}" for v in shares]
+        rows.append(row + ["-"] * (len(rows[0]) - len(row)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+        for row in rows
+    ]
 
 
 def _stations_text(plan: StationPlan) -> list[str]:

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from feasibility.commands import check_outputs, json_text
 from feasibility.console import Bar, interruptible, say, tell
-from feasibility.files import shown_path, write_whole
+from feasibility.files import FileError, shown_path, write_whole
+
+if TYPE_CHECKING:
+    from feasibility.study import Row
+    from feasibility.study_file import Study
 
 UNDECIDED = 3
 
@@ -20,7 +26,7 @@ def study(args: argparse.Namespace, began: float) -> int:
     """`coverable study FILE --out OUT`: every case of a study, kept as they come.
 
     Args:
-        args: file, out, workers, dask, json, csv.
+        args: file, out, workers, dask, json, csv, html.
         began: `time.perf_counter()` when the command began.
 
     Returns:
@@ -32,7 +38,8 @@ def study(args: argparse.Namespace, began: float) -> int:
     from feasibility.study_store import Store
     from feasibility.study_workers import open_workers
 
-    check_outputs({"--out": args.out, "--csv": args.csv})
+    outputs = {"--out": args.out, "--csv": args.csv, "--html": args.html}
+    check_files(args.file, outputs)
     asked = load_study(args.file)
     with Store(args.out) as store:
         before = len(store)
@@ -46,6 +53,8 @@ def study(args: argparse.Namespace, began: float) -> int:
             raise
     say(json_text(as_json(asked, rows)) if args.json else as_text(asked, rows))
     _write(args.csv, as_csv(asked, rows), "table")
+    if args.html is not None:
+        _write(args.html, _page(asked, rows), "page")
     return UNDECIDED if any(row.status == "failed" for row in rows) else 0
 
 
@@ -61,7 +70,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
     from feasibility.comparison_report import as_csv, as_html, as_json, as_text
     from feasibility.study_workers import open_workers
 
-    check_outputs({"--csv": args.csv, "--html": args.html})
+    check_files(args.case, {"--csv": args.csv, "--html": args.html})
     case = load_case(args.case, args.settings)
     robots = [name.strip() for name in args.robots.split(",") if name.strip()]
     with _shown("comparing robots") as progress, open_workers(args.workers, args.dask) as by:
@@ -70,6 +79,42 @@ def compare(args: argparse.Namespace, began: float) -> int:
     _write(args.csv, as_csv(found), "table")
     _write(args.html, as_html(found), "page")
     return 0
+
+
+def check_files(given: str, outputs: Mapping[str, str | None]) -> None:
+    """Refuse outputs that could not be written, or are what is read, before the work.
+
+    Args:
+        given: the study or the case, a file or the name of a built-in one.
+        outputs: files by their flag, None where there is none.
+
+    Raises:
+        FileError: with everything that is wrong.
+    """
+    faults = []
+    try:
+        check_outputs(outputs)
+    except FileError as error:
+        faults.append(str(error))
+    for flag, path in outputs.items():
+        both_exist = path is not None and os.path.isfile(given) and os.path.exists(path)
+        if path is not None and both_exist and os.path.samefile(given, path):
+            faults.append(f"{flag} {shown_path(path)}: is what is read; give another name")
+    if faults:
+        raise FileError("\n  ".join(faults))
+
+
+def _page(asked: Study, rows: tuple[Row, ...]) -> str:
+    """A study as one page, with the poses of the surface where they vary."""
+    from feasibility.placement_view import view_study
+    from feasibility.study_page import as_html
+
+    drawn = None
+    if any(label.startswith(("surface.position", "surface.rpy_deg")) for label in asked.labels):
+        with interruptible() as settle, Bar() as bar:
+            drawn = view_study(asked.tasks, rows, asked.name, progress=bar.callback)
+            settle()
+    return as_html(asked, rows, drawn)
 
 
 def _write(path: str | None, text: str, what: str) -> None:

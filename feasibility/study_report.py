@@ -70,27 +70,38 @@ def _cell(value: Any) -> Any:
 
 
 def as_text(study: Study, rows: Sequence[Row]) -> str:
-    """What came of the study: verdicts, by robot where several are compared, and the best rows."""
-    found = counts(rows)
-    lines = [f"{study.name}: {len(rows)} cases: {_counted(found)}."]
+    """What came of the study: verdicts, by value where there are few, and the best rows."""
+    lines = [headline(study, rows)]
+    if study.description:
+        lines.insert(0, study.description)
     causes = Counter(cause for row in rows if (cause := dominant(row)))
     if causes:
-        told = ", ".join(f"{name} in {count}" for name, count in causes.most_common())
+        told = ", ".join(f"{name.replace('_', ' ')} in {n}" for name, n in causes.most_common())
         lines.append(f"  why cells are missed, mostly: {told}.")
     failed = [row for row in rows if row.status == "failed"]
     if failed:
         lines.append(f"  {len(failed)} failed; the first: {failed[0].result['message']}")
-    lines += _by_value(study, rows)
-    ranked = sorted(rows, key=merit)[: min(BEST, len(rows))]
-    lines += ["", "best:"]
-    lines += [f"  {_row_text(study, row)}" for row in ranked]
+    for label, groups in groups_of(study, rows).items():
+        lines += ["", *_aligned(_group_table(label, groups))]
+    lines += ["", "the best:", *_aligned(_best_table(study, rows))]
     return "\n".join(lines)
+
+
+def headline(study: Study, rows: Sequence[Row]) -> str:
+    """What a person would say of it."""
+    cases = "1 case" if len(rows) == 1 else f"{len(rows)} cases"
+    return f"{study.name}: {cases}: {counted(counts(rows))}."
 
 
 def counts(rows: Sequence[Row]) -> dict[str, int]:
     """How many rows have each verdict."""
     found = Counter(str(row.result["verdict"]) for row in rows)
     return {verdict: found.get(verdict, 0) for verdict in VERDICTS}
+
+
+def counted(found: dict[str, int]) -> str:
+    """'3 feasible, 1 infeasible'."""
+    return ", ".join(f"{count} {name}" for name, count in found.items() if count) or "none"
 
 
 def dominant(row: Row) -> str | None:
@@ -103,47 +114,69 @@ def merit(row: Row) -> tuple[bool, float, float]:
     margins = row.result.get("margins") or {}
     limit = margins.get("limit_deg")
     room = 0.0 if not margins else 360.0 if limit is None else float(limit)
-    share = float(row.result.get("share", 0.0))
+    share = float(row.result.get("share", -1.0))  # unknown is worse than nothing
     return row.result["verdict"] != "feasible", -share, -room
 
 
-def _counted(found: dict[str, int]) -> str:
-    """'3 feasible, 1 infeasible'."""
-    return ", ".join(f"{count} {name}" for name, count in found.items() if count) or "none"
+def best_share(rows: Sequence[Row]) -> float | None:
+    """The largest share of the area covered in one motion, 0..1; None where all failed."""
+    return max((float(row.result["share"]) for row in rows if "share" in row.result), default=None)
 
 
-def _by_value(study: Study, rows: Sequence[Row]) -> list[str]:
-    """One line for each value of the keys that have few values."""
-    lines: list[str] = []
+def share_text(row: Row) -> str:
+    """The share of a row; a failed one has none."""
+    return f"{100.0 * float(row.result['share']):.1f} %" if "share" in row.result else "-"
+
+
+def groups_of(study: Study, rows: Sequence[Row]) -> dict[str, dict[str, list[Row]]]:
+    """Rows by value, for each key that takes a few values."""
+    found: dict[str, dict[str, list[Row]]] = {}
     for label in study.labels:
         groups: dict[str, list[Row]] = {}
         for row in rows:
-            groups.setdefault(_short(row.parameters[label]), []).append(row)
-        if not 2 <= len(groups) <= BEST:
-            continue
-        lines += ["", f"by {label}:"]
-        width = max(map(len, groups))
-        for value, group in groups.items():
-            best = max(float(row.result.get("share", 0.0)) for row in group)
-            lines.append(
-                f"  {value:{width}}  {_counted(counts(group))}; best share {100.0 * best:.1f} %"
-            )
-    return lines
+            groups.setdefault(short(row.parameters[label]), []).append(row)
+        if 2 <= len(groups) <= BEST:
+            found[label] = groups
+    return found
 
 
-def _row_text(study: Study, row: Row) -> str:
-    """One row on one line."""
-    says = ", ".join(f"{label} = {_short(row.parameters[label])}" for label in study.labels)
-    share = 100.0 * float(row.result.get("share", 0.0))
-    text = f"{row.result['verdict']}, {share:.1f} %"
-    limit = (row.result.get("margins") or {}).get("limit_deg")
-    if limit is not None:
-        text += f", {limit:.1f} deg from the limits"
-    return f"{text}: {says}"
-
-
-def _short(value: Any) -> str:
+def short(value: Any) -> str:
     """A value in few characters."""
     if isinstance(value, float):
         return f"{value:.4g}"
     return value if isinstance(value, str) else json.dumps(value)
+
+
+def _group_table(label: str, groups: dict[str, list[Row]]) -> list[list[str]]:
+    """One line for each value of a key, below the names of the columns."""
+    table = [[f"by {label}", *VERDICTS, "best share"]]
+    for value, group in groups.items():
+        best = best_share(group)
+        numbers = [str(number) for number in counts(group).values()]
+        table.append([value, *numbers, "-" if best is None else f"{100.0 * best:.1f} %"])
+    used = [
+        k for k, head in enumerate(table[0])
+        if head not in VERDICTS or any(line[k] != "0" for line in table[1:])
+    ]  # fmt: skip
+    return [[line[k] for k in used] for line in table]
+
+
+def _best_table(study: Study, rows: Sequence[Row]) -> list[list[str]]:
+    """The best rows, below the names of the columns."""
+    ranked = sorted(rows, key=merit)[:BEST]
+    limits = [(row.result.get("margins") or {}).get("limit_deg") for row in ranked]
+    far = ["-" if limit is None else f"{limit:.1f} deg" for limit in limits]
+    table = [["verdict", "share", "from limits", *study.labels]]
+    for row, limit in zip(ranked, far, strict=True):
+        values = [short(row.parameters[label]) for label in study.labels]
+        table.append([str(row.result["verdict"]), share_text(row), limit, *values])
+    return table
+
+
+def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
+    """Columns of equal width."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
+        "  " + "  ".join(f"{cell:<{w}}" for cell, w in zip(line, widths, strict=True)).rstrip()
+        for line in table
+    ]

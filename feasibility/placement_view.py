@@ -1,0 +1,251 @@
+"""Pictures of placements: the arm, and the surface wherever it was tried, by what is covered there.
+
+from feasibility.placement_view import view_placements
+view_placements(placements).save_html("placements.html")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility import robot_visuals
+from feasibility.motion import Motion, motion_of
+from feasibility.page import Camera
+from feasibility.placement_region import Pose, moved_cells
+from feasibility.placement_trial import Stage, Trial
+from feasibility.pose_layers import (
+    HIDDEN,
+    Class,
+    Tried,
+    best_layers,
+    class_layers,
+    class_of_row,
+    class_of_trial,
+    drawn_size,
+    hidden,
+    station_layers,
+)
+from feasibility.pose_outline import outline, placed
+from feasibility.scene import Layer
+from feasibility.search import Search
+from feasibility.viewer import FRAMED, View, compose
+from robots import Robot
+from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.placement import Placements
+    from feasibility.placement_stations import StationPlan
+    from feasibility.study import Row, StudyTask
+    from feasibility.task import Task
+
+Array = NDArray[np.float64]
+Progress = Callable[[int, int | None, str], None]
+
+NEARER = 0.85  # [1] of the distance from which a ball around everything would fill the picture
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Question:
+    """What was asked at every pose."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    search: Search
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Playing:
+    """How the motion over the best pose is looked for, and played."""
+
+    progress: Progress | None
+    play: bool
+    at: float
+
+
+def view_placements(
+    placements: Placements,
+    search: Search | None = None,
+    case: str | None = None,
+    plan: StationPlan | None = None,
+    *,
+    progress: Progress | None = None,
+    play: bool = True,
+    at: float = 0.0,
+) -> View:
+    """Every placement tried as an outline of the surface, and the best one with its motion.
+
+    Args:
+        placements: what a search for placements found.
+        search: its settings; the best placement is asked about once more, for its motion.
+        case: name of the case, for the title.
+        plan: stations to draw too, each with its cells.
+        progress: of that question, see `feasibility.check`.
+        play: start the motion when the page opens.
+        at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
+    """
+    asked = Question(placements.robot, placements.cells, placements.task, search or Search())
+    trials = _best_first(placements)
+    tried = [
+        Tried(trial.pose, class_of_trial(trial), trial.covers[0] if len(trial.covers) else None)
+        for trial in trials
+    ]
+    title = f"{case}: " if case else ""
+    title += f"placements, {placements.answer} ({placements.evidence})"
+    stations = [] if plan is None else station_layers(placements.cells, plan)
+    text = _said(placements, trials)
+    return _view(asked, tried, title, text, stations, Playing(progress, play, at))
+
+
+def view_study(
+    tasks: Sequence[StudyTask],
+    rows: Sequence[Row],
+    name: str | None = None,
+    *,
+    progress: Progress | None = None,
+    play: bool = True,
+    at: float = 0.0,
+) -> View:
+    """The poses of a study as outlines, for the arm and the task of its best row.
+
+    Rows that differ from the best one in more than the pose are not drawn: another arm, another
+    cone or another surface makes another picture.
+
+    Args:
+        tasks: of the study.
+        rows: what came of them, in the same order.
+        name: of the study, for the title.
+        progress: of the question about the best row's motion, see `feasibility.check`.
+        play: start the motion when the page opens.
+        at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
+
+    Raises:
+        ValueError: there are no rows, or not one for each task.
+    """
+    from feasibility.study_frames import case_of
+    from feasibility.study_outcome import arm_of, cells_of, cut_of
+    from feasibility.study_report import merit
+
+    if len(rows) == 0 or len(tasks) != len(rows):
+        raise ValueError(f"expected a row for each task, got {len(rows)} for {len(tasks)} tasks")
+    best = min(range(len(rows)), key=lambda k: merit(rows[k]))
+    drawn = sorted(same_frame(tasks, best), key=lambda k: merit(rows[k]))
+    case = case_of(dict(tasks[best].tables))
+    asked = Question(arm_of(case), cut_of(case), case.task, case.search)
+    tried = []
+    for k in drawn:
+        bits = (rows[k].result.get("components") or [None])[0]
+        cover = None if bits is None else cells_of(bits, int(rows[k].result["cells"]))
+        tried.append(Tried(pose_of(tasks[k].tables), class_of_row(rows[k]), cover))
+    whole = len(drawn) == len(rows)
+    text = f"{len(rows)} cases" if whole else f"{len(drawn)} of {len(rows)} cases"
+    text += f", cone {asked.task.cone_deg:g} deg"
+    if not whole:
+        text += "; those that differ from the best one in more than the pose are not drawn"
+    title = (f"{name}: " if name else "") + "poses of the surface"
+    return _view(asked, tried, title, text, [], Playing(progress, play, at))
+
+
+def pose_of(tables: Any) -> Pose:
+    """Where the surface stands in the tables of a case."""
+    surface = tables["surface"]
+    return Pose.of_values([*surface.get("position", (0, 0, 0)), *surface.get("rpy_deg", (0, 0, 0))])
+
+
+def same_frame(tasks: Sequence[StudyTask], row: int) -> list[int]:
+    """The tasks that differ from one of them in the surface's pose at most."""
+
+    def rest(tables: Any) -> Any:
+        surface = {k: v for k, v in tables["surface"].items() if k not in ("position", "rpy_deg")}
+        return {**tables, "surface": surface}
+
+    wanted = rest(tasks[row].tables)
+    return [k for k, task in enumerate(tasks) if rest(task.tables) == wanted]
+
+
+def _best_first(placements: Placements) -> list[Trial]:
+    """All trials; those found feasible come first, by their margin."""
+    found = list(placements.found)
+    return found + [trial for trial in placements.trials if not any(trial is f for f in found)]
+
+
+def _said(placements: Placements, trials: Sequence[Trial]) -> str:
+    """How many placements were tried, and what the best one gives."""
+    if all(trial.stage is Stage.BOUND for trial in trials):
+        return "wherever the surface stands in the region, a part is out of reach; none was tried"
+    text = f"{len(trials)} placements tried"
+    beyond = int(placements.statistics.get("bound", 0))
+    if beyond:
+        text += f", {beyond} more discarded as out of reach and not drawn"
+    if placements.found:
+        return f"{text}; the best leaves a margin of {placements.found[0].margin:.3f}"
+    return f"{text}; the best covers {100.0 * placements.share:.1f} % of the area"
+
+
+def _view(
+    asked: Question,
+    tried: Sequence[Tried],
+    title: str,
+    text: str,
+    stations: Sequence[Layer],
+    playing: Playing,
+) -> View:
+    """One picture of poses tried, the best one first among them."""
+    cells, motion, parts = asked.cells, None, []
+    if tried:
+        cells = moved_cells(asked.cells, tried[0].pose)
+        if tried[0].kind is Class.FEASIBLE:
+            motion = _motion(asked, cells, playing.progress)
+        parts = best_layers(cells, tried[0], motion)
+    if stations:  # they are what is asked for; the best single one would lie among them
+        parts = [hidden(layer) for layer in parts]
+    lines, size = outline(asked.cells), drawn_size(tried)
+    if len(lines):
+        middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2.0
+        lines = middle + size * (lines - middle)
+    if size < 1.0:
+        text += f". Outlines are drawn at {100.0 * size:.0f} % of their size"
+    drawn = compose(
+        asked.robot, cells, title, f"{asked.robot.name}: {text}",
+        [*parts, *stations, *class_layers(lines, tried)], motion,
+        resting=_home(asked.robot), play=playing.play, at=playing.at,
+    )  # fmt: skip
+    shown = [one.pose for one in tried if one.kind not in HIDDEN]
+    return replace(drawn, camera=_camera(drawn.camera, asked.robot, cells, lines, shown))
+
+
+def _motion(asked: Question, cells: Cells, progress: Progress | None) -> Motion | None:
+    """The covering motion over the best placement; None if the search ran out of time now."""
+    from feasibility.checking import check
+
+    verdict = check(asked.robot, cells, asked.task, asked.search, progress=progress)
+    return motion_of(verdict) if verdict.feasible else None
+
+
+def _home(robot: Robot) -> Array:
+    """Where an arm without work stands."""
+    return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
+
+
+def _camera(
+    camera: Camera, robot: Robot, cells: Cells, lines: Array, poses: Sequence[Pose]
+) -> Camera:
+    """The same direction, from where the arm, the best surface and all outlines can be seen."""
+    if not poses or len(lines) == 0:
+        return camera
+    place, points = np.eye(4), [np.zeros((1, 3)), cells.centres]
+    for step in robot_visuals.joint_placements(robot, _home(robot))[0]:
+        place = place @ step
+        points.append(place[None, :3, 3].copy())
+    points += [placed(lines, pose).reshape(-1, 3) for pose in poses]
+    every = np.concatenate(points)
+    target = (every.min(axis=0) + every.max(axis=0)) / 2.0
+    radius = max(float(np.linalg.norm(every - target, axis=1).max()), 0.1)
+    toward = np.array(camera.eye) - np.array(camera.target)
+    eye = target + NEARER * radius / np.sin(FRAMED) * toward / np.linalg.norm(toward)
+    return Camera(tuple(target.tolist()), tuple(eye.tolist()), camera.zoom)
