@@ -14,6 +14,8 @@ reaches is disconnected: the detail says what that component covers and what sto
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,6 +46,8 @@ from robots.kinematics import Kinematics
 STARTS = 16  # Newton starts of each relaxed question
 MOST_EXAMINED = 400  # cells that are examined one by one
 ENOUGH = 5  # solutions among which the least violation is looked for
+UNPROVED = "not proved: off its target, within the tolerance, the tool point may do better"
+MOST_DECIMALS = 6
 
 
 def _solve(
@@ -186,8 +190,24 @@ def _past_limits(robot: Robot, q: NDArray[np.float64]) -> str:
     return ", and ".join(parts)
 
 
+def decimals(value: float, bound: float, least: int) -> int:
+    """How many decimals, `least` or more, tell a value from the bound that it passes.
+
+    Example:
+        >>> decimals(3.02, 3.0, 1)
+        2
+    """
+    for count in range(least, MOST_DECIMALS):
+        if f"{value:.{count}f}" != f"{bound:.{count}f}":
+            return count
+    return MOST_DECIMALS
+
+
 def diagnose(explorer: Explorer, cell: int) -> Cause:
     """Why nothing reaches a cell.
+
+    The questions are asked with the tool point at its target, as the search asks them. A proof
+    takes the whole tolerance into account; without one the detail says that this was not done.
 
     Args:
         explorer: a finished search.
@@ -196,6 +216,14 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
     Returns:
         The cause; proved where branch and bound or the reach bound ruled the cell out.
     """
+    cause = _cause(explorer, cell)
+    if cause.proved or not explorer.problem.rim > 0.0:
+        return cause
+    return replace(cause, detail=f"{cause.detail}; {UNPROVED}")
+
+
+def _cause(explorer: Explorer, cell: int) -> Cause:
+    """The same without a word on what was not proved."""
     problem, robot, work = explorer.problem, explorer.robot, explorer.work
     proved = explorer.rulings.get(cell) is Ruling.PROVED
     n = robot.n
@@ -215,14 +243,16 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
         origin = robot.model.jointPlacements[1].translation
         away = float(np.linalg.norm(problem.points[cell] - origin))
         reach = robot.reach
+        short, far = decimals(1e3 * distance, 0.0, 0), decimals(away, reach, 3)
         detail = (
-            f"the tool point stays {1e3 * distance:.0f} mm short; the target is {away:.3f} m from "
-            f"the first joint, "
+            f"the tool point stays {1e3 * distance:.{short}f} mm short; the target is "
+            f"{away:.{far}f} m from the first joint, "
         )
         detail += (
-            f"the arm reaches at most {reach:.3f} m"
+            f"the arm reaches at most {reach:.{far}f} m"
             if away > reach
-            else f"inside its outer reach of {reach:.3f} m but where the arm cannot fold itself to"
+            else f"inside its outer reach of {reach:.{far}f} m but where the arm cannot fold "
+            "itself to"
         )
         return Cause(cell, CauseKind.OUT_OF_REACH, proved, detail)
     found = _solve(unlimited, work, cell, guesses, solutions)
@@ -232,7 +262,8 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
     if _solve(slack_cone, work, cell, guesses, _one(explorer)):
         angle = np.degrees(_smallest_angle(explorer, slack_cone, cell))
         alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.rim, 1.0)))
-        detail = f"the tool tilts {angle:.1f} deg there at best, the cone allows {alpha:g} deg"
+        fine = decimals(angle, alpha, 1)
+        detail = f"the tool tilts {angle:.{fine}f} deg there at best, the cone allows {alpha:g} deg"
         if past:
             detail += f"; or {past}"
         return Cause(cell, CauseKind.ORIENTATION, proved, detail)
@@ -297,6 +328,7 @@ def causes_of(explorer: Explorer) -> tuple[Cause, ...]:
             near = int(examined[np.argmin(np.linalg.norm(points[examined] - points[cell], axis=1))])
             proved = explorer.rulings.get(cell) is Ruling.PROVED
             index = list(explorer.cells.unravel(near))
-            detail = f"like {index}, the nearest cell examined: {causes[near].detail}"
+            alike = causes[near].detail.removesuffix(f"; {UNPROVED}")
+            detail = f"like {index}, the nearest cell examined: {alike}"
             causes[cell] = Cause(cell, causes[near].kind, proved, detail)
     return tuple(causes[cell] for cell in missed.tolist())

@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 from feasibility import Search, Task, check
+from feasibility.causes import UNPROVED, decimals
 from feasibility.certificate import replay
 from robots import Robot, load_robot
 from robots.kinematics import Kinematics
-from surfaces import plane, sphere
+from surfaces import hyperboloid, plane, sphere
 from surfaces.grid import GridCells
 
 CENTRE = np.array([0.5, 0.1, 0.4])
@@ -67,3 +68,50 @@ def test_a_single_cell_is_covered_inside_the_cone_at_the_tool_points_own_foot(se
     tilt = tilt_at_foot(robot, verdict.witness.q[0])
     assert tilt <= verdict.certificate.max_angle + 1e-12
     assert verdict.certificate.max_angle <= task.cone
+
+
+def test_what_is_not_proved_is_not_said_to_be_the_best_there_is() -> None:
+    """The last cell is covered, but only by a tool point that lies off its target by 5 mm.
+
+    Newton wants the tool point at the target, and finds 20 degrees there at best.
+    """
+    limits = [(-126.34, 35.35), (-153.32, 133.07), (-90.9, 144.12)]
+    limits += [(-166.45, 105.49), (-49.38, 59.27), (-53.96, 129.41)]
+    arm = load_robot("ur10_limited")
+    robot = arm.with_limits(dict(zip(arm.joint_names, np.radians(limits), strict=True)))
+    waist = hyperboloid(
+        0.08074103777616477,
+        0.20316362037101088,
+        (2.736407, 40.250118),
+        (-0.09664211603407472, -0.039272989993212264),
+        position=(-0.99341, -0.42103, -0.60244),
+        rpy_deg=(-104.3293, -42.0362, 159.4501),
+        side="inside",
+    )
+    cells, task = waist.cells(8, 6), Task(0.005, 15.0, 5e-3)
+    near = (0.5391132678890725, 2.322509635628854, 0.46830953436866546)
+    wrist = (-2.2497912973505088, -0.6741300784253903, -0.3653724514898134)
+    q = np.array([*near, *wrist])
+    points, approaches = task.targets(cells)
+    point, axis = Kinematics(robot).tool(q)
+    assert (robot.lower <= q).all()
+    assert (q <= robot.upper).all()
+    assert np.linalg.norm(point - points[47]) <= 5e-3
+    assert np.degrees(np.arccos(axis @ approaches[47])) <= 15.0
+
+    verdict = check(robot, cells, task, Search(seed=3))
+    details = {cause.cell: cause.detail for cause in verdict.causes if not cause.proved}
+    # A search that uses the whole tolerance may well cover it.
+    assert verdict.covered[47] or details[47].endswith(UNPROVED)
+
+
+@pytest.mark.parametrize("least", [0, 1, 3])
+def test_a_value_never_reads_like_the_bound_that_it_passes(least: int) -> None:
+    rng = np.random.default_rng(least)
+    for bound in rng.uniform(0.0, 200.0, 200):
+        value = bound + 10.0 ** rng.uniform(-5.9, 1.0)
+        count = decimals(value, bound, least)
+        assert count >= least
+        assert f"{value:.{count}f}" != f"{bound:.{count}f}"
+        if count > least:
+            assert f"{value:.{count - 1}f}" == f"{bound:.{count - 1}f}"
