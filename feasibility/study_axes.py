@@ -239,7 +239,7 @@ def _read_values(
 def _read_steps(
     label: str, place: str, path: tuple[str | int, ...], section: Section, axes: list[Axis]
 ) -> None:
-    """Evenly spaced values, both ends among them."""
+    """Evenly spaced values, both ends among them, from the first to the last: up or down."""
     start = section.number("from", "a finite number")
     end = section.number("to", "a finite number")
     steps = section.whole("steps", f"a whole number in 2 .. {MOST_VALUES}")

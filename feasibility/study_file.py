@@ -7,7 +7,8 @@ task = { cone_deg = 30 }           # tables of a case, whose keys replace those 
 
 [vary]                             # every combination of these
 robots = ["puma560", { name = "ur5" }]
-"task.cone_deg" = [20, 30, 45]     # any key of a case; or { from = 20, to = 45, steps = 6 }
+"task.cone_deg" = [20, 30, 45]     # any key of a case; or { from = 20, to = 45, steps = 6 },
+                                   # evenly spaced; { from = 45, to = 20, ... } goes down
 "surface.position" = { x = [0.0, 0.1], y = { range = [-0.2, 0.2] }, z = 0.3 }
 "surface.rpy_deg" = { yaw = { range = [-90, 90] } }
 sampler = "sobol"                  # ranges are sampled together
@@ -30,10 +31,12 @@ from feasibility.case_faults import CaseError, Fault, Section, close, printable,
 from feasibility.files import FileError, read_regular, shown_path
 from feasibility.study import StudyTask
 from feasibility.study_axes import TITLES, Axis, Range, Variation, read_variation
-from feasibility.study_frames import Frames, faults_of, get, put
+from feasibility.study_frames import Frames, cause_of, faults_of, get, put
 from feasibility.toml_text import TomlError, parse_toml, toml_key
 
 MOST_TASKS = 1_000_000
+MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are told each by itself
+MOST_INDICES = 8  # of the others
 MOST_FRAMES = 10_000  # combinations of everything but the surface's pose: each is checked by itself
 
 Tables = dict[str, Any]
@@ -221,12 +224,28 @@ def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
         places = [f"{e.place}[0]" for e, _ in entries if _covers(e.path, key)]
         faults.append(Fault(_join(places[0], key) if places else f"base.{key}", message))
     for n, (entry, values) in enumerate(entries):
+        alike: dict[tuple[str, str], list[int]] = {}
         for k, value in enumerate(values[1:], start=1):
-            faults += [
-                Fault(_join(f"{entry.place}[{k}]", key), message)
-                for key, message in tried(n, value)
-                if (key, message) not in known
-            ]
+            for key, message in tried(n, value):
+                if (key, message) in known:
+                    continue
+                same = alike.setdefault((key, cause_of(message)), [])
+                same.append(k)
+                if len(same) <= MOST_ALIKE:
+                    faults.append(Fault(_join(f"{entry.place}[{k}]", key), message))
+        faults += [
+            Fault(entry.place, _more(key, same[MOST_ALIKE:]))
+            for (key, _), same in alike.items()
+            if len(same) > MOST_ALIKE
+        ]
+
+
+def _more(key: str, indices: Sequence[int]) -> str:
+    """Values that are wrong as others are that have been told."""
+    shown_ones = ", ".join(f"[{k}]" for k in indices[:MOST_INDICES])
+    rest = ", ..." if len(indices) > MOST_INDICES else ""
+    what = "value is" if len(indices) == 1 else "values are"
+    return f"{len(indices)} more {what} no better for {key}: {shown_ones}{rest}"
 
 
 def _covers(path: Sequence[str | int], key: str) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import itertools
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
@@ -19,6 +20,7 @@ from feasibility.study_outcome import HOME, arm_of
 from feasibility.toml_text import parse_toml, toml_document, toml_key, toml_value
 
 ORIGIN = (0.0, 0.0, 0.0)
+POSED = [[key] for key in POSES]
 
 Tables = dict[str, Any]
 
@@ -66,25 +68,27 @@ class Frames:
         return not all(span.is_pose for span in self.varied.ranges)
 
     def tasks(self, faults: list[Fault]) -> Iterator[StudyTask]:
-        """The tasks in order; combinations that make no case are kept as faults."""
+        """The tasks in order; combinations that make no case are kept as faults, one a cause."""
         axes, ranges = self.varied.axes, self.varied.ranges
         samples = draw(self.varied)
         checked: dict[str, Tables | None] = {}
+        refused: dict[tuple[str, str], Refused] = {}
         for values in itertools.product(*(axis.values for axis in axes)):
             for sample in samples:
                 entries: list[tuple[Axis | Range, Any]] = list(zip(axes, values, strict=True))
                 entries += zip(ranges, sample, strict=True)
                 parameters = {entry.label: _said(entry.label, value) for entry, value in entries}
-                tables = self._tables(entries, parameters, checked, faults)
+                tables = self._tables(entries, parameters, checked, refused)
                 if tables is not None:
                     yield StudyTask(tables, parameters)
+        faults += [one.fault() for one in refused.values()]
 
     def _tables(
         self,
         entries: list[tuple[Axis | Range, Any]],
         parameters: Mapping[str, Any],
         checked: dict[str, Tables | None],
-        faults: list[Fault],
+        refused: dict[tuple[str, str], Refused],
     ) -> Tables | None:
         """The checked tables of one combination; None where it makes no case."""
         others = [(entry, value) for entry, value in entries if not entry.is_pose]
@@ -93,7 +97,13 @@ class Frames:
             tables = copy.deepcopy(self.base)
             for entry, value in others:
                 put(tables, entry.path, copy.deepcopy(value))
-            checked[name] = self._checked(tables, parameters, faults)
+            found = faults_of(tables)
+            # Filled in is what the case leaves open.
+            checked[name] = None if found else as_read(case_of(tables).to_tables())
+            said = {k: shown(v) for k, v in parameters.items() if k.split(".")[1:2] not in POSED}
+            for fault in found:
+                cause = fault.key, cause_of(fault.message)
+                refused.setdefault(cause, Refused(fault, said)).add(said)
         frame = checked[name]
         if frame is None:
             return None
@@ -104,18 +114,38 @@ class Frames:
                 put(tables, entry.path, numbers)
         return tables
 
-    def _checked(
-        self, tables: Tables, parameters: Mapping[str, Any], faults: list[Fault]
-    ) -> Tables | None:
-        """The tables with everything filled in that the case leaves open."""
-        found = faults_of(tables)
-        shown_values = ", ".join(
-            f"{label} = {shown(value)}"
-            for label, value in parameters.items()
-            if label.split(".")[1:2] not in [[key] for key in POSES]
-        )
-        faults += [Fault(f"vary: with {shown_values}: {key}", text) for key, text in found]
-        return None if found else as_read(case_of(tables).to_tables())
+
+class Refused:
+    """Combinations that make no case, all for the same cause."""
+
+    def __init__(self, fault: Fault, said: Mapping[str, str]) -> None:
+        """The first of them: what is wrong with it, and what its keys are."""
+        self.first, self.count = fault, 0
+        self.seen: dict[str, set[str]] = {label: set() for label in said}
+        self.said = dict(said)
+
+    def add(self, said: Mapping[str, str]) -> None:
+        """One more of them, or the first."""
+        self.count += 1
+        for label, value in said.items():
+            self.seen[label].add(value)
+
+    def fault(self) -> Fault:
+        """All of them as one fault, with the values that they have in common."""
+        alike = [f"{label} = {v}" for label, v in self.said.items() if len(self.seen[label]) == 1]
+        more = f" ({self.count} combinations with that)" if self.count > 1 else ""
+        place = f"vary: with {', '.join(alike)}: " if alike else "vary: "
+        return Fault(f"{place}{self.first.key}", f"{self.first.message}{more}")
+
+
+def cause_of(message: str) -> str:
+    """What is wrong, whatever the numbers are; digits of names stay.
+
+    Example:
+        >>> cause_of("joint2 must lie in 0 .. 180, got -3.5e+1")
+        'joint2 must lie in # .. #, got #'
+    """
+    return re.sub(r"(?<![\w'.-])[-+]?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)", "#", message)
 
 
 def _said(label: str, value: Any) -> Any:

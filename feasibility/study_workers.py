@@ -9,18 +9,22 @@ from __future__ import annotations
 import os
 import signal
 import threading
-import time
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
+from feasibility.warmup import (
+    Gate,
+    compiling_notice,
+    notify,
+    warm_up,
+    warm_up_in_turn,
+)
+
 ATTEMPTS = 3  # to start worker processes anew
-CONNECT = 10.0  # [s] for a Dask scheduler to answer
-ASK = 2.0  # [s] between two questions about how many workers there are
 LOST = "the connection to the workers was lost; what was finished is kept, run again to continue"
-GATHER = 60.0  # [s] for its first worker to be there
 
 
 class WorkersError(ValueError):
@@ -61,7 +65,8 @@ def open_workers(
         count: processes on this machine; None for one on each processor, 0 for none: then tasks
             run in this process.
         address: of a Dask scheduler, such as "tcp://127.0.0.1:8786", instead of processes.
-        warm: load the kernels of the search into each process before its first task.
+        warm: load the kernels of the search before the first task. Where they have to be compiled,
+            one process does it while the others wait, and a line on stderr says so.
 
     Raises:
         WorkersError: there is no such scheduler, or both are given.
@@ -78,11 +83,13 @@ def open_workers(
         raise WorkersError(f"the number of workers must be >= 0, got {count}")
     workers: Workers
     if address is not None:
-        workers = DaskWorkers(address)
+        from feasibility.study_dask import DaskWorkers
+
+        workers = DaskWorkers(address, warm)
+    elif count == 0:
+        workers = Here(warm)
     else:
-        workers = (
-            Here() if count == 0 else Processes(processors() if count is None else count, warm)
-        )
+        workers = Processes(processors() if count is None else count, warm)
     try:
         yield workers
     except BaseException:
@@ -106,8 +113,16 @@ class Here:
     shared_fate = False
     width = 1
 
+    def __init__(self, warm: bool) -> None:
+        """Nothing is done yet; see `open_workers`."""
+        self._warm = warm
+
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Run it now."""
+        if self._warm:
+            with compiling_notice():
+                warm_up()
+            self._warm = False
         future: Future[Any] = Future()
         try:
             future.set_result(work(*arguments))
@@ -145,8 +160,15 @@ class Processes:
 
         context = get_context("spawn")
         self._end, self._leash = context.Pipe(duplex=False)
+        heard, self._word = context.Pipe(duplex=False)
+        self._ear = threading.Thread(target=_pass_on, args=[heard], daemon=True)
+        self._ear.start()
+        gate = context.Lock() if self._warm else None
         self._pool: Executor = ProcessPoolExecutor(
-            self.width, mp_context=context, initializer=_begin, initargs=(self._end, self._warm)
+            self.width,
+            mp_context=context,
+            initializer=_begin,
+            initargs=(self._end, self._word, gate),
         )
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
@@ -185,87 +207,28 @@ class Processes:
         self._pool.shutdown(wait=True, cancel_futures=True)
         self._leash.close()
         self._end.close()
+        self._word.close()
+        self._ear.join()
 
 
-def _begin(leash: Connection, warm: bool) -> None:
-    """In a new worker: watch the leash, load the kernels."""
+def _pass_on(heard: Connection) -> None:
+    """Say that a worker compiles, when it sends word; until nobody is left who could."""
+    with heard:
+        try:
+            heard.recv_bytes()
+        except (EOFError, OSError):
+            return
+    notify()
+
+
+def _begin(leash: Connection, word: Connection, gate: Gate | None) -> None:
+    """In a new worker: watch the leash; load the kernels, one worker first, if there is a gate."""
 
     def watch() -> None:
         leash.poll(None)  # nothing is ever sent: it returns when the other end is closed
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-    if warm:
-        from feasibility.warmup import warm_up
-
-        warm_up()
-
-
-class DaskWorkers:
-    """The workers of a Dask cluster. Each needs coverable installed; one thread each is best."""
-
-    patience = 1  # Dask has tried several workers before it gives a task up
-    shared_fate = False
-
-    def __init__(self, address: str) -> None:
-        """Connect.
-
-        Raises:
-            WorkersError: Dask is not installed, or nothing useful answers there.
-        """
-        try:
-            from distributed import Client, KilledWorker
-        except ImportError as error:
-            raise WorkersError(
-                "--dask needs the library distributed: pip install 'coverable[dask]'"
-            ) from error
-        self.losses: tuple[type[BaseException], ...] = (KilledWorker,)
-        try:
-            self._client = Client(address, timeout=CONNECT, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
-            raise WorkersError(
-                f"no Dask scheduler answers at {address!r} ({error}); expected an address such as "
-                "tcp://127.0.0.1:8786"
-            ) from error
-        try:
-            self._client.wait_for_workers(1, timeout=GATHER)
-        except TimeoutError as error:
-            self._client.close()
-            raise WorkersError(
-                f"the Dask scheduler at {address!r} has no workers; start some with `dask worker`"
-            ) from error
-        self._width, self._asked = 1, -ASK
-        # Not pure: a task that is submitted again is run again.
-        self._pool: Executor = self._client.get_executor(pure=False)
-
-    @property
-    def width(self) -> int:
-        """Threads of all workers, as of late; at least 1, for while they are replaced.
-
-        Raises:
-            WorkersError: the scheduler is gone.
-        """
-        now = time.monotonic()
-        if now > self._asked + ASK:
-            try:
-                self._width = max(sum(self._client.nthreads().values()), 1)
-            except OSError as error:
-                raise WorkersError(LOST) from error
-            self._asked = now
-        return self._width
-
-    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Run it on the cluster."""
-        return self._pool.submit(work, *arguments)
-
-    def renew(self) -> None:
-        """Dask replaces its workers by itself."""
-
-    def close(self, at_once: bool) -> None:
-        """Leave the cluster; it goes on without us."""
-        try:
-            self._pool.shutdown(wait=not at_once)
-        except (CancelledError, OSError):  # nobody is there to be told
-            pass
-        finally:
-            self._client.close()
+    if gate is not None:
+        warm_up_in_turn(gate, lambda: word.send_bytes(b"!"))
+    word.close()

@@ -22,8 +22,8 @@ USING = "explain placement placement_map placer"
 STORED = """archive case case_edits case_faults case_kinds case_mesh case_patches case_pieces
     case_robot case_surface case_task files result result_cells result_fields result_graph
     result_robot toml_text trajectory_files"""
-STUDIES = """comparison placement_stations placement_study stations study study_axes study_dealing
-    study_file study_frames study_outcome study_store study_workers"""
+STUDIES = """comparison placement_stations placement_study stations study study_axes study_dask
+    study_dealing study_file study_frames study_outcome study_store study_workers"""
 EDGE = """asking cell_shapes cli cli_jobs cli_studies commands comparison_report console
     division_report explain_report job_commands job_view listing meshcat_server meshes motion page
     path_report placement_commands placement_plot placement_report plots report robot_visuals scene

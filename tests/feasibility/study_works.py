@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import sqlite3
 import time
+from contextlib import closing
 from pathlib import Path
 
 
@@ -38,6 +40,37 @@ def _new(mark):
 def die_at_once(*arguments):
     """In the place of what a worker begins with."""
     os._exit(3)
+
+
+def begin_slowly(leash, word, gate):
+    """In the place of what a worker begins with: one that compiles for long."""
+    first = gate.acquire(False)
+    if first:
+        word.send_bytes(b"!")
+        time.sleep(0.2)
+        gate.release()
+
+
+LOADED = []
+
+
+def mark_loaded():
+    """In the place of loading the kernels."""
+    LOADED.append(1)
+
+
+def marks():
+    """How often this process has loaded them."""
+    return LOADED
+
+
+def kept(path):
+    """How many rows a store holds that another process, or thread, writes."""
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as base:
+        try:
+            return int(base.execute("SELECT count(*) FROM tasks").fetchone()[0])
+        except sqlite3.OperationalError:  # before the table is there
+            return 0
 
 
 def fail_odd(tables):
@@ -76,6 +109,17 @@ def plates():
             task = StudyTask({**base, "surface": surface}, {"i": i, "j": j}, slow_verdict)
             tasks.append(task)
     return tasks
+
+
+STUDY = """
+base.robot.name = "ur5"
+base.surface = { kind = "plane", u = [0.4, 0.6], v = [-0.1, 0.1], cells = [2, 2], side = "outside" }
+base.task = { standoff = 0.02, cone_deg = 30 }
+[vary]
+"surface.position" = { x = { range = [-0.2, 0.7] }, z = { range = [-0.2, 0.7] } }
+"surface.rpy_deg" = { yaw = { range = [-90, 90] } }
+count = 80
+"""  # the same kind of plates, as a file; about a third of them feasible
 
 
 def run_plates(store_path, count):

@@ -16,6 +16,7 @@ import tomllib
 import urllib.request
 from pathlib import Path
 
+import numba
 import pytest
 from bad_cases import BAD_CASES, GOOD, write
 from schema import CHECK, conforms
@@ -483,10 +484,14 @@ def test_every_answer_has_its_status(ask, monkeypatch, plate, answer, status):
 def test_a_long_wait_for_kernels_is_explained(monkeypatch):
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     with compiling_notice(patience=60.0):
-        pass
+        numba.njit(lambda x: x + 1)(1)
+    assert sys.stderr.getvalue() == ""
+    with compiling_notice(patience=0.0):
+        time.sleep(0.1)  # slow, but nothing is compiled
     assert sys.stderr.getvalue() == ""
     with compiling_notice(patience=0.0):
         limit = time.monotonic() + 30.0
         while not sys.stderr.getvalue() and time.monotonic() < limit:
-            time.sleep(0.01)
+            numba.njit(lambda x: x + 1)(1)
+        numba.njit(lambda x: x + 2)(1)
     assert sys.stderr.getvalue() == NOTICE + "\n"

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import multiprocessing
 import os
 import random
 import signal
-import sqlite3
 import subprocess
 import sys
 import threading
 import time
-from contextlib import closing
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -21,10 +22,12 @@ from small_cases import TEXTS, small_case, small_verdict
 
 from feasibility.case import Case
 from feasibility.case_edits import as_read
+from feasibility.cli import main
 from feasibility.study import StudyTask, run_tasks
 from feasibility.study_outcome import arm_of, bits_of, cells_of, cut_of, evaluate, outcome_of
 from feasibility.study_store import Store, StoreError
 from feasibility.study_workers import WorkersError, open_workers
+from feasibility.warmup import NOTICE, warm_up_in_turn
 
 SHARED = Path(__file__).parent
 
@@ -281,13 +284,7 @@ if __name__ == "__main__":
 
 def stored(path) -> int:
     """How many rows a store holds that another process writes."""
-    if not path.exists():
-        return 0
-    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as base:
-        try:
-            return int(base.execute("SELECT count(*) FROM tasks").fetchone()[0])
-        except sqlite3.OperationalError:  # before the table is there
-            return 0
+    return study_works.kept(path) if path.exists() else 0
 
 
 def wait_for(holds, process=None, patience: float = 60.0) -> None:
@@ -345,6 +342,61 @@ def test_a_study_killed_five_times_and_resumed(undisturbed, tmp_path) -> None:
     wait_for(lambda: not any(map(alive, orphans)), patience=10.0)
 
 
+STUDY_COMMAND = """
+import sys
+from feasibility.cli import main
+if __name__ == "__main__":
+    study, out, csv, *how = sys.argv[1:]
+    sys.exit(main(["study", study, "--out", out, "--csv", csv, *how]))
+"""
+
+
+@pytest.fixture(scope="module")
+def in_peace(tmp_path_factory):
+    """A study file, and the CSV table that the command writes of it, left in peace."""
+    folder = tmp_path_factory.mktemp("peace")
+    (folder / "plates.toml").write_text(study_works.STUDY, encoding="utf-8")
+    assert command(folder / "plates.toml", folder / "0", "--workers", "0") == 0
+    text = (folder / "0.csv").read_text(encoding="utf-8")
+    lines = list(csv.DictReader(io.StringIO(text)))
+    verdicts = [line["verdict"] for line in lines]
+    assert len(lines) == 80
+    assert min(verdicts.count("feasible"), verdicts.count("infeasible")) >= 20
+    assert any(0.0 < float(line["share"]) < 1.0 for line in lines)
+    return folder / "plates.toml", text
+
+
+def command(study, stem, *how) -> int:
+    """`coverable study`, in this process."""
+    return main(["study", f"{study}", "--out", f"{stem}.study", "--csv", f"{stem}.csv", *how])
+
+
+@pytest.mark.parametrize("count", ["1", "2", "4"])
+def test_the_command_writes_the_same_table_with_any_workers(in_peace, tmp_path, count) -> None:
+    study, text = in_peace
+    assert command(study, tmp_path / "a", "--workers", count) == 0
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
+
+
+def test_the_command_killed_five_times_and_run_again(in_peace, tmp_path) -> None:
+    """With two workers; the last run has cases left to do."""
+    study, text = in_peace
+    path, rng, held = tmp_path / "a.study", random.Random(5), []
+    arguments = study, path, tmp_path / "a.csv", "--workers", "2"
+    for _ in range(5):
+        before = stored(path)
+        with start(STUDY_COMMAND, *arguments) as process:
+            wait_for(lambda before=before: stored(path) > before, process)
+            time.sleep(0.2 * rng.random())
+            process.kill()
+        held.append(stored(path))
+        assert not (tmp_path / "a.csv").exists()
+    assert held == sorted(held)
+    assert 0 < held[0] < held[-1] <= 80
+    assert command(study, tmp_path / "a", "--workers", "2") == 0
+    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
+
+
 def test_ctrl_c_stores_and_leaves_no_worker(tmp_path) -> None:
     """A terminal sends it to the workers too: neither they nor their parent write a traceback."""
     path = tmp_path / "a.study"
@@ -391,6 +443,57 @@ def test_workers_that_cannot_be_had() -> None:
 def test_work_that_no_worker_can_be_told(pool) -> None:
     with pytest.raises(WorkersError, match="cannot run the tasks"):
         run_tasks([StudyTask({}, {}, lambda tables: {})], pool)
+
+
+def test_one_process_compiles_and_a_line_says_so(monkeypatch, capsys) -> None:
+    monkeypatch.setattr("feasibility.study_workers._begin", study_works.begin_slowly)
+    before = threading.active_count()
+    with open_workers(2) as workers:
+        rows = run_tasks(numbers(9, wait=0.01), workers)
+    assert [row.result["double"] for row in rows] == list(range(0, 18, 2))
+    assert capsys.readouterr().err == NOTICE + "\n"
+    assert threading.active_count() == before
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_the_others_wait_for_the_first_to_compile(monkeypatch, fails) -> None:
+    """Threads in the place of processes: nobody else loads while the first one is at it."""
+    gate, entered, may_end = threading.Lock(), [], threading.Event()
+
+    def compile_or_load() -> None:
+        entered.append(threading.current_thread())
+        if len(entered) == 1:
+            may_end.wait(30.0)
+            if fails:
+                raise ValueError("no memory")
+
+    def begin() -> None:
+        with suppress(ValueError):
+            warm_up_in_turn(gate, int)
+
+    monkeypatch.setattr("feasibility.warmup.warm_up", compile_or_load)
+    threads = [threading.Thread(target=begin) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    wait_for(lambda: entered)
+    for thread in threads:
+        thread.join(0.05)
+    assert len(entered) == 1
+    may_end.set()
+    for thread in threads:
+        thread.join(30.0)
+    assert sorted(map(id, entered)) == sorted(map(id, threads))
+    assert gate.acquire(False)
+
+
+def test_this_process_loads_the_kernels_first(monkeypatch) -> None:
+    loaded = []
+    monkeypatch.setattr("feasibility.study_workers.warm_up", lambda: loaded.append(1))
+    with open_workers(0) as workers:
+        assert loaded == []  # nothing is asked yet, and perhaps never
+        assert [workers.submit(len, loaded).result() for _ in range(2)] == [1, 1]
+    with open_workers(0, warm=False) as workers:
+        assert workers.submit(len, loaded).result() == 1
 
 
 def test_workers_that_die_while_starting(monkeypatch) -> None:

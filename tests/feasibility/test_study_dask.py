@@ -9,6 +9,7 @@ import threading
 import pytest
 import study_works
 
+from feasibility.cli import main
 from feasibility.study import StudyTask, run_tasks
 from feasibility.study_store import Store
 from feasibility.study_workers import WorkersError, open_workers
@@ -58,8 +59,49 @@ def test_a_dask_worker_killed_in_the_middle(cluster) -> None:
     assert [row.result["double"] for row in rows] == [2 * k for k in range(150)]
 
 
+def test_a_dask_worker_killed_under_the_command(cluster, tmp_path, capsys) -> None:
+    """Real verdicts, and the table that is written is that of this process alone, byte by byte."""
+    study = tmp_path / "plates.toml"
+    study.write_text(study_works.STUDY, encoding="utf-8")
+    victim = next(iter(cluster.workers.values())).pid
+    path = tmp_path / "dask.study"
+
+    def blow() -> None:
+        """When some cases are kept, and most are not."""
+        while not stop.wait(0.02):
+            if path.exists() and study_works.kept(path) >= 8:
+                os.kill(victim, signal.SIGKILL)
+                held.append(study_works.kept(path))
+                return
+
+    stop, held = threading.Event(), list[int]()
+    thread = threading.Thread(target=blow)
+    thread.start()
+    try:
+        for stem, how in (
+            ("dask", ("--dask", cluster.scheduler_address)),
+            ("0", ("--workers", "0")),
+        ):
+            files = "--out", str(tmp_path / f"{stem}.study"), "--csv", str(tmp_path / f"{stem}.csv")
+            assert main(["study", str(study), *files, *how]) == 0
+    finally:
+        stop.set()
+        thread.join()
+    assert 8 <= held[0] < 80
+    assert (tmp_path / "dask.csv").read_bytes() == (tmp_path / "0.csv").read_bytes()
+    assert len((tmp_path / "0.csv").read_text(encoding="utf-8").splitlines()) == 81
+
+
+def test_one_worker_of_a_machine_loads_first(cluster, monkeypatch, capsys) -> None:
+    monkeypatch.setattr("feasibility.study_dask.warm_up", study_works.mark_loaded)
+    with open_workers(address=cluster.scheduler_address) as there:
+        assert there.submit(study_works.marks).result() in ([], [1])
+        marks = there._client.run(study_works.marks)
+    assert sorted(marks.values()) == [[], [1]]
+
+
 def test_no_scheduler(monkeypatch) -> None:
-    monkeypatch.setattr("feasibility.study_workers.CONNECT", 0.3)
+    monkeypatch.setattr("feasibility.study_dask.CONNECT", 0.3)
     for address in ("tcp://127.0.0.1:9", "nonsense://x", "", "127.0.0.1"):
         with pytest.raises(WorkersError, match="Dask scheduler"), open_workers(address=address):
             pass

@@ -269,6 +269,39 @@ def test_combinations_that_make_no_case_are_told() -> None:
         )
 
 
+def test_a_cause_is_told_once_for_all_combinations_that_have_it() -> None:
+    """Three limits and three cones with each of two arms: six bad combinations, two causes."""
+    whole = "[[-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90], [-90, 90]]"
+    with pytest.raises(CaseError) as caught:
+        read_study(
+            'base.case = "paper/4a"\nbase.robot.name = "puma560"\n'
+            'vary.robots = ["puma560", "ur5"]\n"vary"."task.cone_deg" = [20, 30, 45]\n'
+            f'vary."robot.limits_deg" = [{whole}, {{ joint1 = [-90, 90] }}, {{ joint2 = [0, 9] }}]'
+        )
+    faults = [tuple(fault) for fault in caught.value.faults]
+    assert len(faults) == 2
+    for joint, (key, message) in zip(("joint1", "joint2"), faults, strict=True):
+        assert key.startswith(f"vary: with robot = 'ur5', robot.limits_deg = {{'{joint}'")
+        assert "cone" not in key
+        assert f"no free joint '{joint}'" in message
+        assert message.endswith("(3 combinations with that)")
+
+
+def test_values_that_are_wrong_alike_are_counted() -> None:
+    with pytest.raises(CaseError) as caught:
+        read_study(
+            'base.case = "paper/4a"\nvary."task.standoff" = [0.1, -1, -2]\n'
+            'vary."task.cone_deg" = { from = 170, to = 200, steps = 31 }'
+        )
+    told = dict(caught.value.faults)
+    assert [key.split(":")[0] for key in told] == [
+        *(f"vary.task.standoff[{k}]" for k in (1, 2)),
+        *(f"vary.task.cone_deg[{k}]" for k in (11, 12, 13)),
+        "vary.task.cone_deg",
+    ]
+    assert told["vary.task.cone_deg"].startswith("17 more values are no better for task.cone_deg")
+
+
 def test_files_that_are_none(tmp_path) -> None:
     (tmp_path / "latin.toml").write_bytes(b"a = '\xff'")
     (tmp_path / "large.toml").write_bytes(b"#" * 300_000)
