@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certificate import replay
-from feasibility.joint_route import joint_route, walk_of
-from feasibility.motion_net import MotionNet, net_of
+from feasibility.joint_route import JointRoute, walk_of
+from feasibility.laying import laid
+from feasibility.motion_net import net_of
 from feasibility.path_figures import PathFigures, figures_of
-from feasibility.route import ORDERS, Order, PathError, route
+from feasibility.route import ORDERS, Order, PathError
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
 from robots import Robot
@@ -97,18 +98,15 @@ def coverage_path(
         raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
     needed = _needed(verdict, only)
     net = net_of(verdict)
-    pairs = net.linked_pairs() if order == "shortest" else None
-    visits = route(verdict.cells, order, needed, pairs)
-    nodes = joint_route(net, verdict.cells, visits)
-    return _replayed(verdict, order, needed, net, nodes)
+    return _replayed(verdict, order, needed, laid(net, verdict.cells, order, needed))
 
 
 def _replayed(
-    verdict: Verdict, order: Order, needed: NDArray[np.bool_], net: MotionNet, nodes: list[int]
+    verdict: Verdict, order: Order, needed: NDArray[np.bool_], found: JointRoute
 ) -> CoveragePath:
-    """The path along nodes, once the replay has accepted it."""
+    """The path along a motion, once the replay has accepted it."""
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
-    walk = walk_of(net, nodes)
+    walk = walk_of(found.net, found.nodes)
     replayed = replay(robot, cells, task, walk, needed)
     if not replayed.accepted:
         raise PathError(f"the independent replay refuses the path: {replayed.refusal}")

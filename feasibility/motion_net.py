@@ -8,7 +8,7 @@ graph and its witness); a path adds what it tracks. Every motion can be gone bac
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -37,6 +37,8 @@ class MotionNet:
     """Nodes over each cell."""
     links: list[dict[int, Motion]] = field(default_factory=list)
     """For each node the nodes that a motion joins it with, and that motion from here to there."""
+    lengths: list[dict[int, float]] = field(default_factory=list)
+    """For each node the `joint_length` of these motions."""
     _known: dict[tuple[int, bytes], int] = field(default_factory=dict)
 
     def node(self, cell: int, q: NDArray[np.float64]) -> int:
@@ -48,16 +50,29 @@ class MotionNet:
             self.cell.append(cell)
             self.q.append(q.copy())
             self.links.append({})
+            self.lengths.append({})
         return self._known[key]
 
     def link(self, x: int, y: int, motion: Motion) -> None:
         """Join two nodes by a motion from x to y, unless a shorter one joins them already."""
         if x == y:
             return
-        known = self.links[x].get(y)
-        if known is None or joint_length(motion) < joint_length(known):
-            self.links[x][y] = motion
-            self.links[y][x] = motion[::-1]
+        length = joint_length(motion)
+        if y not in self.links[x] or length < self.lengths[x][y]:
+            self.links[x][y], self.links[y][x] = motion, motion[::-1]
+            self.lengths[x][y] = self.lengths[y][x] = length
+
+    def copy(self) -> MotionNet:
+        """A net that can grow on its own; the motions themselves are shared."""
+        return replace(
+            self,
+            cell=list(self.cell),
+            q=list(self.q),
+            over={cell: list(nodes) for cell, nodes in self.over.items()},
+            links=[dict(near) for near in self.links],
+            lengths=[dict(near) for near in self.lengths],
+            _known=dict(self._known),
+        )
 
     def touch(self, a: int, b: int) -> bool:
         """Do two cells touch?"""

@@ -33,7 +33,13 @@ class PathError(ValueError):
     """A path or a trajectory that cannot be made as asked: why, and what would do."""
 
 
-def grid_order(order: Order, rows: int, columns: int) -> NDArray[np.int64]:
+def grid_order(
+    order: Order,
+    rows: int,
+    columns: int,
+    begin: tuple[int, int] = (0, 0),
+    turned: tuple[bool, bool] = (False, False),
+) -> NDArray[np.int64]:
     """Flat indices of rows x columns cells in the order of a path.
 
     Args:
@@ -41,14 +47,20 @@ def grid_order(order: Order, rows: int, columns: int) -> NDArray[np.int64]:
             (u), "spiral" from the rim to the middle.
         rows: number of rows (u).
         columns: number of columns (v).
+        begin: row and column that count as the first ones, where a grid closes on itself.
+        turned: whether rows, and whether columns, are taken from the last to the first.
 
     Example:
         >>> grid_order("rows", 2, 3).tolist(), grid_order("columns", 2, 3).tolist()
         ([0, 1, 2, 5, 4, 3], [0, 3, 4, 1, 2, 5])
         >>> grid_order("spiral", 3, 3).tolist()
         [0, 1, 2, 5, 8, 7, 6, 3, 4]
+        >>> grid_order("rows", 1, 4, begin=(0, 1)).tolist()
+        [1, 2, 3, 0]
     """
     table = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    table = np.roll(table, (-begin[0], -begin[1]), axis=(0, 1))
+    table = table[:: -1 if turned[0] else 1, :: -1 if turned[1] else 1]
     if order == "spiral":
         parts = []
         while table.size:
@@ -57,9 +69,31 @@ def grid_order(order: Order, rows: int, columns: int) -> NDArray[np.int64]:
         return np.concatenate(parts) if parts else np.empty(0, dtype=np.int64)
     if order == "columns":
         table = table.T
-    turned = table.copy()
-    turned[1::2] = table[1::2, ::-1]
-    return turned.reshape(-1)
+    snake = table.copy()
+    snake[1::2] = table[1::2, ::-1]
+    return snake.reshape(-1)
+
+
+def closed_sides(cells: Cells) -> tuple[bool, bool]:
+    """Whether the last row of a grid touches the first one all along; and the columns too.
+
+    Example:
+        >>> from surfaces import cylinder
+        >>> closed_sides(cylinder(0.5, (0, 360), (0, 1)).cells(6, 3))
+        (True, False)
+    """
+    rows, columns = int(cells.shape[0]), int(cells.shape[1])
+    table = np.arange(len(cells)).reshape(rows, columns)
+    known = set(map(tuple, np.sort(cells.pairs, axis=1).tolist()))
+
+    def close(first: NDArray[np.int64], last: NDArray[np.int64]) -> bool:
+        pairs = np.sort(np.column_stack([first, last]), axis=1)
+        return all(tuple(pair) in known for pair in pairs.tolist())
+
+    return (
+        rows > 2 and close(table[0], table[-1]),
+        columns > 2 and close(table[:, 0], table[:, -1]),
+    )
 
 
 def route(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise, permutations
+from itertools import pairwise, permutations, product
 
 import networkx as nx
 import numpy as np
@@ -16,6 +16,7 @@ from feasibility.route import (
     GRID_ORDERS,
     ORDERS,
     PathError,
+    closed_sides,
     grid_order,
     least_length,
     route,
@@ -23,7 +24,7 @@ from feasibility.route import (
     step_lengths,
 )
 from feasibility.tour import improved, tour_length
-from surfaces import cylinder, plane
+from surfaces import cylinder, plane, sphere
 from surfaces.mesh import mesh
 
 SHAPES = [(rows, columns) for rows in range(1, 7) for columns in range(1, 7)]
@@ -48,6 +49,33 @@ def test_grid_orders_step_from_cell_to_the_next(order, rows, columns):
     if order == "spiral":  # outside in: cells never come nearer to the rim again
         depth = np.minimum(np.minimum(i, rows - 1 - i), np.minimum(j, columns - 1 - j))
         assert (np.diff(depth) >= 0).all()
+
+
+@pytest.mark.parametrize("order", GRID_ORDERS)
+@pytest.mark.parametrize("closed", [(True, False), (False, True), (False, False)])
+def test_orders_begun_elsewhere_step_from_cell_to_the_next_too(order, closed):
+    """Only over the seam of a grid that closes there."""
+    shape = (5, 4)
+    for begin in np.ndindex(*(n if c else 1 for n, c in zip(shape, closed, strict=True))):
+        for turned in product((False, True), repeat=2):
+            found = grid_order(order, *shape, begin, turned)
+            assert sorted(found.tolist()) == list(range(20))
+            steps = np.abs(np.diff(np.stack(np.divmod(found, 4)), axis=1))
+            for axis in (0, 1):
+                if closed[axis]:
+                    steps[axis] = np.minimum(steps[axis], shape[axis] - steps[axis])
+            assert (steps.sum(axis=0) == 1).all()
+            first = np.add(begin, [n - 1 if t else 0 for n, t in zip(shape, turned, strict=True)])
+            assert np.divmod(found[0], 4) == tuple(first % shape)
+
+
+def test_grids_that_close_on_themselves():
+    assert closed_sides(cylinder(0.5, (0, 360), (0, 1)).cells(3, 2)) == (True, False)
+    assert closed_sides(cylinder(0.5, (0, 350), (0, 1)).cells(9, 2)) == (False, False)
+    assert closed_sides(sphere(0.5, (20, 90), (0, 360)).cells(3, 8)) == (False, True)
+    assert closed_sides(sphere(0.5, (0, 90), (0, 360)).cells(3, 8)) == (False, True)
+    assert closed_sides(plane((0, 1), (0, 1)).cells(3, 3)) == (False, False)
+    assert closed_sides(cylinder(0.5, (0, 360), (0, 1)).cells(2, 3)) == (False, False)
 
 
 def test_an_empty_grid_has_an_empty_order():
