@@ -17,6 +17,7 @@ from small_cases import TEXTS, small_case
 
 from feasibility import check
 from feasibility.case import Case, CaseError
+from feasibility.cli import main
 from feasibility.comparison import CONE_STEP_DEG, Arm, Comparison, compare, critical_cone
 from feasibility.comparison_report import as_csv, as_html, as_json, as_text, chart, columns
 from feasibility.dividing import divide
@@ -231,6 +232,44 @@ def test_compare_from_the_command_line(tmp_path, capsys) -> None:
     assert (tmp_path / "a.csv").read_text().startswith("robot,")
     assert (tmp_path / "a.html").read_text().startswith("<!doctype html>")
     assert err.count("\n") == 2
+
+
+HALF_METRE = """
+    robot = { name = "puma560", limits = "set-1" }
+    surface.kind = "plane"
+    surface.u = [-0.25, 0.25]
+    surface.v = [-0.25, 0.25]
+    surface.cells = [3, 3]
+    surface.position = [0.45, 0, 0.2]
+    surface.side = "outside"
+    task = { standoff = 0.02, cone_deg = 30 }
+"""
+FLEET = ["puma560", "ur3", "ur5", "ur5_limited", "ur10", "ur10_limited", "panda", "kinova", "xarm7"]
+
+
+def test_nine_arms_over_half_a_metre_in_one_command(tmp_path, capsys) -> None:
+    """Each row is the arm's own verdict, and all but the smallest arm cover the patch."""
+    (tmp_path / "a.toml").write_text(HALF_METRE)
+    files = "--csv", str(tmp_path / "a.csv"), "--html", str(tmp_path / "a.html")
+    names = "--robots", ",".join(FLEET)
+    assert main(["compare", str(tmp_path / "a.toml"), *names, *files, "--workers", "0"]) == 0
+    text = capsys.readouterr().out
+    lines = {
+        row["robot"]: row for row in csv.DictReader(io.StringIO((tmp_path / "a.csv").read_text()))
+    }
+    assert list(lines) == FLEET
+    page = (tmp_path / "a.html").read_text()
+    case = Case.from_toml(HALF_METRE)
+    for name, row in lines.items():
+        settings = [] if name == "puma560" else [f"robot.name={name}", "robot.limits="]
+        verdict = check(*case.with_overrides(settings).build())
+        assert row["verdict"] == str(verdict.answer)
+        assert int(row["covered"]) == verdict.n_covered
+        assert verdict.feasible == (name != "ur3")
+        assert (float(row["margin_limit_deg"] or -1.0) > 0.0) == verdict.feasible
+        share = 100.0 * verdict.n_covered / 9
+        assert re.search(rf"^{name} +{row['verdict']} +{share:.1f} %", text, re.MULTILINE)
+        assert f"<td>{name}</td><td>{row['verdict']}</td><td>{share:.1f} %</td>" in page
 
 
 STUDY = """
