@@ -31,7 +31,7 @@ from feasibility.pose_layers import (
     station_layers,
 )
 from feasibility.pose_outline import outline, placed
-from feasibility.scene import Layer
+from feasibility.scene import Layer, counted
 from feasibility.search import Search
 from feasibility.viewer import FRAMED, View, compose
 from robots import Robot
@@ -46,7 +46,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Progress = Callable[[int, int | None, str], None]
 
-NEARER = 0.85  # [1] of the distance from which a ball around everything would fill the picture
+LOOKED = 24  # configurations of a motion that have to be in the picture
+NEARER = 0.9  # [1] of the distance from which a ball around everything would fill the picture
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -97,8 +98,13 @@ def view_placements(
     ]
     title = f"{case}: " if case else ""
     title += f"placements, {placements.answer} ({placements.evidence})"
-    stations = [] if plan is None else station_layers(placements.cells, plan)
-    text = _said(placements, trials)
+    text, stations = _said(placements, trials), []
+    if plan is not None:
+        layers = station_layers(placements.cells, plan)
+        stations = list(zip(layers, [trial.pose for trial in plan.trials], strict=True))
+        left_out = len(plan.stations.left_out)
+        text += f"; {len(layers)} station{' covers ' if len(layers) == 1 else 's cover '}"
+        text += f"{len(placements.cells) - left_out} of {counted(len(placements.cells))}"
     return _view(asked, tried, title, text, stations, Playing(progress, play, at))
 
 
@@ -177,7 +183,7 @@ def _best_first(placements: Placements) -> list[Trial]:
 def _said(placements: Placements, trials: Sequence[Trial]) -> str:
     """How many placements were tried, and what the best one gives."""
     if all(trial.stage is Stage.BOUND for trial in trials):
-        return "wherever the surface stands in the region, a part is out of reach; none was tried"
+        return "wherever the surface stands in the region, a part is out of reach"
     text = f"{len(trials)} placements tried"
     beyond = int(placements.statistics.get("bound", 0))
     if beyond:
@@ -192,7 +198,7 @@ def _view(
     tried: Sequence[Tried],
     title: str,
     text: str,
-    stations: Sequence[Layer],
+    stations: Sequence[tuple[Layer, Pose]],
     playing: Playing,
 ) -> View:
     """One picture of poses tried, the best one first among them."""
@@ -205,18 +211,22 @@ def _view(
     if stations:  # they are what is asked for; the best single one would lie among them
         parts = [hidden(layer) for layer in parts]
     lines, size = outline(asked.cells), drawn_size(tried)
+    small = lines
     if len(lines):
         middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2.0
-        lines = middle + size * (lines - middle)
+        small = middle + size * (lines - middle)
     if size < 1.0:
         text += f". Outlines are drawn at {100.0 * size:.0f} % of their size"
     drawn = compose(
         asked.robot, cells, title, f"{asked.robot.name}: {text}",
-        [*parts, *stations, *class_layers(lines, tried)], motion,
+        [*parts, *(layer for layer, _ in stations), *class_layers(small, tried)], motion,
         resting=_home(asked.robot), play=playing.play, at=playing.at,
     )  # fmt: skip
-    shown = [one.pose for one in tried if one.kind not in HIDDEN]
-    return replace(drawn, camera=_camera(drawn.camera, asked.robot, cells, lines, shown))
+    points = [placed(small, one.pose) for one in tried if one.kind not in HIDDEN]
+    whole = [pose for _, pose in stations] or [one.pose for one in tried[:1]]
+    points += [placed(lines, pose) for pose in whole]
+    every = np.concatenate([part.reshape(-1, 3) for part in points] or [np.empty((0, 3))])
+    return replace(drawn, camera=_camera(drawn.camera, asked.robot, motion, every))
 
 
 def _motion(asked: Question, cells: Cells, progress: Progress | None) -> Motion | None:
@@ -232,18 +242,17 @@ def _home(robot: Robot) -> Array:
     return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
 
 
-def _camera(
-    camera: Camera, robot: Robot, cells: Cells, lines: Array, poses: Sequence[Pose]
-) -> Camera:
-    """The same direction, from where the arm, the best surface and all outlines can be seen."""
-    if not poses or len(lines) == 0:
-        return camera
-    place, points = np.eye(4), [np.zeros((1, 3)), cells.centres]
-    for step in robot_visuals.joint_placements(robot, _home(robot))[0]:
+def _camera(camera: Camera, robot: Robot, motion: Motion | None, points: Array) -> Camera:
+    """The same direction, from where the arm, as it moves, and points (k, 3) m can be seen."""
+    walk = _home(robot)[None]
+    if motion is not None:
+        walk = motion.at(np.linspace(0.0, motion.seconds[-1], LOOKED))
+    joints = [np.zeros((1, 3))]
+    place = np.broadcast_to(np.eye(4), (len(walk), 4, 4))
+    for step in robot_visuals.joint_placements(robot, walk).transpose(1, 0, 2, 3):
         place = place @ step
-        points.append(place[None, :3, 3].copy())
-    points += [placed(lines, pose).reshape(-1, 3) for pose in poses]
-    every = np.concatenate(points)
+        joints.append(place[:, :3, 3])
+    every = np.concatenate([*joints, points])
     target = (every.min(axis=0) + every.max(axis=0)) / 2.0
     radius = max(float(np.linalg.norm(every - target, axis=1).max()), 0.1)
     toward = np.array(camera.eye) - np.array(camera.target)

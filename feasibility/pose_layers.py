@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 MOST_DRAWN = 200  # poses of one class; of more, as many spread evenly over their ranks
 FULL_SIZE = 16  # poses shown; of more, each outline is drawn smaller
 SMALLEST = 0.15  # [1] of their size
-THICK = 0.006  # [1] of an outline's size: radius of those of feasible poses
+THICK = 0.0045  # [1] of an outline's size: radius of those of feasible poses
 COVERED: Colour = (0.35, 0.60, 0.80)
 
 

@@ -37,7 +37,7 @@ def outline(cells: Cells) -> Array:
     if len(lines) == 0 or _size(lines.reshape(-1, 3)) < TELLING * size:
         lines = np.concatenate([lines, _sections(triangles)])
     lines = np.concatenate([_thinned(lines, size / MOST), _stroke(cells, STROKE * size)])
-    return (lines - cells.surface.position) @ cells.surface.rotation
+    return lines
 
 
 def placed(points: Array, pose: Pose) -> Array:
@@ -46,13 +46,21 @@ def placed(points: Array, pose: Pose) -> Array:
 
 
 def _triangles(cells: Cells) -> Triangles:
-    """A few triangles of all cells, in the root frame."""
+    """A few triangles of all cells, in the surface's frame."""
     every = np.arange(len(cells))
     if isinstance(cells, MeshCells):
-        return skin_of(cells).fill(every, cells.centres)
-    if len(cells.shape) > 1:
-        return cells.triangles(every, int(np.clip(np.ceil(PIECES / max(cells.shape)), 1, 8)))
-    return patch(cells, every)
+        found = skin_of(cells).fill(every, cells.centres)
+    elif len(cells.shape) > 1:
+        pieces = int(np.clip(np.ceil(PIECES / max(cells.shape)), 1, 8))
+        found = cells.triangles(every, pieces)
+    else:
+        found = patch(cells, every)
+    return found._replace(vertices=_at_home(cells, found.vertices))
+
+
+def _at_home(cells: Cells, points: Array) -> Array:
+    """Points (..., 3) m of the root frame in the surface's frame."""
+    return np.asarray((points - cells.surface.position) @ cells.surface.rotation)
 
 
 def _size(points: Array) -> float:
@@ -110,7 +118,7 @@ def _stroke(cells: Cells, length: float) -> Array:
     if np.linalg.norm(mean) < TELLING:
         return np.empty((0, 2, 3))
     away = np.linalg.norm(cells.centres - cells.centres.mean(axis=0), axis=1)
-    foot = int(away.argmin())
+    foot = int(np.argmax(away <= away.min() + ALIKE * away.max()))  # the first of several as near
     # The tool stands on the side that the targets lie on.
     tip = cells.centres[foot] + length * cells.surface.side_sign * cells.normals[foot]
-    return np.stack([cells.centres[foot], tip])[None]
+    return _at_home(cells, np.stack([cells.centres[foot], tip]))[None]

@@ -15,6 +15,7 @@ from feasibility.study_report import (
     counted,
     counts,
     dominant,
+    group_table,
     groups_of,
     headline,
     merit,
@@ -116,20 +117,11 @@ def _best(study: Study, rows: Sequence[Row]) -> str:
 
 def _by_value(label: str, groups: dict[str, list[Row]]) -> str:
     """One line for each value of a key."""
-    lines = []
-    for value, group in groups.items():
-        best = best_share(group)
-        found = counts(group)
-        lines.append(
-            [
-                html.escape(value),
-                *(str(found[verdict]) for verdict in COLOURS),
-                "-" if best is None else f"{100.0 * best:.1f} %",
-                _bar(best or 0.0),
-            ]
-        )
-    heads = [html.escape(worded(label)), *COLOURS, "best share", ""]
-    return f"<h2>By {html.escape(worded(label))}</h2>\n" + _table(heads, lines)
+    (_, *heads), *lines = group_table(label, groups)
+    bars = [_bar(best_share(group) or 0.0) for group in groups.values()]
+    filled = [[*map(html.escape, line), bar] for line, bar in zip(lines, bars, strict=True)]
+    name = html.escape(worded(label))
+    return f"<h2>By {name}</h2>\n" + _table([name, *heads, ""], filled)
 
 
 def _bar(share: float) -> str:

@@ -122,7 +122,7 @@ def _share_chart(label: str, values: NDArray[np.float64], rows: Sequence[Row]) -
         for words, style, reduced in (("best", "-", np.max), ("mean", "--", np.mean)):
             line = [float(reduced(share[values == end])) for end in ends]
             axes.plot(ends, line, style, color="0.25", linewidth=1, label=words, zorder=0)
-    axes.legend(fontsize=8, loc="best", framealpha=0.8)
+    figure.legend(fontsize=8, loc="outside upper center", ncols=5, frameon=False)
     return Chart(f"Covered share over {worded(label)}", _svg(figure, label))
 
 

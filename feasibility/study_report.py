@@ -82,7 +82,7 @@ def as_text(study: Study, rows: Sequence[Row]) -> str:
     if failed:
         lines.append(f"  {len(failed)} failed; the first: {failed[0].result['message']}")
     for label, groups in groups_of(study, rows).items():
-        lines += ["", *_aligned(_group_table(label, groups))]
+        lines += ["", *_aligned(group_table(label, groups))]
     lines += ["", "the best:", *_aligned(_best_table(study, rows))]
     return "\n".join(lines)
 
@@ -147,9 +147,9 @@ def short(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(value)
 
 
-def _group_table(label: str, groups: dict[str, list[Row]]) -> list[list[str]]:
+def group_table(label: str, groups: dict[str, list[Row]]) -> list[list[str]]:
     """One line for each value of a key, below the names of the columns."""
-    table = [[f"by {label}", *VERDICTS, "best share"]]
+    table = [[f"by {label}:", *VERDICTS, "best share"]]
     for value, group in groups.items():
         best = best_share(group)
         numbers = [str(number) for number in counts(group).values()]
