@@ -5,6 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import json
+import re
+from collections import Counter
+from html import escape
+from html.parser import HTMLParser
 
 import pytest
 from small_cases import TEXTS
@@ -289,3 +293,187 @@ def test_bad_input_is_one_message(argv, words, capsys) -> None:
 def test_processes_and_dask_together_are_refused(capsys) -> None:
     both = ("--workers", "1", "--dask", "tcp://127.0.0.1:1")
     assert_refused(run(capsys, "compare", "plate.toml", "--robots", "ur5", *both), ["--workers"])
+
+
+# -- pages ------------------------------------------------------------------------------------
+
+
+class Page(HTMLParser):
+    """What a page shows: its tags, the rows of its tables, and its text outside of the drawings."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.rows, self.frames = Counter(), [], []
+        self.inside, self.text = None, ""
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.tags[tag] += 1
+        if tag == "tr":
+            self.rows.append([])
+        if tag in ("td", "th"):
+            self.rows[-1].append("")
+        self.inside = tag
+        if tag == "iframe":
+            self.frames.append(dict(attrs)["srcdoc"])
+
+    def handle_endtag(self, tag):
+        self.inside = None
+
+    def handle_data(self, data):
+        if self.inside in ("td", "th"):
+            self.rows[-1][-1] += data
+        elif self.inside in ("h1", "h2", "p", "figcaption", "span"):
+            self.text += data + "\n"
+
+
+def page_of(folder, capsys, name="study.toml", more=()):
+    """The page of a study, and the study's own account of its rows."""
+    files = ("--out", "run.study", "--html", "page.html")
+    status, out, err = run(capsys, "study", name, *files, "--json", *more, *HERE)
+    assert status == 0
+    assert "page: page.html" in err
+    return (folder / "page.html").read_text(encoding="utf-8"), object_in(out)
+
+
+def test_the_page_of_a_study_counts_as_its_table_does(folder, capsys) -> None:
+    """Verdicts, every value of what varies, the best rows and the poses, against the JSON."""
+    text, told = page_of(folder, capsys)
+    page = Page(text)
+    found = {name: number for name, number in told["verdicts"].items() if number}
+    for name, number in found.items():
+        assert f"{number} {name}</span>" in text
+    for key in ("robot", "surface.position.x"):
+        for value in dict.fromkeys(row["parameters"][key] for row in told["rows"]):
+            mine = [row for row in told["rows"] if row["parameters"][key] == value]
+            share = max(row["share"] for row in mine)
+            says = value if key == "robot" else f"{value:g}"
+            numbers = [str(sum(row["verdict"] == name for row in mine)) for name in found]
+            assert [says, *numbers, f"{100 * share:.1f} %", ""] in page.rows
+    best = max(told["rows"], key=lambda row: (row["margins"] or {}).get("limit_deg", -1.0))
+    first = next(row for row in page.rows if row[0] == "feasible")
+    limit = f"{best['margins']['limit_deg']:.1f} deg"
+    x, arm = best["parameters"]["surface.position.x"], best["parameters"]["robot"]
+    assert first == ["feasible", "100.0 %", limit, arm, f"{x:g}"]
+    # One chart over the one number that varies, and the poses of the best row's arm.
+    assert page.tags["figure"] == 1
+    assert "Covered share over surface x (m)" in page.text
+    (frame,) = page.frames
+    drawn = Page(frame)
+    assert "3 of 6 cases" in drawn.text
+    good = sum(r["verdict"] == "feasible" and r["parameters"]["robot"] == arm for r in told["rows"])
+    assert f"feasible ({good})" in frame
+
+
+def test_the_page_of_a_study_fetches_nothing_and_repeats_no_name(folder, capsys) -> None:
+    text, _ = page_of(folder, capsys)
+    program = re.search(r"id=&quot;program&quot;&gt;([^&]*)&lt;", text)[1]
+    assert len(program) > 100_000
+    rest = text.replace(program, "")
+    assert not re.search(r"https?:|(?:src|href)=[\"']?//|@import|url\((?!#)", rest)
+    names = re.findall(r' id="([^"]*)"', text)
+    assert len(names) == len(set(names))
+    again, _ = page_of(folder, capsys)
+    assert again == text
+
+
+def test_names_out_of_files_are_text_on_the_page(folder, capsys) -> None:
+    """A description, a file's name, an arm's file: no tag more than with harmless names."""
+    tags, bad = [], "<img src=x onerror=alert(1)>&\"'"
+    urdf = (
+        '<robot name="{0}"><link name="base"/><link name="tip"/><joint name="j" type="prismatic">'
+        '<parent link="base"/><child link="tip"/><axis xyz="1 0 0"/>'
+        '<limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    for k, name in enumerate(("plain", bad)):
+        (folder / f"{name}.urdf").write_text(urdf.format(escape(name)), encoding="utf-8")
+        study = (
+            f"description = {json.dumps('about ' + name)}\n"
+            + STUDY.replace('"xarm7"', json.dumps({"urdf": f"{name}.urdf"}).replace(":", "="))
+            + 'vary."task.cone_deg" = [20, 30]\n'
+        )
+        (folder / f"{name}.toml").write_text(study, encoding="utf-8")
+        files = ("--out", f"{k}.study", "--html", f"{k}.html")
+        status, _, err = run(capsys, "study", f"{name}.toml", *files, *HERE)
+        assert status == 0, err
+        text = (folder / f"{k}.html").read_text(encoding="utf-8")
+        page = Page(text)
+        assert any(json.dumps(name)[1:-1] in cell for row in page.rows for cell in row)
+        assert f"about {name}" in page.text
+        tags.append((page.tags, Page(page.frames[0]).tags))
+    assert tags[0] == tags[1]
+    assert bad not in text
+
+
+def test_a_study_whose_surface_stays_has_no_picture_of_poses(folder, capsys) -> None:
+    """Two numbers vary: a chart for each, and the map of both with a field for each pair."""
+    text = 'base.case = "plate.toml"\nvary."task.cone_deg" = [10, 20, 30]\n'
+    text += 'vary."task.standoff" = [0.01, 0.02]\n'
+    (folder / "cones.toml").write_text(text, encoding="utf-8")
+    page = Page(page_of(folder, capsys, "cones.toml")[0])
+    assert page.frames == []
+    assert page.tags["figure"] == 3
+    assert "Best covered share over task.cone_deg and task.standoff" in page.text
+
+
+def test_place_draws_what_it_tried(folder, capsys) -> None:
+    """As many poses in the legend as in the table, class by class."""
+    status, _, err = run(
+        capsys, "place", "plate.toml", *SMALL, "--x", -0.2, 0.6, "--count", 8,
+        "--csv", "p.csv", "--html", "p.html", *HERE,
+    )  # fmt: skip
+    assert status == 0
+    assert "view: p.html" in err
+    text = (folder / "p.html").read_text(encoding="utf-8")
+    lines = table_of(folder / "p.csv")
+    drawn = dict(re.findall(r"<label>.*?</i>([a-z][^<]*?) \((\d+)\)</label>", text))
+    assert drawn.pop("feasible") == str(sum(line["verdict"] == "feasible" for line in lines))
+    known = [line for line in lines if line["verdict"] != "feasible"]
+    unsearched = sum(line["stage"] in ("bound", "probe") for line in known)
+    assert int(drawn.pop("ruled out without a search", 0)) == unsearched
+    whole = sum(float(line["share"]) == 1.0 for line in known)
+    assert int(drawn.pop("covered by a search, not replayed", 0)) == whole
+    assert "pause" in text
+
+
+def test_a_region_ruled_out_by_proof_has_no_share_to_tell(capsys) -> None:
+    """Nothing was searched there, so 0 % would be a claim that nobody has looked into."""
+    where = ("place", "plate.toml", *SMALL, "--x", 2.5, 3)
+    status, out, _ = run(capsys, *where, *HERE)
+    assert status == 1
+    assert "%" not in out
+    assert "the best of them" not in out
+    assert "searched  no placement" in out
+    told = object_in(run(capsys, *where, "--json", *HERE)[1])
+    assert told["share"] is None
+    assert told["best"]["stage"] == "bound"
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["study", "study.toml", "--out", "s", "--csv", "t", "--html", "t"], ["is the file of"]),
+        (["study", "study.toml", "--out", "s", "--html", "s"], ["--html s: is the file of --out"]),
+        (["study", "study.toml", "--out", "s", "--html", "./study.toml"],
+         ["--html ./study.toml: is what is read"]),
+        (["study", "study.toml", "--out", "s", "--html", "no/x.html", "--csv", "study.toml"],
+         ["--html no/x.html: there is no folder", "--csv study.toml: is what is read"]),
+        (["compare", "plate.toml", "--robots", "ur5", "--html", "plate.toml"], ["is what is read"]),
+        (["place", "plate.toml", "--x", "0", "1", "--html", "m.svg", "--map", "m.svg"],
+         ["m.svg: is the file of --map too"]),
+        (["place", "plate.toml", "--x", "0", "1", "--html", "plate.toml", "--map", "m.txt"],
+         ["--html plate.toml: is what is read", "--map m.txt: is no kind of picture"]),
+        (["place", "plate.toml", "--x", "0", "1", "--html", "."], ["--html .: is a folder"]),
+    ],
+)  # fmt: skip
+def test_outputs_that_clash_are_refused_before_anything_is_tried(
+    argv, words, folder, capsys, monkeypatch
+) -> None:
+    def refuse(*_):
+        raise AssertionError("something was tried")
+
+    monkeypatch.setattr("feasibility.study_dealing.work_through", refuse)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    assert_refused(run(capsys, *argv, *HERE), words)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
