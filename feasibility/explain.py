@@ -23,10 +23,10 @@ if TYPE_CHECKING:
     from feasibility.probing import Prober
     from feasibility.trials import Trial
 
-SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
-FEW, EACH = 2000, 32  # evaluations, and those for each cell, that any search should have
+SHARE = 28  # verdicts' worth of evaluations that all thresholds together may take
+FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search should have
 EXTRA = 2  # the same, for margins that are still wide once the others have had their share
-LEAST = 100_000  # evaluations that they may always take
+LEAST = 20_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
 PATIENCE = 20.0  # times the time limit of the verdict

@@ -14,12 +14,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.carrying import NO_CELL, follow_all, land_guesses
 from feasibility.certificate import replay
-from feasibility.complete import explore
+from feasibility.complete import evenly, explore
 from feasibility.explorer import Explorer, OutOfTime
 from feasibility.fibre import roomy
-from feasibility.kernels import kernel
-from feasibility.newton import land
 from feasibility.problem import HERE, Problem, place, problem_of, work_for
 from feasibility.proof import Ruling, root_box, rule
 from feasibility.quantities import Kind, Quantity, Setup
@@ -27,26 +26,13 @@ from feasibility.trials import Rationed, Trial, certifiable, configurations
 from feasibility.verdict import Answer, Evidence
 from feasibility.walk import covering_walk
 
-FOLLOW_STEPS = np.int64(15)  # Newton steps that put a neighbour's configuration onto the fibre
 PLANTS = 2  # missed cells that an attempt starts from, besides the first
 SAME = 0.05  # [1], postures nearer than that are taken for one, see `Prober._posture`
-NO_CELL = -1
-
-
-@kernel
-def follow_all(problem, work, order, q):  # type: ignore[no-untyped-def]
-    """Newton onto the fibre over each cell of `order` from its row of q (N, n), in place.
-
-    Returns:
-        How many cells of `order` were landed on before the first failure.
-    """
-    for k in range(order.shape[0]):
-        row = q[order[k]]
-        for j in range(row.shape[0]):
-            row[j] = min(max(row[j], problem.lower[j]), problem.upper[j])
-        if not land(problem, work, order[k], row, FOLLOW_STEPS):
-            return k
-    return order.shape[0]
+MOST_SUSPECTS = 12  # cells that are taken for hard
+AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
+LANDINGS = 16  # random configurations that are put over a cell that no known one covers
+LANDING_STEPS = np.int64(20)  # Newton steps of each
+LEAST_BOXES = 250  # for one cell, however dear proofs have turned out to be
 
 
 class Prober:
@@ -61,12 +47,22 @@ class Prober:
         self.deadline = deadline
         self.problem = problem_of(*setup)
         self._latest = ("", 0), self.problem
+        beyond = replace(setup.task, standoff=setup.task.standoff + 1.0)
+        self.outwards = beyond.targets(setup.cells).points - self.problem.points
+        """(N, 3) how the target points move with the standoff."""
         self.work = work_for(setup.robot.n)
         self.spent_before = 0
         self.tick = tick or (lambda: None)
         self.reach = setup.robot.reach
         self.suspects: list[int] = []
         """Cells that were hard to cover so far, the latest first."""
+        degree = np.diff(setup.cells.neighbours.indptr)
+        inner = degree >= np.median(degree)
+        self._spread = np.concatenate(
+            [evenly(np.flatnonzero(~inner)), evenly(np.flatnonzero(inner))]
+        )
+        self.allowance = 1.0
+        """Share of the boxes asked for that a proof gets: less for each that failed lately."""
 
     @property
     def spent(self) -> int:
@@ -79,19 +75,42 @@ class Prober:
             if self._latest[0] != (quantity.name, k):
                 self._latest = (quantity.name, k), problem_of(*quantity.applied(self.setup, k))
             return self._latest[1]
+        problem = self.centres_at(quantity, k)
         if quantity.kind is Kind.SHIFT:
-            shift = quantity.value(k) * np.array(quantity.axis)
             targets = self.problem.targets.copy()
-            targets[:, 0, :3] += shift  # the constant coefficients of the target points
-            return self.problem._replace(points=self.problem.points + shift, targets=targets)
-        robot = quantity.applied(self.setup, k).robot
-        return self.problem._replace(lower=np.array(robot.lower), upper=np.array(robot.upper))
+            targets[:, 0, :3] += quantity.value(k) * np.array(quantity.axis)  # the constant ones
+            # Arrays that may be written to are of another type, for which kernels compile anew.
+            targets.flags.writeable = self.problem.targets.flags.writeable
+            return problem._replace(targets=targets)
+        return problem
+
+    def centres_at(self, quantity: Quantity, k: int) -> Problem:
+        """The same over the cells' centres, cheaper: what lies between them may be as it was."""
+        value = quantity.value(k) if k else quantity.given
+        if quantity.kind is Kind.CONE:
+            return self.problem_at(quantity, k)
+        if quantity.kind is Kind.STANDOFF:
+            grown = (value - quantity.given) * self.outwards
+            return self.problem._replace(points=self.problem.points + grown)
+        if quantity.kind is Kind.SHIFT:
+            shift = value * np.array(quantity.axis)
+            return self.problem._replace(points=self.problem.points + shift)
+        ends = [self.problem.lower.copy(), self.problem.upper.copy()]
+        ends[quantity.kind is Kind.UPPER][quantity.joint] = value
+        return self.problem._replace(lower=ends[0], upper=ends[1])
+
+    def order(self) -> NDArray[np.int64]:
+        """(N,) all cells, the hard ones first, then those at the edge of the surface."""
+        hard = np.array(self.suspects, dtype=np.int64)
+        rest = self._spread[~np.isin(self._spread, hard)]
+        return np.concatenate([hard, rest])
 
     def suspect(self, cell: int) -> None:
         """Look at this cell first from now on."""
         if cell in self.suspects:
             self.suspects.remove(cell)
         self.suspects.insert(0, cell)
+        del self.suspects[MOST_SUSPECTS:]
 
     def follow(self, problem: Problem, q: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
         """Put configurations of a case nearby onto the fibres of this one.
@@ -106,9 +125,7 @@ class Prober:
         """
         self.tick()
         found = q.copy()
-        first = np.array(self.suspects, dtype=np.int64)
-        rest = np.setdiff1d(np.arange(len(q)), first)
-        order = np.concatenate([first, rest])
+        order = self.order()
         landed = int(follow_all(problem, self.work, order, found))
         if landed == len(order):
             return NO_CELL, found
@@ -118,7 +135,7 @@ class Prober:
     def rule(
         self, problem: Problem, cell: int, boxes: int
     ) -> tuple[Ruling, NDArray[np.float64] | None]:
-        """The reach bound on one cell, then branch and bound with so many boxes.
+        """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
 
         Returns:
             The ruling; and, unless it is PROVED or OPEN, a configuration (n,) that Newton put onto
@@ -128,11 +145,16 @@ class Prober:
         if self.beyond_reach(problem)[cell]:
             self.suspect(cell)
             return Ruling.PROVED, None
+        boxes = max(int(self.allowance * boxes), min(boxes, LEAST_BOXES))
         ruling, q = rule(problem, self.work, cell, root_box(problem), boxes)
+        if ruling is Ruling.OPEN:
+            self.allowance *= 0.5  # the arm's proofs are dear; one that succeeds takes this back
+            return ruling, None
         if ruling is Ruling.PROVED:
+            self.allowance = 1.0
             self.suspect(cell)
             return ruling, None
-        if ruling is Ruling.OPEN or not np.isfinite(q).all():
+        if not np.isfinite(q).all():
             return ruling, None
         row = np.full((len(problem.points), len(q)), np.nan)
         row[cell] = _wound(problem, q)
@@ -159,6 +181,7 @@ class Prober:
         most: float,
         deep: bool,
         needed: NDArray[np.bool_] | None = None,
+        hard: int = NO_CELL,
     ) -> Trial:
         """Search for a covering motion, from known configurations first.
 
@@ -168,6 +191,7 @@ class Prober:
             most: evaluations of the arm after which the search is stopped.
             deep: go on with the whole search where the seeds do not lead to a covering motion.
             needed: (N,) cells that are to be covered; all by default.
+            hard: a cell that random configurations are put over before the whole search begins.
 
         Returns:
             What it came to: feasible with a motion that is still to be `confirmed`; infeasible
@@ -182,7 +206,9 @@ class Prober:
         )
         ended = False
         try:
-            self._plant(explorer, seeds)
+            self._plant(explorer, seeds, deep)
+            if hard != NO_CELL and not explorer.complete:
+                self._land(explorer, hard)
             if deep and not explorer.complete:
                 explore(explorer)
                 ended = True
@@ -252,12 +278,14 @@ class Prober:
         origins, axes = self.work.origins[0] / self.problem.scale, self.work.axes[0]
         return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
 
-    def _plant(self, explorer: Explorer, seeds: NDArray[np.float64]) -> None:
+    def _plant(self, explorer: Rationed, seeds: NDArray[np.float64], deep: bool) -> None:
         """Plant seeds until one component covers every cell, hard cells first."""
         known = np.asarray(np.isfinite(seeds).all(axis=1))
         first = [cell for cell in self.suspects if known[cell]][:1]
         for cell in first or np.flatnonzero(known)[:1].tolist():
             explorer.plant(cell, np.clip(seeds[[cell]], explorer.low, explorer.high))
+        if not deep:
+            explorer.most = min(explorer.most, AGAIN * float(explorer.work.counts[0]))
         for _ in range(PLANTS):
             missed = np.flatnonzero(known & ~explorer.covered)
             if explorer.complete or not len(missed):
@@ -265,6 +293,19 @@ class Prober:
             cell = int(missed[len(missed) // 2])
             known[cell] = False
             explorer.plant(cell, seeds[[cell]])
+
+    def _land(self, explorer: Rationed, cell: int) -> None:
+        """Plant what random configurations lead to over one cell, the hardest.
+
+        Where they lead to nothing, little hope is left: half of the ration will do.
+        """
+        guesses = explorer.guesses(LANDINGS)
+        landed = np.zeros(len(guesses), dtype=bool)
+        land_guesses(explorer.problem, explorer.work, cell, guesses, LANDING_STEPS, landed)
+        if landed.any():
+            explorer.plant(cell, guesses[landed])
+        elif explorer.roadmap.first_node[cell] < 0:
+            explorer.most = 0.5 * (explorer.most + float(explorer.work.counts[0]))
 
 
 def _wound(problem: Problem, q: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,13 +9,14 @@ a proof; what the proof finds instead is a configuration of another branch, whic
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.probing import NO_CELL, Prober
+from feasibility.carrying import NO_CELL, Carrying, Reached
+from feasibility.probing import Prober
 from feasibility.proof import Ruling
 from feasibility.quantities import Kind, Quantity
 from feasibility.thresholds import Finding, Span, Threshold, last_true
@@ -27,9 +28,9 @@ HINT_BOXES = 1500  # for one cell, where a configuration is as welcome as a proo
 BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is looked for
 LOOKED_AT = 3  # cells asked for a proof before a search is made
 SCAN = 20  # values looked at on the way to the end of a quantity that is not monotone
-HALVINGS = 3  # of a wide bracket, by searches, even when none should be begun any more
-TRIES = 2  # other motions that are searched for past the end of one
-SHORT = 1  # verdicts' worth of evaluations that a search from known configurations may take
+SEARCHES = 2  # short of one that failed, even when none should be begun any more
+BACKS = (0.06, 0.25)  # [1] where the search fails at the end: the next ones are that much nearer
+SHORT = 0.7  # verdicts' worth of evaluations that a search from known configurations may take
 
 
 class Side(NamedTuple):
@@ -40,13 +41,13 @@ class Side(NamedTuple):
 
 
 class Edge(NamedTuple):
-    """Where following a motion, and short searches, have led."""
+    """Where carrying a motion's configurations, and short searches, have led."""
 
     good: Side
     bad: int
-    """Steps at which no motion was found; a neighbour of `good`, or the far end."""
+    """Steps at which no motion was found, the nearest to `good`; or the far end."""
     failed: int
-    """The cell that could not be followed to there; `NO_CELL` where a search failed."""
+    """The cell that could not be carried to there; `NO_CELL` where a search failed."""
     other: Finding | None
     """What the search found there; None without one."""
 
@@ -63,6 +64,8 @@ class Turning:
     """Evaluations (of the prober) at which no further search is begun, except to end with one."""
     motions: Sequence[Trial] = ()
     """Covering motions of the case as it stands, the one of its verdict first."""
+    rivals: list[Side] = field(default_factory=list)
+    """The same, as far as each goes as it is, the furthest first; none that was looked at."""
 
     # -- a case that is feasible as it stands ----------------------------------------------------
 
@@ -71,8 +74,9 @@ class Turning:
         end = self.quantity.last + 1
         # The cone is no matter of posture, and asking each motion for its angle is dear.
         motions = self.motions[: 1 if self.quantity.kind is Kind.CONE else None]
-        best = max((self._slid(Side(0, trial), end) for trial in motions), key=lambda side: side.k)
-        good, other = self._outwards(best)
+        sides = [self._slid(Side(0, trial), end) for trial in motions]
+        self.rivals = sorted(sides, key=lambda side: -side.k)
+        good, other = self._outwards(self.rivals.pop(0))
         told = self._told(good)
         if not told.feasible:  # the replay refuses what the search found
             return Threshold(self.quantity, self._told(Side(0, self.motions[0])), told)
@@ -179,54 +183,55 @@ class Turning:
                 return good, there
 
     def _follow(self, good: Side, far: int, there: Finding | None) -> Edge:
-        """As far as the motion can be followed, and a short search agrees."""
-        way = 1 if far > good.k else -1
-        bad, failed, other, trusted = far, NO_CELL, there, there is None
-        good = self._slid(good, bad)
-        halved = 0
-        while abs(bad - good.k) > 1:
-            if halved >= HALVINGS and self.prober.spent >= self.stop:
-                break
-            if trusted:
-                k, q, cell = self._reach(good, bad)
-                if k == good.k:
-                    bad, failed, other = k + way, cell, None
-                    break
-            else:
-                k, halved = (good.k + bad) // 2, halved + 1
-                cell, q = self.prober.follow(self.prober.problem_at(self.quantity, k), good.trial.q)
-                if cell != NO_CELL:
-                    bad, failed, other = k, cell, None
-                    continue
-            trial = self._search(k, q)
+        """As far as a motion's configurations can be carried, and a short search agrees."""
+        good = self._slid(good, far)
+        bad, other, searches, backs = far, there, 0, list(BACKS)
+        if there is None:
+            reached = self._furthest(good, far)
+        else:
+            reached = self._short_of(good, far, good.trial.q, 0.5)
+        while reached.k != good.k:
+            trial = self._search(reached.k, reached.q)
             if trial.found:
-                good = self._slid(Side(k, trial), bad)
+                good = self._slid(Side(reached.k, trial), bad)
+                if other is None:
+                    reached = self._reach(good, bad)
+                    continue
+                backs = []
             else:
-                bad, failed, other, trusted = k, NO_CELL, self._finding(Side(k, trial)), False
-        return Edge(good, bad, failed, other)
+                bad, other = reached.k, self._finding(Side(reached.k, trial))
+            searches += 1
+            if searches > SEARCHES and self.prober.spent >= self.stop:
+                break
+            reached = self._short_of(good, bad, reached.q, backs.pop(0) if backs else 0.5)
+        if other is not None:
+            return Edge(good, bad, NO_CELL, other)
+        return Edge(good, good.k + (1 if far > good.k else -1), reached.cell, None)
 
-    def _reach(self, good: Side, bad: int) -> tuple[int, NDArray[np.float64], int]:
-        """How far the configurations of a motion can be followed.
+    def _reach(self, good: Side, bad: int) -> Reached:
+        """How far the configurations of a motion can be carried."""
+        return Carrying(self.prober, self.quantity, good.k, good.trial.q).reach(bad)
 
-        Returns:
-            The last number of steps; the configurations there (N, n); the cell that fails at the
-            next, `NO_CELL` if that is `bad`.
-        """
-        known, failures = {good.k: good.trial.q}, dict[int, int]()
+    def _furthest(self, good: Side, far: int) -> Reached:
+        """The same, of this motion and those of the case as it stands, whichever go furthest."""
+        way = 1 if far > good.k else -1
+        best = self._reach(good, far)
+        while self.rivals:
+            k, trial = self.rivals.pop(0)
+            beyond = best.k + way
+            if beyond == far:
+                return best
+            carrying = Carrying(self.prober, self.quantity, k, trial.q)
+            if k * way > best.k * way or carrying.goes_to(beyond):
+                reached = carrying.reach(far)
+                if reached.k * way > best.k * way:
+                    best = reached
+        return best
 
-        def holds(k: int) -> bool:
-            nearest = min(known, key=lambda other: abs(other - k))
-            problem = self.prober.problem_at(self.quantity, k)
-            cell, q = self.prober.follow(problem, known[nearest])
-            if cell == NO_CELL:
-                known[k] = q
-            else:
-                failures[k] = cell
-            return cell == NO_CELL
-
-        gallop = not self.quantity.monotone
-        k = last_true(holds, good.k, bad, gallop)
-        return k, known[k], failures.get(k + (1 if bad > k else -1), NO_CELL)
+    def _short_of(self, good: Side, bad: int, q: NDArray[np.float64], share: float) -> Reached:
+        """Short of a failed search by a share of the way to it, with its configurations."""
+        back = max(round(share * abs(bad - good.k)), 1)
+        return Reached(bad - back if bad > good.k else bad + back, q, NO_CELL)
 
     def _slid(self, good: Side, bad: int) -> Side:
         """As far as the motion itself, as it is, keeps to the limit or to the cone."""
@@ -261,14 +266,8 @@ class Turning:
         elif edge.other is not None and abs(edge.bad - edge.good.k) > 1:
             return edge.other  # the ration ended the halving
         # This motion goes no further. Another one may, so the search begins afresh.
-        problem, tries = self.prober.problem_at(self.quantity, k), 0
-        for motion in self.motions:
-            cell, q = self.prober.follow(problem, motion.q)
-            if cell == NO_CELL and tries < TRIES and self.prober.spent < self.stop:
-                tries += 1
-                if (trial := self._search(k, q)).found:
-                    return Side(k, trial)
-        trial = self._search(k, seeds, deep=True)
+        hard = [edge.failed, *self.prober.suspects][edge.failed == NO_CELL :][:1]
+        trial = self._search(k, seeds, deep=True, hard=hard[0] if hard else NO_CELL)
         return Side(k, trial) if trial.found else self._finding(Side(k, trial))
 
     def _proof_beyond(
@@ -286,11 +285,14 @@ class Turning:
             proof = self._proof(k, edge.failed)
         return proof, q
 
-    def _search(self, k: int, seeds: NDArray[np.float64], deep: bool = False) -> Trial:
+    def _search(
+        self, k: int, seeds: NDArray[np.float64], deep: bool = False, hard: int = NO_CELL
+    ) -> Trial:
         """Search at k steps: from the seeds alone, or deeper, with half of what is left."""
         left = self.stop - self.prober.spent
         most = max(left, self.verdict_cost) // 2 if deep else SHORT * self.verdict_cost
-        return self.prober.attempt(self.prober.problem_at(self.quantity, k), seeds, most, deep)
+        problem = self.prober.problem_at(self.quantity, k)
+        return self.prober.attempt(problem, seeds, most, deep, hard=hard)
 
     def _told(self, side: Side) -> Finding:
         """A feasible side, once the replay has seen its motion."""
