@@ -139,7 +139,7 @@ def as_text(
         ("case", case),
         ("region", ", ".join(ranges)),
         ("evidence", f"{placements.evidence}: {evidence}"),
-        ("found", placements.message),
+        ("found", _found_text(placements)),
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
         ("missed", _causes_text(placements)),
         ("searched", "" if _searched(placements.best) else _unsearched_text(placements)),
@@ -162,6 +162,18 @@ def as_text(
 def _searched(trial: Trial | None) -> bool:
     """Was a covering motion looked for at a placement? Else its share is unknown, not 0."""
     return trial is not None and trial.stage in (Stage.SEARCH, Stage.CHECK)
+
+
+def _found_text(placements: Placements) -> str:
+    """What was found; of placements that were not searched no share is told."""
+    if _searched(placements.best) or placements.evidence is Evidence.PROOF:
+        return placements.message
+    number = placements.statistics
+    return (
+        f"None found in the region: of {number['drawn']} placements {number['bound']} have a "
+        f"target out of reach, {number['probe']} failed a few Newton starts, and none was searched"
+        + ("; the search was stopped before." if placements.answer is Answer.UNDECIDED else ".")
+    )
 
 
 def _unsearched_text(placements: Placements) -> str:

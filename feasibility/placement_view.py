@@ -31,7 +31,7 @@ from feasibility.pose_layers import (
     station_layers,
 )
 from feasibility.pose_outline import outline, placed
-from feasibility.scene import Layer, counted
+from feasibility.scene import Layer, cells_layers, counted
 from feasibility.search import Search
 from feasibility.viewer import FRAMED, View, compose
 from robots import Robot
@@ -182,6 +182,8 @@ def _best_first(placements: Placements) -> list[Trial]:
 
 def _said(placements: Placements, trials: Sequence[Trial]) -> str:
     """How many placements were tried, and what the best one gives."""
+    if not trials:
+        return "no placement was tried; the surface is drawn where it stands in the case"
     if all(trial.stage is Stage.BOUND for trial in trials):
         return "wherever the surface stands in the region, a part is out of reach"
     text = f"{len(trials)} placements tried"
@@ -202,7 +204,7 @@ def _view(
     playing: Playing,
 ) -> View:
     """One picture of poses tried, the best one first among them."""
-    cells, motion, parts = asked.cells, None, []
+    cells, motion, parts = asked.cells, None, cells_layers(asked.cells)
     if tried:
         cells = moved_cells(asked.cells, tried[0].pose)
         if tried[0].kind is Class.FEASIBLE:

@@ -15,7 +15,7 @@ from surfaces.mesh_cells import MeshCells
 Array = NDArray[np.float64]
 
 MOST = 96  # segments of one outline
-PIECES = 24  # along one side of a patch, about
+FINEST = 8  # pieces that a cell's side is cut into, at most
 ALIKE = 1e-6  # [1] of the surface's size: corners nearer than this are one
 TELLING = 0.5  # [1] of the surface's size: a smaller rim does not show where the surface lies
 STROKE = 0.12  # [1] of the surface's size: the stroke that points to the working side
@@ -51,7 +51,7 @@ def _triangles(cells: Cells) -> Triangles:
     if isinstance(cells, MeshCells):
         found = skin_of(cells).fill(every, cells.centres)
     elif len(cells.shape) > 1:
-        pieces = int(np.clip(np.ceil(PIECES / max(cells.shape)), 1, 8))
+        pieces = int(np.clip(MOST // (2 * sum(cells.shape)), 1, FINEST))
         found = cells.triangles(every, pieces)
     else:
         found = patch(cells, every)

@@ -17,6 +17,7 @@ from feasibility import Search, Task, check, pose_layers
 from feasibility.case import Case
 from feasibility.placement import Placements, place
 from feasibility.placement_region import Pose, Region, moved_cells
+from feasibility.placement_report import as_text
 from feasibility.placement_stations import StationPlan
 from feasibility.placement_trial import Margins, Stage, Trial
 from feasibility.placement_view import NEARER, same_frame, view_placements, view_study
@@ -324,6 +325,22 @@ def test_a_region_out_of_reach_claims_no_share():
     assert "out of reach" in view.legend.text
     assert "%" not in view.legend.text
     assert "the best of them" not in [entry.label for entry in view.legend.entries]
+
+
+def test_where_the_time_ran_out_at_once_the_surface_alone_is_drawn():
+    """Nothing was tried, so nothing is said of reach, and no share."""
+    region = Region.around(Pose.of_surface(PLATE), {"x": (0.4, 0.6)})
+    late = place(ur5(), CELLS, TASK, region, time_limit=1e-9)
+    assert late.trials == ()
+    view = view_placements(late)
+    assert "no placement was tried" in view.legend.text
+    assert "reach" not in view.legend.text
+    assert classes_of(view) == {}
+    drawn = vertices(objects(view.commands)["/surface/patch"])
+    np.testing.assert_allclose(drawn.min(axis=0), [0.35, -0.1, 0.2], atol=2e-5)
+    np.testing.assert_allclose(drawn.max(axis=0), [0.65, 0.1, 0.2], atol=2e-5)
+    assert "%" not in as_text(late)
+    assert "no placement" in as_text(late)
 
 
 def test_stations_are_drawn_where_they_stand():
