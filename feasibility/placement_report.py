@@ -142,7 +142,7 @@ def as_text(
         ("found", _found_text(placements)),
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
         ("missed", _causes_text(placements)),
-        ("searched", "" if _searched(placements.best) else _unsearched_text(placements)),
+        ("share", "" if _searched(placements.best) else _unsearched_text(placements)),
         ("check", "" if placements.found else _checked_text(placements)),
         ("time", f"{placements.timing['total_s']:.2f} s"),
     ]
@@ -177,10 +177,10 @@ def _found_text(placements: Placements) -> str:
 
 
 def _unsearched_text(placements: Placements) -> str:
-    """Why no placement was searched."""
+    """Why it is not known what share could be covered."""
     if placements.evidence is Evidence.PROOF:
-        return "no placement: as each has a target out of reach, none can cover the whole surface"
-    return "no placement; so what share could be covered is not known"
+        return "not known: what the bound rules out is not searched"
+    return "not known: no placement was searched"
 
 
 def _checked_text(placements: Placements) -> str:

@@ -444,7 +444,7 @@ def test_a_region_ruled_out_by_proof_has_no_share_to_tell(capsys) -> None:
     assert status == 1
     assert "%" not in out
     assert "the best of them" not in out
-    assert "searched  no placement" in out
+    assert "share     not known" in out
     told = object_in(run(capsys, *where, "--json", *HERE)[1])
     assert told["share"] is None
     assert told["best"]["stage"] == "bound"
