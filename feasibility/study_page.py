@@ -47,12 +47,15 @@ def as_html(study: Study, rows: Sequence[Row], drawn: View | None = None) -> str
         parts.append(f"<p>{html.escape(words)}</p>\n")
     parts.append(_best(study, rows))
     parts += [_by_value(label, groups) for label, groups in groups_of(study, rows).items()]
+    pictures = charts(study.labels, rows)
     figures = [
         f"<figure>{chart.svg}<figcaption>{html.escape(chart.caption)}</figcaption></figure>\n"
-        for chart in charts(study.labels, rows)
+        for chart in pictures.drawn
     ]
     if figures:
         parts.append(f'<h2>Covered share</h2>\n<div class="charts">{"".join(figures)}</div>\n')
+    if pictures.left_out:
+        parts.append(f"<p>Pairs of numbers without a map: {pictures.left_out}.</p>\n")
     if drawn is not None:
         page = html.escape(drawn.html(), quote=True)
         parts.append(f'<h2>Poses</h2>\n<iframe srcdoc="{page}" loading="lazy"></iframe>\n')

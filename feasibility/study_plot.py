@@ -25,6 +25,7 @@ WRITTEN = 80  # fields of a map, up to which their shares are written into them
 CRISP = 2_000  # dots that are drawn as such; more become a picture within the picture
 WIDTH, HEIGHT = 4.6, 3.3  # inches
 UNKNOWN = "0.85"
+ROUNDING = 1e-6  # [%]: shares are written rounded down, so that 100 means all
 
 
 class Chart(NamedTuple):
@@ -36,7 +37,15 @@ class Chart(NamedTuple):
     """An element for a page."""
 
 
-def charts(labels: Sequence[str], rows: Sequence[Row]) -> list[Chart]:
+class Charts(NamedTuple):
+    """The pictures of a study."""
+
+    drawn: list[Chart]
+    left_out: int
+    """Pairs of numbers over which no map is drawn."""
+
+
+def charts(labels: Sequence[str], rows: Sequence[Row]) -> Charts:
     """The covered share over each number that varies, and maps of it over two of them.
 
     Args:
@@ -48,12 +57,13 @@ def charts(labels: Sequence[str], rows: Sequence[Row]) -> list[Chart]:
     made = [_share_chart(label, axes[label], known) for label in axes]
     pairs = list(itertools.combinations(axes, 2))
     groups = _panels(labels, axes, known)
-    for across, up in pairs[: max(1, MAPS // len(groups))]:
+    chosen = pairs[: max(1, MAPS // len(groups))]
+    for across, up in chosen:
         made += [
             _map_chart((across, up), (axes[across][which], axes[up][which]), share, words)
             for words, which, share in groups
         ]
-    return made
+    return Charts(made, len(pairs) - len(chosen))
 
 
 def numbers_of(labels: Sequence[str], rows: Sequence[Row]) -> dict[str, NDArray[np.float64]]:
@@ -151,7 +161,15 @@ def _map_chart(
         for (j, i), value in np.ndenumerate(fields if fields.size <= WRITTEN else np.empty((0, 0))):
             if np.isfinite(value):
                 colour = "black" if value > 60 else "white"
-                axes.text(i, j, f"{value:.0f}", ha="center", va="center", color=colour, fontsize=8)
+                axes.text(
+                    i,
+                    j,
+                    f"{int(value + ROUNDING)}",
+                    ha="center",
+                    va="center",
+                    color=colour,
+                    fontsize=8,
+                )
         caption = f"Best covered share {caption}"
     else:
         order = np.argsort(share, kind="stable")  # the best on top

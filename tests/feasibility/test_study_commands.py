@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import csv
 import io
+import itertools
 import json
+import math
 import re
 from collections import Counter
 from html import escape
 from html.parser import HTMLParser
 
+import numpy as np
 import pytest
 from small_cases import TEXTS
 
@@ -18,6 +21,8 @@ from feasibility.case import load_case
 from feasibility.cli import main
 from feasibility.placement_region import Pose
 from feasibility.placement_report import settings_of
+from feasibility.study import Row
+from feasibility.study_plot import charts
 
 SMALL = ("--set", "surface.cells=[3,3]")
 HERE = ("--workers", "0")
@@ -415,6 +420,41 @@ def test_a_study_whose_surface_stays_has_no_picture_of_poses(folder, capsys) -> 
     assert page.frames == []
     assert page.tags["figure"] == 3
     assert "Best covered share over task.cone_deg and task.standoff" in page.text
+
+
+def test_maps_show_the_best_of_each_field_and_leave_out_what_failed() -> None:
+    """Every number written into a map against a maximum taken by hand, one map for each arm."""
+    values = {"robot": ["ur5", "<b>"], "a": [1, 2, 3], "b": [0.5, 0.7], "c": [4, 9], "d": [0, 1]}
+    rng = np.random.default_rng(3)
+    rows = []
+    for row in itertools.product(*values.values()):
+        share = float(rng.uniform(0.0, 0.9999))
+        result = {"verdict": "infeasible", "share": share}
+        if rng.random() < 0.1:
+            result = {"verdict": "undecided", "evidence": "budget", "message": "died"}
+        rows.append(Row(dict(zip(values, row, strict=True)), "done", result, 0.1))
+    made = charts(list(values), rows)
+    numbers = ["a", "b", "c", "d"]
+    captions = [chart.caption for chart in made.drawn]
+    assert captions[:4] == [f"Covered share over {name}" for name in numbers]
+    pairs = list(itertools.combinations(numbers, 2))[:3]
+    assert captions[4:] == [
+        f"Best covered share over {x} and {y}, robot = {arm}" for x, y in pairs
+        for arm in values["robot"]
+    ]  # fmt: skip
+    assert made.left_out == 3
+    drawn = iter(made.drawn[4:])
+    for (x, y), arm in itertools.product(pairs, values["robot"]):
+        written = re.findall(r'<text style="font-size: 8px[^>]*>(\d+)</text>', next(drawn).svg)
+        best = [
+            max(
+                100 * row.result["share"] for row in rows
+                if "share" in row.result and row.parameters["robot"] == arm
+                and (row.parameters[x], row.parameters[y]) == (i, j)
+            )
+            for j in values[y] for i in values[x]
+        ]  # fmt: skip
+        assert written == [str(math.floor(share)) for share in best]
 
 
 def test_place_draws_what_it_tried(folder, capsys) -> None:
