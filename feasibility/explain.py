@@ -22,8 +22,9 @@ from surfaces import Cells
 if TYPE_CHECKING:
     from feasibility.probing import Prober
     from feasibility.trials import Trial
+    from feasibility.turning import Turning
 
-SHARE = 28  # verdicts' worth of evaluations that all thresholds together may take
+SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search should have
 EXTRA = 2  # the same, for margins that are still wide once the others have had their share
 LEAST = 20_000  # evaluations that they may always take
@@ -133,9 +134,11 @@ def explain(
     q = known_configurations(verdict)
     dropped = None if verdict.feasible else drop(prober, verdict, q)
     motions = _motions(prober, verdict, q) if verdict.feasible else []
-    for threshold in _thresholds(prober, verdict, q, motions, asked):
+    turnings: list[Turning] = []
+    for turning, threshold in _thresholds(prober, verdict, q, motions, asked):
+        turnings.append(turning)
         done.append(threshold)  # one by one: `tick` counts them
-    _refine(prober, verdict, motions, done)
+    _refine(prober, verdict, turnings, done)
     left_out = tuple(quantity.name for quantity in asked[len(done) :])
     seconds = time.monotonic() - began
     return Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds)
@@ -155,7 +158,7 @@ def _thresholds(
     q: NDArray[np.float64],
     motions: Sequence[Trial],
     asked: Sequence[Quantity],
-) -> Iterator[Threshold]:
+) -> Iterator[tuple[Turning, Threshold]]:
     """The thresholds one by one, each with a fair share of what is left; until the deadline."""
     from feasibility.turning import Turning
 
@@ -168,10 +171,10 @@ def _thresholds(
         fair = (total - prober.spent) // (len(asked) - index)
         turning = Turning(prober, quantity, cost, prober.spent + fair, motions)
         if verdict.feasible:
-            yield turning.tighten()
+            yield turning, turning.tighten()
         else:
             here = Finding(quantity.given, verdict.answer, verdict.evidence, verdict.message)
-            yield turning.widen(here, q)
+            yield turning, turning.widen(here, q)
 
 
 def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[Trial]:
@@ -186,25 +189,20 @@ def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[T
 
 
 def _refine(
-    prober: Prober, verdict: Verdict, motions: Sequence[Trial], found: list[Threshold]
+    prober: Prober, verdict: Verdict, turnings: Sequence[Turning], found: list[Threshold]
 ) -> None:
     """Spend what others left over on margins whose sides are still far apart, in place."""
-    from feasibility.turning import BEYOND, Turning
+    from feasibility.turning import BEYOND
 
     cost = cost_of(verdict)
-    left = (SHARE + EXTRA) * cost - prober.spent
+    most = (SHARE + EXTRA) * cost
     wide = [k for k, t in enumerate(found) if verdict.feasible and t.steps_apart > max(BEYOND)]
-    if not wide or left < EXTRA * cost * len(wide) / 2:
-        return
-    for k in wide:
-        if time.monotonic() > prober.deadline:
+    for done, k in enumerate(sorted(wide, key=lambda k: -found[k].steps_apart)):
+        left = most - prober.spent
+        if left < EXTRA * cost or time.monotonic() > prober.deadline:
             return
-        turning = Turning(
-            prober, found[k].quantity, cost, prober.spent + left // len(wide), motions
-        )
-        again = turning.tighten()
-        if again.margin >= found[k].margin:
-            found[k] = again
+        turnings[k].stop = prober.spent + left // (len(wide) - done)
+        found[k] = turnings[k].tighter(found[k])
 
 
 def known_configurations(verdict: Verdict) -> NDArray[np.float64]:

@@ -34,7 +34,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         helps.sort(key=_effort)
     for threshold in helps:
         lines += _item(sentence(threshold, verdict.feasible), "- ")
-    if not helps:
+    if not helps and others:
         lines += _item("No single change that was looked at was found to make it feasible.")
     if others:
         lines += ["", "What does not help alone:"]
@@ -44,11 +44,27 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         for threshold in (t for t in others if not t.ruled_out):
             lines += _item(sentence(threshold, verdict.feasible), "- ")
     if explanation.dropped is not None:
-        lines += ["", *_item(dropping(explanation.dropped, len(verdict.cells)))]
+        lines += ["", *_item(_dropped(explanation, explanation.dropped))]
     if explanation.left_out:
-        names = ", ".join(explanation.left_out)
-        lines += ["", *_item(f"The time limit left no time for: {names}.")]
+        lines += ["", *_item(_unknown(explanation))]
     return "\n".join(lines)
+
+
+def _unknown(explanation: Explanation) -> str:
+    """Which thresholds the time limit left no time for."""
+    names, number = ", ".join(explanation.left_out), len(explanation.left_out)
+    if not explanation.thresholds:
+        return f"The time limit ran out before any threshold was looked for: unknown are {names}."
+    return f"The time limit ran out; {number} thresholds are unknown: {names}."
+
+
+def _dropped(explanation: Explanation, dropped: Dropped) -> str:
+    """What would have to be given up, unless the search for it was cut short."""
+    verdict = explanation.verdict
+    if verdict.answer is Answer.UNDECIDED and dropped.waypoints is None:
+        found = f"{verdict.n_covered} of {len(verdict.cells)} cells"
+        return f"The best motion so far covers {found}; what would have to be dropped is unknown."
+    return dropping(dropped, len(verdict.cells))
 
 
 def _effort(threshold: Threshold) -> float:
@@ -80,7 +96,7 @@ def sentence(threshold: Threshold, tightened: bool) -> str:
     quantity, found = threshold.quantity, threshold.feasible
     if found is None:
         return _helpless(threshold)
-    value, now = shown(quantity, found.value), shown(quantity, quantity.given)
+    value, now = shown(quantity, found.value, True), shown(quantity, quantity.given)
     text = (_margin if tightened else _remedy)(quantity, value, now)
     if threshold.span is not None:
         text += f", and on to {shown(quantity, threshold.span.feasible.value)}"
@@ -148,19 +164,25 @@ def _change(quantity: Quantity) -> str:
 
 def _against(quantity: Quantity, other: Finding) -> str:
     """What speaks against a value."""
-    at = shown(quantity, other.value)
-    if other.evidence is Evidence.PROOF and other.cell is not None:
-        return f"at {at} {other.detail}"
-    if other.value == quantity.given:
-        return f"{other.answer} as it is, at {at}"
-    return f"at {at} {other.detail}"
+    if other.value == quantity.given and (
+        other.evidence is not Evidence.PROOF or other.cell is None
+    ):
+        return f"{other.answer} as it is, at {shown(quantity, other.value)}"
+    return f"at {shown(quantity, other.value, False)} {other.detail}"
 
 
-def shown(quantity: Quantity, value: float) -> str:
-    """A value with its unit: degrees or millimetres."""
-    if quantity.unit == "rad":
-        return f"{round(math.degrees(value), 2):g} deg"
-    return f"{round(1e3 * value, 2):g} mm"
+def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str:
+    """A value with its unit: degrees or millimetres, to two digits.
+
+    A limit or a cone that is said to be feasible is rounded to where it allows more, and one that
+    is not to where it allows less, so that what was found holds for the number printed too.
+    """
+    value, unit = (math.degrees(value), "deg") if quantity.unit == "rad" else (1e3 * value, "mm")
+    if feasible is None or not quantity.monotone:
+        return f"{round(value, 2):.10g} {unit}"
+    up = feasible != (quantity.kind is Kind.LOWER)
+    cents = round(100.0 * value, 4)  # what conversions leave behind is no reason to round
+    return f"{(math.ceil(cents) if up else math.floor(cents)) / 100.0:.10g} {unit}"
 
 
 def dropping(dropped: Dropped, cells: int) -> str:

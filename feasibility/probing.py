@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -230,7 +231,10 @@ class Prober:
         if ended and certifiable(problem):
             detail = f"the search ended without a covering motion; {best}"
             return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
-        detail = f"not found with {int(explorer.work.counts[0])} evaluations of the arm; {best}"
+        spent = f"{int(explorer.work.counts[0])} evaluations of the arm"
+        detail = f"not found with {spent}; {best}"
+        if time.monotonic() > self.deadline:
+            detail = f"unknown: the time limit ran out after {spent}; {best}"
         return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
 
     def confirmed(

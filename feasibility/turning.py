@@ -66,6 +66,8 @@ class Turning:
     """Covering motions of the case as it stands, the one of its verdict first."""
     rivals: list[Side] = field(default_factory=list)
     """The same, as far as each goes as it is, the furthest first; none that was looked at."""
+    good: Side | None = None
+    """The last feasible side of a margin that was found."""
 
     # -- a case that is feasible as it stands ----------------------------------------------------
 
@@ -80,7 +82,21 @@ class Turning:
         told = self._told(good)
         if not told.feasible:  # the replay refuses what the search found
             return Threshold(self.quantity, self._told(Side(0, self.motions[0])), told)
+        self.good = good
         return Threshold(self.quantity, told, other)
+
+    def tighter(self, found: Threshold) -> Threshold:
+        """The same threshold, its sides brought nearer to each other if that succeeds."""
+        good, other, apart = self.good, found.other, found.steps_apart
+        if good is None or other is None:
+            return found
+        near = (good.k + apart + k for k in (0, 1, -1))
+        bad = next((k for k in near if self.quantity.value(k) == other.value), None)
+        if bad is None:
+            return found
+        good, beyond = self._narrow(good, bad, other)
+        told = self._told(good)
+        return Threshold(self.quantity, told, beyond) if told.feasible else found
 
     def _outwards(self, here: Side) -> tuple[Side, Finding | None]:
         """The last feasible side on the way to the end; and what was found past it, if anything."""

@@ -15,7 +15,8 @@ from paper_cases import PAPER_CASES
 from feasibility import Search, Task, check
 from feasibility.explain import Explanation, explain
 from feasibility.explain_report import as_json, as_text, shown
-from feasibility.quantities import Kind, Setup
+from feasibility.probing import Prober
+from feasibility.quantities import Kind, Quantity, Setup
 from feasibility.thresholds import Threshold
 from feasibility.verdict import Answer, Evidence, Verdict
 from robots import load_robot
@@ -330,10 +331,39 @@ def test_out_of_time_is_said_and_nothing_is_claimed() -> None:
     assert not any(t.feasible is not None for t in explanation.thresholds)
     assert len(explanation.left_out) == 21 - len(explanation.thresholds)
     assert len(explanation.left_out) > 0
-    text = as_text(explanation, "4d")
+    text = " ".join(as_text(explanation, "4d").split())
     assert "undecided" in text
-    assert "The time limit left no time for: " in text
+    assert "The time limit ran out" in text
+    for name in explanation.left_out:
+        assert name in text[text.rindex("unknown") :]
+    # Cells that nothing was looked for at are no cells to drop.
+    assert "what would have to be dropped is unknown" in text
+    assert "have to be dropped." not in text
     assert "would need" not in text
+    assert "No single change" not in text or explanation.thresholds
+
+
+def test_a_search_that_the_time_limit_cut_says_so() -> None:
+    """Not "not found": more time may find it."""
+    setup = setup_of("4a")
+    prober = Prober(setup, 0, deadline=0.0)
+    nothing = np.full((90, 6), np.nan)
+    trial = prober.attempt(prober.problem, nothing, np.inf, deep=True)
+    assert (trial.answer, trial.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert trial.detail.startswith("unknown: the time limit ran out")
+
+
+@pytest.mark.parametrize("cents", [0.0, 0.3, 0.5, 0.7])
+def test_a_printed_limit_is_on_the_side_that_was_found(cents: float) -> None:
+    """Whoever copies the number gets what the verdict was about, or something easier."""
+    value = math.radians(41.7 + cents / 100.0)
+    for kind, freer in ((Kind.CONE, 1.0), (Kind.UPPER, 1.0), (Kind.LOWER, -1.0)):
+        for sign in (1.0, -1.0):
+            quantity = Quantity(kind, "", "rad", 0.0, sign, 0.1, True, 0)
+            for feasible, way in ((True, freer), (False, -freer)):
+                printed = float(shown(quantity, sign * value, feasible).removesuffix(" deg"))
+                off = way * (printed - math.degrees(sign * value))
+                assert -1e-9 <= off < 0.01
 
 
 def test_a_cone_of_zero_is_undecided_and_a_wider_one_is_found() -> None:
