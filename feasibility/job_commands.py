@@ -14,6 +14,7 @@ from feasibility.files import shown_path
 if TYPE_CHECKING:
     from feasibility.explain import Explanation
     from feasibility.route import Order
+    from feasibility.verdict import Verdict
     from feasibility.viewer import View
 
 WHY_COMPLETE = {
@@ -43,14 +44,11 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.speed_limits import motion_limits
         from feasibility.timing import trajectory
 
-        robot = question.setup.robot
+        robot, loaded = question.setup.robot, question.so_far()
         limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
         verdict = check(*question.setup, progress=question.progress)
         if not verdict.feasible:
-            reason = f"no path over this surface is known. {verdict!r}"
-            tell(f"coverable path: {question.case.name}: {reason}")
-            tell("`coverable explain` says what would help, `coverable divide` how to split it.")
-            return STATUS[str(verdict.answer)]
+            return _no_path(args, question.case.name, verdict, loaded)
         question.progress(0, None, "laying the path")
         order: Order = args.order or ("rows" if len(verdict.cells.shape) == 2 else "shortest")
         found = coverage_path(verdict, order)
@@ -73,6 +71,22 @@ def path(args: argparse.Namespace, began: float) -> int:
 
         write_view(view_path(found, run, question.case.name), args.html)
     return 0
+
+
+def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: float) -> int:
+    """Say why there is no path; the exit status is the verdict's."""
+    from feasibility.path_report import no_path_json
+
+    reason = f"no path over this surface is known. {verdict!r}"
+    tell(f"coverable path: {name}: {reason}")
+    tell("`coverable explain` says what would help, `coverable divide` how to split it.")
+    for flag, files in (("--out", args.out), ("--html", [args.html])):
+        for file in files:
+            if file is not None:
+                tell(f"{flag}: nothing written to {shown_path(file)}")
+    if args.json:
+        say(json_text(no_path_json(verdict, reason, loaded)))
+    return STATUS[str(verdict.answer)]
 
 
 def divide(args: argparse.Namespace, began: float) -> int:

@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 import math
+import re
 import textwrap
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any
 
 import numpy as np
 
 from feasibility.coverage import CoveragePath
+from feasibility.interpolation import used
 from feasibility.path_figures import PathFigures
+from feasibility.report import as_json as verdict_json
 from feasibility.result import plain
 from feasibility.speed_limits import MotionLimits
 from feasibility.trajectory import Trajectory
+from feasibility.verdict import Verdict
 from feasibility.version import version
+from robots import Robot
 
 WIDTH = 100  # columns
 
@@ -33,6 +39,7 @@ def as_json(
     figures = path.figures
     sliding = path.robot.prismatic
     return {
+        "verdict": "feasible",
         "order": path.order,
         "cells": int(path.needed.sum()),
         "visits": path.visits.tolist(),
@@ -65,20 +72,66 @@ def as_json(
     }
 
 
+def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[str, Any]:
+    """What `coverable path --json` prints where there is no path: the verdict's object, and why.
+
+    Args:
+        verdict: infeasible or undecided.
+        reason: one sentence.
+        before_s: as in `report.as_json`.
+    """
+    return verdict_json(verdict, before_s) | {"message": reason, "trajectory": None}
+
+
+def at_most(value: float, digits: int) -> str:
+    """A number to some significant digits that is no less: a bound that still holds as printed.
+
+    Example:
+        >>> at_most(0.12341, 3), at_most(0.5, 3), at_most(0.0, 3)
+        ('0.124', '0.5', '0')
+    """
+    return _rounded(value, digits, ROUND_CEILING)
+
+
+def at_least(value: float, digits: int) -> str:
+    """A number to some significant digits that is no more.
+
+    Example:
+        >>> at_least(12.999, 3), at_least(-0.12341, 3)
+        ('12.9', '-0.124')
+    """
+    return _rounded(value, digits, ROUND_FLOOR)
+
+
+def _rounded(value: float, digits: int, rounding: str) -> str:
+    """A number with so many significant digits, rounded one way; inf stays inf."""
+    if math.isfinite(value):
+        value = float(Context(prec=digits, rounding=rounding).create_decimal(Decimal(value)))
+    return f"{value:.{digits}g}"
+
+
 def _timing(
     path: CoveragePath, trajectory: Trajectory, limits: MotionLimits | None
 ) -> dict[str, Any]:
-    """Duration and the largest of everything, with the limits where they are known."""
+    """Duration and the largest of everything, with the limits where they are known.
+
+    With limits the largest is over all that a controller may make of the samples.
+    """
     names = path.robot.joint_names
-    fastest = np.abs(trajectory.dq).max(axis=0).tolist()
-    quickest = np.abs(trajectory.ddq).max(axis=0).tolist()
+    fastest, quickest = np.abs(trajectory.dq).max(axis=0), np.abs(trajectory.ddq).max(axis=0)
+    speed = float(trajectory.tool_speed.max())
+    if limits is not None:
+        most = used(path.robot, trajectory, limits)
+        fastest = most.velocity * limits.velocity
+        quickest = most.acceleration * limits.acceleration
+        speed = most.tool_speed * limits.tool_speed
     found: dict[str, Any] = {
         "duration_s": trajectory.duration,
         "samples": len(trajectory),
         "tool_way_m": trajectory.tool_way,
-        "max_tool_speed": float(trajectory.tool_speed.max()),
-        "max_velocity": dict(zip(names, fastest, strict=True)),
-        "max_acceleration": dict(zip(names, quickest, strict=True)),
+        "max_tool_speed": speed,
+        "max_velocity": dict(zip(names, fastest.tolist(), strict=True)),
+        "max_acceleration": dict(zip(names, quickest.tolist(), strict=True)),
     }
     if limits is not None:
         found["limits"] = {
@@ -108,8 +161,8 @@ def as_text(
         (
             "certificate",
             f"{path.certificate.waypoints:,} waypoints replayed, between them too: tool within "
-            f"{1e3 * path.certificate.max_position_error:.3g} mm, axis within "
-            f"{math.degrees(path.certificate.max_angle):.4g} deg",
+            f"{at_most(1e3 * path.certificate.max_position_error, 3)} mm, axis within "
+            f"{at_most(math.degrees(path.certificate.max_angle), 4)} deg",
         ),
     ]
     if trajectory is not None:
@@ -117,20 +170,21 @@ def as_text(
             (
                 "time",
                 f"{trajectory.duration:.4g} s in {len(trajectory):,} samples, tool at up to "
-                f"{trajectory.tool_speed.max():.4g} m/s",
+                f"{at_most(float(trajectory.tool_speed.max()), 4)} m/s",
             )
         )
-        rows += _limit_rows(trajectory, limits)
+        rows += _limit_rows(path.robot, trajectory, limits)
     head = f"path: one continuous motion over {count:,} cell{'s' if count > 1 else ''}."
     return "\n".join([head, "", *(_row(name, text) for name, text in rows)])
 
 
 def _row(name: str, text: str) -> str:
-    """A named line; the rest of a long one is indented below."""
+    """A named line; the rest of a long one is indented below, no number without its unit."""
+    held = re.sub(r"(?<=\d) (?=(?:deg|mm|m|m/s|s|%)\b|%)", "\u00a0", text)
     return textwrap.fill(
-        text, WIDTH, initial_indent=f"  {name:<14}", subsequent_indent=" " * 16,
+        held, WIDTH, initial_indent=f"  {name:<14}", subsequent_indent=" " * 16,
         break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
+    ).replace("\u00a0", " ")  # fmt: skip
 
 
 def _length_text(figures: PathFigures) -> str:
@@ -141,7 +195,7 @@ def _length_text(figures: PathFigures) -> str:
         text += f", {figures.revisited:.3g} m of it again ({share})"
     if figures.least_length > 0.0:
         text += (
-            f"; no path through all centres is shorter than {figures.least_length:.4g} m "
+            f"; no path through all centres is shorter than {at_least(figures.least_length, 4)} m "
             f"(ratio {figures.ratio:.3f})"
         )
     return text
@@ -161,26 +215,28 @@ def _margins_text(figures: PathFigures) -> str:
     """What the path keeps free."""
     parts = []
     if math.isfinite(figures.turn_margin):
-        parts.append(f"{math.degrees(figures.turn_margin):.3g} deg to a limit")
+        parts.append(f"{at_least(math.degrees(figures.turn_margin), 3)} deg to a limit")
     if math.isfinite(figures.slide_margin):
-        parts.append(f"{1e3 * figures.slide_margin:.3g} mm to a limit")
-    parts.append(f"{math.degrees(figures.cone_margin):.3g} deg of the cone")
-    parts.append(f"smallest singular value {figures.singular_value:.3g}")
+        parts.append(f"{at_least(1e3 * figures.slide_margin, 3)} mm to a limit")
+    parts.append(f"{at_least(math.degrees(figures.cone_margin), 3)} deg of the cone")
+    parts.append(f"smallest singular value {at_least(figures.singular_value, 3)}")
     return ", ".join(parts)
 
 
-def _limit_rows(trajectory: Trajectory, limits: MotionLimits | None) -> list[tuple[str, str]]:
-    """How much of its limits a trajectory uses."""
+def _limit_rows(
+    robot: Robot, trajectory: Trajectory, limits: MotionLimits | None
+) -> list[tuple[str, str]]:
+    """How much of its limits a trajectory uses, between samples too."""
     if limits is None:
         return []
-    velocity = float((np.abs(trajectory.dq) / limits.velocity).max())
-    acceleration = float((np.abs(trajectory.ddq) / limits.acceleration).max())
+    most = used(robot, trajectory, limits)
+    velocity, acceleration = (100 * float(s.max()) for s in (most.velocity, most.acceleration))
     return [
         (
             "limits",
-            f"at most {100 * velocity:.3g} % of the joints' velocities, "
-            f"{100 * acceleration:.3g} % of their accelerations, "
-            f"{100 * float(trajectory.tool_speed.max()) / limits.tool_speed:.3g} % of the tool's "
-            f"{limits.tool_speed:g} m/s",
+            f"at most {at_most(velocity, 3)} % of the joints' velocities, "
+            f"{at_most(acceleration, 3)} % of their accelerations, "
+            f"{at_most(100 * most.tool_speed, 3)} % of the tool's {limits.tool_speed:g} m/s, "
+            "between samples too, as quintics or cubics",
         )
     ]

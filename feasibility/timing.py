@@ -1,34 +1,35 @@
 """Time along a path: as fast as joints and tool may, from rest to rest.
 
 The path's straight lines are blended into a smooth curve (`blend`); toppra finds the largest speed
-along it that velocities, accelerations and the tool's speed allow (`parameterisation`). Velocities
-hold by construction (`speed_limits`). What accelerations are over, from toppra's own rounding, is
-taken back by running everything a little slower. So all limits hold along the curve, between
-samples too. (A controller that puts curves of its own through the samples may pass accelerations
-for a moment; sample more densely where that matters.) The samples at last are replayed like any
-witness, as a motion of straight lines.
+along it that velocities, accelerations and the tool's speed allow (`timed_curve`), so that all
+limits hold along the curve.
+
+A controller sees its samples only, and puts quintics or cubics through them (`interpolation`). The
+fastest way along a curve jumps from one acceleration to another, and these swing past both. So the
+joints that would be over a limit then are given less, the way along the curve is sought again, and
+the little that is left is mended by running slower. The samples at last are replayed like any
+witness: as a motion of straight lines, of quintics and of cubics.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feasibility.blend import Curve, blended, inside
+from feasibility.blend import Curve, blended
 from feasibility.certificate import replay
 from feasibility.coverage import CoveragePath
-from feasibility.parameterisation import acceleration_excess, parameterised
-from feasibility.route import PathError
-from feasibility.speed_limits import (
-    MotionLimits,
-    fine_grid,
-    motion_limits,
-    number,
-    squared_speeds,
-    tool_slopes,
+from feasibility.interpolation import (
+    KINDS,
+    PLACES,
+    accelerations_used,
+    motion_between,
+    past_limits,
+    used,
 )
+from feasibility.route import PathError
+from feasibility.speed_limits import MotionLimits, motion_limits, number
+from feasibility.timed_curve import samples, timed_curve
 from feasibility.trajectory import Trajectory
 from feasibility.verdict import Walk
 from robots import Robot
@@ -37,43 +38,14 @@ Array = NDArray[np.float64]
 
 DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
-ALLOWED = 0.999  # [1] share of an acceleration limit that toppra is given
-TRIES = 4  # runs of toppra, each slower where the one before was over an acceleration limit
-MOST_OVER = 4.0  # [1] share of an acceleration limit that running slower altogether may mend
 SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be asked for
 FINER = 4  # times that the period may be halved
-CROWDED = 0.2  # [1] share of the period; samples nearer to a passage of a centre are left out
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class TimedCurve:
-    """A curve with the time at which it passes each place of a grid."""
-
-    curve: Curve
-    grid: Array
-    """(m,) places k of the curve."""
-    x: Array
-    """(m,) 1/s^2, (dk/dt)^2 at each place; it runs straight in between."""
-    time: Array
-    """(m,) s."""
-    limits: MotionLimits
-
-    @property
-    def duration(self) -> float:
-        """Seconds from start to end."""
-        return float(self.time[-1])
-
-    def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """q, its velocity and its acceleration (k, n) at times (k,)."""
-        i = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
-        u = 0.5 * (self.x[i + 1] - self.x[i]) / (self.grid[i + 1] - self.grid[i])
-        past = time - self.time[i]
-        rate = np.sqrt(self.x[i])
-        k = np.clip(self.grid[i] + past * (rate + 0.5 * u * past), self.grid[i], self.grid[i + 1])
-        rate = np.where(time < self.duration, np.maximum(rate + u * past, 0.0), 0.0)[:, None]
-        spline = self.curve.spline()
-        q, slope, bend = (spline.derivative(order)(k) for order in range(3))
-        return q, slope * rate, bend * rate**2 + slope * u[:, None]
+AT_LIMIT = 1e-6  # [rad] or [m] that interpolation may add where a path runs along a joint's limit
+ROUNDS = 3  # ways along a curve that are sought, each with less for joints that were over
+PARTS = (1.0, 0.95, 0.91, 0.86)  # [1] of a period: where samples lie between jumps is chance
+SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing down as a whole
+SLOWINGS = 8  # times that the last of them is slowed down as a whole
+RESERVE = 1e-3  # [1] share of all limits that is left free
 
 
 def trajectory(
@@ -93,10 +65,11 @@ def trajectory(
         acceleration: rad/s^2 or m/s^2, of all joints or (n,) of each; by default what takes a joint
             to its largest velocity in half a second.
         period: s between samples; a sample more stands where a cell's centre is passed. It is
-            halved where the straight lines between samples would leave the tolerance.
+            halved where the motion between samples would leave the tolerance.
 
     Returns:
-        The samples, accepted by the independent replay as a motion of straight lines.
+        The samples. They keep to the limits, and the independent replay accepts them, as straight
+        lines and as the quintics and cubics that controllers make of them.
 
     Raises:
         PathError: a number is not as it should be, or no such motion was found.
@@ -118,75 +91,58 @@ def trajectory(
         raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
     if len(np.unique(path.walk.q, axis=0)) == 1:
         return _standing(robot, path.walk)
-    timed = timed_curve(robot, blended(robot, cells, task, path.walk), limits)
-    refusal = ""
+    curve, refusal = blended(robot, cells, task, path.walk), ""
     for _ in range(FINER + 1):
-        run = samples(robot, timed, period)
-        replayed = replay(robot, cells, task, run.walk, path.needed)
-        if replayed.accepted:
+        run = within_limits(robot, curve, limits, period)
+        refusal = _refusal(path, run)
+        if not refusal:
             return run
-        refusal = replayed.refusal
         period *= 0.5
     raise PathError(f"the independent replay refuses the timed motion: {refusal}")
 
 
-def timed_curve(robot: Robot, curve: Curve, limits: MotionLimits) -> TimedCurve:
-    """Time along a curve.
+def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: float) -> Trajectory:
+    """Samples of a curve that keep to the limits however they are interpolated.
 
     Raises:
-        PathError: toppra finds no way to run it.
+        PathError: no such way to run it was found.
     """
-    spline = curve.spline()
-    grid = fine_grid(robot, spline, curve.pieces)
-    most = squared_speeds(robot, spline, grid, limits)
-    # In s = k * unit, speeds are about 1, which is what the solver's tolerances are made for.
-    unit = 1.0 / float(np.sqrt(np.median(most)))
-    allowed = most
-    for _ in range(TRIES):
-        x = parameterised(spline, grid, unit, allowed, ALLOWED * limits.acceleration) / unit**2
-        over = acceleration_excess(spline, grid, x, limits.acceleration)
-        if over.max() <= 1.0:
+    less, share = 1.0 - RESERVE, np.ones(robot.n)
+    for _ in range(ROUNDS):
+        given = MotionLimits(
+            less * limits.velocity, less * share * limits.acceleration, less * limits.tool_speed
+        )
+        timed = timed_curve(robot, curve, given)
+        runs = [samples(robot, timed, part * period) for part in PARTS]
+        over = np.max([accelerations_used(run, limits) for run in runs], axis=0)
+        if over.max() <= SLIGHTLY:
             break
-        # Slower there and around, where toppra's own rounding has got too fast.
-        wide = np.maximum.reduce([np.roll(np.append(over, 0.0), k) for k in range(-2, 4)])
-        slower = np.minimum(allowed, x / np.maximum(wide, 1.0) ** 2)
-        allowed = np.where(wide > 1.0, slower, allowed)
-    worst = max(float(over.max()), float((x / most).max()))
-    if worst > 1.0:
-        if worst > MOST_OVER:
-            raise PathError(
-                f"no timing was found that keeps to the accelerations; they are {worst:.2g} times "
-                "too large at a turn"
-            )
-        x = x / worst
-    rate = np.sqrt(x)
-    time = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(grid) / (rate[:-1] + rate[1:]))])
-    if not np.isfinite(time).all():
-        raise PathError("no timing was found: the motion would have to stop on its way")
-    return TimedCurve(curve, grid, x, time, limits)
-
-
-def samples(robot: Robot, timed: TimedCurve, period: float) -> Trajectory:
-    """A timed curve every `period` seconds, and where it passes the centres of cells."""
-    curve = timed.curve
-    passages = timed.time[np.searchsorted(timed.grid, curve.marks.astype(float))]
-    regular = np.arange(0.0, timed.duration, period)
-    nearest = np.searchsorted(passages, regular)
-    apart = np.minimum(
-        np.abs(regular - passages[np.minimum(nearest, len(passages) - 1)]),
-        np.abs(regular - passages[np.maximum(nearest - 1, 0)]),
+        share /= np.maximum(over, 1.0)
+    slower = 1.0
+    for _ in range(SLOWINGS):
+        run = samples(robot, timed.slowed(slower), period)
+        too_fast = used(robot, run, limits).too_fast
+        if too_fast <= 1.0:
+            return run
+        slower *= too_fast + RESERVE
+    raise PathError(
+        "no timing was found that keeps to the limits between samples too; a shorter period helps"
     )
-    regular = regular[apart > CROWDED * period]
-    time = np.concatenate([passages, regular])
-    order = np.argsort(time, kind="stable")
-    time = time[order]
-    cell = np.concatenate([curve.cell, np.full(len(regular), -1, dtype=np.int64)])[order]
-    q, dq, ddq = timed.at(time)
-    q = inside(robot, q)
-    return Trajectory(
-        joint_names=robot.joint_names, time=time, q=q, dq=dq, ddq=ddq,
-        tool_speed=tool_slopes(robot, q, dq), cell=cell,
-    )  # fmt: skip
+
+
+def _refusal(path: CoveragePath, run: Trajectory) -> str:
+    """Why the samples will not do, as straight lines or interpolated; empty where they will."""
+    robot, cells, task = path.robot, path.cells, path.task
+    past = past_limits(robot, run)
+    if past > AT_LIMIT:
+        return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
+    walks = [run.walk, *(motion_between(run, kind, PLACES) for kind in KINDS)]
+    for walk in walks:
+        held = Walk(q=np.clip(walk.q, robot.lower, robot.upper), cell=walk.cell)
+        replayed = replay(robot, cells, task, held, path.needed)
+        if not replayed.accepted:
+            return replayed.refusal
+    return ""
 
 
 def _standing(robot: Robot, walk: Walk) -> Trajectory:

@@ -11,6 +11,7 @@ from feasibility import Task, check
 from feasibility.coverage import coverage_path
 from feasibility.timing import trajectory
 from robots import load_robot
+from robots.kinematics import Kinematics
 from surfaces import plane, sphere
 
 FEASIBLE = ("4a", "4b", "4c", "4e", "5a", "5b", "5c", "5d", "5e", "5f")
@@ -47,24 +48,49 @@ def run_of(name):
     return trajectory(path_of(name), SPEED)
 
 
-def quintic(run, per_interval):
-    """(m, n) between samples as a controller goes: quintic through q, dq and ddq of both ends.
+def interpolated(run, degree, per_interval):
+    """q, dq and ddq, (m, n) each, between samples as a controller goes.
 
-    Polynomials by solving for their coefficients, so that nothing is shared with what made them.
+    Quintics go through q, dq and ddq of both ends, cubics through q and dq. Polynomials by solving
+    for their coefficients, so that nothing is shared with what made them.
     """
     t = np.linspace(0.0, 1.0, per_interval, endpoint=False)
-    powers = np.arange(6)
-    rows = []
-    for order in range(3):
-        factor = np.prod([powers - k for k in range(order)], axis=0) if order else np.ones(6)
-        rows.append([np.where(powers >= order, factor, 0) * np.where(powers == order, 1, 0)])
-        rows.append([np.where(powers >= order, factor, 0)])
-    matrix = np.vstack(rows).astype(float)  # values at 0 and 1, slopes at 0 and 1, bends at 0 and 1
+    powers = np.arange(degree + 1)
+
+    def falling(order):
+        """Factors of the derivatives of the powers."""
+        return np.prod([powers - k for k in range(order)], axis=0) if order else powers**0
+
+    sides = [run.q, run.dq, run.ddq][: (degree + 1) // 2]
+    rows = [
+        np.where(where, falling(order), 0)
+        for order in range(len(sides))
+        for where in (powers == order, powers >= order)  # at 0, at 1
+    ]
     h = np.diff(run.time)[:, None]
-    sides = [run.q, run.dq, run.ddq]
     ends = np.stack(
         [side[k : len(run) - 1 + k] * h**order for order, side in enumerate(sides) for k in (0, 1)]
     )
-    coefficients = np.linalg.solve(matrix, ends.reshape(6, -1)).reshape(ends.shape)
-    dense = np.einsum("tp,pin->itn", np.vander(t, 6, increasing=True), coefficients)
-    return np.vstack([dense.reshape(-1, run.q.shape[1]), run.q[-1:]])
+    solved = np.linalg.solve(np.vstack(rows).astype(float), ends.reshape(degree + 1, -1))
+    coefficients = solved.reshape(ends.shape)
+    found = []
+    for order, side in enumerate((run.q, run.dq, run.ddq)):
+        values = np.where(powers >= order, falling(order), 0) * t[:, None] ** np.maximum(
+            powers - order, 0
+        )
+        dense = np.einsum("tp,pin->itn", values, coefficients) / h[:, None] ** order
+        found.append(np.vstack([dense.reshape(-1, run.q.shape[1]), side[-1:]]))
+    return found
+
+
+def assert_keeps_to_limits(verdict, run, limits):
+    """Joints, velocities, accelerations and the tool's speed, however samples are interpolated."""
+    robot, kinematics = verdict.robot, Kinematics(verdict.robot)
+    for degree in (3, 5):
+        q, dq, ddq = interpolated(run, degree, per_interval=7)
+        assert (q >= robot.lower - 1e-6).all()
+        assert (q <= robot.upper + 1e-6).all()
+        assert (np.abs(dq) <= limits.velocity * (1 + 1e-9)).all()
+        assert (np.abs(ddq[:-1]) <= limits.acceleration * (1 + 1e-9)).all()
+        speed = [np.linalg.norm(kinematics.jacobians(a)[0] @ b) for a, b in zip(q, dq, strict=True)]
+        assert max(speed) <= limits.tool_speed * (1 + 1e-6)

@@ -10,6 +10,7 @@ import pytest
 from feasibility.case import load_case
 from feasibility.certificate import replay
 from feasibility.cli import main
+from feasibility.path_report import at_least, at_most
 from feasibility.trajectory_files import load_trajectory
 
 
@@ -30,6 +31,7 @@ def test_a_path_is_written_in_three_formats_that_replay(tmp_path, capsys):
     )
     assert status == 0
     told = json.loads(out)
+    assert told["verdict"] == "feasible"
     assert told["order"] == "rows"
     assert told["cells"] == 90
     assert told["revisited_share"] <= 0.15
@@ -52,13 +54,44 @@ def test_a_path_is_written_in_three_formats_that_replay(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("settings", "status"), [([], 1), (["--set", "search.time_limit=1e-6"], 3)]
 )
-def test_a_path_of_what_is_not_feasible_is_refused_with_the_reason(settings, status, capsys):
-    """The verdict's own status, nothing on stdout, and where to go from here."""
-    found, out, err = run(capsys, "path", "paper/4d", *settings)
+def test_a_path_of_what_is_not_feasible_is_refused_with_the_reason(
+    settings, status, tmp_path, capsys
+):
+    """The verdict's own status, nothing on stdout, no files, and where to go from here."""
+    files = [str(tmp_path / "run.csv"), str(tmp_path / "run.html")]
+    outs = ["--out", files[0], "--html", files[1]]
+    found, out, err = run(capsys, "path", "paper/4d", *settings, *outs)
     assert found == status
     assert out == ""
     assert "no path over this surface is known" in err
     assert "coverable explain" in err
+    assert "--out: nothing written to" in err
+    assert "--html: nothing written to" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", ["path", "divide", "explain"])
+@pytest.mark.parametrize("case", ["infeasible", "undecided", "hopeless"])
+def test_json_is_one_object_whatever_the_answer(command, case, capsys):
+    """Infeasible, out of time, and a surface that no cell of can be reached."""
+    settings, status = {
+        "infeasible": ([], 1),
+        "undecided": (["--set", "search.time_limit=1e-6"], 3),
+        "hopeless": (["--set", "surface.position=[9, 0, 0]"], 1),
+    }[case]
+    found, out, err = run(capsys, command, "paper/4d", "--json", *settings)
+    told = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
+    assert found == status
+    assert "Traceback" not in err
+    if command == "path":
+        answer = "undecided" if case == "undecided" else "infeasible"
+        assert told["verdict"] == answer
+        assert (
+            told["covered"] == {"infeasible": 60, "undecided": told["covered"], "hopeless": 0}[case]
+        )
+        assert told["trajectory"] is None
+        assert told["message"] in err
+        assert answer in told["message"]
 
 
 @pytest.mark.parametrize(
@@ -107,3 +140,21 @@ def test_an_explanation_says_what_helps(tmp_path, capsys):
     assert status == 1
     told = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
     assert any("joint1" in json.dumps(threshold) for threshold in told["thresholds"])
+
+
+@pytest.mark.parametrize("digits", [1, 3, 4])
+def test_bounds_are_rounded_to_where_they_hold(digits):
+    """A number that is copied from a sentence keeps what the sentence says."""
+    rng = np.random.default_rng(1)
+    for value in [
+        *rng.normal(size=200) * 10.0 ** rng.integers(-6, 6, 200),
+        0.0,
+        1.0,
+        99.999,
+        180.0,
+    ]:
+        above, below = float(at_most(value, digits)), float(at_least(value, digits))
+        assert below <= value <= above
+        assert above - below <= 10.0 ** (1 - digits) * abs(value) * (1 + 1e-9)
+        for text in (at_most(value, digits), at_least(value, digits)):
+            assert len(text.split("e")[0].strip("-0.").replace(".", "")) <= digits

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from dense_replay import assert_motion
-from path_cases import SPEED, path_of, quintic, run_of, verdict_of
+from path_cases import SPEED, assert_keeps_to_limits, interpolated, path_of, run_of, verdict_of
 
 from feasibility.certificate import replay
 from feasibility.coverage import coverage_path
@@ -75,11 +75,9 @@ def test_a_trajectory_read_back_covers_the_surface_within_all_limits(name, endin
     every = np.ones(len(verdict.cells), dtype=bool)
     replayed = replay(robot, verdict.cells, verdict.task, Walk(run.q, run.cell), every)
     assert replayed.accepted, replayed.refusal
-    assert_motion(verdict, np.clip(quintic(run, 2), robot.lower, robot.upper))
+    assert_motion(verdict, np.clip(interpolated(run, 5, 2)[0], robot.lower, robot.upper))
     limits = motion_limits(robot, SPEED)
-    most = 1.0 + 1e-9
-    assert (np.abs(run.dq) <= limits.velocity * most).all()
-    assert (np.abs(run.ddq) <= limits.acceleration * most).all()
+    assert_keeps_to_limits(verdict, run, limits)
     # Differences of what is in the file, not its own word for it.
     h = np.diff(run.time)[:, None]
     assert (np.abs(np.diff(run.q, axis=0)) <= h * limits.velocity * (1 + 1e-6)).all()
