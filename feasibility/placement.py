@@ -199,7 +199,7 @@ def _beyond(
     began: float,
 ) -> Placements:  # fmt: skip
     """The answer where the reach bound leaves no placement."""
-    values = region.samples(1, 0)
+    values = region.samples(0, 0)  # its middle
     trials = [
         Trial(Pose.of_values(row), Stage.BOUND, float(reach.share(row[None])[0])) for row in values
     ]

@@ -171,7 +171,12 @@ class Region:
         return np.clip(np.round(values, DIGITS), self.low, self.high)
 
     def _spread(self, count: int, seed: int) -> Array:
-        """(k, 6) the first points of a scrambled Sobol sequence; k is a power of two >= count."""
+        """(k, 6) the first points of a scrambled Sobol sequence; k is a power of two >= count.
+
+        None for a count of 0, and then without loading scipy.stats, which takes its time.
+        """
+        if count == 0:
+            return np.empty((0, len(AXES)))
         from scipy.stats import qmc
 
         free = self.high > self.low

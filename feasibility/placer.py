@@ -49,10 +49,12 @@ class Placer:
             [here.targets[..., :3] @ turn.T, here.targets[..., 3:] @ turn.T], axis=2
         )
         targets[:, 0, :3] += shift
+        # As `problem_of` has them: for other arrays all kernels would be compiled once more.
+        targets.flags.writeable = False
         return here._replace(
             points=np.ascontiguousarray(here.points @ turn.T + shift),
             approaches=np.ascontiguousarray(here.approaches @ turn.T),
-            targets=np.ascontiguousarray(targets),
+            targets=targets,
         )
 
     def try_at(self, pose: Pose, early: bool = True) -> Trial:

@@ -140,6 +140,8 @@ def warm_up() -> None:
     explorer.stir(0)
     explorer.rule(0, root_box(explorer.problem), 1)
     diagnose(explorer, 0)
+    beyond = plane(width=(5.0, 5.02), length=(0.1, 0.12), side="outside").cells(1, 2)
+    diagnose(Explorer(robot, beyond, problem_of(robot, beyond, task), 0), 0)
     replay(robot, cells, task, covering_walk(explorer.roadmap, explorer.best), explorer.covered)
     _warm = True
 

@@ -10,6 +10,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -263,6 +264,8 @@ def test_a_moved_problem_is_the_problem_of_the_moved_surface(name: str) -> None:
         for field in ("points", "approaches", "first_piece", "bends", "strays", "turning", "near"):
             assert getattr(one, field) == pytest.approx(getattr(two, field), abs=1e-7), field
         assert one.targets == pytest.approx(two.targets, abs=1e-7)
+        # Of the same types, so that no kernel has to be compiled for it anew.
+        assert [numba.typeof(field) for field in one] == [numba.typeof(field) for field in two]
 
 
 def bent_mesh():
