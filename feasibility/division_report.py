@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from feasibility.division import Division, Plan, SubPatch
+from feasibility.filling import filled
 from feasibility.reconfigure import Reconfiguration
-from feasibility.report import WIDTH, causes_listed
+from feasibility.report import causes_listed
 from feasibility.result import plain
 from feasibility.version import version
 from surfaces import Cells
@@ -142,7 +142,7 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
             f"{seconds['search_s']:.3f}, division {seconds['divide_s']:.3f})",
         ),
     ]
-    lines = [head, "", *(_filled(f"  {name:<12}", text) for name, text in rows)]
+    lines = [head, "", *(filled(f"  {name:<12}", text) for name, text in rows)]
     if division.patches:
         lines += ["", "In this order:", *_steps(division.fewest, division)]
     if division.connected is not division.fewest:
@@ -165,18 +165,6 @@ def _motions(division: Division) -> str:
     return f"{what} (the fewest known)"
 
 
-def _filled(head: str, text: str) -> str:
-    """Text behind a head; the rest of a long one is indented below."""
-    return textwrap.fill(
-        text,
-        WIDTH,
-        initial_indent=head,
-        subsequent_indent=" " * len(head),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-
-
 def _steps(plan: Plan, division: Division) -> Iterator[str]:
     """Patches and the moves between them, a line each."""
     for k, patch in enumerate(plan.patches):
@@ -184,13 +172,13 @@ def _steps(plan: Plan, division: Division) -> Iterator[str]:
         text = (
             f"{number:,} cell{'' if number == 1 else 's'} ({patch.area:.3g} m2"
             + (f", in {patch.pieces} pieces" if patch.pieces > 1 else "")
-            + f"), about {_middle(patch, division.cells)}; "
+            + f"), around cell {_middle(patch, division.cells)}; "
         )
         text += f"{patch.certificate.waypoints:,} waypoints, "
         text += f"refused: {patch.refusal}" if patch.refusal else "accepted by the replay"
-        yield _filled(f"  {f'patch {k + 1}':<12}", text)
+        yield filled(f"  {f'patch {k + 1}':<12}", text)
         if k < len(plan.moves):
-            yield _filled(f"  {'move':<12}", plan.moves[k].described())
+            yield filled(f"  {'move':<12}", plan.moves[k].described())
 
 
 def _middle(patch: SubPatch, cells: Cells) -> list[int]:

@@ -55,9 +55,10 @@ def view_path(
         speed = f"{trajectory.duration:.1f} s"
     strokes, tracks = _strokes(motion, 0.06 * cell_size(cells))
     title = f"{case}: " if case else ""
+    again = f", {figures.revisited:.2g} m of it again" if figures.revisited > 0.0 else ""
     text = (
         f"{robot.name}: {int(path.needed.sum())} cells in order {path.order}, "
-        f"{figures.length:.2f} m, {figures.revisited:.2f} m of it again, {speed}"
+        f"{figures.length:.2f} m{again}, {speed}"
     )
     return compose(
         robot, cells, f"{title}coverage path", text, [*cells_layers(cells), strokes], motion,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-import re
-import textwrap
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any
 
 import numpy as np
 
 from feasibility.coverage import CoveragePath
+from feasibility.filling import filled
 from feasibility.interpolation import used
 from feasibility.path_figures import PathFigures
 from feasibility.report import as_json as verdict_json
@@ -20,8 +19,6 @@ from feasibility.trajectory import Trajectory
 from feasibility.verdict import Verdict
 from feasibility.version import version
 from robots import Robot
-
-WIDTH = 100  # columns
 
 
 def as_json(
@@ -175,16 +172,7 @@ def as_text(
         )
         rows += _limit_rows(path.robot, trajectory, limits)
     head = f"path: one continuous motion over {count:,} cell{'s' if count > 1 else ''}."
-    return "\n".join([head, "", *(_row(name, text) for name, text in rows)])
-
-
-def _row(name: str, text: str) -> str:
-    """A named line; the rest of a long one is indented below, no number without its unit."""
-    held = re.sub(r"(?<=\d) (?=(?:deg|mm|m|m/s|s|%)\b|%)", "\u00a0", text)
-    return textwrap.fill(
-        held, WIDTH, initial_indent=f"  {name:<14}", subsequent_indent=" " * 16,
-        break_long_words=False, break_on_hyphens=False,
-    ).replace("\u00a0", " ")  # fmt: skip
+    return "\n".join([head, "", *(filled(f"  {name:<14}", text) for name, text in rows)])
 
 
 def _length_text(figures: PathFigures) -> str:
