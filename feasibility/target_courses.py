@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from surfaces import Cells
 
+TELLING = 0.1  # [1] a course whose normal strays no further knows how the surface bends
 ASIDE = 1.1  # [1] the normal may turn that much faster between the places looked at
 
 
@@ -41,8 +42,10 @@ def folded_courses(cells: Cells, height: float) -> NDArray[np.bool_]:
     """
     folded = cells.courses.folds(height)
     cell = np.zeros(len(cells), dtype=bool)
-    cell[cells.pairs[folded]] = True
-    return np.asarray(cell[cells.pairs].any(axis=1))
+    # One over a crease, or one that strays so far, tells nothing of its neighbours.
+    telling = ~cells.courses.creased & (cells.courses.strays[:, 1] <= TELLING)
+    cell[cells.pairs[folded & telling]] = True
+    return np.asarray(folded | cell[cells.pairs].any(axis=1))
 
 
 @lru_cache(
