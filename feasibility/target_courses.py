@@ -91,18 +91,22 @@ def closed_courses(cells: Cells, task: Task) -> str:
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     ways = target_courses(cells, task.standoff)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
-    if ways.folded.any():
+    courses = cells.courses
+    smooth = ~courses.creased & (courses.strays[:, 1] <= TELLING)
+    folds = ways.folded & smooth
+    if folds.any():
         return (
-            f"The offset surface folds {some.format(int(ways.folded.sum()))}: the standoff reaches "
+            f"The offset surface folds {some.format(int(folds.sum()))}: the standoff reaches "
             "the surface's radius of curvature on its hollow side, so no motion can be certified "
             "there; use a smaller standoff."
         )
     rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
-    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim)
+    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim) | ways.folded
     if rough.any():
         return (
             f"The surface is creased, or rougher than the task allows, "
-            f"{some.format(int(rough.sum()))}, so no motion can be certified there; use a finer or "
+            f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
+            "of a mesh it can, but not into a hollow one, or past a corner); use a finer or "
             "smoother mesh, cut it along its creases, or allow a wider cone or a larger tolerance."
         )
     return ""
