@@ -20,7 +20,8 @@ from surfaces import Cells
 Array = NDArray[np.float64]
 
 GUESSES = 4  # places tried first on each piece of a course
-REFINEMENTS = 4  # Newton steps from the best of them
+REFINEMENTS = 16  # Newton steps from the best of them, at most
+SETTLED = 1e-9  # [1] of a course: a step so small is the last
 BLOCK = 4096  # waypoints at once, to bound the memory
 LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
 MOST_LOOKS = 400  # times that many places on a course over a mesh
@@ -169,28 +170,46 @@ def _places(
     return t, arrived
 
 
+def _slopes(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> Array:
+    """(k, 3) m, derivatives of target points by t."""
+    piece, s, count = _pieces(ways, course, t)
+    by_s = np.column_stack([np.ones(len(s)), 2.0 * s, 3.0 * s * s])
+    slopes = np.einsum("kp,kpd->kd", by_s, ways.cubics[piece, 1:, :3])
+    return np.asarray(slopes * count[:, None])
+
+
 def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> Array:
     """(k,) t of the place on each course that is nearest to a point."""
     t = np.empty(len(course))
     counts = np.diff(ways.first)[course]
     for count in np.unique(counts):
         alike = np.flatnonzero(counts == count)
-        grid = np.linspace(0.0, 1.0, GUESSES * count + 1)
+        # Not where two pieces meet: a course may be at rest there, and Newton's method with it.
+        inner = (np.arange(GUESSES * count) + 0.5) / (GUESSES * count)
+        grid = np.concatenate([[0.0], inner, [1.0]])
         for first in range(0, len(alike), BLOCK):
             some = alike[first : first + BLOCK]
             places, _ = _at(ways, np.repeat(course[some], len(grid)), np.tile(grid, len(some)))
             away = places.reshape(len(some), len(grid), 3) - points[some, None]
             t[some] = grid[np.argmin((away**2).sum(axis=2), axis=1)]
+    # Newton's steps, shortened where one leads further away: next to a place where a course is at
+    # rest they go too far.
+    left, width = np.arange(len(t)), 1.0 / (GUESSES * counts)
+    off = _at(ways, course, t)[0] - points
     for _ in range(REFINEMENTS):
-        piece, s, count = _pieces(ways, course, t)
-        cubics = ways.cubics[piece, :, :3]
-        off = np.einsum("kp,kpd->kd", np.vander(s, 4, increasing=True), cubics) - points
-        slope = cubics[:, 1] + s[:, None] * (2.0 * cubics[:, 2] + 3.0 * s[:, None] * cubics[:, 3])
-        slope *= count[:, None]
+        slope = _slopes(ways, course[left], t[left])
         square = (slope**2).sum(axis=1)
-        step = np.divide((off * slope).sum(axis=1), square, out=np.zeros(len(t)), where=square > 0)
-        widest = 1.0 / (GUESSES * count)
-        t = np.clip(t - np.clip(step, -widest, widest), 0.0, 1.0)
+        step = (off[left] * slope).sum(axis=1)
+        step = np.divide(step, square, out=np.zeros(len(left)), where=square > 0.0)
+        step = np.clip(step, -width[left], width[left])
+        tried = np.clip(t[left] - step, 0.0, 1.0)
+        there = _at(ways, course[left], tried)[0] - points[left]
+        nearer = (there**2).sum(axis=1) < (off[left] ** 2).sum(axis=1)
+        t[left[nearer]], off[left[nearer]] = tried[nearer], there[nearer]
+        width[left[~nearer]] = 0.25 * np.abs(step[~nearer])
+        left = left[np.abs(step) > SETTLED]
+        if len(left) == 0:
+            break
     return t
 
 

@@ -21,6 +21,7 @@ ORDINARY = 0.01  # [1] share of the rim that an ordinary course may stray
 # from the one aimed at, and wants the cone to hold at the tool point's own foot.
 ASIDE = 0.05  # [1] share of a piece by which that nearest place may lie off the one aimed at
 STANDING = 0.999  # [1] share of the tolerance that motions over a centre may use: courses stray too
+SPARE = 1.1  # [1] courses over a mesh may stray that much more where the replay looks than was seen
 NEAR_COSTS = 3.0  # [1], times `near` and the turning of the normal: what that may cost of the rim
 
 # Why a motion stopped: the constraint that left no room.
@@ -85,7 +86,7 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
         first_piece=ways.first,
         targets=ways.cubics,
         bends=np.column_stack([ways.bends, ways.turning]),
-        strays=ways.strays,
+        strays=ways.strays * (SPARE if cells.surface.grain else 1.0),
         rim=rim,
         tolerance=float(tolerance),
         inner_rim=float(rim - ordinary - NEAR_COSTS * ways.standing * near),
@@ -128,9 +129,9 @@ class Work(NamedTuple):
     target: NDArray[np.float64]
     """(2, 3) target point and approach direction."""
     bend: NDArray[np.float64]
-    """(4,) largest second derivatives of target point and approach direction over the present
+    """(5,) largest second derivatives of target point and approach direction over the present
     step, by its own parameter in 0..1, zero while the target stands still; how fast the direction
-    turns there (1/m); and how far the target goes (m)."""
+    turns there (1/m); and how fast the target goes by that parameter at both ends (m)."""
     room: NDArray[np.float64]
     """(2,) what the present step keeps to of tolerance (m) and rim; 0 where it has no room."""
     counts: NDArray[np.int64]
@@ -156,7 +157,7 @@ def work_for(n: int) -> Work:
         held=np.zeros(n, dtype=np.bool_),
         trial=np.zeros(n),
         target=np.zeros((2, 3)),
-        bend=np.zeros(4),
+        bend=np.zeros(5),
         room=np.zeros(2),
         counts=np.zeros(1, dtype=np.int64),
         blame=np.zeros(2, dtype=np.int64),
@@ -184,6 +185,7 @@ def look_at(problem, work, target, approach):  # type: ignore[no-untyped-def]
     work.bend[1] = 0.0
     work.bend[2] = problem.turning
     work.bend[3] = 0.0
+    work.bend[4] = 0.0
     work.room[0] = STANDING * problem.tolerance
     work.room[1] = problem.inner_rim
     for k in range(3):
@@ -221,6 +223,23 @@ def aim(problem, work, course, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def speed_at(problem, course, t):  # type: ignore[no-untyped-def]
+    """How far the target goes along a course for each unit of t, at t, m."""
+    first = problem.first_piece[course]
+    count = problem.first_piece[course + 1] - first
+    piece = min(np.int64(t * count), count - 1)
+    s = t * count - piece
+    square = 0.0
+    for k in range(3):
+        slope = 3.0 * s * problem.targets[first + piece, 3, k]
+        slope = problem.targets[first + piece, 1, k] + s * (
+            2.0 * problem.targets[first + piece, 2, k] + slope
+        )
+        square += slope * slope
+    return np.sqrt(square) * count
+
+
+@kernel
 def bend_between(problem, work, course, t0, t1):  # type: ignore[no-untyped-def]
     """Set `work.bend` and `work.room` for a step along a course from t0 to t1, either way."""
     first = problem.first_piece[course]
@@ -232,10 +251,8 @@ def bend_between(problem, work, course, t0, t1):  # type: ignore[no-untyped-def]
         for piece in range(low, high + 1):
             most = max(most, problem.bends[first + piece, part])
         work.bend[part] = most * (t1 - t0) ** 2 if part < 2 else most
-    way = 0.0
-    for k in range(3):
-        way += problem.targets[first + low, 1, k] ** 2
-    work.bend[3] = np.sqrt(way) * count * abs(t1 - t0)
+    work.bend[3] = speed_at(problem, course, t0) * abs(t1 - t0)
+    work.bend[4] = speed_at(problem, course, t1) * abs(t1 - t0)
     # No more room than over the centres, and no less on an ordinary course: every configuration
     # that works over a cell can set out from it.
     lost = problem.rim - problem.strays[course, 1] - NEAR_COSTS * work.bend[2] * problem.near

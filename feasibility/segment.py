@@ -87,10 +87,14 @@ def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
     certifies.
     """
     total, total_axis = spread(problem, work, q0, q1)
-    # The replay takes the nearest places of the course, up to twice the errors from those aimed at.
+    # The replay takes the nearest places of the course, up to twice the errors from those aimed at;
+    # where the target sets out from rest, s goes by the root of the way.
     longer = 1.0
-    if work.bend[3] > 0.0:
-        longer += 2.0 * (work.error[0, 0] + work.error[1, 0]) / work.bend[3]
+    for slot in range(2):
+        error = work.error[slot, 0]
+        speed = max(work.bend[3 + slot], np.sqrt(error * work.bend[0]))
+        if speed > 0.0:
+            longer += 2.0 * error / speed
     way, turn = longer * longer * work.bend[0], longer * longer * work.bend[1]
     position = peak(work.error[0, 0], work.error[1, 0], total + way)
     aside = work.bend[2] * (total + way)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from surfaces import Cells
 
+TELLING = 0.1  # [1] a course whose normal strays no further knows how the surface bends
 ASIDE = 1.1  # [1] the normal may turn that much faster between the places looked at
 
 
@@ -41,8 +42,10 @@ def folded_courses(cells: Cells, height: float) -> NDArray[np.bool_]:
     """
     folded = cells.courses.folds(height)
     cell = np.zeros(len(cells), dtype=bool)
-    cell[cells.pairs[folded]] = True
-    return np.asarray(cell[cells.pairs].any(axis=1))
+    # One over a crease, or one that strays so far, tells nothing of its neighbours.
+    telling = ~cells.courses.creased & (cells.courses.strays[:, 1] <= TELLING)
+    cell[cells.pairs[folded & telling]] = True
+    return np.asarray(folded | cell[cells.pairs].any(axis=1))
 
 
 @lru_cache(
@@ -88,18 +91,22 @@ def closed_courses(cells: Cells, task: Task) -> str:
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     ways = target_courses(cells, task.standoff)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
-    if ways.folded.any():
+    courses = cells.courses
+    smooth = ~courses.creased & (courses.strays[:, 1] <= TELLING)
+    folds = ways.folded & smooth
+    if folds.any():
         return (
-            f"The offset surface folds {some.format(int(ways.folded.sum()))}: the standoff reaches "
+            f"The offset surface folds {some.format(int(folds.sum()))}: the standoff reaches "
             "the surface's radius of curvature on its hollow side, so no motion can be certified "
             "there; use a smaller standoff."
         )
     rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
-    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim)
+    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim) | ways.folded
     if rough.any():
         return (
             f"The surface is creased, or rougher than the task allows, "
-            f"{some.format(int(rough.sum()))}, so no motion can be certified there; use a finer or "
+            f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
+            "of a mesh it can, but not into a hollow one, or past a corner); use a finer or "
             "smoother mesh, cut it along its creases, or allow a wider cone or a larger tolerance."
         )
     return ""

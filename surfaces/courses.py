@@ -33,6 +33,7 @@ FACETED = 5e-4  # [1], the same for the normal of a mesh
 FACETED_FOOT = 0.01  # [1], share of a mesh's edges that a course may stray from it
 STANDS = 1e-3  # [1] a parallel curve that is so much shorter stands still
 PLACES = 3  # along a piece, where its slopes are looked at
+RESTS = 1e-6  # [1] of its way: a slope so small is none
 BETWEEN = 1.5  # [1], on what was measured at samples: for what lies between them
 SHARPER = 1.5  # [1], on curvatures at the two centres: for what lies between them
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on bends
@@ -104,12 +105,38 @@ class Courses:
         return fastest
 
     def _slopes_along(self) -> Iterator[tuple[Array, Array]]:
-        """Derivatives by s of foot and normal (P, 3), at places along every piece."""
+        """Derivatives by s of foot and normal (P, 3), at places along every piece.
+
+        Where a course is at rest at an end of a piece, both are the whole way over the piece.
+        """
+        whole, rests = self._whole, self._rests
         for s in np.linspace(0.0, 1.0, PLACES):
             slope = (
                 self.cubics[:, 1] + 2.0 * s * self.cubics[:, 2] + 3.0 * s * s * self.cubics[:, 3]
             )
+            slope[rests] = whole[rests]
             yield slope[:, :3], slope[:, 3:]
+
+    @property
+    def _whole(self) -> Array:
+        """(P, 6) the way of foot and normal over each piece."""
+        return np.asarray(self.cubics[:, 1:].sum(axis=1))
+
+    @property
+    def _rests(self) -> NDArray[np.bool_]:
+        """(P,) pieces at an end of which the foot is at rest."""
+        first = self.cubics[:, 1, :3]
+        last = first + 2.0 * self.cubics[:, 2, :3] + 3.0 * self.cubics[:, 3, :3]
+        still = RESTS * np.linalg.norm(self._whole[:, :3], axis=1)
+        slowest = np.minimum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
+        return np.asarray(slowest < still)
+
+    @property
+    def creased(self) -> NDArray[np.bool_]:
+        """(M,) courses that come to rest on their way, see `surfaces.creased`."""
+        if len(self) == 0:
+            return np.zeros(0, dtype=bool)
+        return np.logical_or.reduceat(self._rests, self.first[:-1])
 
     def _local(self, courses: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Powers 1, s, s^2, s^3 (k, 4), and the cubics (k, 4, 6) that hold at t."""
@@ -143,6 +170,13 @@ def courses_of(cells: Cells) -> Courses:
         missing = np.flatnonzero(np.isinf(strays).any(axis=1))
         if len(missing) == 0:
             break
+    if grain:
+        from surfaces.creased import over_creases
+        from surfaces.mesh_cells import MeshCells
+
+        if isinstance(cells, MeshCells):
+            rough = np.flatnonzero((strays > close).any(axis=1))
+            fitted += over_creases(cells, rough, close, strays)
     return _joined(fitted, strays)
 
 
@@ -166,7 +200,24 @@ def _fit(cells: Cells, pairs: NDArray[np.int64], count: int, parts: int) -> tupl
     values = np.concatenate([points, normals], axis=2).swapaxes(0, 1).copy()
     values[0] = np.hstack([cells.centres[pairs[:, 0]], cells.normals[pairs[:, 0]]])
     values[-1] = np.hstack([cells.centres[pairs[:, 1]], cells.normals[pairs[:, 1]]])
-    fit, evaluate = _maps(count, parts)
+    return fitted_to(cells, pairs, values, count)
+
+
+def fitted_to(
+    cells: Cells, pairs: NDArray[np.int64], values: Array, count: int, rests: str = ""
+) -> tuple[Array, Array]:
+    """Cubics (m, count, 4, 6) through every other sample of m courses, and their strays (m, 2).
+
+    Args:
+        cells: the cells.
+        pairs: (m, 2) which the courses, or parts of them, belong to.
+        values: (2 parts + 1, m, 6) foot and normal at equal steps; brought up to date where the
+            courses are smoother than the surface.
+        count: number of cubics.
+        rests: "last" where the courses are at rest at their last end, "both" at both.
+    """
+    parts = len(values) // 2
+    fit, evaluate = _maps(count, parts, rests)
     cubics = fit @ values[::2].reshape(parts + 1, -1)
     off = (evaluate @ cubics).reshape(values.shape)
     smoothed = np.flatnonzero(cells.surface.smoothed(cells, pairs))
@@ -189,8 +240,8 @@ def _fit(cells: Cells, pairs: NDArray[np.int64], count: int, parts: int) -> tupl
 
 
 @cache
-def _maps(count: int, parts: int) -> tuple[Array, Array]:
-    """From samples to cubics, and from cubics to values; both linear.
+def _maps(count: int, parts: int, rests: str) -> tuple[Array, Array]:
+    """From samples to cubics, and from cubics to values; both linear. See `fitted_to`.
 
     Returns:
         (4 count, parts + 1): coefficients of the least-squares spline of `count` pieces that keeps
@@ -198,12 +249,13 @@ def _maps(count: int, parts: int) -> tuple[Array, Array]:
         places.
     """
     design = _basis(count, np.linspace(0.0, 1.0, parts + 1))  # (parts + 1, count + 3)
-    # End coefficients are the end samples; the others fit what these leave.
+    # End coefficients are the end samples, and so are their neighbours where the curve is at rest
+    # there; the others fit what these leave.
     coefficients = np.zeros((count + 3, parts + 1))
-    coefficients[0, 0] = coefficients[-1, -1] = 1.0
-    rest = np.eye(parts + 1) - np.outer(design[:, 0], np.eye(parts + 1)[0])
-    rest -= np.outer(design[:, -1], np.eye(parts + 1)[-1])
-    coefficients[1:-1] = np.linalg.pinv(design[:, 1:-1]) @ rest
+    free = slice(2 if rests == "both" else 1, -2 if rests else -1)
+    coefficients[: free.start, 0] = coefficients[free.stop :, -1] = 1.0
+    rest = np.eye(parts + 1) - design @ coefficients
+    coefficients[free] = np.linalg.pinv(design[:, free]) @ rest
     # A cubic is known by its values at four places.
     places = np.array([0.125, 0.375, 0.625, 0.875])
     values = _basis(count, ((np.arange(count)[:, None] + places) / count).reshape(-1))

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.checks import Checks
-from surfaces.mesh_normals import blended, carried, corner_normals, unit
+from surfaces.mesh_normals import WIDTH, blended, carried, corner_normals, sectors, unit
 from surfaces.surface import Foot, Side, Surface, points_of, sharpest_turn
 from surfaces.triangles import TriangleMesh
 
@@ -37,13 +37,17 @@ class MeshSurface(Surface):
     """In the surface's own frame."""
     corner_normals: Array
     """(F, 3, 3) unit normal at each corner of each face, in the own frame."""
+    rim_normals: Array
+    """(F, 3, 3) the same on creases, where both sides have one: the normal turns to it over a strip
+    along the crease, `WIDTH` of a face wide."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays."""
         super().__post_init__()
-        normals = np.array(self.corner_normals, dtype=float)
-        normals.flags.writeable = False
-        object.__setattr__(self, "corner_normals", normals)
+        for name in ("corner_normals", "rim_normals"):
+            normals = np.array(getattr(self, name), dtype=float)
+            normals.flags.writeable = False
+            object.__setattr__(self, name, normals)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -86,8 +90,16 @@ class MeshSurface(Surface):
 
     def normals_at(self, face: Ints, weights: Array) -> Array:
         """(..., 3) unit normals in the root frame at places of faces, by their weights."""
-        inside = np.einsum("...c,...ci->...i", weights, self.corner_normals[face])
-        return unit(inside) @ self.rotation.T
+        own = self.corner_normals[face]
+        turned = own + self.rim_share(face, weights)[..., None, None] * (
+            self.rim_normals[face] - own
+        )
+        return unit(np.einsum("...c,...ci->...i", weights, turned)) @ self.rotation.T
+
+    def rim_share(self, face: Ints, weights: Array) -> Array:
+        """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it."""
+        along = (weights * self._rims[face]).sum(axis=-1)  # 1 on the crease
+        return np.asarray(np.clip(1.0 - (1.0 - along) / WIDTH, 0.0, 1.0))
 
     def trace(self, cells: Cells, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Surface.trace`: the nearest places of straight lines on the faces of both cells.
@@ -113,6 +125,12 @@ class MeshSurface(Surface):
 
     def beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Array, Array]:
         """See `Surface.beneath`: on the two cells and those that touch both."""
+        faces, weights = self.faces_beneath(cells, pairs, points)
+        found = np.einsum("mkc,mkci->mki", weights, self._balls[0][faces])
+        return found @ self.rotation.T + self.position, self.normals_at(faces, weights)
+
+    def faces_beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Ints, Array]:
+        """The same as faces (m, k) and weights (m, k, 3)."""
         from surfaces.mesh_cells import MeshCells
         from surfaces.mesh_feet import put_on_cells
 
@@ -125,9 +143,7 @@ class MeshSurface(Surface):
         pairs = np.ascontiguousarray(pairs)
         near_indptr, near = cells.neighbours
         put_on_cells(*self._balls, members, indptr, near, near_indptr, pairs, local, faces, weights)
-        corners = self._balls[0][faces]
-        found = np.einsum("mkc,mkci->mki", weights, corners) @ self.rotation.T + self.position
-        return found, self.normals_at(faces, weights)
+        return faces, weights
 
     def sharpness(self, cells: Cells, height: float = 0.0) -> Array:
         """See `Surface.sharpness`: of the face of each cell where the normal turns fastest."""
@@ -136,8 +152,10 @@ class MeshSurface(Surface):
         if not isinstance(cells, MeshCells):
             raise TypeError("the cells are not of a mesh")
         corners = self.mesh.vertices[self.mesh.faces]
-        turns = self.corner_normals[:, 1:] - self.corner_normals[:, :1]  # along two sides
-        slopes = corners[:, 1:] - corners[:, :1] + height * turns
+        # On the strip along a crease the normal turns as over a face that is so much smaller.
+        size = np.where(self._rims.any(axis=1), WIDTH, 1.0)[:, None, None]
+        turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]  # along two sides
+        slopes = size * (corners[:, 1:] - corners[:, :1]) + height * turns
         face = sharpest_turn(*(_products(sides) for sides in (slopes, turns)))
         sharpest = np.zeros(len(cells))
         np.maximum.at(sharpest, cells.labels, face)
@@ -162,7 +180,7 @@ class MeshSurface(Surface):
         return MeshCells.cut(self, count, size)
 
     def finer(self, vertices: Array, faces: Ints, parent: Ints) -> MeshSurface:
-        """The same surface in smaller triangles, with one normal a vertex.
+        """The same surface in smaller triangles, with a continuous normal.
 
         Args:
             vertices: (W, 3) m, in the own frame.
@@ -171,8 +189,14 @@ class MeshSurface(Surface):
         """
         normals = carried(self.mesh, self.corner_normals, vertices, faces, parent)
         mesh = TriangleMesh(vertices, faces, self.mesh.history)
-        smooth = blended(vertices, faces, normals)
-        return MeshSurface(self.rotation, self.position, self.side, mesh, smooth[faces])
+        own = blended(vertices, faces, normals, sectors(mesh))
+        rim = blended(vertices, faces, normals, faces)
+        return MeshSurface(self.rotation, self.position, self.side, mesh, own, rim)
+
+    @cached_property
+    def _rims(self) -> NDArray[np.bool_]:
+        """(F, 3) corners that lie on a crease."""
+        return np.asarray((self.corner_normals != self.rim_normals).any(axis=2))
 
     @cached_property
     def _balls(self) -> tuple[Array, Array, Array]:
@@ -273,7 +297,8 @@ def mesh(
     }
     check.done()
     triangles = _triangles(source, scale)
-    return MeshSurface(mesh=triangles, corner_normals=corner_normals(triangles), **pose)  # type: ignore[arg-type]
+    normals = corner_normals(triangles)
+    return MeshSurface(mesh=triangles, corner_normals=normals, rim_normals=normals, **pose)  # type: ignore[arg-type]
 
 
 def _triangles(source: Any, scale: float | None) -> TriangleMesh:

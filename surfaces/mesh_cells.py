@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -189,7 +189,7 @@ def _figures(surface: MeshSurface, labels: Ints) -> Figures:
     from surfaces.cell_figures import figures
 
     mesh = surface.mesh
-    # One normal a vertex, as `MeshSurface.finer` leaves it.
     normals = np.empty_like(mesh.vertices)
-    normals[mesh.faces.ravel()] = surface.corner_normals.reshape(-1, 3)
-    return figures(mesh.vertices, mesh.faces, normals, labels)
+    normals[mesh.faces.ravel()] = surface.rim_normals.reshape(-1, 3)
+    made = figures(mesh.vertices, mesh.faces, normals, labels)
+    return replace(made, normals=surface.normals_at(made.faces, made.weights) @ surface.rotation)

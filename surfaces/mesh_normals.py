@@ -2,9 +2,10 @@
 
 Where neighbouring faces meet at less than `CREASE`, a mesh is taken as a smooth surface cut into
 facets, and the normal is interpolated between its vertices. Sharper edges are edges of the part.
-There the corners of the faces on either side keep normals of their own; once a mesh is fine enough
-for its cells, `blended` joins them again over the width of one small face, so that the normal is
-continuous and a tool can roll over the edge.
+There the corners of the faces on either side keep normals of their own. Once a mesh is fine enough
+for its cells, they are joined again over a narrow strip along the crease (`WIDTH` of a small face),
+so that the normal is continuous and a tool can roll over the edge: at a standoff far wider than the
+strip it goes round the edge in an arc, as it should.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 CREASE = np.radians(30.0)  # rad between the normals of two faces; usual for smooth shading
+WIDTH = 0.1  # [1] of a face, from a crease inwards, over which its normal turns
 
 
 def corner_normals(mesh: TriangleMesh) -> Floats:
@@ -29,8 +31,7 @@ def corner_normals(mesh: TriangleMesh) -> Floats:
     of a crease, of those only that turn less than `CREASE` from the face's own.
     """
     normals = mesh.vertex_normals[mesh.faces]
-    pairs = mesh.face_normals[mesh.edges.faces]
-    sharp = np.einsum("ei,ei->e", pairs[:, 0], pairs[:, 1]) < np.cos(CREASE)
+    sharp = sharp_edges(mesh)
     if not sharp.any():
         return normals
     creased = np.zeros(len(mesh.vertices), dtype=bool)
@@ -73,19 +74,55 @@ def carried(mesh: TriangleMesh, normals: Floats, fine: Floats, faces: Ints, pare
     return unit(np.einsum("gkc,gci->gki", weights, normals[parent]))
 
 
-def blended(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
-    """(W, 3) one unit normal a vertex: the mean of those of its corners, weighted by angle."""
+def blended(vertices: Floats, faces: Ints, normals: Floats, groups: Ints) -> Floats:
+    """(F, 3, 3) corner normals, one for each group of corners: the mean, weighted by angle.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3).
+        normals: (F, 3, 3) unit normals of the corners.
+        groups: (F, 3) the group of each corner, from 0 on: `faces` itself for one normal a vertex,
+            `sectors` for one on each side of a crease.
+    """
     weighted = normals * corner_angles(vertices, faces)[..., None]
+    count = int(groups.max()) + 1
     sums = np.column_stack(
-        [np.bincount(faces.ravel(), weighted[..., k].ravel(), len(vertices)) for k in range(3)]
+        [np.bincount(groups.ravel(), weighted[..., k].ravel(), count) for k in range(3)]
     )
     lengths = np.linalg.norm(sums, axis=1)
-    # Where faces are folded back onto each other one of them speaks for the vertex.
-    some = np.zeros((len(vertices), 3))
-    some[faces.ravel()] = normals.reshape(-1, 3)
+    # Where faces are folded back onto each other one of them speaks for all.
+    some = np.zeros((count, 3))
+    some[groups.ravel()] = normals.reshape(-1, 3)
     folded = lengths < 1e-9
     sums[folded] = some[folded]
-    return unit(sums)
+    return np.asarray(unit(sums)[groups])
+
+
+def sharp_edges(mesh: TriangleMesh) -> NDArray[np.bool_]:
+    """(E,) which of `mesh.edges` are creases."""
+    pairs = mesh.face_normals[mesh.edges.faces]
+    return np.asarray(np.einsum("ei,ei->e", pairs[:, 0], pairs[:, 1]) < np.cos(CREASE))
+
+
+def sectors(mesh: TriangleMesh) -> Ints:
+    """(F, 3) which corners lie together at their vertex, without a crease between them.
+
+    A crease that ends at a vertex parts nothing there.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    smooth = ~sharp_edges(mesh)
+    faces, ends = mesh.edges.faces[smooth], mesh.edges.vertices[smooth]
+    joined = [
+        3 * faces[:, side] + (mesh.faces[faces[:, side]] == ends[:, [end]]).argmax(axis=1)
+        for end in range(2)
+        for side in range(2)
+    ]
+    rows, columns = np.concatenate(joined[::2]), np.concatenate(joined[1::2])
+    count = mesh.faces.size
+    graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64).reshape(-1, 3)
 
 
 def corner_angles(vertices: Floats, faces: Ints) -> Floats:

@@ -110,16 +110,17 @@ def box_mesh():
     return TriangleMesh(0.2 * made.vertices, made.faces)
 
 
-def test_a_crease_is_named_and_nothing_is_certified_across_it():
-    """Two sides of a box: no motion found is honest, but the reason is the surface's."""
+def test_a_closed_box_is_covered_or_told_why():
+    """All six sides, over its edges; `test_creases.py` looks at such motions again."""
     robot = load_robot("ur5")
     surface = mesh(box_mesh(), side="outside", position=(0.45, -0.05, 0.25))
-    verdict = check(robot, surface.cells(60), Task(standoff=0.02, cone_deg=30))
-    assert verdict.answer in ("undecided", "infeasible")
-    if verdict.answer == "undecided":
-        assert "creased" in verdict.message or "folds" in verdict.message
-    else:
-        assert verdict.evidence == "proof"
+    cells = surface.cells(60)
+    assert "folded over a crease" in " ".join(cells.notes)
+    verdict = check(robot, cells, Task(standoff=0.02, cone_deg=30))
+    assert verdict.feasible
+    stiff = check(robot, cells, Task(standoff=0.02, cone_deg=1e-3))
+    assert not stiff.feasible
+    assert "crease" in stiff.message or "proved" in stiff.message
 
 
 def test_a_dent_smaller_than_the_standoff_folds_and_is_said_so():
