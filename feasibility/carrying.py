@@ -99,7 +99,7 @@ class Carrying:
             if k == bad - way or self.lands(order[:SAMPLE], k) < min(SAMPLE, len(order)):
                 break
             low = k
-        return self._shrunk(order, low, k, bad)
+        return self._shrunk(order, low, k)
 
     def _stops(self, bad: int) -> list[int]:
         """Values on the way to the last one before `bad`, and that one."""
@@ -112,7 +112,7 @@ class Carrying:
             steps = [step for step in steps if step < length] + [length]
         return [self.start + way * step for step in steps]
 
-    def _shrunk(self, order: NDArray[np.int64], low: int, k: int, bad: int) -> Reached:
+    def _shrunk(self, order: NDArray[np.int64], low: int, k: int) -> Reached:
         """The last value up to k steps that every cell is carried to.
 
         Some are known to be carried to `low`. Cells that were carried further before are left
@@ -124,22 +124,27 @@ class Carrying:
             if at == len(order):
                 break
             cell = order[at : at + 1]
-            failed = int(cell[0])
-            self.prober.suspect(failed)
-            k = self._alone(cell, low, k)
+            self.prober.suspect(int(cell[0]))
+            alone = self._alone(cell, low, k)
+            failed, k = failed if alone == k else int(cell[0]), alone
             low = self.start if abs(k - self.start) <= abs(low - self.start) else low
             at += 1
         if k == self.start:
             return Reached(k, self.first, failed)
-        if failed == NO_CELL and abs(bad - k) > 1 and self.prober.suspects:
-            failed = self.prober.suspects[0]
         return Reached(k, self.q.copy(), failed)
 
     def _alone(self, cell: NDArray[np.int64], low: int, bad: int) -> int:
-        """The last value before `bad` that one cell (1,) is carried to."""
-        start = low
+        """The last value up to `bad`, where it failed from afar, that a cell (1,) is carried to."""
+        start, top = low, bad
         if low != self.start and not self.lands(cell, low):
             self.q[cell] = self.first[cell]
             start, bad = self.start, low
         gallop = not self.quantity.monotone and start == self.start
-        return last_true(lambda k: self.lands(cell, k) == 1, start, bad, gallop)
+        way = 1 if bad > start else -1
+        k = last_true(lambda k: self.lands(cell, k) == 1, start, bad, gallop)
+        # The next value may have failed from further away only.
+        while k != top and self.lands(cell, k + way):
+            k += way
+            if k != top:
+                k = last_true(lambda k: self.lands(cell, k) == 1, k, top, gallop=True)
+        return k

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search should have
-EXTRA = 2  # the same, for margins that are still wide once the others have had their share
+EXTRA = 3  # the same, for margins that are still wide once the others have had their share
 LEAST = 20_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be

@@ -25,13 +25,15 @@ HEADS = {
 def as_text(explanation: Explanation, case_name: str) -> str:
     """The thresholds for people: what helps first, then what does not."""
     verdict = explanation.verdict
-    lines = [f"{case_name}: {HEADS[verdict.answer]}", *_item(verdict.message), ""]
+    head = HEADS[verdict.answer] if explanation.thresholds else f"{verdict.answer}."
+    lines = [f"{case_name}: {head}", *_item(verdict.message)]
     if len(verdict.cells) == 0:
         return f"{case_name}: there are no cells to cover, so there is nothing to explain."
     helps = [t for t in explanation.thresholds if t.feasible is not None]
     others = [t for t in explanation.thresholds if t.feasible is None]
     if not verdict.feasible:
         helps.sort(key=_effort)
+    lines += [""] if helps or others else []
     for threshold in helps:
         lines += _item(sentence(threshold, verdict.feasible), "- ")
     if not helps and others:

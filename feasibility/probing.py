@@ -33,7 +33,7 @@ MOST_SUSPECTS = 12  # cells that are taken for hard
 AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
 LANDINGS = 16  # random configurations that are put over a cell that no known one covers
 LANDING_STEPS = np.int64(20)  # Newton steps of each
-LEAST_BOXES = 250  # for one cell, however dear proofs have turned out to be
+LEAST_BOXES = 120  # for one cell, however dear proofs have turned out to be
 
 
 class Prober:
@@ -62,7 +62,7 @@ class Prober:
         self._spread = np.concatenate(
             [evenly(np.flatnonzero(~inner)), evenly(np.flatnonzero(inner))]
         )
-        self.allowance = 1.0
+        self.allowance = 0.5
         """Share of the boxes asked for that a proof gets: less for each that failed lately."""
 
     @property
@@ -89,7 +89,7 @@ class Prober:
         """The same over the cells' centres, cheaper: what lies between them may be as it was."""
         value = quantity.value(k) if k else quantity.given
         if quantity.kind is Kind.CONE:
-            return self.problem_at(quantity, k)
+            return self._coned(value) or self.problem_at(quantity, k)
         if quantity.kind is Kind.STANDOFF:
             grown = (value - quantity.given) * self.outwards
             return self.problem._replace(points=self.problem.points + grown)
@@ -99,6 +99,14 @@ class Prober:
         ends = [self.problem.lower.copy(), self.problem.upper.copy()]
         ends[quantity.kind is Kind.UPPER][quantity.joint] = value
         return self.problem._replace(lower=ends[0], upper=ends[1])
+
+    def _coned(self, cone: float) -> Problem | None:
+        """The problem with another cone (rad), as it is over the cells' centres, nearly."""
+        rim, former = float(2.0 * np.sin(0.5 * cone)), self.problem
+        if not (cone < np.pi and former.rim < np.inf and former.rim > 0.0):
+            return None
+        lost = (former.rim - former.inner_rim) * min(1.0, rim / former.rim)
+        return former._replace(rim=rim, inner_rim=rim - lost)
 
     def order(self) -> NDArray[np.int64]:
         """(N,) all cells, the hard ones first, then those at the edge of the surface."""
@@ -231,10 +239,9 @@ class Prober:
         if ended and certifiable(problem):
             detail = f"the search ended without a covering motion; {best}"
             return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
-        spent = f"{int(explorer.work.counts[0])} evaluations of the arm"
-        detail = f"not found with {spent}; {best}"
+        detail = f"not found with {int(explorer.work.counts[0])} evaluations of the arm; {best}"
         if time.monotonic() > self.deadline:
-            detail = f"unknown: the time limit ran out after {spent}; {best}"
+            detail = "unknown, because the time limit ran out"
         return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
 
     def confirmed(

@@ -29,8 +29,9 @@ BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is loo
 LOOKED_AT = 3  # cells asked for a proof before a search is made
 SCAN = 20  # values looked at on the way to the end of a quantity that is not monotone
 SEARCHES = 2  # short of one that failed, even when none should be begun any more
-BACKS = (0.06, 0.25)  # [1] where the search fails at the end: the next ones are that much nearer
-SHORT = 0.7  # verdicts' worth of evaluations that a search from known configurations may take
+MORE_SEARCHES = 4  # the same where none has found anything
+BACKS = (0.1, 0.3)  # [1] where the search fails at the end: the next ones are that much nearer
+SHORT = 0.55  # verdicts' worth of evaluations that a search from known configurations may take
 
 
 class Side(NamedTuple):
@@ -201,7 +202,7 @@ class Turning:
     def _follow(self, good: Side, far: int, there: Finding | None) -> Edge:
         """As far as a motion's configurations can be carried, and a short search agrees."""
         good = self._slid(good, far)
-        bad, other, searches, backs = far, there, 0, list(BACKS)
+        begun, bad, other, searches, backs = good.k, far, there, 0, list(BACKS)
         if there is None:
             reached = self._furthest(good, far)
         else:
@@ -217,7 +218,8 @@ class Turning:
             else:
                 bad, other = reached.k, self._finding(Side(reached.k, trial))
             searches += 1
-            if searches > SEARCHES and self.prober.spent >= self.stop:
+            enough = SEARCHES if good.k != begun else MORE_SEARCHES
+            if searches > enough and self.prober.spent >= self.stop:
                 break
             reached = self._short_of(good, bad, reached.q, backs.pop(0) if backs else 0.5)
         if other is not None:

@@ -13,11 +13,13 @@ from dense_replay import tools
 from paper_cases import PAPER_CASES
 
 from feasibility import Task
-from feasibility.probing import NO_CELL, Prober, apart
+from feasibility.carrying import NO_CELL, Carrying, follow_all
+from feasibility.probing import LEAST_BOXES, Prober, apart
 from feasibility.problem import problem_of
 from feasibility.proof import Ruling
 from feasibility.quantities import Kind, Quantity, Setup, quantities, shifted
 from feasibility.thresholds import last_true
+from feasibility.turning import Turning
 from feasibility.verdict import Answer, Evidence, Walk
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
@@ -222,6 +224,68 @@ def test_followed_configurations_lie_on_the_fibres(name: str) -> None:
     assert cell != NO_CELL  # NaN is never taken for a configuration
 
 
+@pytest.mark.parametrize("name", ["4c", "small"])
+def test_over_the_centres_the_cheap_problem_is_the_whole_one(name: str) -> None:
+    setup = SMALL if name == "small" else paper(name)
+    prober = prober_of(setup)
+    for widen in (False, True):
+        for q in quantities(setup, widen):
+            for k in (0, 5, q.last):
+                cheap, fresh = prober.centres_at(q, k), problem_of(*q.applied(setup, k))
+                for field in ("points", "approaches", "lower", "upper", "rim"):
+                    np.testing.assert_allclose(
+                        getattr(cheap, field), getattr(fresh, field), atol=1e-9, err_msg=q.name
+                    )
+
+
+@pytest.mark.parametrize("name", ["4c", "small"])
+def test_configurations_are_carried_as_far_as_they_go_and_no_further(name: str) -> None:
+    """At the value reached every cell is landed on; the cell that is named fails at the next."""
+    setup = SMALL if name == "small" else paper(name)
+    prober = prober_of(setup)
+    start = prober.others(24, 1)[0]
+    named = 0
+    for q in quantities(setup, widen=False):
+        reached = Carrying(prober, q, 0, start.q).reach(q.last + 1)
+        assert 0 <= reached.k <= q.last
+        problem = prober.problem_at(q, reached.k)
+        if len(setup.cells) <= 40:  # on more cells the search that follows looks at the rest
+            cell, found = prober.follow(problem, reached.q)
+            assert cell == NO_CELL
+            points, axes = tools(setup.robot, found)
+            robot, cells, task = q.applied(setup, reached.k)
+            aims = task.targets(cells)
+            assert np.linalg.norm(points - aims.points, axis=1).max() <= 1e-3
+            cosine = np.clip((axes * aims.approaches).sum(axis=1), -1.0, 1.0)
+            assert np.degrees(np.arccos(cosine)).max() <= task.cone_deg + 1e-6
+            assert ((found >= robot.lower) & (found <= robot.upper)).all()
+        if reached.cell != NO_CELL:
+            named += 1
+            beyond = prober.centres_at(q, reached.k + 1)
+            one = np.array([reached.cell])
+            assert follow_all(beyond, prober.work, one, reached.q.copy()) == 0, q.name
+        else:
+            assert reached.k == q.last
+    assert named >= 5
+
+
+def test_proofs_that_fail_are_asked_for_less_until_one_succeeds() -> None:
+    setup = paper("4d")
+    prober = prober_of(setup)
+    for _ in range(20):
+        assert prober.rule(prober.problem, 89, 2)[0] is Ruling.OPEN
+    assert prober.allowance < 1e-3
+    before = prober.spent
+    assert prober.rule(prober.problem, 89, 3000)[0] is Ruling.OPEN
+    # A box may be looked at up to three times.
+    assert LEAST_BOXES <= prober.spent - before <= 3 * LEAST_BOXES
+    assert prober.rule(prober.problem, 60, 3000)[0] is not Ruling.PROVED
+    prober.allowance = 0.5
+    assert prober.rule(prober.problem, 60, 3000)[0] is Ruling.PROVED
+    assert prober.allowance == 1.0
+    assert prober.rule(prober.problem, 89, 3000)[0] is Ruling.PROVED
+
+
 def test_a_ruling_brings_a_proof_or_a_configuration() -> None:
     setup = paper("4d")
     prober = prober_of(setup)
@@ -281,3 +345,22 @@ def test_rows_far_apart_are_chosen_first() -> None:
     assert apart(rows, 3) == [0, 4, 3]
     assert apart(rows, 99) == [0, 4, 3]  # the others are nearly the same
     assert apart(rows[:0], 3) == []
+
+
+def test_a_wide_margin_is_narrowed_from_where_it_stands() -> None:
+    setup = paper("4a")
+    prober = prober_of(setup)
+    motions = prober.others(24, 2)
+    narrowed = 0
+    for name in ("joint5 lower limit", "joint5 upper limit", "shift along +x"):
+        turning = Turning(prober, quantity(setup, name), 2000, 0, motions)
+        found = turning.tighten()
+        turning.stop = prober.spent + 100_000
+        again = turning.tighter(found)
+        assert again.feasible is not None
+        assert again.other is not None
+        assert again.feasible.evidence is Evidence.WITNESS
+        assert again.margin >= found.margin
+        assert again.steps_apart <= found.steps_apart
+        narrowed += again.steps_apart < found.steps_apart
+    assert narrowed >= 1
