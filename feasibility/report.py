@@ -221,7 +221,8 @@ def _hints(verdict: Verdict) -> list[str]:
         hints.append(f"--set task.cone_deg=... opens the cone ({verdict.task.cone_deg:g} now)")
     if CauseKind.DISCONNECTED in kinds:
         hints.append(f"{_narrower(verdict)} leaves out what needs a second motion")
-    hints.append("--html view.html shows which cells are missed")
+    shows = "it" if verdict.covered.all() else "which cells are missed"
+    hints.append(f"--html view.html shows {shows}")
     return hints
 
 

@@ -26,8 +26,9 @@ STUDIES = """comparison placement_stations placement_study stations study study_
     study_dealing study_file study_frames study_outcome study_store study_workers"""
 EDGE = """asking cell_shapes cli cli_jobs cli_studies commands comparison_report console
     division_report explain_report job_commands job_view listing meshcat_server meshes motion page
-    path_report placement_commands placement_plot placement_report plots report robot_visuals scene
-    skin study_commands study_report threejs viewer"""
+    path_report placement_commands placement_plot placement_report placement_view plots pose_layers
+    pose_outline report robot_visuals scene
+    skin study_commands study_page study_plot study_report threejs viewer"""
 LAYERS = tuple(names.split() for names in (WORDS, SEARCHES, ASKING, USING, STORED, STUDIES, EDGE))
 
 HEAVY = {"matplotlib", "meshcat", "rich", "trimesh", "yourdfpy"}

@@ -20,7 +20,10 @@ from oracle_cases import Problem
 from random_cases import draw, draw_ur5
 
 from feasibility import Search, Task, check
+from feasibility.case import load_case
+from feasibility.certificate import replay
 from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
+from feasibility.warmup import warm_up
 from robots import load_robot
 from surfaces import plane, sphere
 
@@ -358,3 +361,31 @@ def test_ctrl_c_ends_a_hard_search_soon(tmp_path) -> None:
     # Before it there may be a word about kernels that had to be compiled.
     assert err.endswith("coverable: interrupted\n")
     assert "Traceback" not in err
+
+
+def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
+    """The search is made to use more than the tolerance; the second time it keeps to less."""
+    from feasibility import checking, complete
+
+    made = complete.problem_of
+    asked = []
+    warm_up()
+
+    def generous(robot, cells, task):
+        problem = made(robot, cells, task)
+        asked.append(problem.tolerance)
+        return problem._replace(tolerance=1.08 * problem.tolerance)
+
+    robot, cells, task, _ = load_case("paper/4a").build()
+    monkeypatch.setattr(complete, "problem_of", generous)
+    verdict = checking.check(robot, cells, task)
+    assert asked == pytest.approx([1e-3, 0.9e-3])
+    assert verdict.feasible
+    assert verdict.certificate.max_position_error <= 1e-3
+    every = np.ones(len(cells), dtype=bool)
+    assert replay(robot, cells, task, verdict.witness, every).accepted
+    monkeypatch.setattr(checking, "NARROWER", 1.0)
+    again = checking.check(robot, cells, task)
+    assert again.answer == "undecided"
+    assert "refuses it: the tool point strays" in again.message
+    assert again.witness is None
