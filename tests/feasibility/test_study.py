@@ -24,6 +24,7 @@ from feasibility.case import Case
 from feasibility.case_edits import as_read
 from feasibility.cli import main
 from feasibility.study import StudyTask, run_tasks
+from feasibility.study_file import load_study
 from feasibility.study_outcome import arm_of, bits_of, cells_of, cut_of, evaluate, outcome_of
 from feasibility.study_store import Store, StoreError
 from feasibility.study_workers import WorkersError, open_workers
@@ -205,14 +206,6 @@ def test_only_what_has_changed_is_done(pool, tmp_path) -> None:
     assert {row.result["pid"] for row in after[6:]} == {os.getpid()}
 
 
-def test_the_table_does_not_depend_on_the_workers(undisturbed, tmp_path) -> None:
-    before = set(multiprocessing.active_children())
-    for count in (1, 2, 4):
-        rows = study_works.run_plates(tmp_path / f"{count}.study", count)
-        assert facts(rows) == undisturbed
-    assert set(multiprocessing.active_children()) <= before
-
-
 # -- killing ----------------------------------------------------------------------------------
 
 
@@ -318,30 +311,6 @@ def alive(pid: int) -> bool:
         return False
 
 
-def test_a_study_killed_five_times_and_resumed(undisturbed, tmp_path) -> None:
-    path = tmp_path / "a.study"
-    rng = random.Random(11)
-    orphans = set[int]()
-    held = []
-    for count in (0, 2, 0, 2, 0):
-        before = stored(path)
-        with start(RUN, path, count) as process:
-            # Something is done, then the blow falls at a random moment.
-            wait_for(lambda before=before: stored(path) > before, process)
-            time.sleep(0.2 * rng.random())
-            orphans |= workers_of(process.pid)
-            process.kill()
-        held.append(stored(path))
-    assert held == sorted(held)
-    assert 0 < held[0] < held[-1] <= 60
-    with Store(path) as store:
-        kept = store.find(task.key for task in study_works.plates())
-    assert len(kept) == held[-1]
-    rows = study_works.run_plates(path, 2)
-    assert facts(rows) == undisturbed
-    wait_for(lambda: not any(map(alive, orphans)), patience=10.0)
-
-
 STUDY_COMMAND = """
 import sys
 from feasibility.cli import main
@@ -374,27 +343,50 @@ def command(study, stem, *how) -> int:
 @pytest.mark.parametrize("count", ["1", "2", "4"])
 def test_the_command_writes_the_same_table_with_any_workers(in_peace, tmp_path, count) -> None:
     study, text = in_peace
+    before = set(multiprocessing.active_children())
     assert command(study, tmp_path / "a", "--workers", count) == 0
     assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
+    assert set(multiprocessing.active_children()) <= before
 
 
 def test_the_command_killed_five_times_and_run_again(in_peace, tmp_path) -> None:
-    """With two workers; the last run has cases left to do."""
+    """What was kept stays, workers end with their parent, and the table is that of one run."""
     study, text = in_peace
     path, rng, held = tmp_path / "a.study", random.Random(5), []
-    arguments = study, path, tmp_path / "a.csv", "--workers", "2"
-    for _ in range(5):
+    orphans = set[int]()
+    for count in (0, 2, 0, 2, 2):
         before = stored(path)
-        with start(STUDY_COMMAND, *arguments) as process:
+        with start(STUDY_COMMAND, study, path, tmp_path / "a.csv", "--workers", count) as process:
+            # Something is done, then the blow falls at a random moment.
             wait_for(lambda before=before: stored(path) > before, process)
             time.sleep(0.2 * rng.random())
+            orphans |= workers_of(process.pid)
             process.kill()
         held.append(stored(path))
         assert not (tmp_path / "a.csv").exists()
     assert held == sorted(held)
     assert 0 < held[0] < held[-1] <= 80
+    with Store(path) as store:
+        kept = store.find(task.key for task in load_study(study).tasks)
+    assert len(kept) == held[-1]
     assert command(study, tmp_path / "a", "--workers", "2") == 0
     assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
+    assert orphans
+    wait_for(lambda: not any(map(alive, orphans)), patience=10.0)
+
+
+def test_two_commands_with_one_store(in_peace, tmp_path) -> None:
+    study, text = in_peace
+    tables = [tmp_path / "a.csv", tmp_path / "b.csv"]
+    both = [
+        start(STUDY_COMMAND, study, tmp_path / "a.study", table, "--workers", "0")
+        for table in tables
+    ]
+    for process in both:
+        err = process.communicate(timeout=120)[1]
+        assert process.returncode == 0, err
+    assert [table.read_text(encoding="utf-8") for table in tables] == [text, text]
+    assert stored(tmp_path / "a.study") == 80
 
 
 def test_ctrl_c_stores_and_leaves_no_worker(tmp_path) -> None:
