@@ -151,7 +151,8 @@ def coarse(figures: Figures, most_turn_deg: float = MOST_TURN_DEG) -> str:
         parts.append(
             f"{_share(creased)} folded over a crease of up to "
             f"{math.degrees(float(figures.crease.max())):.0f} degrees, which no smaller cell "
-            "removes; cut the surface there, and ask for each part by itself"
+            "removes: their one centre speaks for both sides; cut the surface there for cells that "
+            "end at it"
         )
     return "; ".join(parts)
 
