@@ -63,8 +63,8 @@ class Arm:
     patches_share: float | None
     """Of the area, 0..1, that these cover together."""
     critical_cone_deg: float | None
-    """The smallest cone with a covering motion, to `CONE_STEP_DEG`; None where there is none, or
-    it was not asked for."""
+    """The smallest cone with a covering motion, to `CONE_STEP_DEG`; narrower ones than
+    `LEAST_CONE_DEG` are not looked at. None where there is none, or it was not asked for."""
     margins: dict[str, float | None] | None
     """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m."""
     seconds: float

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from feasibility.comparison import Arm, Comparison
+from feasibility.comparison import LEAST_CONE_DEG, Arm, Comparison
 from feasibility.version import version
 
 Column = tuple[str, Callable[[Arm], str]]
@@ -53,7 +53,7 @@ def columns(comparison: Comparison) -> list[Column]:
     if comparison.divided:
         found.append(("motions needed", _patches))
     if comparison.critical:
-        found.append(("smallest cone", lambda arm: _unit(arm.critical_cone_deg, "deg")))
+        found.append(("smallest cone", _smallest_cone))
     return [
         *found,
         ("from limits", lambda arm: _unit((arm.margins or {}).get("limit_deg"), "deg")),
@@ -62,6 +62,13 @@ def columns(comparison: Comparison) -> list[Column]:
         ("joints", lambda arm: str(arm.joints)),
         ("mostly missed for", lambda arm: (arm.cause or "-").replace("_", " ")),
     ]
+
+
+def _smallest_cone(arm: Arm) -> str:
+    """'12.5 deg'; narrower ones than some are not looked at."""
+    cone = arm.critical_cone_deg
+    few = cone is not None and cone <= LEAST_CONE_DEG
+    return f"{'<= ' if few else ''}{_unit(cone, 'deg')}"
 
 
 def _patches(arm: Arm) -> str:

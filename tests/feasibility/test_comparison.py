@@ -184,6 +184,16 @@ class _Page(HTMLParser):
             self.cells.append(data)
 
 
+def test_the_narrowest_cone_looked_at_is_a_bound(compared) -> None:
+    """Feasible down to where the search for it stops: so no number is claimed to be the least."""
+    for cone, said in ((3.0, "<= 3.0 deg"), (2.0, "<= 2.0 deg"), (3.5, "3.5 deg"), (None, "-")):
+        arm = replace(compared.arms[0], critical_cone_deg=cone)
+        told = replace(compared, arms=(arm,), critical=True)
+        (cell,) = [say(arm) for heading, say in columns(told) if heading == "smallest cone"]
+        assert cell == said
+        assert said.replace("<", "&lt;") in as_html(told)
+
+
 def test_the_page_stands_by_itself(compared) -> None:
     page = _Page()
     text = as_html(compared)
