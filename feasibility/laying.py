@@ -18,7 +18,7 @@ from feasibility.motion_net import MotionNet
 from feasibility.route import GRID_ORDERS, Order, PathError, closed_sides, grid_order, route
 from surfaces import Cells
 
-MOST_CELLS = 3000  # cells that are passed in all attempts together, so that large grids end too
+MOST_CELLS = 6000  # cells that are passed in all attempts together, so that large grids end too
 MOST_TRIED = 24  # attempts at one order
 TURNED = ((False, False), (True, True), (True, False), (False, True))  # corners to begin at
 

@@ -118,6 +118,6 @@ def samples(robot: Robot, timed: TimedCurve, period: float) -> Trajectory:
     q, dq, ddq = timed.at(time)
     q = inside(robot, q)
     return Trajectory(
-        joint_names=robot.joint_names, time=time, q=q, dq=dq, ddq=ddq,
+        joint_names=robot.joint_names, time=time, q=q, dq=dq + 0.0, ddq=ddq + 0.0,
         tool_speed=tool_slopes(robot, q, dq), cell=cell,
     )  # fmt: skip
