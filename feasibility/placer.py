@@ -7,12 +7,12 @@ the same problem with its arrays turned and shifted, and the cells need not be c
 
 from __future__ import annotations
 
-from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.cause_counts import cause_counts
 from feasibility.explorer import Explorer
 from feasibility.placement_bounds import Reach
 from feasibility.placement_region import Array, Pose, moved_cells
@@ -23,11 +23,8 @@ from feasibility.problem import Problem, problem_of
 from feasibility.search import Search
 from feasibility.set_cover import undominated
 from feasibility.task import Task
-from feasibility.verdict import CauseKind, Verdict
 from robots import Robot
 from surfaces import Cells
-
-EXAMINED = 6  # missed cells whose causes are looked for; the others take the nearest one's
 
 
 class Placer:
@@ -144,7 +141,7 @@ class Placer:
             answer=verdict.answer,
             evidence=verdict.evidence,
             message=verdict.message,
-            causes=_causes(verdict) if causes else {},
+            causes=cause_counts(verdict).cells if causes else {},
             fk=int(verdict.statistics["fk"]) + (0 if tried is None else tried.fk),
         )
 
@@ -181,25 +178,3 @@ class Placer:
         """The room that the component which covers every cell leaves."""
         limits, cone = least_room(explorer).tolist()
         return Margins(limits, cone, max(0.0, min(1.0, self.reach.slack(pose.values))))
-
-
-def _causes(verdict: Verdict) -> dict[str, int]:
-    """Missed cells by cause; of those that nothing reaches, some are examined."""
-    from feasibility.causes import diagnose
-
-    missed = np.flatnonzero(~verdict.covered)
-    reached = np.zeros(len(verdict.cells), dtype=bool)
-    for component in verdict.components:
-        reached[component] = True
-    counts: Counter[str] = Counter()
-    counts[str(CauseKind.DISCONNECTED)] = int(reached[missed].sum())
-    lost = missed[~reached[missed]]
-    if len(lost):
-        problem = problem_of(verdict.robot, verdict.cells, verdict.task)
-        explorer = Explorer(verdict.robot, verdict.cells, problem, verdict.seed)
-        few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
-        kinds = [str(diagnose(explorer, int(cell)).kind) for cell in few]
-        centres = verdict.cells.centres
-        away = np.linalg.norm(centres[lost][:, None] - centres[few][None], axis=2)
-        counts.update(kinds[int(k)] for k in away.argmin(axis=1))
-    return {kind: count for kind, count in counts.most_common() if count}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-from collections import Counter
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from feasibility.case import Case
 from feasibility.case_robot import read_robot
 from feasibility.case_surface import read_surface
+from feasibility.cause_counts import cause_counts
 from feasibility.toml_text import parse_toml, toml_document
 
 if TYPE_CHECKING:
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from surfaces import Cells
     from surfaces.mesh_cells import MeshCells
 
-EXAMINED = 6  # missed cells of one verdict whose causes are looked for; the others take the nearest
 ROBOTS_KEPT = 32  # arms that one worker keeps
 MESHES_KEPT = 4
 HOME = {"position": (0.0, 0.0, 0.0), "rpy_deg": (0.0, 0.0, 0.0)}
@@ -120,7 +119,7 @@ def outcome_of(verdict: Verdict) -> Outcome:
     """
     areas = np.asarray(verdict.cells.areas)
     whole = float(areas.sum())
-    causes, examined = _causes(verdict)
+    causes, examined = cause_counts(verdict)
     return {
         "verdict": str(verdict.answer),
         "evidence": str(verdict.evidence),
@@ -222,38 +221,3 @@ def cells_of(bits: str, n: int) -> NDArray[np.bool_]:
     if len(data) != (n + 7) // 8:
         raise ValueError(f"{len(data)} bytes do not hold the bits of {n} cells")
     return np.unpackbits(data, count=n).astype(bool)
-
-
-def _causes(verdict: Verdict) -> tuple[dict[str, int], int]:
-    """How many cells are missed for each cause, and how many were examined for it."""
-    missed = np.flatnonzero(~verdict.covered)
-    if len(missed) == 0:
-        return {}, 0
-    if verdict.method == "greedy":
-        kinds = [str(cause.kind) for cause in verdict.causes]
-        return _counted(kinds), len(kinds)
-    from feasibility.causes import diagnose
-    from feasibility.complete import Explorer, problem_of
-    from feasibility.verdict import CauseKind
-
-    reached = np.zeros(len(verdict.cells), dtype=bool)
-    for cells in verdict.components:
-        reached[cells] = True
-    kinds = [str(CauseKind.DISCONNECTED)] * int(reached[missed].sum())
-    lost = missed[~reached[missed]]
-    if len(lost) == 0:
-        return _counted(kinds), 0
-    # A fresh explorer: what is asked of it are Newton's method and random starts alone.
-    problem = problem_of(verdict.robot, verdict.cells, verdict.task)
-    explorer = Explorer(verdict.robot, verdict.cells, problem, verdict.seed)
-    few = np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(int))
-    examined = [diagnose(explorer, int(cell)) for cell in lost[few]]
-    centres = verdict.cells.centres
-    away = np.linalg.norm(centres[lost][:, None] - centres[lost[few]][None], axis=2)  # (L, E)
-    kinds += [str(examined[int(k)].kind) for k in away.argmin(axis=1)]
-    return _counted(kinds), len(examined)
-
-
-def _counted(kinds: list[str]) -> dict[str, int]:
-    """Causes with their number of cells, the most frequent first."""
-    return dict(sorted(Counter(kinds).items(), key=lambda entry: (-entry[1], entry[0])))
