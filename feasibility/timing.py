@@ -44,7 +44,8 @@ AT_LIMIT = 1e-6  # [rad] or [m] that interpolation may add where a path runs alo
 ROUNDS = 3  # ways along a curve that are sought, each with less for joints that were over
 PARTS = (1.0, 0.95, 0.91, 0.86)  # [1] of a period: where samples lie between jumps is chance
 SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing down as a whole
-SLOWINGS = 8  # times that the last of them is slowed down as a whole
+SLOWINGS = 8  # times that the last of them is slowed down a little; and then as much as it needs
+SMALL = 1.004  # [1] times that this is slower
 RESERVE = 1e-3  # [1] share of all limits that is left free
 
 
@@ -119,12 +120,13 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
             break
         share /= np.maximum(over, 1.0)
     slower = 1.0
-    for _ in range(SLOWINGS):
+    for attempt in range(2 * SLOWINGS):
         run = samples(robot, timed.slowed(slower), period)
         too_fast = used(robot, run, limits).too_fast
         if too_fast <= 1.0:
             return run
-        slower *= too_fast + RESERVE
+        # Other samples are over by another little: at first small steps, which may do.
+        slower *= min(too_fast, SMALL if attempt < SLOWINGS else too_fast) + RESERVE
     raise PathError(
         "no timing was found that keeps to the limits between samples too; a shorter period helps"
     )
