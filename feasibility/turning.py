@@ -31,7 +31,7 @@ SCAN = 20  # values looked at on the way to the end of a quantity that is not mo
 SEARCHES = 2  # short of one that failed, even when none should be begun any more
 MORE_SEARCHES = 4  # the same where none has found anything
 BACKS = (0.1, 0.3)  # [1] where the search fails at the end: the next ones are that much nearer
-SHORT = 0.55  # verdicts' worth of evaluations that a search from known configurations may take
+SHORT = 0.8  # verdicts' worth of evaluations that a search from known configurations may take
 
 
 class Side(NamedTuple):
