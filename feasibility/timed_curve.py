@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import BSpline
 
 from feasibility.blend import Curve, inside
 from feasibility.parameterisation import acceleration_excess, parameterised
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 ALLOWED = 0.999  # [1] share of an acceleration limit that toppra is given
 TRIES = 4  # runs of toppra, each slower where the one before was over an acceleration limit
 MOST_OVER = 4.0  # [1] share of an acceleration limit that running slower altogether may mend
+RUSHES = (1000.0, 100.0, 10.0, 1.0, 0.1)  # [1] times the median of (dk/dt)^2: caps, one by one
 TICK = 1e-9  # [s]
 CROWDED = 0.2  # [1] share of the period; samples nearer to a passage of a centre are left out
 
@@ -73,17 +75,17 @@ def timed_curve(robot: Robot, curve: Curve, limits: MotionLimits) -> TimedCurve:
     grid = fine_grid(robot, spline, curve.pieces)
     most = squared_speeds(robot, spline, grid, limits)
     # In s = k * unit, speeds are about 1, which is what the solver's tolerances are made for.
-    unit = 1.0 / float(np.sqrt(np.median(most)))
-    allowed = most
-    for _ in range(TRIES):
-        x = parameterised(spline, grid, unit, allowed, ALLOWED * limits.acceleration) / unit**2
-        over = acceleration_excess(spline, grid, x, limits.acceleration)
-        if over.max() <= 1.0:
+    typical = float(np.median(most))
+    unit = 1.0 / np.sqrt(typical)
+    # Over pieces on which the arm hardly moves, k could rush so that the solver's numbers run out.
+    for rush in RUSHES:
+        try:
+            x = _within(spline, grid, unit, np.minimum(most, rush * typical), limits)
             break
-        # Slower there and around, where toppra's own rounding has got too fast.
-        wide = np.maximum.reduce([np.roll(np.append(over, 0.0), k) for k in range(-2, 4)])
-        slower = np.minimum(allowed, x / np.maximum(wide, 1.0) ** 2)
-        allowed = np.where(wide > 1.0, slower, allowed)
+        except PathError:
+            if rush == RUSHES[-1]:
+                raise
+    over = acceleration_excess(spline, grid, x, limits.acceleration)
     worst = max(float(over.max()), float((x / most).max()))
     if worst > 1.0:
         if worst > MOST_OVER:
@@ -97,6 +99,26 @@ def timed_curve(robot: Robot, curve: Curve, limits: MotionLimits) -> TimedCurve:
     if not np.isfinite(time).all():
         raise PathError("no timing was found: the motion would have to stop on its way")
     return TimedCurve(curve, grid, x, time, limits)
+
+
+def _within(
+    spline: BSpline, grid: Array, unit: float, allowed: Array, limits: MotionLimits
+) -> Array:
+    """(m,) (dk/dt)^2 at most `allowed` (m,), with accelerations over their limits where it must be.
+
+    Raises:
+        PathError: toppra finds none.
+    """
+    for _ in range(TRIES):
+        x = parameterised(spline, grid, unit, allowed, ALLOWED * limits.acceleration) / unit**2
+        over = acceleration_excess(spline, grid, x, limits.acceleration)
+        if over.max() <= 1.0:
+            break
+        # Slower there and around, where toppra's own rounding has got too fast.
+        wide = np.maximum.reduce([np.roll(np.append(over, 0.0), k) for k in range(-2, 4)])
+        slower = np.minimum(allowed, x / np.maximum(wide, 1.0) ** 2)
+        allowed = np.where(wide > 1.0, slower, allowed)
+    return x
 
 
 def samples(robot: Robot, timed: TimedCurve, period: float) -> Trajectory:

@@ -361,6 +361,24 @@ def test_a_motion_that_turns_back_is_run_without_a_stop_in_between():
 # -- bounds -------------------------------------------------------------------------------------
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_steps_of_very_different_size_are_timed(seed):
+    """From a micrometre to a stride, with turns of every sharpness; toppra alone gives some up."""
+    rng = np.random.default_rng(seed)
+    steps = 10.0 ** rng.uniform(-7, -1, (250, 1)) * rng.normal(size=(250, 6))
+    q = 0.3 * np.vstack([np.zeros(6), np.cumsum(steps, axis=0)])
+    cell = np.full(len(q), -1)
+    cell[[0, -1]] = [0, 1]
+    curve = control_points(Walk(q, cell), 2.0 ** -rng.integers(1, 13, len(q)).astype(float))
+    robot = load_robot("ur5")
+    limits = motion_limits(robot, SPEED)
+    timed = timed_curve(robot, curve, limits)
+    over = acceleration_excess(curve.spline(), timed.grid, timed.x, limits.acceleration)
+    assert over.max() <= 1.0 + 1e-9
+    assert (timed.x <= squared_speeds(robot, curve.spline(), timed.grid, limits) + 1e-12).all()
+    assert np.isfinite(timed.time).all()
+
+
 @pytest.mark.parametrize("name", ["puma560", "ur5", "panda"])
 def test_bounds_on_the_speed_hold_on_whole_pieces(name):
     robot, rng = load_robot(name), np.random.default_rng(2)
