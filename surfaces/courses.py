@@ -288,14 +288,15 @@ def _basis(count: int, t: Array) -> Array:
 
 
 def _joined(fitted: list[tuple[NDArray[np.int64], Array]], strays: Array) -> Courses:
-    """All courses in the order of the pairs, with their bends."""
-    counts = np.zeros(len(strays), dtype=np.int64)
-    for some, cubics in fitted:
-        counts[some] = cubics.shape[1]
+    """All courses in the order of the pairs, with their bends; the last fit of each counts."""
+    counts, final = np.zeros((2, len(strays)), dtype=np.int64)
+    for turn, (some, cubics) in enumerate(fitted):
+        counts[some], final[some] = cubics.shape[1], turn
     first = np.concatenate([[0], np.cumsum(counts)])
     joined = np.empty((first[-1], 4, 6))
-    for some, cubics in fitted:
-        joined[first[some][:, None] + np.arange(cubics.shape[1])] = cubics
+    for turn, (some, cubics) in enumerate(fitted):
+        kept = final[some] == turn
+        joined[first[some[kept]][:, None] + np.arange(cubics.shape[1])] = cubics[kept]
     square = np.repeat(counts, counts)[:, None] ** 2  # from s to t
     ends = [2.0 * joined[:, 2], 2.0 * joined[:, 2] + 6.0 * joined[:, 3]]
     bends = np.stack(

@@ -7,6 +7,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from surfaces.courses import _joined
 from surfaces.creased import _shortest
 from surfaces.mesh import mesh
 from surfaces.mesh_normals import sectors
@@ -96,6 +97,22 @@ PARTS = {
     "box": box,
     "can": can,
 }
+
+
+@pytest.mark.parametrize("counts", [(1, 8, 4), (8, 4, 16), (4, 64, 1)])
+def test_the_last_fit_of_a_course_counts(counts):
+    """However many pieces it had before, the others keep theirs."""
+    rng = np.random.default_rng(0)
+    before, after, others = counts
+    fits = [
+        (np.array([1, 3]), rng.normal(size=(2, before, 4, 6))),
+        (np.array([0, 2]), rng.normal(size=(2, others, 4, 6))),
+        (np.array([3]), rng.normal(size=(1, after, 4, 6))),
+    ]
+    courses = _joined(fits, np.zeros((4, 2)))
+    expected = [fits[1][1][0], fits[0][1][0], fits[1][1][1], fits[2][1][0]]
+    assert np.diff(courses.first).tolist() == [len(cubics) for cubics in expected]
+    np.testing.assert_array_equal(courses.cubics, np.concatenate(expected))
 
 
 @pytest.mark.parametrize("name", PARTS)
