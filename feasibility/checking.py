@@ -108,8 +108,10 @@ def _complete_check(
     deadline = np.inf if search.time_limit is None else began + search.time_limit
 
     def attempt(within: Task) -> _Attempt:
+        start = time.monotonic()
         problem = problem_of(robot, cells, within)
-        return _attempt(Explorer(robot, cells, problem, search.seed, deadline, progress), task)
+        explorer = Explorer(robot, cells, problem, search.seed, deadline, progress)
+        return _attempt(explorer, task, start)
 
     tried = [attempt(task)]
     if tried[0].narrowly_refused:
@@ -153,13 +155,12 @@ def _complete_check(
     )
 
 
-def _attempt(explorer: Explorer, task: Task) -> _Attempt:
-    """Search, and replay the motion found against a task."""
+def _attempt(explorer: Explorer, task: Task, began: float) -> _Attempt:
+    """Search since `began` (s), and replay the motion found against a task."""
     from feasibility.certificate import replay
     from feasibility.complete import OutOfTime, close, explore
     from feasibility.walk import covering_walk
 
-    began = time.monotonic()
     in_time = True
     try:
         explore(explorer)

@@ -33,7 +33,7 @@ FACETED = 5e-4  # [1], the same for the normal of a mesh
 FACETED_FOOT = 0.01  # [1], share of a mesh's edges that a course may stray from it
 STANDS = 1e-3  # [1] a parallel curve that is so much shorter stands still
 PLACES = 3  # along a piece, where its slopes are looked at
-RESTS = 1e-6  # [1] of its way: a slope so small is none
+LEGS = 4  # of a course over a crease; it is at rest between them
 BETWEEN = 1.5  # [1], on what was measured at samples: for what lies between them
 SHARPER = 1.5  # [1], on curvatures at the two centres: for what lies between them
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on bends
@@ -53,10 +53,12 @@ class Courses:
     """(P, 2) largest |f''| (m) and |n''| on each piece, for t in 0..1 on the whole course."""
     strays: Array
     """(M, 2) how far foot (m) and normal (1) may be from the surface's own, at most."""
+    rests: NDArray[np.bool_]
+    """(P,) pieces at an end of which the foot is at rest, see `surfaces.creased`."""
 
     def __post_init__(self) -> None:
         """Write-protect the arrays."""
-        for name in ("first", "cubics", "bends", "strays"):
+        for name in ("first", "cubics", "bends", "strays", "rests"):
             getattr(self, name).flags.writeable = False
 
     def __len__(self) -> int:
@@ -109,34 +111,21 @@ class Courses:
 
         Where a course is at rest at an end of a piece, both are the whole way over the piece.
         """
-        whole, rests = self._whole, self._rests
+        resting = np.flatnonzero(self.rests)
+        whole = self.cubics[resting, 1:].sum(axis=1)
         for s in np.linspace(0.0, 1.0, PLACES):
             slope = (
                 self.cubics[:, 1] + 2.0 * s * self.cubics[:, 2] + 3.0 * s * s * self.cubics[:, 3]
             )
-            slope[rests] = whole[rests]
+            slope[resting] = whole
             yield slope[:, :3], slope[:, 3:]
-
-    @property
-    def _whole(self) -> Array:
-        """(P, 6) the way of foot and normal over each piece."""
-        return np.asarray(self.cubics[:, 1:].sum(axis=1))
-
-    @property
-    def _rests(self) -> NDArray[np.bool_]:
-        """(P,) pieces at an end of which the foot is at rest."""
-        first = self.cubics[:, 1, :3]
-        last = first + 2.0 * self.cubics[:, 2, :3] + 3.0 * self.cubics[:, 3, :3]
-        still = RESTS * np.linalg.norm(self._whole[:, :3], axis=1)
-        slowest = np.minimum(np.linalg.norm(first, axis=1), np.linalg.norm(last, axis=1))
-        return np.asarray(slowest < still)
 
     @property
     def creased(self) -> NDArray[np.bool_]:
         """(M,) courses that come to rest on their way, see `surfaces.creased`."""
-        if len(self) == 0:
-            return np.zeros(0, dtype=bool)
-        return np.logical_or.reduceat(self._rests, self.first[:-1])
+        if not self.rests.any():
+            return np.zeros(len(self), dtype=bool)
+        return np.logical_or.reduceat(self.rests, self.first[:-1])
 
     def _local(self, courses: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Powers 1, s, s^2, s^3 (k, 4), and the cubics (k, 4, 6) that hold at t."""
@@ -170,14 +159,17 @@ def courses_of(cells: Cells) -> Courses:
         missing = np.flatnonzero(np.isinf(strays).any(axis=1))
         if len(missing) == 0:
             break
+    creased = np.zeros(len(pairs), dtype=bool)
     if grain:
         from surfaces.creased import over_creases
         from surfaces.mesh_cells import MeshCells
 
         if isinstance(cells, MeshCells):
             rough = np.flatnonzero((strays > close).any(axis=1))
-            fitted += over_creases(cells, rough, close, strays)
-    return _joined(fitted, strays)
+            for some, cubics in over_creases(cells, rough, close, strays):
+                fitted.append((some, cubics))
+                creased[some] = True
+    return _joined(fitted, strays, creased)
 
 
 def _blocks(
@@ -287,7 +279,9 @@ def _basis(count: int, t: Array) -> Array:
     return values
 
 
-def _joined(fitted: list[tuple[NDArray[np.int64], Array]], strays: Array) -> Courses:
+def _joined(
+    fitted: list[tuple[NDArray[np.int64], Array]], strays: Array, creased: NDArray[np.bool_]
+) -> Courses:
     """All courses in the order of the pairs, with their bends; the last fit of each counts."""
     counts, final = np.zeros((2, len(strays)), dtype=np.int64)
     for turn, (some, cubics) in enumerate(fitted):
@@ -297,10 +291,14 @@ def _joined(fitted: list[tuple[NDArray[np.int64], Array]], strays: Array) -> Cou
     for turn, (some, cubics) in enumerate(fitted):
         kept = final[some] == turn
         joined[first[some[kept]][:, None] + np.arange(cubics.shape[1])] = cubics[kept]
+    rests = np.zeros(len(joined), dtype=bool)
+    for course in np.flatnonzero(creased):
+        legs = np.arange(first[course], first[course + 1]).reshape(LEGS, -1)
+        rests[legs[1:, 0]] = rests[legs[:-1, -1]] = True
     square = np.repeat(counts, counts)[:, None] ** 2  # from s to t
     ends = [2.0 * joined[:, 2], 2.0 * joined[:, 2] + 6.0 * joined[:, 3]]
     bends = np.stack(
         [np.max([np.linalg.norm(end[:, part], axis=1) for end in ends], axis=0) for part in HALVES],
         axis=1,
     )
-    return Courses(first, joined, ROUNDING * square * bends, strays)
+    return Courses(first, joined, ROUNDING * square * bends, strays, rests)

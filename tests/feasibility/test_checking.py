@@ -272,9 +272,9 @@ def test_hardly_any_time_gives_undecided_and_no_error(time_limit: float) -> None
     setup = built(HARD, load_robot("puma560"))
     assert len(setup[1].courses) > 100_000  # part of the cells, as are their centres
     verdict_of(*DRAWN[0])  # loads the kernels
-    began = time.monotonic()
+    began = time.process_time()  # what else the machine does is not counted
     verdict = check(*setup, Search(time_limit=time_limit))
-    assert time.monotonic() - began <= 0.5 + time_limit
+    assert time.process_time() - began <= 0.5 + time_limit
     assert (verdict.answer, verdict.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
     assert len(verdict.graph) == len(verdict.cells)
     for component in verdict.components:

@@ -62,7 +62,9 @@ def test_creased_courses_are_smooth_in_time_and_stay_on_the_surface(name):
         np.testing.assert_allclose(slopes[:-1], cubics[1:, 1], atol=1e-9)
         quarter = len(cubics) // 4
         assert np.abs(cubics[[quarter, 2 * quarter, 3 * quarter], 1]).max() < 1e-12
+        assert np.abs(slopes[[quarter - 1, 2 * quarter - 1, 3 * quarter - 1]]).max() < 1e-12
     courses = cells.courses
+    assert np.flatnonzero(courses.rests).size == 6 * len(which)
     t = np.random.default_rng(0).uniform(size=200)
     pair = np.repeat(which, len(t))
     foot, normal = courses.at(pair, np.tile(t, len(which)))
@@ -109,7 +111,7 @@ def test_the_last_fit_of_a_course_counts(counts):
         (np.array([0, 2]), rng.normal(size=(2, others, 4, 6))),
         (np.array([3]), rng.normal(size=(1, after, 4, 6))),
     ]
-    courses = _joined(fits, np.zeros((4, 2)))
+    courses = _joined(fits, np.zeros((4, 2)), np.zeros(4, dtype=bool))
     expected = [fits[1][1][0], fits[0][1][0], fits[1][1][1], fits[2][1][0]]
     assert np.diff(courses.first).tolist() == [len(cubics) for cubics in expected]
     np.testing.assert_array_equal(courses.cubics, np.concatenate(expected))
