@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 GUESSES = 4  # places tried first on each piece of a course
 REFINEMENTS = 16  # Newton steps from the best of them, at most
-SETTLED = 1e-9  # [1] of a course: a step so small is the last
+SETTLED = 1e-7  # [1] of a course: a step so small is the last
 BLOCK = 4096  # waypoints at once, to bound the memory
 LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
 MOST_LOOKS = 400  # times that many places on a course over a mesh
@@ -148,8 +148,13 @@ def _pieces(
 def _at(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
     """Target points and approach directions (k, 3) at t."""
     piece, s, _ = _pieces(ways, course, t)
-    values = np.einsum("kp,kpd->kd", np.vander(s, 4, increasing=True), ways.cubics[piece])
+    values = np.einsum("kp,kpd->kd", _powers(s), ways.cubics[piece])
     return values[:, :3], values[:, 3:]
+
+
+def _powers(s: Array) -> Array:
+    """(k, 4) 1, s, s^2, s^3."""
+    return np.column_stack([np.ones(len(s)), s, s * s, s * s * s])
 
 
 def _places(
@@ -173,7 +178,7 @@ def _places(
 def _slopes(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> Array:
     """(k, 3) m, derivatives of target points by t."""
     piece, s, count = _pieces(ways, course, t)
-    by_s = np.column_stack([np.ones(len(s)), 2.0 * s, 3.0 * s * s])
+    by_s = _powers(s)[:, :3] * [1.0, 2.0, 3.0]
     slopes = np.einsum("kp,kpd->kd", by_s, ways.cubics[piece, 1:, :3])
     return np.asarray(slopes * count[:, None])
 
