@@ -43,7 +43,7 @@ def test_python_of_the_readme_runs_and_says_what_it_promises(
 
 
 def test_case_file_of_the_readme_is_feasible(tmp_path: Path) -> None:
-    (text,) = blocks(README, "toml")
+    text, _ = blocks(README, "toml")
     (tmp_path / "case.toml").write_text(text)
     assert check(*Case.from_toml(text, tmp_path).build()).feasible
     assert main(["check", str(tmp_path / "case.toml")]) == 0
@@ -53,17 +53,24 @@ def test_commands_of_the_readme_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    for name, text in zip(("case", "study"), blocks(README, "toml"), strict=True):
+        (tmp_path / f"{name}.toml").write_text(text)
     lines = [line for block in blocks(README, "") for line in block.splitlines()]
     commands = [shlex.split(x, comments=True) for x in lines if x.startswith("coverable")]
     assert len(commands) >= 8
     for _, *arguments in commands:
         if arguments[0] == "show":  # without it, a browser window
             arguments += ["--html", "shown.html"]
+        if arguments[0] == "place":  # fewer, to save time
+            arguments += ["--count", "8"]
         expected = 1 if arguments[1:2] == ["paper/4d"] else 0
         assert main(arguments) == expected, arguments
         assert "usage" not in capsys.readouterr().err
     assert (tmp_path / "walk.csv").read_text().startswith("cell,joint1,")
-    assert (tmp_path / "shown.html").stat().st_size > 1e5
+    for page in ("shown.html", "where.html", "study.html"):
+        assert (tmp_path / page).stat().st_size > 1e5
+    assert (tmp_path / "where.png").read_bytes().startswith(b"\x89PNG")
+    assert len((tmp_path / "table.csv").read_text().splitlines()) == 1 + 2 * 3 * 4
 
 
 @pytest.mark.parametrize("page", PAGES)
