@@ -152,8 +152,11 @@ class MeshSurface(Surface):
         if not isinstance(cells, MeshCells):
             raise TypeError("the cells are not of a mesh")
         corners = self.mesh.vertices[self.mesh.faces]
-        # On the strip along a crease the normal turns as over a face that is so much smaller.
-        size = np.where(self._rims.any(axis=1), WIDTH, 1.0)[:, None, None]
+        # On the strip along a crease the normal turns as over a face that is so much smaller; half
+        # way from one unit normal to the other, their mean is shorter, and turns faster.
+        halves = 0.5 * np.linalg.norm(self.corner_normals + self.rim_normals, axis=2).min(axis=1)
+        strip = WIDTH / (1.0 + WIDTH) * halves
+        size = np.where(self._rims.any(axis=1), strip, 1.0)[:, None, None]
         turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]  # along two sides
         slopes = size * (corners[:, 1:] - corners[:, :1]) + height * turns
         face = sharpest_turn(*(_products(sides) for sides in (slopes, turns)))

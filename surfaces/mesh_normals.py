@@ -109,10 +109,12 @@ def sectors(mesh: TriangleMesh) -> Ints:
 
     A crease that ends at a vertex parts nothing there.
     """
+    smooth = ~sharp_edges(mesh)
+    if smooth.all():
+        return mesh.faces  # one fan of faces at each vertex
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
-    smooth = ~sharp_edges(mesh)
     faces, ends = mesh.edges.faces[smooth], mesh.edges.vertices[smooth]
     joined = [
         3 * faces[:, side] + (mesh.faces[faces[:, side]] == ends[:, [end]]).argmax(axis=1)

@@ -146,6 +146,29 @@ def test_the_normal_turns_in_a_narrow_strip_alone():
     assert normals[2000] == pytest.approx([0, 0, 1], abs=1e-9)
 
 
+@pytest.mark.parametrize("name", PARTS)
+def test_the_normal_turns_no_faster_than_is_said(name):
+    """By differences within the faces along creases, most of them on the strip."""
+    cells = mesh(PARTS[name]()).cells(50)
+    surface = cells.surface
+    rng = np.random.default_rng(3)
+    creased = np.flatnonzero((surface.corner_normals != surface.rim_normals).any(axis=(1, 2)))
+    face = rng.choice(creased, 20_000)
+    on_crease = (surface.corner_normals[face] != surface.rim_normals[face]).any(axis=2)
+    weights = rng.dirichlet([1, 1, 1], len(face)) * np.where(on_crease, 20.0, 1.0)
+    weights /= weights.sum(axis=1, keepdims=True)
+    step = 1e-4 * rng.normal(size=(len(face), 3))
+    ahead = weights + step - step.mean(axis=1, keepdims=True)
+    inside = (ahead > 0.0).all(axis=1)
+    corners = surface.mesh.vertices[surface.mesh.faces[face]]
+    way = np.einsum("kc,kci->ki", ahead - weights, corners)
+    turn = surface.normals_at(face, ahead) - surface.normals_at(face, weights)
+    rate = (np.linalg.norm(turn, axis=1) / np.linalg.norm(way, axis=1))[inside]
+    said = cells.sharpness[cells.labels[face[inside]]]
+    assert (rate <= said * (1.0 + 1e-6)).all()
+    assert (rate / said).max() > 0.6
+
+
 def test_corners_are_parted_by_creases_alone():
     """Against the faces round every vertex, one by one, on a rough sheet full of broken creases."""
     x, y = np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 12), indexing="ij")
