@@ -43,7 +43,7 @@ lint: .venv/installed
 test: lint
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 ifneq ($(NOTEBOOKS),)
-	$(BIN)/python -m pytest --nbmake --nbmake-timeout=900 $(NOTEBOOKS)
+	$(BIN)/python -m pytest -n 2 --dist loadfile --nbmake --nbmake-timeout=900 $(NOTEBOOKS)
 endif
 
 bench: .venv/installed

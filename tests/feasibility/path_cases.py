@@ -16,7 +16,7 @@ from surfaces import plane, sphere
 
 FEASIBLE = ("4a", "4b", "4c", "4e", "5a", "5b", "5c", "5d", "5e", "5f")
 BEST = dict.fromkeys(FEASIBLE, "shortest") | {"5c": "spiral", "5a": "columns"}
-"""An order for each case; all four are tried in `test_coverage`."""
+"""An order for each case; `test_coverage` tries all four for some."""
 PATCHES = ("ur5", "panda")
 SPEED = 0.15  # [m/s]
 
