@@ -407,7 +407,7 @@ print(counts["refused"], counts["accepted"])
         env={**os.environ, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=100,
+        timeout=300,
         check=False,
     )
     assert done.stderr == ""
