@@ -192,10 +192,4 @@ def _swing(robot: Robot, levers: Array, change: Array, bent: Array) -> Array:
 
 def tool_slopes(robot: Robot, q: Array, slope: Array) -> Array:
     """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n)."""
-    kinematics = Kinematics(robot)
-    return np.array(
-        [
-            np.linalg.norm(kinematics.jacobians(place)[0] @ along)
-            for place, along in zip(q, slope, strict=True)
-        ]
-    )
+    return np.linalg.norm(Kinematics(robot).tool_velocities(q, slope), axis=1)

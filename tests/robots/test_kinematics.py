@@ -41,6 +41,23 @@ def test_jacobians_are_the_slopes_of_the_tool(seed, tmp_path):
             np.testing.assert_allclose(rows[:, i], slope, rtol=0, atol=2e-9)
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_the_tool_moves_as_its_jacobian_says(seed, tmp_path):
+    rng = np.random.default_rng(500 + seed)
+    robot = load_text(tmp_path, random_arm(rng))
+    kinematics = Kinematics(robot)
+    q = np.array([random_q(robot, rng) for _ in range(5)])
+    dq = rng.normal(size=q.shape)
+    expected = [kinematics.jacobians(place)[0] @ rate for place, rate in zip(q, dq, strict=True)]
+    np.testing.assert_allclose(kinematics.tool_velocities(q, dq), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("shapes", [((6,), (6,)), ((2, 6), (3, 6)), ((2, 5), (2, 5))])
+def test_velocities_of_the_wrong_shape_are_refused(shapes):
+    with pytest.raises(ValueError, match=r"q and dq must both have shape \(m, 6\)"):
+        Kinematics(load_robot("puma560")).tool_velocities(*map(np.zeros, shapes))
+
+
 def test_a_full_turn_is_another_configuration_with_the_same_placement():
     robot = load_robot("kinova")
     assert robot.joint_kinds.count("continuous") == 3
