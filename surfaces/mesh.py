@@ -278,13 +278,13 @@ def mesh(
         source: path of an STL, OBJ, PLY, OFF or GLB file; or a `TriangleMesh`; or anything with
             `vertices` and `faces`, such as a `trimesh.Trimesh`. The files and the last kind are
             checked and repaired, see `surfaces.mesh_repair.clean`.
-        scale: metres per unit of the file; see `surfaces.mesh_file.read_mesh`.
+        scale: metres per unit of the source; see `surfaces.mesh_file.read_mesh`.
         side: 'outside' for a tool on the side that the faces look to, 'inside' for the other.
         position: (3,) m, origin of the mesh's frame in the root frame.
         rpy_deg: (3,) fixed-axis roll, pitch, yaw of the mesh's frame.
 
     Raises:
-        SurfaceError: the numbers make no pose, or the mesh is no surface; with the reason.
+        SurfaceError: the numbers make no pose or scale, or the mesh is no surface; with the reason.
 
     Example:
         >>> square = mesh(TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
@@ -306,11 +306,14 @@ def mesh(
 
 def _triangles(source: Any, scale: float | None) -> TriangleMesh:
     """The clean triangles of a source."""
-    from surfaces.mesh_file import read_mesh
+    from surfaces.mesh_file import metres_per_unit, read_mesh
     from surfaces.mesh_repair import clean
 
-    if isinstance(source, TriangleMesh):
-        return source if scale is None else TriangleMesh(scale * source.vertices, source.faces)
-    if hasattr(source, "vertices") and hasattr(source, "faces"):
-        return clean((1.0 if scale is None else scale) * np.asarray(source.vertices), source.faces)
-    return read_mesh(source, scale)
+    if not (hasattr(source, "vertices") and hasattr(source, "faces")):
+        return read_mesh(source, scale)
+    unit = metres_per_unit(scale, "the mesh")
+    if not isinstance(source, TriangleMesh):
+        return clean(unit * np.asarray(source.vertices), source.faces)
+    if scale is None:
+        return source
+    return TriangleMesh(unit * source.vertices, source.faces, source.history)

@@ -22,6 +22,7 @@ from surfaces.mesh_raw import RawMesh
 from surfaces.mesh_repair import clean
 from surfaces.mesh_stl import read_stl
 from surfaces.surface import SurfaceError
+from surfaces.tables import real
 from surfaces.triangles import TriangleMesh
 
 LARGEST_FILE = 512 << 20  # bytes
@@ -79,18 +80,9 @@ def read_mesh(
             file's name, the place and what would do.
     """
     name = repr(Path(os.fsdecode(path)).name[:100])
-    if scale is not None:
-        number = isinstance(scale, (int, float, np.integer, np.floating)) and not isinstance(
-            scale, bool
-        )
-        if not number or not 1e-9 <= scale <= 1e9:
-            raise SurfaceError(
-                f"scale must be a number > 0 (metres per unit of {name}), within 1e-9 .. 1e9, "
-                f"got {scale!r}"
-            )
+    unit = metres_per_unit(scale, name)
     try:
         raw = _read(path)
-        unit = 1.0 if scale is None else float(scale)
         with np.errstate(over="ignore"):  # infinite coordinates are refused next
             vertices = raw.vertices * unit
         mesh = clean(vertices, raw.faces, drop_crumbs=drop_crumbs, history=raw.notes)
@@ -99,6 +91,23 @@ def read_mesh(
         return _with_likely_unit(mesh)
     except SurfaceError as error:
         raise SurfaceError(f"{name}: {error}") from error
+
+
+def metres_per_unit(scale: float | None, name: str) -> float:
+    """The scale as a number, 1 where none is given; `name` says of what.
+
+    Raises:
+        SurfaceError: it is no number, or not within 1e-9 .. 1e9.
+    """
+    if scale is None:
+        return 1.0
+    unit = real(scale)
+    if not 1e-9 <= unit <= 1e9:
+        raise SurfaceError(
+            f"scale must be a number > 0 (metres per unit of {name}), within 1e-9 .. 1e9, "
+            f"got {scale!r}"
+        )
+    return unit
 
 
 def _read(path: str | os.PathLike[str]) -> RawMesh:
