@@ -180,7 +180,7 @@ class Region:
         from scipy.stats import qmc
 
         free = self.high > self.low
-        sampler = qmc.Sobol(int(free.sum()), scramble=True, rng=np.random.default_rng(seed))
+        sampler = qmc.Sobol(int(free.sum()), scramble=True, seed=np.random.default_rng(seed))
         unit = sampler.random_base2(max(count - 1, 0).bit_length())
         values = np.tile(self.low, (len(unit), 1))
         values[:, free] += unit * (self.high - self.low)[free]

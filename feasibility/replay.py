@@ -105,7 +105,7 @@ def tool_poses(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Tool points (k, 3) m and approach axes (k, 3) at q (k, n), by Pinocchio."""
     model, data = robot.model, robot.model.createData()
-    frame = model.getFrameId(robot.tool_frame)
+    frame = robot.tool_frame_id
     points, rotations = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
     kinematics = Kinematics(robot)
     plain = model.nq == model.nv

@@ -205,7 +205,7 @@ def _capsule(robot: Robot, joint: int) -> Mesh:
     if joint < robot.n:
         end = model.jointPlacements[joint + 1].translation
     else:
-        end = model.frames[model.getFrameId(robot.tool_frame)].placement.translation
+        end = model.frames[robot.tool_frame_id].placement.translation
     radius = 0.03 * min(robot.reach, 10.0)
     body = trimesh.creation.icosphere(subdivisions=3, radius=1.3 * radius)
     if np.linalg.norm(end) > 1e-6:
