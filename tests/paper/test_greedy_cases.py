@@ -51,7 +51,7 @@ def test_sphere_as_published() -> None:
     assert (verdict.n_covered, verdict.n_edges) == (90, 305)
     assert (verdict.statistics["calls"], verdict.statistics["capped"]) == (305, 0)
     assert verdict.statistics["starts"] == 1
-    # No branch is worth more than another to the paper, yet two of eight are cut here.
+    # No branch is worth more than another to the paper, yet two of seven are cut here.
     touched = []
     for start in branches(verdict):
         once = greedy_check(
