@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,10 +13,12 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from robots.robot import Robot
 
+ARMS = 16  # whose bounds are remembered: a search asks for them again and again
 SWEEPS = 60  # of the descent below; any number gives a bound, more a tighter one
 MOST_SLIDES = 10  # prismatic joints in a row whose 2^k end positions are looked at one by one
 
 
+@lru_cache(maxsize=ARMS)
 def reach_bound(robot: Robot) -> float:
     """Upper bound (m) on the distance of the tool point from the origin of the first joint.
 

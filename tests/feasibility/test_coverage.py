@@ -177,13 +177,13 @@ def test_the_figures_of_a_path_measured_again(name):
 
 def _singular_value(robot, q, step=1e-6):
     """The smallest of five singular values, by finite differences of the tool's place."""
-    kinematics, smallest = Kinematics(robot), np.inf
+    kinematics, reach, smallest = Kinematics(robot), robot.reach, np.inf
     for row in q:
         columns = []
         for j in range(robot.n):
             shift = step * np.eye(robot.n)[j]
             ahead, behind = kinematics.tool(row + shift), kinematics.tool(row - shift)
-            columns.append([*(ahead[0] - behind[0]) / robot.reach, *(ahead[1] - behind[1])])
+            columns.append([*(ahead[0] - behind[0]) / reach, *(ahead[1] - behind[1])])
         values = np.linalg.svd(np.array(columns).T / (2 * step), compute_uv=False)
         smallest = min(smallest, float(values[4]))
     return smallest
