@@ -25,7 +25,6 @@ LARGEST_FILE = 512 << 20  # bytes, as it lies on the disk
 LARGEST_CONTENT = 2 << 30  # bytes of all members, inflated
 LARGEST_TEXT = 64 << 20  # bytes of the JSON member, inflated
 MOST_MEMBERS = 64
-MOST_DIMENSIONS = 2
 
 Dtype = type[np.float64] | type[np.int64]
 

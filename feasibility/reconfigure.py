@@ -28,6 +28,7 @@ TURN = 2.0 * np.pi
 MOST_EXACT = 12  # patches up to which the best order is found; beyond, the nearest comes next
 AS_GOOD = 1.02  # how much larger than the least the largest move may be
 SLACK = 1e-9  # [rad] rounding in sums of turns
+LEAST_TOLD = 0.05  # [deg], [0.1 mm]: smaller moves are not named
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,16 +48,12 @@ class Reconfiguration:
         """(n,) how far each joint moves, rad or m, with its sign."""
         return self.end - self.start
 
-    def described(self, least_deg: float = 0.05) -> str:
-        """The joints that move, the furthest first: 'shoulder_pan_joint by -352.1 deg, ...'.
-
-        Args:
-            least_deg: turns smaller than this (slides: as many tenths of millimetres) are not told.
-        """
+    def described(self) -> str:
+        """The joints that move, the furthest first: 'shoulder_pan_joint by -352.1 deg, ...'."""
         shown = np.where(self.prismatic, 1e4 * self.moves, np.degrees(self.moves))
         parts = []
         for j in np.argsort(-np.abs(shown), kind="stable").tolist():
-            if abs(shown[j]) >= least_deg:
+            if abs(shown[j]) >= LEAST_TOLD:
                 value, unit = (0.1 * shown[j], "mm") if self.prismatic[j] else (shown[j], "deg")
                 parts.append(f"{self.joint_names[j]} by {value:+.1f} {unit}")
         return ", ".join(parts) or "no joint"

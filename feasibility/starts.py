@@ -26,6 +26,7 @@ CLOSE = 1e-3  # [rad], [m]: configurations nearer than this are taken as one
 STALLED = 1e-7  # [rad], [m]: a Newton step this short, away from the fibre, leads nowhere
 LONGEST_STEP = 0.5  # [rad], [m]: of one joint, per Newton step
 STRIDE = 0.2  # [rad], [m]: of one joint, per step of a self-motion
+STRIDES = 60  # at most, in one self-motion
 DRY_SEEDS = 40  # random configurations in a row that bring nothing new, before the search ends
 MOST_STARTS = 32  # windings of joints with several turns make branches without end
 
@@ -114,10 +115,10 @@ class Fibre:
         return ~(((q <= self._lower) & (pull < 0)) | ((q >= self._upper) & (pull > 0)))
 
     def toward(
-        self, q: NDArray[np.float64], goal: NDArray[np.float64], align: bool, strides: int = 60
+        self, q: NDArray[np.float64], goal: NDArray[np.float64], align: bool
     ) -> NDArray[np.float64]:
         """Follow the fibre from q (n,) straight towards `goal` (n,), until it comes no nearer."""
-        for _ in range(strides):
+        for _ in range(STRIDES):
             _, jacobian = self._rows(q, align)
             pull = goal - q
             free = self._free(q, pull)

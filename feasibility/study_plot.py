@@ -22,6 +22,7 @@ MAPS = 6  # at most
 PANELS = 4  # values of a key that is no number, each with a map of its own
 RASTER = 40  # values of a number, up to which a map has one field for each pair of values
 WRITTEN = 80  # fields of a map, up to which their shares are written into them
+MOST_TICKS = 8
 CRISP = 2_000  # dots that are drawn as such; more become a picture within the picture
 WIDTH, HEIGHT = 4.6, 3.3  # inches
 UNKNOWN = "0.85"
@@ -182,9 +183,9 @@ def _map_chart(
     return Chart(caption, _svg(figure, caption))
 
 
-def _ticks(put: Any, values: NDArray[np.float64], most: int = 8) -> None:
-    """Name at most so many of the places 0, 1, 2, ... by their values."""
-    step = -(-len(values) // most)
+def _ticks(put: Any, values: NDArray[np.float64]) -> None:
+    """Name at most `MOST_TICKS` of the places 0, 1, 2, ... by their values."""
+    step = -(-len(values) // MOST_TICKS)
     places = np.arange(0, len(values), step)
     put(places, [f"{value:.4g}" for value in values[places]])
 

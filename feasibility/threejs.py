@@ -89,16 +89,13 @@ def mesh(
     return _object(path, "Mesh", data, material)
 
 
-def segments(
-    path: str, points: ArrayLike, colour: Colour, *, opacity: float = 1.0, colours: Any = None
-) -> Command:
+def segments(path: str, points: ArrayLike, colour: Colour, *, colours: Any = None) -> Command:
     """Line segments, one pixel wide on most machines.
 
     Args:
         path: where in the scene tree.
         points: (2 k, 3) m: the ends of k segments.
         colour: of all segments, unless `colours` says otherwise.
-        opacity: 1 hides what is behind.
         colours: (2 k, 3) one colour for each point, 0 to 1.
     """
     data: dict[str, Any] = {"attributes": {"position": _positions(points)}}
@@ -106,8 +103,8 @@ def segments(
         "type": "LineBasicMaterial",
         "color": 0xFFFFFF if colours is not None else hex_colour(colour),
         "vertexColors": 2 if colours is not None else 0,
-        "opacity": opacity,
-        "transparent": opacity < 1.0,
+        "opacity": 1.0,
+        "transparent": False,
     }
     if colours is not None:
         data["attributes"]["color"] = _array(np.asarray(colours), 3, "float32")

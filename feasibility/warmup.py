@@ -1,4 +1,4 @@
-"""A word to whoever waits while kernels are compiled for the first time."""
+"""Kernels loaded ahead of the work, and a word to whoever waits while they are compiled."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ def notify(notice: str = NOTICE) -> None:
 
 
 @contextmanager
-def slow_notice(patience: float = PATIENCE, notice: str = WAITING) -> Iterator[None]:
-    """Say something on stderr if the block takes longer than `patience` seconds."""
-    timer = threading.Timer(patience, notify, [notice])
+def slow_notice() -> Iterator[None]:
+    """Say something on stderr if the block takes longer than `PATIENCE` seconds."""
+    timer = threading.Timer(PATIENCE, notify, [WAITING])
     timer.daemon = True
     timer.start()
     try:

@@ -16,6 +16,8 @@ from robots.robot import Robot, RobotError
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf, JointInfo
 
+MOST_NAMES = 40  # that a message lists
+
 
 def robot_from_urdf(
     checked: CheckedUrdf,
@@ -98,15 +100,15 @@ def _tool_frame(checked: CheckedUrdf, name: str, asked: str | None) -> str:
     return asked
 
 
-def suggestion(asked: str, known: Sequence[str], limit: int = 40) -> str:
+def suggestion(asked: str, known: Sequence[str]) -> str:
     """Names that come close to `asked`, or the known ones if none does."""
     import difflib
 
     close = difflib.get_close_matches(asked, known, n=5, cutoff=0.5)
     if close:
         return f"did you mean {' or '.join(repr(match) for match in close)}?"
-    shown = ", ".join(list(known)[:limit])
-    return f"it has: {shown}" + (", ..." if len(known) > limit else "")
+    shown = ", ".join(list(known)[:MOST_NAMES])
+    return f"it has: {shown}" + (", ..." if len(known) > MOST_NAMES else "")
 
 
 def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> None:

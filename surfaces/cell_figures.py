@@ -125,13 +125,13 @@ def figures(
     )
 
 
-def coarse(figures: Figures, most_turn_deg: float = MOST_TURN_DEG) -> str:
+def coarse(figures: Figures) -> str:
     """Say which share of the cells is too large for the curvature, and what would do; or "".
 
-    A cell is too large where a normal in it leans more than `most_turn_deg` from its mean. Smaller
+    A cell is too large where a normal in it leans more than `MOST_TURN_DEG` from its mean. Smaller
     cells mend that, unless the surface has a crease.
     """
-    most = math.radians(most_turn_deg)
+    most = math.radians(MOST_TURN_DEG)
     count = len(figures.areas)
     creased = figures.crease > most
     curved = (figures.flatness > most) & ~creased
@@ -144,7 +144,7 @@ def coarse(figures: Figures, most_turn_deg: float = MOST_TURN_DEG) -> str:
         parts.append(
             f"{_share(curved)} too large for the curvature: the normal leans up to "
             f"{math.degrees(worst):.0f} degrees from the cell's mean, more than "
-            f"{most_turn_deg:g}; about {_round_up(count * ratio**2):,} cells "
+            f"{MOST_TURN_DEG:g}; about {_round_up(count * ratio**2):,} cells "
             f"(size = {size / ratio:.2g} m) would do"
         )
     if creased.any():

@@ -178,11 +178,6 @@ class PieceCells(Cells):
             turns=(np.inf, np.inf),
         )
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What a user should know about the surface; one sentence each."""
-        return self.surface.notes
-
     def __repr__(self) -> str:
         """One line."""
         grids = " + ".join(f"{nu} x {nv}" for nu, nv in self.counts)
