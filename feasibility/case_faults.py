@@ -10,8 +10,13 @@ from typing import Any, NamedTuple
 MOST_SHOWN = 50  # faults in one message
 MOST_GUESSES = 20  # unknown keys for which a known one is looked up
 LARGEST_WHOLE = 2**63 - 1
+DEG = "degrees"
+METRES = "metres"
 
 Pair = tuple[float, float]
+Triple = tuple[float, float, float]
+
+ORIGIN: Triple = (0.0, 0.0, 0.0)
 
 
 class Fault(NamedTuple):

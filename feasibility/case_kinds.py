@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
-from feasibility.case_faults import Section, alternatives, close, shown
+from feasibility.case_faults import DEG, METRES, alternatives
 from feasibility.case_mesh import MESH_KEYS
-from feasibility.case_patches import DEG, METRES, PATCHES, patch_keys
+from feasibility.case_patches import PATCHES, patch_keys
 
 PIECES_KEYS = ("pieces", "gap")
 OWN_KEYS: Mapping[str, tuple[str, ...]] = {
@@ -16,21 +16,6 @@ OWN_KEYS: Mapping[str, tuple[str, ...]] = {
 }
 CHARTED = ("sphere", "cylinder", "hyperboloid", "plane")
 """The kinds that the greedy search knows."""
-
-
-def read_kind(section: Section, kinds: Iterable[str]) -> str | None:
-    """The kind, if it is one of some."""
-    options = tuple(kinds)
-    expected = alternatives([f'"{kind}"' for kind in options])
-    if not section.wants("kind", expected, required=True):
-        return None
-    kind = section.table["kind"]
-    if not isinstance(kind, str) or kind not in options:
-        guess = close(kind, options)
-        hint = f"; did you mean {guess}?" if guess else ""
-        section.fault("kind", f"must be {expected}, got {shown(kind)}{hint}")
-        return None
-    return kind
 
 
 def foreign_keys(kind: str) -> dict[str, str]:

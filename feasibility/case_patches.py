@@ -8,14 +8,12 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from feasibility.case_faults import BuildError, Fault, Pair, Section, shown
+from feasibility.case_faults import DEG, METRES, BuildError, Fault, Pair, Section, shown
 from feasibility.files import shown_path
 
 if TYPE_CHECKING:
     from surfaces import Patch
 
-DEG = "degrees"
-METRES = "metres"
 MOST_CELLS = 1_000_000  # the graph of a verdict takes some kilobytes a cell
 STEEPEST = 1e6  # of a cone
 MOST_NUMBERS = 120_000  # in one table of numbers

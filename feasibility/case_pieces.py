@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from feasibility.case_faults import BuildError, Fault, Section
-from feasibility.case_kinds import OWN_KEYS, foreign_keys, read_kind
+from feasibility.case_faults import ORIGIN, BuildError, Fault, Section, Triple
+from feasibility.case_kinds import OWN_KEYS, foreign_keys
 from feasibility.case_patches import MOST_CELLS, PATCHES, build_patch, read_grid, read_patch
 
 if TYPE_CHECKING:
@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from surfaces.piece_cells import PieceCells
     from surfaces.piecewise import Piecewise
 
-Triple = tuple[float, float, float]
-
-ORIGIN: Triple = (0.0, 0.0, 0.0)
 MOST_PIECES = 200  # as `surfaces.piecewise` has it
 
 
@@ -117,7 +114,7 @@ def _piece(whole: Section, k: int, entry: Any) -> PiecePart | None:
     place = f"{whole.name}.pieces[{k}]"
     section = Section(place, entry, whole.faults)
     before = len(whole.faults)
-    kind = read_kind(section, PATCHES)
+    kind = section.choice("kind", tuple(PATCHES), required=True)
     position = section.numbers("position", 3, "three finite numbers (metres)")
     rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
     if kind is None:  # which other keys belong here is not known

@@ -8,15 +8,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any, cast
 
-from feasibility.case_faults import Fault, Pair, Section, is_number, is_text, printable, shown
+from feasibility.case_faults import (
+    DEG,
+    METRES,
+    Fault,
+    Pair,
+    Section,
+    Triple,
+    is_number,
+    is_text,
+    printable,
+    shown,
+)
 
 if TYPE_CHECKING:
     from robots import Robot
 
-Triple = tuple[float, float, float]
-
-DEG = "degrees"
-METRES = "metres"
 URDF_ENDINGS = (".urdf", ".xml", ".xacro")
 
 

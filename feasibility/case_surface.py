@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from feasibility.case_faults import BuildError, Fault, Section
-from feasibility.case_kinds import OWN_KEYS, foreign_keys, read_kind
+from feasibility.case_faults import ORIGIN, BuildError, Fault, Section, Triple
+from feasibility.case_kinds import OWN_KEYS, foreign_keys
 from feasibility.case_mesh import build_mesh, cut_mesh, read_count, read_mesh_keys
 from feasibility.case_patches import PATCHES, build_patch, read_grid, read_patch
 from feasibility.case_pieces import PiecePart, build_pieces, cut_pieces, read_pieces
@@ -17,10 +17,6 @@ if TYPE_CHECKING:
     from surfaces import Cells, Patch, Surface
     from surfaces.mesh import MeshSurface
     from surfaces.piecewise import Piecewise
-
-Triple = tuple[float, float, float]
-
-ORIGIN: Triple = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +92,7 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
     """
     section = Section("surface", table, faults)
     before = len(faults)
-    kind = read_kind(section, OWN_KEYS)
+    kind = section.choice("kind", tuple(OWN_KEYS), required=True)
     side = section.choice("side", ("inside", "outside"))
     position = section.numbers("position", 3, "three finite numbers (metres)")
     rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
@@ -111,8 +107,8 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
         values=values,
         cells=cells,
         side=cast(Literal["inside", "outside"], side or "inside"),
-        position=cast("tuple[float, float, float]", position or ORIGIN),
-        rpy_deg=cast("tuple[float, float, float]", rpy_deg or ORIGIN),
+        position=cast("Triple", position or ORIGIN),
+        rpy_deg=cast("Triple", rpy_deg or ORIGIN),
     )
     if kind in PATCHES and "file" not in values:
         faults += faults_of_building(part)
