@@ -1,11 +1,11 @@
 """The independent replay: what must accept a motion before the word "feasible" is said.
 
-It shares no code with the search. It knows Pinocchio's frame placements and joint Jacobians, the
-courses between cell centres, which it compares with the surface's own nearest points and normals
-(`feasibility.following`), and the bound between samples; it sees only the walk, not how it was
-found. The bound is derived in `feasibility.segment`; here it is evaluated again from Pinocchio's
-Jacobian: the column of joint j moved to the tool point has the length r_j (the lever arm), and the
-length of its turn of the axis is s_j.
+It shares no code with the search but the courses between cell centres, and compares these with the
+surface's own nearest points and normals (`feasibility.following`). Besides, it knows Pinocchio's
+frame placements and joint Jacobians, and the bound between samples; it sees only the walk, not how
+it was found. The bound is derived in `feasibility.segment`; here it is evaluated again from
+Pinocchio's Jacobian: the column of joint j moved to the tool point has the length r_j (the lever
+arm), and the length of its turn of the axis is s_j.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""A division as one JSON object, as text for people, and the command that makes it."""
+"""A division as one JSON object, and as text for people."""
 
 from __future__ import annotations
 

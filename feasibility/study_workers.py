@@ -69,8 +69,7 @@ def open_workers(
             one process does it while the others wait, and a line on stderr says so.
 
     Raises:
-        WorkersError: there is no such scheduler, or both are given.
-        ValueError: the count is negative.
+        WorkersError: there is no such scheduler, both are given, or the count is negative.
 
     Example:
         >>> with open_workers(0) as workers:
