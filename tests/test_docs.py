@@ -62,7 +62,9 @@ def test_commands_of_the_readme_run(
         if arguments[0] == "show":  # without it, a browser window
             arguments += ["--html", "shown.html"]
         if arguments[0] == "place":  # fewer, to save time
-            arguments += ["--count", "8"]
+            arguments += ["--count", "4"]
+        if arguments[:2] == ["place", "case.toml"]:
+            arguments += ["--set", "surface.cells=[3, 4]"]
         expected = 1 if arguments[1:2] == ["paper/4d"] else 0
         assert main(arguments) == expected, arguments
         assert "usage" not in capsys.readouterr().err

@@ -400,7 +400,7 @@ standoff = 0.02
 cone_deg = 30
 [vary]
 robots = ["ur5", "panda"]
-"surface.position" = { x = [0.45, 0.8, 2.0], y = 0, z = 0.2 }
+"surface.position" = { x = [0.45, 0.6, 2.0], y = 0, z = 0.2 }
 "surface.rpy_deg".yaw = [0, 45]
 """
 
