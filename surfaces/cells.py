@@ -85,9 +85,13 @@ class Cells(ABC):
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
 
     @property
-    @abstractmethod
     def middle(self) -> int:
-        """A cell near the middle of the surface, where a search may begin."""
+        """A cell near the middle of the surface, where a search may begin.
+
+        Here the one whose centre is nearest to the mean of all, by area.
+        """
+        mean = np.average(self.centres, axis=0, weights=self.areas)
+        return int(np.argmin(np.linalg.norm(self.centres - mean, axis=1)))
 
     @cached_property
     def pairs(self) -> NDArray[np.int64]:

@@ -82,10 +82,7 @@ class GridCells(Cells):
             SurfaceError: the patch is of a kind that its compiled loops do not know.
         """
         if not isinstance(self.surface, ChartedPatch):
-            raise SurfaceError(
-                f"the greedy search works on {CHARTED} only, not on a {self.surface.kind}; use "
-                'search.method = "complete"'
-            )
+            raise _uncharted(self.surface.kind)
         return self.surface
 
     @cached_property
@@ -220,13 +217,17 @@ def charted_grid(cells: Cells) -> GridCells:
     Raises:
         SurfaceError: they are no grid on a patch that its compiled loops know.
     """
-    if not isinstance(cells, GridCells):
-        raise SurfaceError(
-            f"the greedy search works on {CHARTED} only, not on a {cells.surface.kind}; use "
-            'search.method = "complete"'
-        )
-    cells.charted  # noqa: B018 - asks
+    if not isinstance(cells, GridCells) or not isinstance(cells.surface, ChartedPatch):
+        raise _uncharted(cells.surface.kind)
     return cells
+
+
+def _uncharted(kind: str) -> SurfaceError:
+    """What to say of a surface that the greedy search does not know."""
+    return SurfaceError(
+        f"the greedy search works on {CHARTED} only, not on a {kind}; use "
+        'search.method = "complete"'
+    )
 
 
 def _bin(values: NDArray[np.float64], limits: tuple[float, float], count: int) -> NDArray[np.int64]:

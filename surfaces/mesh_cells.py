@@ -94,12 +94,6 @@ class MeshCells(Cells):
         return self.figures.borders.lengths
 
     @cached_property
-    def middle(self) -> int:
-        """The cell whose centre is nearest to the mean of all, by area."""
-        mean = np.average(self.centres, axis=0, weights=self.areas)
-        return int(np.argmin(np.linalg.norm(self.centres - mean, axis=1)))
-
-    @cached_property
     def members(self) -> tuple[Ints, Ints]:
         """Faces cell by cell (F,), and where each cell's begin (N + 1,)."""
         order = np.argsort(self.labels, kind="stable")

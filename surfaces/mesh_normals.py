@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.triangles import TriangleMesh
+from surfaces.triangles import TriangleMesh, components, corner_angles
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -112,28 +112,14 @@ def sectors(mesh: TriangleMesh) -> Ints:
     smooth = ~sharp_edges(mesh)
     if smooth.all():
         return mesh.faces  # one fan of faces at each vertex
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     faces, ends = mesh.edges.faces[smooth], mesh.edges.vertices[smooth]
     joined = [
         3 * faces[:, side] + (mesh.faces[faces[:, side]] == ends[:, [end]]).argmax(axis=1)
         for end in range(2)
         for side in range(2)
     ]
-    rows, columns = np.concatenate(joined[::2]), np.concatenate(joined[1::2])
-    count = mesh.faces.size
-    graph = coo_array((np.ones(len(rows), dtype=bool), (rows, columns)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64).reshape(-1, 3)
-
-
-def corner_angles(vertices: Floats, faces: Ints) -> Floats:
-    """(F, 3) rad."""
-    corners = vertices[faces]
-    ahead = np.roll(corners, -1, axis=1) - corners
-    behind = np.roll(corners, 1, axis=1) - corners
-    cross = np.linalg.norm(np.cross(ahead, behind), axis=2)
-    return np.arctan2(cross, np.einsum("fki,fki->fk", ahead, behind))
+    pairs = np.column_stack([np.concatenate(joined[::2]), np.concatenate(joined[1::2])])
+    return components(pairs, mesh.faces.size).reshape(-1, 3)
 
 
 def unit(vectors: NDArray[Any]) -> Floats:

@@ -92,12 +92,6 @@ class PieceCells(Cells):
             array.flags.writeable = False
         return Neighbours(indptr, indices)
 
-    @cached_property
-    def middle(self) -> int:
-        """The cell whose centre is nearest to the mean of all, by area."""
-        mean = np.average(self.centres, axis=0, weights=self.areas)
-        return int(np.argmin(np.linalg.norm(self.centres - mean, axis=1)))
-
     def around(self, a: int, b: int) -> tuple[int, ...]:
         """Two pieces, and all others that have a seam with both; of one piece, itself alone."""
         if a == b:

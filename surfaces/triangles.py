@@ -216,13 +216,18 @@ def _edges(vertices: Floats, faces: Ints) -> Edges:
     return edges
 
 
+def corner_angles(vertices: Floats, faces: Ints) -> Floats:
+    """(F, 3) rad, of each face at its corners."""
+    corners = vertices[faces]
+    ahead = np.roll(corners, -1, axis=1) - corners
+    behind = np.roll(corners, 1, axis=1) - corners
+    cross = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    return np.arctan2(cross, np.einsum("fki,fki->fk", ahead, behind))
+
+
 def _vertex_normals(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
     """Unit normals at the vertices, each face weighted by its angle there."""
-    corners = vertices[faces]
-    towards_next = np.roll(corners, -1, axis=1) - corners
-    towards_last = np.roll(corners, 1, axis=1) - corners
-    cross = np.linalg.norm(np.cross(towards_next, towards_last), axis=2)
-    angles = np.arctan2(cross, np.einsum("fki,fki->fk", towards_next, towards_last))
+    angles = corner_angles(vertices, faces)
     sums = np.column_stack(
         [
             np.bincount(faces.ravel(), (angles * normals[:, axis, None]).ravel(), len(vertices))
