@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.target_courses import TargetCourses, target_courses
+from feasibility.target_courses import TargetCourses, beside_facets, target_courses
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from feasibility.verdict import Walk
 from surfaces import Cells
@@ -25,7 +25,6 @@ SETTLED = 1e-7  # [1] of a course: a step so small is the last
 BLOCK = 4096  # waypoints at once, to bound the memory
 LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
 MOST_LOOKS = 400  # times that many places on a course over a mesh
-CLEAR = 1.0  # [1] times the tolerance by which a target may be nearer to a mesh than the standoff
 ARRIVED = 0.02  # [1] share of the tolerance: a tool point so near to a centre is at it
 STAYS = -1  # in place of a course
 
@@ -74,14 +73,14 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         k = int(np.flatnonzero(course < STAYS)[0])
         names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
         return _faulty(nothing, f"the motion goes from cell {names}, which do not touch")
-    ways = target_courses(cells, task.standoff)
+    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    ways = target_courses(cells, task.standoff, tolerance)
 
     # Each segment, and each waypoint between marks, belongs to one stretch from mark to mark.
     stretch = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
     backwards = (start > end)[stretch]
     inner = np.flatnonzero(walk.cell < 0)
     along = inner[course[stretch[inner]] != STAYS]
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     places, arrived = np.zeros(m), walk.cell >= 0
     places[along], arrived[along] = _places(
         ways, course[stretch[along]], points[along], ARRIVED * tolerance
@@ -239,29 +238,32 @@ def _strays(
 
     The surface itself is asked for its nearest points, at places that the fit of the courses did
     not look at; what the courses say of themselves counts where it is more. On a mesh the places
-    are half a tolerance apart, and the targets are looked at too: a thorn beside the course, or
-    another part of the mesh, may be nearer to them than the standoff.
+    are half a tolerance apart, and the targets are compared with the triangles themselves too,
+    which may be nearer to them than the standoff: a thorn beside the course, another part of the
+    mesh, or facets that are not square to the interpolated normal.
     """
     courses, surface = cells.courses, cells.surface
     owner, t = _looks(cells, used, 0.5 * tolerance)
     foot, normal = courses.at(used[owner], t)
-    found = surface.closest(foot)
+    feet = surface.closest(foot)
     strays = courses.strays[used].copy()
-    np.maximum.at(strays[:, 0], owner, np.abs(found.height))
-    np.maximum.at(strays[:, 1], owner, np.linalg.norm(normal - found.normal, axis=1))
+    np.maximum.at(strays[:, 0], owner, np.abs(feet.height))
+    np.maximum.at(strays[:, 1], owner, np.linalg.norm(normal - feet.normal, axis=1))
     if not np.isfinite(strays).all():
         return strays, "a course between two cells is not known"
-    if not found.inside.all():
+    if not feet.inside.all():
         return strays, "a course between two cells leaves the surface"
     strays[:, 0] += standoff * strays[:, 1]
-    if surface.grain > 0.0 and standoff > 0.0:
-        away = np.abs(surface.closest(foot + surface.side_sign * standoff * normal).height)
-        nearer = standoff - away - strays[owner, 0]
-        if not nearer.max(initial=0.0) <= CLEAR * tolerance:
+    if surface.grain > 0.0:
+        found = beside_facets(cells, standoff, tolerance, used[owner], t)
+        np.maximum.at(strays[:, 0], owner, found.off)
+        np.maximum.at(strays[:, 1], owner, found.leans)
+        if not found.off.max(initial=0.0) <= tolerance:
+            away = found.away.min()
             return strays, (
-                f"on its way the tool point would come within {1e3 * away.min():.3g} mm of the "
+                f"on its way the tool point would come within {1e3 * away:.3g} mm of the "
                 f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something stands out "
-                "of it there"
+                "of it there, or its facets are too coarse for this standoff"
             )
     return strays, ""
 

@@ -69,7 +69,7 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
     """Gather arm, cells and task for the compiled search."""
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
     targets = task.targets(cells)
-    ways = target_courses(cells, task.standoff)
+    ways = target_courses(cells, task.standoff, tolerance)
     chain = Chain.checked(robot)
     rim = np.inf if task.cone_deg >= 180.0 else float(2.0 * np.sin(0.5 * task.cone))
     strays = ways.strays[:, 1]

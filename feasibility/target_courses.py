@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from surfaces import Cells
+from surfaces.mesh import MeshSurface
 
 TELLING = 0.1  # [1] a course whose normal strays no further knows how the surface bends
 ASIDE = 1.1  # [1] the normal may turn that much faster between the places looked at
+FEW, MANY = 3, 32  # places on a course over a mesh; and on one over a crease, or off its facets by
+OFF = 0.05  # [1] of the tolerance
 
 
 class TargetCourses(NamedTuple):
@@ -48,11 +51,77 @@ def folded_courses(cells: Cells, height: float) -> NDArray[np.bool_]:
     return np.asarray(folded | cell[cells.pairs].any(axis=1))
 
 
-@lru_cache(
-    maxsize=2
-)  # search and replay ask for the same; cells are values, told apart by identity
-def target_courses(cells: Cells, standoff: float) -> TargetCourses:
-    """Offset the courses of `cells` to the tool's side by `standoff` (m)."""
+def _see_facets(
+    cells: Cells, standoff: float, tolerance: float, strays: NDArray[np.float64]
+) -> None:
+    """Bring the strays (M, 2) of courses over a mesh up to what its triangles say."""
+    some = np.arange(len(strays))
+    for count in (FEW, MANY):
+        t = (np.arange(count) + 0.5) / count
+        found = beside_facets(
+            cells, standoff, tolerance, np.repeat(some, count), np.tile(t, len(some))
+        )
+        off = found.off.reshape(-1, count).max(axis=1)
+        leans = found.leans.reshape(-1, count).max(axis=1)
+        strays[some] = np.maximum(strays[some], np.column_stack([off, leans]))
+        some = some[(off > OFF * tolerance) | (leans > 0.0) | cells.courses.creased[some]]
+
+
+class BesideFacets(NamedTuple):
+    """What the triangles of a mesh themselves say of k places on courses."""
+
+    off: NDArray[np.float64]
+    """(k,) m, by how much the target's distance from them is not the standoff."""
+    leans: NDArray[np.float64]
+    """(k,) |n - m| of the course's normal n and the direction m from the mesh to the target; on
+    the strips along creases only, elsewhere normals are interpolated."""
+    away: NDArray[np.float64]
+    """(k,) m, the target's distance from them."""
+
+
+def beside_facets(
+    cells: Cells,
+    standoff: float,
+    tolerance: float,
+    courses: NDArray[np.int64],
+    t: NDArray[np.float64],
+) -> BesideFacets:
+    """Compare targets with the triangles of a mesh, without any interpolation.
+
+    On the strip along a crease, and where normals are interpolated, the targets are nearer to the
+    mesh than the standoff. So they are where something stands out of it. Nearer to a crease than
+    the tolerance leaves over the standoff, the normal is any of those that meet there.
+
+    Args:
+        cells: of a mesh.
+        standoff: m.
+        tolerance: m, of the tool point.
+        courses: (k,) which courses.
+        t: (k,) places on them.
+    """
+    surface = cells.surface
+    if not isinstance(surface, MeshSurface):
+        raise TypeError("the cells are not of a mesh")
+    foot, normal = cells.courses.at(courses, t)
+    leans = np.zeros(len(t))
+    away, direction = surface.beside(foot + surface.side_sign * standoff * normal)
+    off = np.abs(standoff - away) if standoff > 0.0 else leans
+    strip = surface.from_crease(foot)
+    some = np.isfinite(strip) & (strip >= tolerance - standoff)
+    leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
+    return BesideFacets(off, leans, away)
+
+
+# Search and replay ask for the same; cells are values, told apart by identity.
+@lru_cache(maxsize=4)
+def target_courses(cells: Cells, standoff: float, tolerance: float) -> TargetCourses:
+    """Offset the courses of `cells` to the tool's side by `standoff` (m).
+
+    Args:
+        cells: the cells.
+        standoff: m.
+        tolerance: m, of the tool point.
+    """
     courses, sign = cells.courses, cells.surface.side_sign
     height = sign * standoff
     folded = folded_courses(cells, height)
@@ -64,6 +133,10 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
     bends[np.repeat(folded, np.diff(courses.first))] = np.inf
     # To the side of a course the normal may turn faster than along it.
     sharpness = cells.surface.sharpness(cells, height)
+    if standoff > 0.0 and isinstance(cells.surface, MeshSurface):
+        # Over an edge it turns as over a ball of the standoff.
+        edge = np.where(cells.surface.creased_cells(cells), 1.0 / max(standoff, tolerance), 0.0)
+        sharpness = np.maximum(sharpness, edge)
     across = sharpness[cells.pairs].max(axis=1)
     turning = np.maximum(courses.turning(height), np.repeat(across, np.diff(courses.first)))
     turning *= ASIDE
@@ -73,6 +146,8 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
         standing = ASIDE * sharpness[np.isfinite(sharpness)].max(initial=0.0)
     strays = courses.strays.copy()
     strays[:, 0] += standoff * strays[:, 1]
+    if cells.surface.grain > 0.0:
+        _see_facets(cells, standoff, tolerance, strays)
     for array in (cubics, bends, turning, strays, folded):
         array.flags.writeable = False
     return TargetCourses(
@@ -89,7 +164,7 @@ def target_courses(cells: Cells, standoff: float) -> TargetCourses:
 def closed_courses(cells: Cells, task: Task) -> str:
     """Why no motion can be certified between some neighbouring cells; empty where it can."""
     tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
-    ways = target_courses(cells, task.standoff)
+    ways = target_courses(cells, task.standoff, tolerance)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
     courses = cells.courses
     smooth = ~courses.creased & (courses.strays[:, 1] <= TELLING)

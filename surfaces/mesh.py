@@ -24,6 +24,7 @@ Ints = NDArray[np.int64]
 
 _ORIGIN = (0.0, 0.0, 0.0)
 JUMP = 3.0  # times as far as the line goes: then nearest places jump
+ON = 1e-9  # [1] of the mean edge: so near to a face is on it
 FIRST_CANDIDATES = 8  # faces looked at for each point before it is known that they are enough
 
 
@@ -83,6 +84,50 @@ class MeshSurface(Surface):
             normal=self.normals_at(face, weights).reshape(*shape, 3),
             inside=np.ones(shape, dtype=bool),
         )
+
+    def beside(self, points: Array) -> tuple[Array, Array]:
+        """Distances (k,) m of points (k, 3) m from the triangles, and outward directions (k, 3).
+
+        These are unit vectors along the lines from the nearest places to the points, without any
+        interpolation: over an edge the direction to the edge; on a face the face's own normal.
+        """
+        local = (points - self.position) @ self.rotation
+        face, weights = self._nearest(local)
+        off = local - np.einsum("kc,kci->ki", weights, self._balls[0][face])
+        distance = np.linalg.norm(off, axis=1)
+        flat = self.mesh.face_normals[face]
+        outer = np.where(np.einsum("ki,ki->k", off, flat) >= 0.0, 1.0, -1.0)
+        on = distance <= ON * self.grain
+        direction = off * (outer / np.where(on, 1.0, distance))[:, None]
+        return distance, np.where(on[:, None], flat, direction) @ self.rotation.T
+
+    def from_crease(self, points: Array) -> Array:
+        """(k,) m, how far off a crease the nearest places of points (k, 3) m are, at most.
+
+        Only on the strips where the normal turns; inf elsewhere.
+        """
+        away = np.full(len(points), np.inf)
+        if not self._rims.any():
+            return away
+        face, weights = self._nearest((points - self.position) @ self.rotation)
+        some = np.flatnonzero(self.rim_share(face, weights) > 0.0)
+        corners, rims = self._balls[0][face[some]], self._rims[face[some]]
+        parts = weights[some] * rims
+        near = np.einsum("kc,kci->ki", parts / parts.sum(axis=1, keepdims=True), corners)
+        off = np.linalg.norm(np.einsum("kc,kci->ki", weights[some], corners) - near, axis=1)
+        # A face with three corners on creases may have none of its edges on one.
+        away[some] = np.where(rims.all(axis=1), 2.0 * self._balls[2][face[some]], off)
+        return away
+
+    def creased_cells(self, cells: Cells) -> NDArray[np.bool_]:
+        """(N,) which of the cells have such a strip."""
+        from surfaces.mesh_cells import MeshCells
+
+        if not isinstance(cells, MeshCells):
+            raise TypeError("the cells are not of a mesh")
+        creased = np.zeros(len(cells), dtype=bool)
+        creased[cells.labels[self._rims.any(axis=1)]] = True
+        return creased
 
     def faces_below(self, points: ArrayLike) -> Ints:
         """(k,) the face nearest to each of `points` (k, 3) m."""

@@ -1,0 +1,42 @@
+"""Motions over meshes that a hunt found to be nearer to the triangles than they may be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dense_replay import tools
+from test_creases import PER_SEGMENT, nearest, roof
+
+from feasibility import Task, check
+from robots import load_robot
+from surfaces.mesh import mesh
+
+CASES = {
+    "sharp, near": (roof(120), Task(0.02, 45, 3e-4), 20),
+    "sharp, far": (roof(120), Task(0.05, 45, 3e-4), 20),
+    "right": (roof(90), Task(0.05, 45, 3e-4), 20),
+    "blunt": (roof(45), Task(0.02, 20, 3e-4), 12),
+    "smooth": (roof(25), Task(0.03, 30, 1e-3), 12),
+    "hollow": (roof(-20), Task(0.03, 30, 1e-3), 12),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) -> None:
+    """By the exact distance, and over a sharp edge by the direction to it too."""
+    part, task, count = CASES[name]
+    surface = mesh(part, position=(0.5, -0.15, 0.3))
+    verdict = check(load_robot("ur5"), surface.cells(count), task)
+    assert verdict.feasible
+    assert verdict.witness is not None
+    assert verdict.certificate is not None
+    walk, certificate = verdict.witness, verdict.certificate
+    share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
+    q = walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share
+    tips, axes = tools(verdict.robot, np.concatenate([q.reshape(-1, 6), walk.q[-1:]]))
+    foot = nearest(part.vertices[part.faces] + surface.position, tips)
+    away = np.linalg.norm(tips - foot, axis=1)
+    assert np.abs(away - task.standoff).max() <= certificate.max_position_error
+    if name not in ("smooth", "hollow"):  # where normals are interpolated
+        cosine = ((foot - tips) * axes).sum(axis=1) / away
+        assert np.arccos(np.clip(cosine, -1, 1)).max() <= certificate.max_angle + 1e-9
