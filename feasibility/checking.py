@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from feasibility.search import Search
+from feasibility.search import Progress, Search
 from feasibility.target_courses import closed_courses
 from feasibility.task import DEFAULT_TOLERANCE, Task
 from feasibility.verdict import Answer, Evidence, Verdict, Walk, deferred
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from feasibility.certificate import Replay
-    from feasibility.complete import Explorer, Progress
+    from feasibility.complete import Explorer
 
 
 NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them

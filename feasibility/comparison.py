@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from feasibility.case import Case
 from feasibility.case_edits import as_read
 from feasibility.case_faults import CaseError, Fault
-from feasibility.study import Progress, StudyTask, run_tasks
+from feasibility.quantities import LEAST_CONE_DEG
+from feasibility.search import Progress
+from feasibility.study import StudyTask, run_tasks
 from feasibility.study_outcome import arm_of, cut_of, finite, outcome_of
 from feasibility.toml_text import toml_document
 
@@ -23,7 +25,6 @@ if TYPE_CHECKING:
 
 MOST_DIVIDED = 400  # cells of a surface that is divided: a division takes several verdicts
 CONE_STEP_DEG = 0.5  # resolution of the critical cone
-LEAST_CONE_DEG = 3.0  # narrower ones take many times the waypoints
 
 Tables = dict[str, Any]
 

@@ -9,7 +9,8 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from feasibility.comparison import LEAST_CONE_DEG, Arm, Comparison
+from feasibility.comparison import Arm, Comparison
+from feasibility.quantities import LEAST_CONE_DEG
 from feasibility.version import version
 
 Column = tuple[str, Callable[[Arm], str]]

@@ -19,12 +19,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.explorer import BUDGET, Explorer, OutOfTime, Progress
+from feasibility.explorer import Explorer, OutOfTime
 from feasibility.fibre import roomy
-from feasibility.growth import close_pairs
 from feasibility.problem import problem_of
 from feasibility.proof import Boxes, Ruling, root_box
-from feasibility.roadmap import DONE, EDGES, FULL, NODES, grown, joined_pairs, root_of
+from feasibility.roadmap import EDGES, NODES, root_of
 
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
@@ -164,18 +163,7 @@ def close(explorer: Explorer) -> None:
     """
     if explorer.roadmap.counters[NODES] == 0:
         return
-    pairs = explorer.cells.pairs
-    joined_pairs(explorer.roadmap, pairs, explorer.best, explorer.pairs)
-    while True:
-        status = close_pairs(
-            explorer.problem, explorer.work, explorer.roadmap, pairs, explorer.pairs,
-            explorer.best, BUDGET,
-        )  # fmt: skip
-        if status == DONE:
-            return
-        if status == FULL:
-            explorer.roadmap = grown(explorer.roadmap)
-        explorer.tick("joining neighbouring cells")
+    explorer.join(explorer.pairs, explorer.best)
 
 
 def pair_edges(explorer: Explorer) -> dict[tuple[int, int], int]:
@@ -190,4 +178,4 @@ def pair_edges(explorer: Explorer) -> dict[tuple[int, int], int]:
     return edges
 
 
-__all__ = ["Explorer", "OutOfTime", "Progress", "close", "explore", "pair_edges", "problem_of"]
+__all__ = ["Explorer", "OutOfTime", "close", "explore", "pair_edges", "problem_of"]

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.division import Division, Plan
-from feasibility.search import Search
+from feasibility.search import Progress, Search
 from feasibility.task import Task
 from feasibility.verdict import Cause
 from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    from feasibility.complete import Explorer, Progress
+    from feasibility.complete import Explorer
 
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from feasibility.checking import check
 from feasibility.quantities import Quantity, Setup, quantities
-from feasibility.search import Search
+from feasibility.search import Progress, Search
 from feasibility.task import Task
 from feasibility.thresholds import Finding, Threshold
 from feasibility.verdict import Verdict
@@ -33,7 +33,6 @@ POSTURES = 6  # of these, as far apart as can be
 PATIENCE = 20.0  # times the time limit of the verdict
 
 AS_IS = "asking about the case as it stands"
-Progress = Callable[[int, int | None, str], None]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

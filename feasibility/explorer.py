@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.growth import seed_cell, spread_out, stir
+from feasibility.growth import close_pairs, seed_cell, spread_out, stir
 from feasibility.meeting import NARROWEST, WIDEST, meet, nearest_pairs
 from feasibility.problem import Problem, Work, work_for
 from feasibility.proof import Boxes, Ruling, rule
@@ -25,8 +24,10 @@ from feasibility.roadmap import (
     Roadmap,
     empty_roadmap,
     grown,
+    joined_pairs,
     root_of,
 )
+from feasibility.search import Progress
 from robots import Robot
 from surfaces import Cells
 
@@ -34,8 +35,6 @@ BUDGET = 8_000  # evaluations of the arm between two looks at the clock
 GUESSES = 4  # of one stir
 MEETINGS = 6  # pairs of nodes that one round tries to join between two centres
 PATIENCE = 60  # failed connections of two components that stirring allows
-
-Progress = Callable[[int, int | None, str], None]
 
 
 class OutOfTime(Exception):
@@ -211,6 +210,31 @@ class Explorer:
         entries = slice(self.indptr[cell], self.indptr[cell + 1])
         return int(self.links[entries][self.indices[entries] == other][0])
 
+    def join(self, state: NDArray[np.int64], component: int) -> None:
+        """Look for a motion of a component between every two neighbouring cells.
+
+        Args:
+            state: (M + 1,) of each pair, see `close_pairs`; filled here.
+            component: its root.
+        """
+        pairs = self.cells.pairs
+        joined_pairs(self.roadmap, pairs, component, state)
+        while True:
+            status = close_pairs(
+                self.problem,
+                self.work,
+                self.roadmap,
+                pairs,
+                state,
+                component,
+                self.before_next_look(),
+            )
+            if status == DONE:
+                return
+            if status == FULL:
+                self.roadmap = grown(self.roadmap)
+            self.tick("joining neighbouring cells")
+
     def room(self, rows: int) -> Roadmap:
         """The roadmap, grown until an edge and so many rows of `ways` fit."""
         self.roadmap = grown(self.roadmap)
@@ -224,14 +248,6 @@ class Explorer:
         owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
         return np.unique(owners[inside[owners] & ~inside[self.indices]])
 
-    def wound(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(n,) the same placement of the arm, joints brought inside their limits by full turns."""
-        lower, upper = self.problem.lower, self.problem.upper
-        turn = np.where(self.robot.prismatic, 0.0, 2.0 * np.pi)
-        q = q + turn * np.ceil(np.maximum(lower - q, 0.0) / (2.0 * np.pi))
-        q = q - turn * np.ceil(np.maximum(q - upper, 0.0) / (2.0 * np.pi))
-        return np.clip(q, lower, upper)  # rounding
-
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds is planted."""
         ruling, looked = Ruling.OPEN, int(boxes.counts[1])
@@ -244,5 +260,13 @@ class Explorer:
         # A box that is left undecided mostly straddles the tolerance: Newton starts well from it.
         # (A slide without ends has boxes without a middle.)
         if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and np.isfinite(q).all():
-            self.plant(cell, self.wound(q)[None])
+            self.plant(cell, wound(self.problem, q)[None])
         return ruling
+
+
+def wound(problem: Problem, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) the same placement of the arm, joints brought inside their limits by full turns."""
+    turn = np.where(problem.chain.prismatic, 0.0, 2.0 * np.pi)
+    q = q + turn * np.ceil(np.maximum(problem.lower - q, 0.0) / (2.0 * np.pi))
+    q = q - turn * np.ceil(np.maximum(q - problem.upper, 0.0) / (2.0 * np.pi))
+    return np.clip(q, problem.lower, problem.upper)  # rounding

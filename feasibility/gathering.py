@@ -14,9 +14,8 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.explorer import BUDGET, Explorer
-from feasibility.growth import close_pairs
-from feasibility.roadmap import DONE, FULL, grown, joined_pairs, root_of
+from feasibility.explorer import Explorer
+from feasibility.roadmap import root_of
 from feasibility.set_cover import set_cover
 
 DRY_ROUNDS = 10  # rounds without gain after which components are taken as they are
@@ -89,13 +88,4 @@ def tie(explorer: Explorer, component: int, wanted: NDArray[np.bool_]) -> None:
     pairs = explorer.cells.pairs
     state = np.zeros(len(pairs) + 1, dtype=np.int64)
     state[:-1][~wanted[pairs].all(axis=1)] = ELSEWHERE
-    joined_pairs(explorer.roadmap, pairs, component, state)
-    while True:
-        status = close_pairs(
-            explorer.problem, explorer.work, explorer.roadmap, pairs, state, component, BUDGET
-        )
-        if status == DONE:
-            return
-        if status == FULL:
-            explorer.roadmap = grown(explorer.roadmap)
-        explorer.tick("joining neighbouring cells")
+    explorer.join(state, component)

@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from feasibility.continuity import JSpace
 from feasibility.jsteps import Steps
 from feasibility.replay import Path, Replay, replay
-from feasibility.search import Search
+from feasibility.search import Progress, Search
 from feasibility.starts import DRY_SEEDS, starts
 from feasibility.task import Task
-from feasibility.treesearch import Progress, Tree, tree_search
+from feasibility.treesearch import Tree, tree_search
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, deferred
 from feasibility.warmup import compiling_notice
 from robots import Robot

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility import threejs
+from feasibility import robot_visuals, threejs
 from feasibility.cell_shapes import cell_size
 from feasibility.meshes import tubes
 from feasibility.motion import LONGEST, Motion, paced
 from feasibility.page import Entry
-from feasibility.scene import TRAIL, Layer, cells_layers, patch_layers
+from feasibility.scene import TRAIL, Layer, cells_layers, missed_layer, patch_layers
 from feasibility.threejs import Colour
 from feasibility.verdict import CauseKind
 from feasibility.viewer import View, compose
@@ -91,7 +91,7 @@ def view_division(division: Division, case: str | None = None) -> View:
     )
     return compose(
         robot, cells, f"{title}{number} patch{'' if number == 1 else 'es'}", text.rstrip("; "),
-        parts, motion, resting=walks[0][0] if walks else _home(robot),
+        parts, motion, resting=walks[0][0] if walks else robot_visuals.home(robot),
     )  # fmt: skip
 
 
@@ -140,8 +140,6 @@ def _move(
 
 def _left_out(division: Division) -> list[Layer]:
     """Cells in no patch, by cause."""
-    from feasibility.scene import missed_layer
-
     kinds: dict[CauseKind | None, list[int]] = {}
     for cause in division.left_out:
         kinds.setdefault(cause.kind, []).append(cause.cell)
@@ -151,8 +149,3 @@ def _left_out(division: Division) -> list[Layer]:
         missed_layer(division.cells, kind, np.array(cells, dtype=np.int64))
         for kind, cells in kinds.items()
     ]
-
-
-def _home(robot: Robot) -> NDArray[np.float64]:
-    """Where an arm without work stands."""
-    return np.clip(np.zeros(robot.n), robot.lower, robot.upper)

@@ -24,11 +24,11 @@ from typing import Any
 import numpy as np
 
 from feasibility.placement_bounds import Beyond, Reach
-from feasibility.placement_hunt import Hunt, Judge, Progress
+from feasibility.placement_hunt import Hunt, Judge
 from feasibility.placement_region import PlacementError, Pose, Region
 from feasibility.placement_trial import Stage, Trial
 from feasibility.placer import Placer
-from feasibility.search import Search
+from feasibility.search import Progress, Search
 from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence
 from robots import Robot

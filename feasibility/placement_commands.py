@@ -16,9 +16,10 @@ from feasibility.study_commands import check_files
 
 if TYPE_CHECKING:
     from feasibility.placement import Placements
-    from feasibility.placement_hunt import Judge, Progress
+    from feasibility.placement_hunt import Judge
     from feasibility.placement_map import PlacementMap
     from feasibility.placement_stations import StationPlan
+    from feasibility.search import Progress
     from feasibility.viewer import View
 
 STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}

@@ -12,6 +12,7 @@ import numpy as np
 from feasibility.placement_bounds import Reach
 from feasibility.placement_region import Array, Pose, Region
 from feasibility.placement_trial import Stage, Trial
+from feasibility.search import Progress
 
 DRAWS = 16  # as many times more are drawn where the bound leaves few
 FEW = 32  # poses within reach that refinement should start from
@@ -21,8 +22,6 @@ WIDTHS = (0.5, 0.35, 0.25, 0.17, 0.12, 0.08)  # [1] of the region, around the be
 CYCLES = 3  # times through the widths, as long as nothing is feasible
 APART = 0.05  # [1] of the region's widths: placements nearer to each other are alike
 BATCH = 64  # poses between two looks at the clock
-
-Progress = Callable[[int, int | None, str], None]
 
 
 class Judge(Protocol):

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.placement import Placements
-from feasibility.placement_hunt import BATCH, Judge, Progress
+from feasibility.placement_hunt import BATCH, Judge
 from feasibility.placement_region import AXES, Array, PlacementError, Pose, Region
 from feasibility.placement_trial import Stage
+from feasibility.search import Progress
 
 SIDE = 15  # places along each of the first two axes
 PANELS = 3  # places along the third

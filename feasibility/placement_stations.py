@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 from feasibility.placement import COUNT, Placements
 from feasibility.placement_bounds import Reach
-from feasibility.placement_hunt import BATCH, Judge, Progress
+from feasibility.placement_hunt import BATCH, Judge
 from feasibility.placement_region import Pose
 from feasibility.placement_study import trial_table
 from feasibility.placement_trial import Trial
 from feasibility.placer import Placer
-from feasibility.search import Search
+from feasibility.search import Progress, Search
 from feasibility.stations import Stations, stations_of
 
 

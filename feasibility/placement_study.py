@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from feasibility.case import TABLES, Case
-from feasibility.placement_hunt import Progress
 from feasibility.placement_region import Pose
 from feasibility.placement_trial import Margins, Stage, Trial
 from feasibility.placer import Placer
+from feasibility.search import Progress
 from feasibility.study import StudyTask, run_tasks
 from feasibility.study_outcome import bits_of, cells_of
 from feasibility.study_store import Store
@@ -26,7 +26,7 @@ Tables = dict[str, Any]
 
 
 class StudyJudge:
-    """Tries placements of a case's surface as tasks of a study; see `placement.Judge`."""
+    """Tries placements of a case's surface as tasks of a study; see `placement_hunt.Judge`."""
 
     def __init__(
         self,
@@ -48,11 +48,11 @@ class StudyJudge:
         self.progress = progress
 
     def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
-        """See `placement.Judge`."""
+        """See `placement_hunt.Judge`."""
         return self._all(poses, {"early": early})
 
     def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
-        """See `placement.Judge`."""
+        """See `placement_hunt.Judge`."""
         return self._all(poses, {"causes": causes})
 
     def _all(self, poses: Sequence[Pose], how: Tables) -> list[Trial]:

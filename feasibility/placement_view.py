@@ -6,7 +6,7 @@ view_placements(placements).save_html("placements.html")
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +32,7 @@ from feasibility.pose_layers import (
 )
 from feasibility.pose_outline import outline, placed
 from feasibility.scene import Layer, cells_layers, counted
-from feasibility.search import Search
+from feasibility.search import Progress, Search
 from feasibility.viewer import FRAMED, View, compose
 from robots import Robot
 from surfaces import Cells
@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from feasibility.task import Task
 
 Array = NDArray[np.float64]
-Progress = Callable[[int, int | None, str], None]
 
 LOOKED = 24  # configurations of a motion that have to be in the picture
 NEARER = 0.9  # [1] of the distance from which a ball around everything would fill the picture
@@ -222,7 +221,7 @@ def _view(
     drawn = compose(
         asked.robot, cells, title, f"{asked.robot.name}: {text}",
         [*parts, *(layer for layer, _ in stations), *class_layers(small, tried)], motion,
-        resting=_home(asked.robot), play=playing.play, at=playing.at,
+        resting=robot_visuals.home(asked.robot), play=playing.play, at=playing.at,
     )  # fmt: skip
     points = [placed(small, one.pose) for one in tried if one.kind not in HIDDEN]
     whole = [pose for _, pose in stations] or [one.pose for one in tried[:1]]
@@ -239,14 +238,9 @@ def _motion(asked: Question, cells: Cells, progress: Progress | None) -> Motion 
     return motion_of(verdict) if verdict.feasible else None
 
 
-def _home(robot: Robot) -> Array:
-    """Where an arm without work stands."""
-    return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
-
-
 def _camera(camera: Camera, robot: Robot, motion: Motion | None, points: Array) -> Camera:
     """The same direction, from where the arm, as it moves, and points (k, 3) m can be seen."""
-    walk = _home(robot)[None]
+    walk = robot_visuals.home(robot)[None]
     if motion is not None:
         walk = motion.at(np.linspace(0.0, motion.seconds[-1], LOOKED))
     joints = [np.zeros((1, 3))]

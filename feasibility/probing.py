@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from feasibility.carrying import NO_CELL, follow_all, land_guesses
 from feasibility.certificate import replay
 from feasibility.complete import evenly, explore
-from feasibility.explorer import Explorer, OutOfTime
+from feasibility.explorer import Explorer, OutOfTime, wound
 from feasibility.fibre import roomy
 from feasibility.problem import HERE, Problem, place, problem_of, work_for
 from feasibility.proof import Ruling, root_box, rule
@@ -166,7 +166,7 @@ class Prober:
         if not np.isfinite(q).all():
             return ruling, None
         row = np.full((len(problem.points), len(q)), np.nan)
-        row[cell] = _wound(problem, q)
+        row[cell] = wound(problem, q)
         landed = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
         return ruling, row[cell] if landed else None
 
@@ -317,13 +317,6 @@ class Prober:
             explorer.plant(cell, guesses[landed])
         elif explorer.roadmap.first_node[cell] < 0:
             explorer.most = 0.5 * (explorer.most + float(explorer.work.counts[0]))
-
-
-def _wound(problem: Problem, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) joints brought inside their limits by full turns."""
-    turn = np.where(problem.chain.prismatic, 0.0, 2.0 * np.pi)
-    q = q + turn * np.ceil(np.maximum(problem.lower - q, 0.0) / (2.0 * np.pi))
-    return q - turn * np.ceil(np.maximum(q - problem.upper, 0.0) / (2.0 * np.pi))
 
 
 def apart(features: NDArray[np.float64], most: int) -> list[int]:

@@ -44,6 +44,11 @@ def joint_paths(robot: Robot) -> tuple[str, ...]:
     return tuple(paths)
 
 
+def home(robot: Robot) -> NDArray[np.float64]:
+    """(n,) where an arm without work stands: at zero, or at the limit next to it."""
+    return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
+
+
 def joint_placements(robot: Robot, walk: ArrayLike) -> NDArray[np.float64]:
     """Each joint's frame in the frame of the joint before it, by Pinocchio.
 

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
+
+Progress = Callable[[int, int | None, str], None]
+"""Called with how much is done, of how much (None: unknown), and what is being done."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,11 +6,12 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
+from feasibility.search import Progress
 from feasibility.study_dealing import Answer, Tables, Work, deal
 from feasibility.study_outcome import evaluate
 from feasibility.study_store import Record, Status, Store
@@ -18,8 +19,6 @@ from feasibility.study_workers import Workers
 from feasibility.version import version
 
 KEEP_S = 0.5  # [s] for which finished tasks may wait to be written together
-
-Progress = Callable[[int, int | None, str], None]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -14,12 +14,11 @@ from feasibility.console import Bar, interruptible, say, tell
 from feasibility.files import FileError, shown_path, write_whole
 
 if TYPE_CHECKING:
+    from feasibility.search import Progress
     from feasibility.study import Row
     from feasibility.study_file import Study
 
 UNDECIDED = 3
-
-Progress = Callable[[int, int | None, str], None]
 
 
 def study(args: argparse.Namespace, began: float) -> int:

@@ -8,17 +8,15 @@ configuration and end somewhere in the neighbouring cell, so they do not compose
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.continuity import JSpace, Outcome
+from feasibility.search import Progress
 from surfaces.grid import GridCells
-
-Progress = Callable[[int, int | None, str], None]
-"""Called with the cells that the running tree touches, the number of cells, and what is done."""
 
 
 @dataclass(slots=True)

@@ -3,7 +3,7 @@
     from feasibility.viewer import show
     show(verdict)
 
-The viewer stands at the edge: nothing else imports it.
+The viewer stands at the edge: only other views and the commands import it.
 """
 
 from __future__ import annotations
@@ -223,7 +223,7 @@ def _resting(verdict: Verdict) -> NDArray[np.float64]:
     for q in known:
         if q is not None:
             return np.asarray(q, dtype=float)
-    return np.clip(np.zeros(verdict.robot.n), verdict.robot.lower, verdict.robot.upper)
+    return robot_visuals.home(verdict.robot)
 
 
 def _stage(robot: Robot, cells: Cells, floor: float) -> list[Command]:
