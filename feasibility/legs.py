@@ -12,9 +12,8 @@ from feasibility.motion_net import MotionNet
 
 GOALS = 2  # nodes over the next cell that are headed for, besides those that are joined already
 TURNS = 6  # nodes over one cell that a self-motion is tried to
-SAME = (
-    1e-3  # [rad] or [m], arrivals nearer to a known node than this are it, if a motion joins them
-)
+# [rad] or [m]: arrivals nearer to a known node than this are it, if a motion joins them.
+SAME = 1e-3
 
 
 def step_to(net: MotionNet, x: int, cell: int) -> list[int]:

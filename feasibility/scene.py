@@ -67,14 +67,15 @@ class Layer:
 
 def layers(verdict: Verdict) -> list[Layer]:
     """Every part of the picture but the arm, in the order of the legend."""
-    parts = cells_layers(verdict.cells)
     if len(verdict.cells) == 0:
         return []
-    parts += _graph(verdict)
-    parts += _start(verdict)
-    parts += _missed(verdict)
-    parts += _components(verdict)
-    return parts
+    return [
+        *cells_layers(verdict.cells),
+        *_graph(verdict),
+        *_start(verdict),
+        *_missed(verdict),
+        *_components(verdict),
+    ]
 
 
 def cells_layers(cells: Cells) -> list[Layer]:

@@ -7,14 +7,15 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 
 class Answer(StrEnum):
@@ -123,6 +124,7 @@ class Verdict:
     components: tuple[NDArray[np.int64], ...] = ()
     """Cells of each connected component found, the best first; the greedy search keeps its best
     tree only."""
+    # A plain default would be an attribute of the class too, and hide that the field is deferred.
     tree: nx.DiGraph | None = field(default_factory=lambda: None)
     """Tree T of the paper's search; None for other methods."""
     start: int | None = None

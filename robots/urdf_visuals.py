@@ -20,14 +20,8 @@ from numpy.typing import NDArray
 from robots.urdf_values import BadValue, Faults, Triple, numbers, triple
 from robots.urdf_xml import Node, shown
 
-MESH_SUFFIXES = (
-    ".stl",
-    ".dae",
-    ".obj",
-    ".ply",
-    ".off",
-    ".glb",
-)  # .gltf and the like pull in other files
+# .gltf and the like pull in other files.
+MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".off", ".glb")
 MAX_MESH_BYTES = 256 * 2**20
 MAX_VISUALS = 2000
 MAX_PATH = 500  # characters; following a path takes time for each of its parts
