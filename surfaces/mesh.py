@@ -204,7 +204,7 @@ class MeshSurface(Surface):
         size = np.where(self._rims.any(axis=1), strip, 1.0)[:, None, None]
         turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]  # along two sides
         slopes = size * (corners[:, 1:] - corners[:, :1]) + height * turns
-        face = sharpest_turn(*(_products(sides) for sides in (slopes, turns)))
+        face = sharpest_turn(slopes, turns)
         sharpest = np.zeros(len(cells))
         np.maximum.at(sharpest, cells.labels, face)
         return sharpest
@@ -291,12 +291,6 @@ class MeshSurface(Surface):
     def __repr__(self) -> str:
         """One line."""
         return f"mesh({self.mesh!r}, side={self.side!r}, position={self.position.tolist()})"
-
-
-def _products(sides: Array) -> tuple[Array, Array, Array]:
-    """x.x, x.y and y.y of two vectors each (k, 2, 3)."""
-    x, y = sides[:, 0], sides[:, 1]
-    return (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
 
 
 def _bent_lines(start: Array, middle: Array, end: Array, t: Array) -> Array:

@@ -119,8 +119,7 @@ class Patch(Surface):
             ahead, behind = np.add(places, step), np.subtract(places, step)
             turns.append(self.normal(*ahead) - self.normal(*behind))
             slopes.append(self.point(*ahead) - self.point(*behind) + height * turns[-1])
-        (e, f, g), (a, b, c) = map(_products, (slopes, turns))
-        return sharpest_turn((e, f, g), (a, b, c))
+        return sharpest_turn(np.stack(slopes, axis=1), np.stack(turns, axis=1))
 
     def cells(self, nu: int, nv: int) -> GridCells:
         """Cut the patch into nu x nv E-cells of equal parameter steps.
@@ -149,14 +148,6 @@ class Patch(Surface):
                 ranges.append(f"{name}=({low:g}, {high:g})")
         parts = [lengths, *ranges, f"side={self.side!r}", f"position={self.position.tolist()}"]
         return f"{self.kind}({', '.join(part for part in parts if part)})"
-
-
-def _products(
-    pair: list[NDArray[np.float64]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Products (N,) of two vectors (N, 3): first by first, first by second, second by second."""
-    x, y = pair
-    return (x * x).sum(axis=1), (x * y).sum(axis=1), (y * y).sum(axis=1)
 
 
 def _over_a_pole(

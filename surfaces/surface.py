@@ -156,18 +156,20 @@ def points_of(points: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def sharpest_turn(
-    slopes: tuple[NDArray[np.float64], ...], turns: tuple[NDArray[np.float64], ...]
-) -> NDArray[np.float64]:
+def sharpest_turn(slopes: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[np.float64]:
     """(k,) how fast a normal turns, at most, for each metre of the surface that it belongs to.
 
     Args:
-        slopes: e, f, g: products x.x, x.y, y.y of two steps x and y on the surface, (k,) each.
-        turns: a, b, c: the same products of what the normal changes by along these steps.
+        slopes: (k, 2, 3) two steps on the surface.
+        turns: (k, 2, 3) what the normal changes by along these steps.
 
-    The square of what is wanted is the larger eigenvalue of [[e, f], [f, g]]^-1 [[a, b], [b, c]].
+    The square of what is wanted is the larger eigenvalue of [[e, f], [f, g]]^-1 [[a, b], [b, c]],
+    where e, f, g are the products x.x, x.y, y.y of the steps x and y; a, b, c those of the turns.
     """
-    (e, f, g), (a, b, c) = slopes, turns
+    (e, f, g), (a, b, c) = (
+        [(pair[:, i] * pair[:, j]).sum(axis=1) for i, j in ((0, 0), (0, 1), (1, 1))]
+        for pair in (slopes, turns)
+    )
     area = np.maximum(e * g - f * f, 1e-300)
     with np.errstate(over="ignore", invalid="ignore"):  # a surface that stands still
         half = 0.5 * (a * g - 2.0 * b * f + c * e) / area
