@@ -9,7 +9,8 @@ starts and a descent of what is in the way:
 
 Where dropping the cone or dropping the limits would each do, the cause is the cone if the tool
 point is reached inside the limits, and the detail names both. A cell that another component
-reaches is disconnected: the detail says what that component covers and what stops the motion.
+reaches is disconnected: the detail says what that component covers and what stops the motion. So is
+one where the arm turns out to fit after all, as after a search that was stopped early.
 """
 
 from __future__ import annotations
@@ -217,7 +218,8 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
         The cause; proved where branch and bound or the reach bound ruled the cell out.
     """
     cause = _cause(explorer, cell)
-    if cause.proved or not explorer.problem.rim > 0.0:
+    told = cause.proved or cause.kind is CauseKind.DISCONNECTED
+    if told or not explorer.problem.rim > 0.0:
         return cause
     return replace(cause, detail=f"{cause.detail}; {UNPROVED}")
 
@@ -262,6 +264,9 @@ def _cause(explorer: Explorer, cell: int) -> Cause:
     if _solve(slack_cone, work, cell, guesses, _one(explorer)):
         angle = np.degrees(_smallest_angle(explorer, slack_cone, cell))
         alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.rim, 1.0)))
+        if angle <= alpha and not proved:
+            detail = "the arm can stand there, but the search ended before it found a motion to it"
+            return Cause(cell, CauseKind.DISCONNECTED, False, detail)
         fine = decimals(angle, alpha, 1)
         detail = f"the tool tilts {angle:.{fine}f} deg there at best, the cone allows {alpha:g} deg"
         if past:

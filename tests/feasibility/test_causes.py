@@ -8,7 +8,7 @@ import re
 import numpy as np
 from dense_replay import tools
 
-from feasibility import Task, check
+from feasibility import Search, Task, check
 from feasibility.verdict import CauseKind, Evidence, Verdict
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
@@ -123,3 +123,16 @@ def test_causes_are_made_once_and_in_order() -> None:
         assert cause.detail
         assert "nan" not in cause.detail
         assert "inf" not in cause.detail
+
+
+def test_a_search_that_was_stopped_blames_nothing_that_is_not_so() -> None:
+    """Every cell of this plate can be covered: no cause may say what would have to give."""
+    plate = plane((0.3, 0.6), (-0.2, 0.2), position=(0, 0, 0.2), side="outside")
+    task = Task(0.02, 45)
+    assert check(PUMA, plate.cells(3, 4), task).feasible
+    stopped = check(PUMA, plate.cells(3, 4), task, Search(time_limit=1e-9))
+    assert stopped.evidence is Evidence.BUDGET
+    assert len(stopped.causes) == int((~stopped.covered).sum()) > 0
+    assert kinds(stopped) == {CauseKind.DISCONNECTED}
+    assert not any(cause.proved for cause in stopped.causes)
+    assert all("can stand there" in cause.detail for cause in stopped.causes)
