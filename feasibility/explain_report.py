@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-import textwrap
 from collections.abc import Iterator
 from typing import Any
 
 from feasibility.explain import Dropped, Explanation
+from feasibility.filling import filled
 from feasibility.quantities import Kind, Quantity
 from feasibility.thresholds import Finding, Threshold
 from feasibility.verdict import Answer, Evidence
 from feasibility.version import version
-
-WIDTH = 100  # columns
 
 HEADS = {
     Answer.FEASIBLE: "feasible. How far it can be tightened, one thing at a time:",
@@ -26,7 +24,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
     """The thresholds for people: what helps first, then what does not."""
     verdict = explanation.verdict
     head = HEADS[verdict.answer] if explanation.thresholds else f"{verdict.answer}."
-    lines = [f"{case_name}: {head}", *_item(verdict.message)]
+    lines = [f"{case_name}: {head}", filled("  ", verdict.message)]
     if len(verdict.cells) == 0:
         return f"{case_name}: there are no cells to cover, so there is nothing to explain."
     helps = [t for t in explanation.thresholds if t.feasible is not None]
@@ -35,20 +33,22 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         helps.sort(key=_effort)
     lines += [""] if helps or others else []
     for threshold in helps:
-        lines += _item(sentence(threshold, verdict.feasible), "- ")
+        lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
     if not helps and others:
-        lines += _item("No single change that was looked at was found to make it feasible.")
+        lines.append(
+            filled("  ", "No single change that was looked at was found to make it feasible.")
+        )
     if others:
         lines += ["", "What does not help alone:"]
         ruled_out = [_helpless_label(t.quantity) for t in others if t.ruled_out]
         if ruled_out:
-            lines += _item(f"proved: {'; '.join(ruled_out)}.", "- ")
+            lines.append(filled("  - ", f"proved: {'; '.join(ruled_out)}."))
         for threshold in (t for t in others if not t.ruled_out):
-            lines += _item(sentence(threshold, verdict.feasible), "- ")
+            lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
     if explanation.dropped is not None:
-        lines += ["", *_item(_dropped(explanation, explanation.dropped))]
+        lines += ["", filled("  ", _dropped(explanation, explanation.dropped))]
     if explanation.left_out:
-        lines += ["", *_item(_unknown(explanation))]
+        lines += ["", filled("  ", _unknown(explanation))]
     return "\n".join(lines)
 
 
@@ -74,18 +74,6 @@ def _effort(threshold: Threshold) -> float:
     quantity, found = threshold.quantity, threshold.feasible
     way = abs(quantity.end - quantity.given)
     return abs(found.value - quantity.given) / way if found is not None and way > 0.0 else 1.0
-
-
-def _item(text: str, mark: str = "") -> list[str]:
-    """Wrapped lines of one item."""
-    return textwrap.wrap(
-        text,
-        WIDTH,
-        initial_indent="  " + mark,
-        subsequent_indent="  " + " " * len(mark),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 def sentence(threshold: Threshold, tightened: bool) -> str:

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-import textwrap
 from collections.abc import Sequence
 from typing import Any
 
+from feasibility.filling import filled
 from feasibility.placement import Placements
 from feasibility.placement_map import PlacementMap
 from feasibility.placement_region import AXES, Pose
 from feasibility.placement_stations import StationPlan
 from feasibility.placement_study import trial_table
 from feasibility.placement_trial import Stage, Trial
-from feasibility.report import CAUSES, EVIDENCE, WIDTH
+from feasibility.report import CAUSES, EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version
 
@@ -147,7 +147,7 @@ def as_text(
         ("time", f"{placements.timing['total_s']:.2f} s"),
     ]
     lines = [PROVED if proved else SENTENCES[placements.answer], ""]
-    lines += [_row(name, text) for name, text in rows if text]
+    lines += [filled(f"  {name:<10}", text) for name, text in rows if text]
     if placements.found:
         lines += ["", *_table(placements.found)]
         put = " ".join(f"--set '{setting}'" for setting in settings_of(placements.found[0].pose))
@@ -194,14 +194,6 @@ def _causes_text(placements: Placements) -> str:
         f"{count} cell{'s' if count > 1 else ''}: {CAUSES[CauseKind(kind)]}"
         for kind, count in placements.causes.items()
     )
-
-
-def _row(name: str, text: str) -> str:
-    """A name and its text, wrapped."""
-    return textwrap.fill(
-        text, WIDTH, initial_indent=f"  {name:<10}", subsequent_indent=" " * 12,
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
 
 
 def _table(trials: Sequence[Trial]) -> list[str]:

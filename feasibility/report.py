@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-import textwrap
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -13,12 +12,13 @@ import numpy as np
 
 from feasibility.case import Case
 from feasibility.case_kinds import OWN_KEYS
+from feasibility.filling import filled
 from feasibility.result import plain
+from feasibility.tree_walk import tree_walk
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 from feasibility.version import version
 from surfaces import Cells
 
-WIDTH = 100  # columns
 DETAILS = 3  # cells of one group whose details are told
 
 SENTENCES = {
@@ -52,6 +52,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
     return {
         "verdict": str(verdict.answer),
         "evidence": str(verdict.evidence),
+        "message": verdict.message,
         "cells": len(verdict.cells),
         "covered": verdict.n_covered,
         "edges": verdict.n_edges,
@@ -117,7 +118,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("certificate", _certificate_text(verdict)),
         ("time", _time_text(_seconds(verdict, before_s))),
     ]
-    lines = [head, "", *(_row(name, text) for name, text in rows if text)]
+    lines = [head, "", *(filled(f"  {name:<12}", text) for name, text in rows if text)]
     groups = list(causes_listed(verdict.causes, verdict.cells))
     if groups:
         lines += ["", "Not covered:", *groups]
@@ -125,19 +126,6 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     if hints:
         lines += ["", "To try next:", *(f"  {hint}" for hint in hints)]
     return "\n".join(lines)
-
-
-def _row(name: str, text: str) -> str:
-    """A named line; the rest of a long one is indented below."""
-    indent = " " * 14
-    return textwrap.fill(
-        text,
-        WIDTH,
-        initial_indent=f"  {name:<12}",
-        subsequent_indent=indent,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
 
 
 def _certificate_text(verdict: Verdict) -> str:
@@ -193,12 +181,13 @@ def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:
 def _hints(verdict: Verdict) -> list[str]:
     """What to try next."""
     if verdict.answer is Answer.FEASIBLE:
-        walk = ["--witness walk.csv writes the motion"] if verdict.witness is not None else []
+        stored = verdict.witness is not None or verdict.tree is not None
+        walk = ["--witness walk.csv writes the motion"] if stored else []
         more = [
             "coverable path, with the same case, puts the cells in order and times the motion",
             "coverable explain says how much may change before it breaks",
         ]
-        whole = walk and len(verdict.cells)
+        whole = verdict.witness is not None and len(verdict.cells)
         return [*walk, "--html view.html shows it", *(more if whole else [])]
     hints = []
     if not verdict.task.cone_deg > 0.0:
@@ -241,10 +230,13 @@ def _narrower(verdict: Verdict) -> str:
 def witness_csv(verdict: Verdict) -> str | None:
     """The covering motion as CSV: `cell`, then one column per joint; None where there is none.
 
-    Floats are written so that they read back as the same numbers.
+    Floats are written so that they read back as the same numbers. That of a greedy search is its
+    tree, which enters the cells and need not pass their centres, see `tree_walk`.
     """
-    walk = verdict.witness
-    if verdict.answer is not Answer.FEASIBLE or walk is None:
+    if verdict.answer is not Answer.FEASIBLE:
+        return None
+    walk = tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
+    if walk is None:
         return None
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -50,7 +50,9 @@ def test_json_of_a_feasible_case():
     assert timing["load_s"] == pytest.approx(verdict.timing["load_s"] + 1.5, abs=1e-6)
     assert timing["search_s"] == pytest.approx(verdict.timing["search_s"], abs=1e-6)
     parts = timing["load_s"] + timing["search_s"] + timing["certify_s"]
-    assert timing["total_s"] == pytest.approx(parts, abs=0.01)
+    # What passes between the parts counts too; a machine may take its time there.
+    assert timing["total_s"] == pytest.approx(verdict.timing["total_s"] + 1.5, abs=1e-6)
+    assert timing["total_s"] >= parts - 1e-5
 
 
 def test_json_names_every_uncovered_cell_by_its_two_indices():
