@@ -81,8 +81,8 @@ def greedy_check(
 ) -> Verdict:
     """The verdict of the paper's search: feasible when one tree T touches every cell.
 
-    To touch a cell is to enter it; its centre need not be visited, so there is no `witness`.
-    Before "feasible" is said, Pinocchio replays every path of T.
+    To touch a cell is to enter it; its centre need not be visited, so there is no `witness`, but
+    `tree_walk` makes one motion of T. Before "feasible" is said, Pinocchio replays every path of T.
 
     Args:
         robot, cells: the arm, and the E-cells.

@@ -52,7 +52,6 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
     return {
         "verdict": str(verdict.answer),
         "evidence": str(verdict.evidence),
-        "message": verdict.message,
         "cells": len(verdict.cells),
         "covered": verdict.n_covered,
         "edges": verdict.n_edges,
@@ -71,6 +70,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "method": verdict.method,
         "seed": int(verdict.seed),
         "version": version(),
+        "message": verdict.message,
     }
 
 

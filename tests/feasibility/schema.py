@@ -50,6 +50,7 @@ CHECK = {
     "method": OneOf("complete", "greedy"),
     "seed": int,
     "version": str,
+    "message": str,  # beyond CONTRACT: what was found, in sentences
 }
 
 

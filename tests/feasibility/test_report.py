@@ -218,6 +218,6 @@ def test_the_csv_is_one_motion_over_every_cell_centre(name):
     assert "\r" not in text
 
 
-@pytest.mark.parametrize("name", ["long plate", "greedy dome", "no cells"])
+@pytest.mark.parametrize("name", ["long plate", "no cells"])
 def test_there_is_no_csv_without_a_motion(name):
     assert witness_csv(small_verdict(name)) is None
