@@ -55,6 +55,7 @@ def asked(
         from feasibility.case_faults import CaseError, Fault
         from feasibility.warmup import compiling_notice
 
+        settle()
         case = load_case(args.case, args.settings)
         if check_first is not None:
             check_first()
@@ -62,6 +63,7 @@ def asked(
             raise CaseError(case.name, [Fault("search.method", only_complete)])
         with compiling_notice():  # cutting a mesh has kernels of its own
             setup = case.build()
+        settle()
         for note in setup.robot.notes:
             tell(f"note: {setup.robot.name}: {note}")
         for note in setup.cells.notes:

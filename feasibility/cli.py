@@ -172,12 +172,18 @@ def _expected() -> tuple[type[Exception], ...]:
     return tuple(found)
 
 
+def _say_nothing(_: sys.UnraisableHookArgs) -> None:
+    """Nobody can do anything about it."""
+
+
 def run() -> NoReturn:
     """The console script: like `main`, and ends the process at once.
 
     Every file is closed by then. Taking numba and Pinocchio apart in order would take another third
     of a second, also after Ctrl-C.
     """
+    if os.environ.get(TRACEBACK, "") in ("", "0"):
+        sys.unraisablehook = _say_nothing  # such as the half-made objects of a Ctrl-C, taken apart
     status = main()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError, AttributeError):

@@ -14,6 +14,7 @@ from types import FrameType, TracebackType
 from typing import Any, TextIO
 
 PAUSE = 0.05  # [s] between two updates of the progress bar
+IMPORTER = "importlib._bootstrap"
 
 
 def prepare() -> None:
@@ -70,15 +71,17 @@ def interruptible() -> Iterator[Callable[[], None]]:
     """Remember a Ctrl-C that Python loses.
 
     A KeyboardInterrupt raised while the interpreter runs one of its own callbacks (it does so
-    during imports) is printed and dropped. Call what this context yields before an answer is given:
-    it raises KeyboardInterrupt if there has been one.
+    during imports) is printed and dropped, and a library whose import it ends says that it is
+    broken. So the first Ctrl-C lets a running import end. Call what this context yields as soon as
+    may be, and before an answer is given: it raises KeyboardInterrupt if there has been one.
     """
     seen = False
 
     def note(number: int, frame: FrameType | None) -> None:
         nonlocal seen
-        seen = True
-        signal.default_int_handler(number, frame)
+        again, seen = seen, True
+        if again or not _importing(frame):
+            signal.default_int_handler(number, frame)
 
     def settle() -> None:
         if seen:
@@ -91,8 +94,20 @@ def interruptible() -> Iterator[Callable[[], None]]:
     signal.signal(signal.SIGINT, note)
     try:
         yield settle
+    except Exception:
+        settle()  # what a library says about being interrupted is no error of its own
+        raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _importing(frame: FrameType | None) -> bool:
+    """Is a module being imported there?"""
+    while frame is not None:
+        if frame.f_globals.get("__name__") == IMPORTER:
+            return True
+        frame = frame.f_back
+    return False
 
 
 class Bar:

@@ -247,6 +247,30 @@ def test_an_interrupt_that_python_drops_is_not_lost(ask, monkeypatch, plate):
     assert signal.getsignal(signal.SIGINT) is before
 
 
+def test_an_interrupt_during_an_import_lets_it_end(ask, monkeypatch, plate, tmp_path):
+    """An import that is broken off leaves a library that says it is broken."""
+    lines = "import signal", "signal.raise_signal(signal.SIGINT)", "whole = True"
+    (tmp_path / "imported_when_interrupted.py").write_text("\n".join(lines))
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def importing(*_, **__):
+        assert __import__("imported_when_interrupted").whole
+        return small_verdict("plate")
+
+    monkeypatch.setattr(feasibility.checking, "check", importing)
+    assert ask("check", plate) == (130, "", "coverable: interrupted\n")
+
+
+def test_what_a_library_says_of_an_interrupt_is_no_error(ask, monkeypatch, plate):
+    def broken(*_, **__):
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise ImportError("some part of it failed to import")
+
+    monkeypatch.setattr(feasibility.checking, "check", broken)
+    assert ask("check", plate) == (130, "", "coverable: interrupted\n")
+
+
 def test_ctrl_c_ends_a_running_search(tmp_path):
     slow = "import sys, time, feasibility.checking as c; from feasibility.cli import main\n"
     slow += "def wait(*a, **k): print('ready', flush=True); time.sleep(60)\n"
