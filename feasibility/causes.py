@@ -20,7 +20,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.complete import Explorer, evenly
+from feasibility.complete import evenly
+from feasibility.explorer import Explorer
 from feasibility.fibre import connect
 from feasibility.growth import CONNECT_STEPS
 from feasibility.kernels import kernel, put

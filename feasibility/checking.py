@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from feasibility.certificate import Replay
-    from feasibility.complete import Explorer
+    from feasibility.explorer import Explorer
 
 
 NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
@@ -100,7 +100,8 @@ def _complete_check(
     called = time.monotonic()
     with compiling_notice():
         from feasibility.causes import causes_of
-        from feasibility.complete import Explorer, problem_of
+        from feasibility.explorer import Explorer
+        from feasibility.problem import problem_of
 
         warm_up()
     cells.courses  # noqa: B018 - part of the cells, made once
@@ -158,7 +159,8 @@ def _complete_check(
 def _attempt(explorer: Explorer, task: Task, began: float) -> _Attempt:
     """Search since `began` (s), and replay the motion found against a task."""
     from feasibility.certificate import replay
-    from feasibility.complete import OutOfTime, close, explore
+    from feasibility.complete import close, explore
+    from feasibility.explorer import OutOfTime
     from feasibility.walk import covering_walk
 
     in_time = True

@@ -19,15 +19,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.explorer import Explorer, OutOfTime
+from feasibility.explorer import Explorer
 from feasibility.fibre import roomy
-from feasibility.problem import problem_of
 from feasibility.proof import Boxes, Ruling, root_box
 from feasibility.roadmap import EDGES, NODES, root_of
 
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
 DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
+SETTLED_ROUNDS = 12  # the same once a proof has settled the verdict: only more cells are at stake
 MOST_ROUNDS = 200
 SEEDS = 6  # guesses at a missed cell, each round
 FIRST_BOXES = 1000  # boxes for each cell that nothing has reached
@@ -109,6 +109,7 @@ def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
 def _rounds(explorer: Explorer) -> None:
     """Step 3: rounds of seeding and stirring, until some in a row have gained nothing."""
     dry = 0
+    enough = SETTLED_ROUNDS if Ruling.PROVED in explorer.rulings.values() else DRY_ROUNDS
     for _ in range(MOST_ROUNDS):
         roots = explorer.roots()
         if not roots or explorer.covered[explorer.reached].all():
@@ -117,7 +118,7 @@ def _rounds(explorer: Explorer) -> None:
         _round(explorer, roots[:TOP])
         explorer.rounds += 1
         dry = dry + 1 if _standing(explorer) == before else 0
-        if explorer.complete or dry >= DRY_ROUNDS:
+        if explorer.complete or dry >= enough:
             return
 
 
@@ -176,6 +177,3 @@ def pair_edges(explorer: Explorer) -> dict[tuple[int, int], int]:
         if i != j and root_of(roadmap, roadmap.component[x]) == best:
             edges.setdefault((min(i, j), max(i, j)), e)
     return edges
-
-
-__all__ = ["Explorer", "OutOfTime", "close", "explore", "pair_edges", "problem_of"]

@@ -16,7 +16,7 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    from feasibility.complete import Explorer
+    from feasibility.explorer import Explorer
 
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
@@ -96,8 +96,10 @@ def _searched(
     robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
 ) -> tuple[Explorer, bool]:
     """The search with all components that it found, and whether it ran to its end."""
-    from feasibility.complete import Explorer, OutOfTime, explore, problem_of
+    from feasibility.complete import explore
+    from feasibility.explorer import Explorer, OutOfTime
     from feasibility.gathering import gather
+    from feasibility.problem import problem_of
 
     deadline = np.inf if search.time_limit is None else time.monotonic() + search.time_limit
     problem = problem_of(robot, cells, task)

@@ -124,7 +124,9 @@ def warm_up() -> None:
         return
     from feasibility.causes import diagnose
     from feasibility.certificate import replay
-    from feasibility.complete import Explorer, close, explore, problem_of
+    from feasibility.complete import close, explore
+    from feasibility.explorer import Explorer
+    from feasibility.problem import problem_of
     from feasibility.proof import root_box
     from feasibility.task import Task
     from feasibility.walk import covering_walk

@@ -56,16 +56,15 @@ class Chain(NamedTuple):
                 f"one-dof joints that ends at {robot.tool_frame!r}; lock the joints off the chain"
             )
         data = model.createData()
-        pin.forwardKinematics(model, data, pin.neutral(model))
+        pin.computeJointJacobians(model, data, pin.neutral(model))
         rotations = np.empty((n, 3, 3))
         translations = np.empty((n + 1, 3))
         prismatic = np.empty(n, dtype=bool)
         align = np.eye(3)  # brings z onto the axis of the previous joint
         for i in range(n):
             # The joint's motion subspace, in its own frame: (linear, angular).
-            subspace = pin.getJointJacobian(
-                model, pin_jacobians(model, data), i + 1, pin.ReferenceFrame.LOCAL
-            ).reshape(6, n)[:, i]  # Pinocchio flattens a single column
+            jacobian = pin.getJointJacobian(model, data, i + 1, pin.ReferenceFrame.LOCAL)
+            subspace = jacobian.reshape(6, n)[:, i]  # Pinocchio flattens a single column
             linear, angular = subspace[:3], subspace[3:]
             prismatic[i] = np.linalg.norm(angular) < 0.5
             placement = model.jointPlacements[i + 1]
@@ -102,12 +101,6 @@ class Chain(NamedTuple):
                     f"at q = {q.tolist()}; this is a defect of coverable, please report it"
                 )
         return chain
-
-
-def pin_jacobians(model: pin.Model, data: pin.Data) -> pin.Data:
-    """Fill `data` with the joint Jacobians at the neutral configuration and return it."""
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    return data
 
 
 def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """The surface as compiled loops see it: the foot of a point, and the cell it falls in.
 
-One implementation serves `Surface.closest` and the search kernels alike. A new kind of surface
+One implementation serves `ChartedPatch.closest` and the search kernels alike. A new kind of surface
 adds a code, a `_..._foot` function in its own frame, and a branch in `foot`.
 """
 
@@ -23,7 +23,7 @@ class Chart(NamedTuple):
     It holds no arrays: numba counts references to an array whenever it is read out of a tuple,
     and that took longer than the geometry.
 
-    Built by `Surface.chart` and `Cells.chart`.
+    Built by `ChartedPatch.chart` and `GridCells.chart`.
     """
 
     code: int

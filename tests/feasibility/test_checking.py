@@ -378,19 +378,19 @@ def test_ctrl_c_ends_a_hard_search(tmp_path) -> None:
 
 def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
     """The search is made to use more than the tolerance; the second time it keeps to less."""
-    from feasibility import checking, complete
+    from feasibility import checking, problem
 
-    made = complete.problem_of
+    made = problem.problem_of
     asked = []
     warm_up()
 
     def generous(robot, cells, task):
-        problem = made(robot, cells, task)
-        asked.append(problem.tolerance)
-        return problem._replace(tolerance=1.08 * problem.tolerance)
+        given = made(robot, cells, task)
+        asked.append(given.tolerance)
+        return given._replace(tolerance=1.08 * given.tolerance)
 
     robot, cells, task, _ = load_case("paper/4a").build()
-    monkeypatch.setattr(complete, "problem_of", generous)
+    monkeypatch.setattr(problem, "problem_of", generous)
     verdict = checking.check(robot, cells, task)
     assert asked == pytest.approx([1e-3, 0.9e-3])
     assert verdict.feasible

@@ -7,8 +7,9 @@ import pytest
 from random_arms import QUESTIONS, finite_limits, question, tools
 
 from feasibility.certificate import replay
-from feasibility.complete import Explorer, close, explore
+from feasibility.complete import close, explore
 from feasibility.continuation import track
+from feasibility.explorer import Explorer
 from feasibility.fibre import roomy
 from feasibility.problem import problem_of, work_for
 from feasibility.roadmap import EDGES

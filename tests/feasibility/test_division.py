@@ -21,10 +21,11 @@ from feasibility import Search, Task, check
 from feasibility.case import load_case
 from feasibility.case_faults import CaseError
 from feasibility.certificate import replay
-from feasibility.complete import Explorer, explore
+from feasibility.complete import explore
 from feasibility.dividing import divide
 from feasibility.division import Division, Plan
 from feasibility.division_report import STATUS, answer_of, as_json, as_text
+from feasibility.explorer import Explorer
 from feasibility.gathering import table_of, tie
 from feasibility.job_commands import divide as run
 from feasibility.labels import count_of

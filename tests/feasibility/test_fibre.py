@@ -9,7 +9,7 @@ from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
 
 from feasibility import Task, check
 from feasibility.certificate import replay
-from feasibility.complete import Explorer
+from feasibility.explorer import Explorer
 from feasibility.fibre import connect, roomy, settle
 from feasibility.problem import problem_of, work_for
 from feasibility.verdict import Walk

@@ -20,7 +20,7 @@ from random_arms import (
 )
 
 from feasibility import Task
-from feasibility.complete import Explorer
+from feasibility.explorer import Explorer
 from feasibility.fibre import roomy
 from feasibility.problem import problem_of, work_for
 from feasibility.proof import Ruling, root_box, rule

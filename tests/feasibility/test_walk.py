@@ -10,7 +10,8 @@ import pytest
 from random_arms import QUESTIONS, planar_arm, question
 
 from feasibility import Task
-from feasibility.complete import Explorer, close, explore
+from feasibility.complete import close, explore
+from feasibility.explorer import Explorer
 from feasibility.problem import problem_of, work_for
 from feasibility.roadmap import (
     COMPONENTS,
