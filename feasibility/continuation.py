@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.fibre import RIM_SLACK, wish_for_room
-from feasibility.kernels import kernel
+from feasibility.kernels import kernel, put
 from feasibility.newton import correct, linearise
 from feasibility.problem import (
     CONE,
@@ -51,16 +51,12 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
     """Follow a course from `begin` to `end`, from q (in place).
 
     Args:
-        problem: the `Problem`.
-        work: the `Work` of this thread.
+        problem, work: the `Problem`, and the `Work` of this thread.
         course: which course.
-        begin: place on the course in [0, 1] that q is at now.
-        end: place to reach, before or behind it.
+        begin, end: places on it in [0, 1]: where q is now, and the one to reach, before or behind.
         q: (n,) configuration, moved to the end of the motion.
-        goal: (n,) configuration to head for, read when `has_goal`.
-        has_goal: whether there is a goal.
-        ways: (m, n) receives the waypoints after the start, from row `first` on.
-        first: first row to write.
+        goal, has_goal: (n,) configuration to head for, and whether there is one.
+        ways, first: (m, n) receives the waypoints after the start, from row `first` on.
 
     Returns:
         Number of waypoints written, or -1 when the motion stopped short (`work.blame` says why)
@@ -87,14 +83,12 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
         aim(problem, work, course, there)
         copy_slot(work)
         if has_goal:
-            share = dt / (1.0 - t)
             for j in range(n):
-                work.wish[j] = share * (goal[j] - q[j])
+                work.wish[j] = dt / (1.0 - t) * (goal[j] - q[j])
         else:
             linearise(problem, work, NEXT, problem.rim)
             wish_for_room(problem, work, q, 2.0 * size * dt)
-        for j in range(n):
-            work.trial[j] = q[j]
+        put(work.trial, q)
         position, cone = np.inf, np.inf
         if correct(problem, work, work.trial, RIM_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
             # Slot 0's errors are against the old target; they were stored when it was accepted.
@@ -110,7 +104,7 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
             if t >= 1.0 - 1e-12:
                 return written
             accept(work)
-            dt *= min(2.0, 0.85 / np.sqrt(max(max(position, 0.1), 0.1)))
+            dt *= min(2.0, 0.85 / np.sqrt(max(position, 0.1)))
         else:
             if position < np.inf and position > 1.0:
                 factor = max(0.2, min(0.7, 0.85 / np.sqrt(position)))
