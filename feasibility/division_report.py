@@ -174,7 +174,8 @@ def _steps(plan: Plan, division: Division) -> Iterator[str]:
             + (f", in {patch.pieces} pieces" if patch.pieces > 1 else "")
             + f"), around cell {_middle(patch, division.cells)}; "
         )
-        text += f"{patch.certificate.waypoints:,} waypoints, "
+        waypoints = patch.certificate.waypoints
+        text += f"{waypoints:,} waypoint{'' if waypoints == 1 else 's'}, "
         text += f"refused: {patch.refusal}" if patch.refusal else "accepted by the replay"
         yield filled(f"  {f'patch {k + 1}':<12}", text)
         if k < len(plan.moves):

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 RECONFIGURED: Colour = (0.80, 0.05, 0.05)
 STROKES = 160  # pieces of the trail that appear one after the other
 DENSE = 24  # points drawn of one move between patches
+FEW = 2  # joints of a move that the legend names
 FRAMES = 3_000  # samples of a trajectory that are drawn, at most
 
 
@@ -69,7 +70,10 @@ def view_path(
 def view_division(division: Division, case: str | None = None) -> View:
     """The patches of the plan with the fewest motions, and the moves between them in red."""
     robot, cells, plan = division.robot, division.cells, division.fewest
-    names = [f"patch {k + 1} ({len(patch.cells)} cells)" for k, patch in enumerate(plan.patches)]
+    names = [
+        f"patch {k + 1} ({len(patch.cells)} cell{'' if len(patch.cells) == 1 else 's'})"
+        for k, patch in enumerate(plan.patches)
+    ]
     parts = [*cells_layers(cells), *patch_layers(cells, plan.patch_of(len(cells)), names)]
     parts += _left_out(division)
     walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
@@ -87,7 +91,7 @@ def view_division(division: Division, case: str | None = None) -> View:
     number = len(plan.patches)
     title = f"{case}: " if case else ""
     text = f"{robot.name}: {division.n_covered} of {len(cells)} cells; " + "; ".join(
-        f"move {k + 1} to {k + 2}: {move.described()}" for k, move in enumerate(plan.moves)
+        f"move {k + 1} to {k + 2}: {move.described(FEW)}" for k, move in enumerate(plan.moves)
     )
     return compose(
         robot, cells, f"{title}{number} patch{'' if number == 1 else 'es'}", text.rstrip("; "),

@@ -29,10 +29,19 @@ from feasibility.placement_region import PlacementError, Pose, Region
 from feasibility.placement_trial import Stage, Trial
 from feasibility.placer import Placer
 from feasibility.search import Progress, Search
+from feasibility.target_courses import closed_courses
 from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence
 from robots import Robot
 from surfaces import Cells
+
+MISSED = {
+    CauseKind.OUT_OF_REACH: "out of reach",
+    CauseKind.JOINT_LIMITS: "missed for joint limits",
+    CauseKind.ORIENTATION: "missed for orientation",
+    CauseKind.COLLISION: "missed for collision",
+    CauseKind.DISCONNECTED: "reachable by another motion only",
+}
 
 COUNT = 256  # poses spread over the region
 AROUND = 8  # poses tried around each of the best, a round
@@ -257,9 +266,12 @@ def _told(
         best = trials[0].share if trials else 0.0
         message = (
             f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
-            + (f", and most of the rest is missed for {cause.replace('_', ' ')}" if cause else "")
+            + (f", and most of the rest is {MISSED[cause]}" if cause else "")
             + ("; the time limit ran out." if hunt.late else ". This is no proof.")
         )
+        closed = closed_courses(cells, task)
+        if closed and answer is Answer.UNDECIDED:
+            message += f" Wherever it stands: {closed}"
     return Placements(
         robot=robot,
         cells=cells,

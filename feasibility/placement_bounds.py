@@ -80,7 +80,8 @@ class Reach:
 
     def share(self, values: Array) -> Array:
         """(k,) share of the area within reach, at most: nothing beyond can be covered."""
-        return np.asarray(self.within(values) @ self.areas / self.areas.sum())
+        share = self.within(values) @ self.areas / self.areas.sum()
+        return np.minimum(share, 1.0)  # sums in another order may round to a little more
 
     def slack(self, values: Array) -> float:
         """Share of the reach that the furthest target leaves, at one pose (6,); 1 for any reach."""

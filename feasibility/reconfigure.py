@@ -48,14 +48,20 @@ class Reconfiguration:
         """(n,) how far each joint moves, rad or m, with its sign."""
         return self.end - self.start
 
-    def described(self) -> str:
-        """The joints that move, the furthest first: 'shoulder_pan_joint by -352.1 deg, ...'."""
+    def described(self, most: int | None = None) -> str:
+        """The joints that move, the furthest first: 'shoulder_pan_joint by -352.1 deg, ...'.
+
+        Args:
+            most: how many are named, if not all; the others are counted.
+        """
         shown = np.where(self.prismatic, 1e4 * self.moves, np.degrees(self.moves))
         parts = []
         for j in np.argsort(-np.abs(shown), kind="stable").tolist():
             if abs(shown[j]) >= LEAST_TOLD:
                 value, unit = (0.1 * shown[j], "mm") if self.prismatic[j] else (shown[j], "deg")
                 parts.append(f"{self.joint_names[j]} by {value:+.1f} {unit}")
+        if most is not None and len(parts) > most + 1:
+            parts[most:] = [f"{len(parts) - most} more"]
         return ", ".join(parts) or "no joint"
 
 

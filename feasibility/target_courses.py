@@ -58,9 +58,8 @@ def _see_facets(
     some = np.arange(len(strays))
     for count in (FEW, MANY):
         t = (np.arange(count) + 0.5) / count
-        found = beside_facets(
-            cells, standoff, tolerance, np.repeat(some, count), np.tile(t, len(some))
-        )
+        places = np.repeat(some, count), np.tile(t, len(some))
+        found = beside_facets(cells, standoff, tolerance, *places, everywhere=False)
         off = found.off.reshape(-1, count).max(axis=1)
         leans = found.leans.reshape(-1, count).max(axis=1)
         strays[some] = np.maximum(strays[some], np.column_stack([off, leans]))
@@ -85,6 +84,7 @@ def beside_facets(
     tolerance: float,
     courses: NDArray[np.int64],
     t: NDArray[np.float64],
+    everywhere: bool,
 ) -> BesideFacets:
     """Compare targets with the triangles of a mesh, without any interpolation.
 
@@ -98,17 +98,28 @@ def beside_facets(
         tolerance: m, of the tool point.
         courses: (k,) which courses.
         t: (k,) places on them.
+        everywhere: look at the whole mesh, which takes long at large standoffs; otherwise at the
+            cells of the course and at those that touch both.
     """
     surface = cells.surface
     if not isinstance(surface, MeshSurface):
         raise TypeError("the cells are not of a mesh")
+
+    def nearest(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        if everywhere:
+            return surface.nearest(points)
+        faces, weights = surface.faces_beneath(cells, cells.pairs[courses], points[:, None])
+        return faces[:, 0], weights[:, 0]
+
     foot, normal = cells.courses.at(courses, t)
+    target = foot + surface.side_sign * standoff * normal
+    away, direction = surface.beside(target, *nearest(target))
     leans = np.zeros(len(t))
-    away, direction = surface.beside(foot + surface.side_sign * standoff * normal)
     off = np.abs(standoff - away) if standoff > 0.0 else leans
-    strip = surface.from_crease(foot)
-    some = np.isfinite(strip) & (strip >= tolerance - standoff)
-    leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
+    if surface.creased:
+        strip = surface.from_crease(*nearest(foot))
+        some = np.isfinite(strip) & (strip >= tolerance - standoff)
+        leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
     return BesideFacets(off, leans, away)
 
 
@@ -169,19 +180,41 @@ def closed_courses(cells: Cells, task: Task) -> str:
     courses = cells.courses
     smooth = ~courses.creased & (courses.strays[:, 1] <= TELLING)
     folds = ways.folded & smooth
+    rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
+    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim) | ways.folded
+    parted = _parted(cells, ~rough)
     if folds.any():
+        if cells.surface.grain > 0.0:  # facets do not tell the two apart
+            return (
+                "The offset surface folds where it is hollow, or the mesh is too coarse where it "
+                f"bends, {some.format(int(folds.sum()))}: the standoff is too large for the "
+                f"radius of curvature, so no motion can be certified there{parted}; use a smaller "
+                "standoff, a mesh that is finer along its bends, or a part of it that ends there."
+            )
         return (
             f"The offset surface folds {some.format(int(folds.sum()))}: the standoff reaches "
             "the surface's radius of curvature on its hollow side, so no motion can be certified "
-            "there; use a smaller standoff."
+            f"there{parted}; use a smaller standoff."
         )
-    rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
-    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim) | ways.folded
     if rough.any():
         return (
             f"The surface is creased, or rougher than the task allows, "
             f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
-            "of a mesh it can, but not into a hollow one, or past a corner); use a finer or "
-            "smoother mesh, cut it along its creases, or allow a wider cone or a larger tolerance."
+            f"of a mesh it can, but not into a hollow one, or past a corner){parted}; use a finer "
+            "or smoother mesh, cut it along its creases, or allow a wider cone or a larger "
+            "tolerance."
         )
     return ""
+
+
+def _parted(cells: Cells, usable: NDArray[np.bool_]) -> str:
+    """Whether the ways (M,) that can be used leave the cells in several parts, whatever the arm."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(cells)
+    links = [coo_array((np.ones(len(k)), k.T), (n, n)) for k in (cells.pairs, cells.pairs[usable])]
+    whole, parts = (connected_components(link, directed=False)[0] for link in links)
+    if parts == whole:
+        return ""
+    return f", which leaves {parts} parts of the surface that no arm's motion joins"
