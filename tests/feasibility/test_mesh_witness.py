@@ -22,7 +22,7 @@ from surfaces.parametric import cylinder
 from surfaces.surface import rotation_from_rpy
 from surfaces.triangles import TriangleMesh
 
-PER_SEGMENT = 20
+PER_SEGMENT = 10
 SETTLED = 1e-7  # m, how far the last turn may move a foot
 TURNS = 60  # of the search for a foot
 
