@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from feasibility.following import follow
-from feasibility.task import DEFAULT_TOLERANCE, Task
+from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
 from robots import Robot
 from robots.kinematics import Kinematics
@@ -162,8 +162,8 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     fault = _malformed(robot, cells, walk)
     if fault:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
-    rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
+    tolerance = task.leeway
+    rim = task.rim
     poses = placements(robot, walk.q)
     beside = follow(cells, task, walk, poses.points, poses.axes)
     if beside.fault:

@@ -10,7 +10,7 @@ import numpy as np
 
 from feasibility.search import Progress, Search
 from feasibility.target_courses import closed_courses
-from feasibility.task import DEFAULT_TOLERANCE, Task
+from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence, Verdict, Walk, deferred
 from robots import Robot
 from surfaces import Cells
@@ -184,7 +184,7 @@ def _attempt(explorer: Explorer, task: Task, began: float) -> _Attempt:
 
 def _narrowed(task: Task) -> Task:
     """A task that leaves the replay some room."""
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    tolerance = task.leeway
     return replace(task, tolerance=NARROWER * tolerance, cone_deg=NARROWER * task.cone_deg)
 
 
@@ -196,7 +196,7 @@ def _answer(
 
     total = len(explorer.cells)
     covered = int(explorer.covered.sum())
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    tolerance = task.leeway
     within = f"within {1e3 * tolerance:g} mm and {task.cone_deg:g} deg"
     proved = sum(ruling is Ruling.PROVED for ruling in explorer.rulings.values())
     if total == 0:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.target_courses import TargetCourses, beside_facets, target_courses
-from feasibility.task import DEFAULT_TOLERANCE, Task
+from feasibility.task import Task
 from feasibility.verdict import Walk
 from surfaces import Cells
 
@@ -73,7 +73,7 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         k = int(np.flatnonzero(course < STAYS)[0])
         names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
         return _faulty(nothing, f"the motion goes from cell {names}, which do not touch")
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    tolerance = task.leeway
     ways = target_courses(cells, task.standoff, tolerance)
 
     # Each segment, and each waypoint between marks, belongs to one stretch from mark to mark.
@@ -255,7 +255,7 @@ def _strays(
         return strays, "a course between two cells leaves the surface"
     strays[:, 0] += standoff * strays[:, 1]
     if surface.grain > 0.0:
-        found = beside_facets(cells, standoff, tolerance, used[owner], t)
+        found = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)
         np.maximum.at(strays[:, 0], owner, found.off)
         np.maximum.at(strays[:, 1], owner, found.leans)
         if not found.off.max(initial=0.0) <= tolerance:

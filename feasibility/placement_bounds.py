@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.placement_region import Array, Pose, Region
-from feasibility.task import DEFAULT_TOLERANCE, Task
+from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
 from surfaces.surface import rotation_from_rpy
@@ -64,7 +64,7 @@ class Reach:
             areas=np.array(cells.areas),
             origin=np.array(robot.model.jointPlacements[1].translation),
             reach=robot.reach,
-            tolerance=DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance,
+            tolerance=task.leeway,
         )
 
     def distances(self, values: Array) -> Array:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from feasibility.kernels import kernel
 from feasibility.target_courses import target_courses
-from feasibility.task import DEFAULT_TOLERANCE, Task
+from feasibility.task import Task
 from robots import Robot
 from robots.chain import Chain, frames
 from surfaces import Cells
@@ -67,11 +67,11 @@ class Problem(NamedTuple):
 
 def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
     """Gather arm, cells and task for the compiled search."""
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    tolerance = task.leeway
     targets = task.targets(cells)
     ways = target_courses(cells, task.standoff, tolerance)
     chain = Chain.checked(robot)
-    rim = np.inf if task.cone_deg >= 180.0 else float(2.0 * np.sin(0.5 * task.cone))
+    rim = task.rim
     strays = ways.strays[:, 1]
     ordinary = float(strays[strays <= ORDINARY * rim].max(initial=0.0)) if rim < np.inf else 0.0
     near = NEWTON * tolerance

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.task import DEFAULT_TOLERANCE, Task
+from feasibility.task import Task
 from surfaces import Cells
 from surfaces.mesh import MeshSurface
 
@@ -174,13 +174,13 @@ def target_courses(cells: Cells, standoff: float, tolerance: float) -> TargetCou
 
 def closed_courses(cells: Cells, task: Task) -> str:
     """Why no motion can be certified between some neighbouring cells; empty where it can."""
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    tolerance = task.leeway
     ways = target_courses(cells, task.standoff, tolerance)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
     courses = cells.courses
     smooth = ~courses.creased & (courses.strays[:, 1] <= TELLING)
     folds = ways.folded & smooth
-    rim = np.inf if task.cone_deg >= 180.0 else 2.0 * np.sin(0.5 * task.cone)
+    rim = task.rim
     rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim) | ways.folded
     parted = _parted(cells, ~rough)
     if folds.any():

@@ -31,6 +31,8 @@ class Task:
         >>> task = Task(standoff=0.005, cone_deg=45)
         >>> round(task.cone, 4)
         0.7854
+        >>> task.leeway
+        0.001
 
     Raises:
         ValueError: standoff or tolerance is negative or not finite, or the cone is outside
@@ -63,6 +65,16 @@ class Task:
     def cone(self) -> float:
         """The half angle alpha of the cone, radians."""
         return math.radians(self.cone_deg)
+
+    @property
+    def leeway(self) -> float:
+        """The tolerance, m; where it is left to the method, that of the complete search."""
+        return DEFAULT_TOLERANCE if self.tolerance is None else self.tolerance
+
+    @property
+    def rim(self) -> float:
+        """|a - b| of unit vectors a and b, `cone` apart, 0 .. 2; inf where any axis will do."""
+        return math.inf if self.cone_deg >= 180.0 else 2.0 * math.sin(0.5 * self.cone)
 
     def targets(self, cells: Cells) -> Targets:
         """Target points and approach directions of the centres of `cells` (eqs. 1 and 2)."""

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.task import DEFAULT_TOLERANCE
 from feasibility.verdict import Verdict, Walk
 from robots.kinematics import Kinematics
 
@@ -74,7 +73,7 @@ def _at_centres(verdict: Verdict, q: NDArray[np.float64]) -> NDArray[np.int64]:
     from scipy.spatial import KDTree
 
     kinematics, task = Kinematics(verdict.robot), verdict.task
-    tolerance = DEFAULT_TOLERANCE if task.tolerance is None else task.tolerance
+    tolerance = task.leeway
     points = np.array([kinematics.tool(row)[0] for row in q])
     away, cell = KDTree(task.targets(verdict.cells).points).query(points)
     return np.where(away <= tolerance, cell, -1).astype(np.int64)
