@@ -75,7 +75,12 @@ def add_studies(subcommands: argparse._SubParsersAction, add_case: Callable[...,
     place.add_argument("--map", metavar="FILE", help="draw the share covered over the region")
     place.add_argument("--html", metavar="FILE", help="write a view of all placements tried")
     place.add_argument("--out", metavar="FILE", help="keep finished placements, to go on from them")
-    place.add_argument("--time-limit", type=positive, metavar="S", help="seconds")
+    place.add_argument(
+        "--time-limit",
+        type=positive,
+        metavar="S",
+        help="seconds for the search; stations, map and view come on top",
+    )
     _add_workers(place)
     place.set_defaults(run=_run("placement_commands", "run_place"))
 

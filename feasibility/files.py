@@ -70,6 +70,10 @@ def check_writable(path: str | os.PathLike[str]) -> None:
         if isinstance(error, FileError):
             raise
         raise FileError(f"{name}: cannot be written: {reason(error)}") from error
+    if _is_special(file):
+        if not os.access(file, os.W_OK):
+            raise FileError(f"{name}: cannot be written to")
+        return
     if not os.access(folder, os.W_OK | os.X_OK):
         raise FileError(f"{name}: the folder {shown_path(folder)} cannot be written to")
 
@@ -87,10 +91,10 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
         FileError: the file cannot be written; nothing is left behind.
     """
     check_writable(path)
+    if _is_special(Path(path)):
+        return _write_through(Path(path), write)
     # A link is followed, so that the file it points to is replaced and not the link.
     file = Path(os.path.realpath(path))
-    if file.exists() and not file.is_file():  # a pipe or device cannot be replaced
-        return _write_through(file, write)
     temporary = ""
     try:
         handle, temporary = tempfile.mkstemp(prefix=f".{file.name[:40]}.", dir=file.parent)
@@ -106,6 +110,11 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
         if temporary and os.path.exists(temporary):
             os.unlink(temporary)
     return Path(path)
+
+
+def _is_special(file: Path) -> bool:
+    """Is it a pipe or a device, such as /dev/stdout, which cannot be replaced?"""
+    return file.exists() and not file.is_file() and not file.is_dir()
 
 
 def _write_through(file: Path, write: Callable[[IO[bytes]], object]) -> Path:

@@ -230,7 +230,9 @@ def _stations_text(plan: StationPlan) -> list[str]:
         return ["no stations: no motion found covers any cell"]
     plural = "" if number == 1 else "s"
     proof = "proved fewest of what was found" if stations.optimal else f"at least {stations.bound}"
-    lines = [f"{number} station{plural} ({proof}):"]
+    poses = len({trial.pose for trial in plan.trials})
+    where = f", at {poses} placement{'' if poses == 1 else 's'}" if poses < number else ""
+    lines = [f"{number} station{plural}{where} ({proof}):"]
     for station, trial, refusal in zip(stations.stations, plan.trials, plan.refusals, strict=True):
         lines.append(
             f"  {len(station.cells):5d} cell{'' if len(station.cells) == 1 else 's'} at "

@@ -145,7 +145,7 @@ def coarse(figures: Figures) -> str:
             f"{_share(curved)} too large for the curvature: the normal leans up to "
             f"{math.degrees(worst):.0f} degrees from the cell's mean, more than "
             f"{MOST_TURN_DEG:g}; about {_round_up(count * ratio**2):,} cells "
-            f"(size = {size / ratio:.2g} m) would do"
+            f"(cell_size = {size / ratio:.2g} m) would do"
         )
     if creased.any():
         parts.append(
