@@ -85,14 +85,17 @@ class MeshSurface(Surface):
             inside=np.ones(shape, dtype=bool),
         )
 
-    def beside(self, points: Array) -> tuple[Array, Array]:
-        """Distances (k,) m of points (k, 3) m from the triangles, and outward directions (k, 3).
+    def nearest(self, points: Array) -> tuple[Ints, Array]:
+        """Faces (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m."""
+        return self._nearest((points - self.position) @ self.rotation)
 
-        These are unit vectors along the lines from the nearest places to the points, without any
+    def beside(self, points: Array, face: Ints, weights: Array) -> tuple[Array, Array]:
+        """Distances (k,) m of points (k, 3) m from places of faces, and outward directions (k, 3).
+
+        These are unit vectors along the lines from the places to the points, without any
         interpolation: over an edge the direction to the edge; on a face the face's own normal.
         """
         local = (points - self.position) @ self.rotation
-        face, weights = self._nearest(local)
         off = local - np.einsum("kc,kci->ki", weights, self._balls[0][face])
         distance = np.linalg.norm(off, axis=1)
         flat = self.mesh.face_normals[face]
@@ -101,15 +104,17 @@ class MeshSurface(Surface):
         direction = off * (outer / np.where(on, 1.0, distance))[:, None]
         return distance, np.where(on[:, None], flat, direction) @ self.rotation.T
 
-    def from_crease(self, points: Array) -> Array:
-        """(k,) m, how far off a crease the nearest places of points (k, 3) m are, at most.
+    @property
+    def creased(self) -> bool:
+        """Are there strips along creases, where the normal turns?"""
+        return bool(self._rims.any())
+
+    def from_crease(self, face: Ints, weights: Array) -> Array:
+        """(k,) m, how far off a crease places of faces are, at most.
 
         Only on the strips where the normal turns; inf elsewhere.
         """
-        away = np.full(len(points), np.inf)
-        if not self._rims.any():
-            return away
-        face, weights = self._nearest((points - self.position) @ self.rotation)
+        away = np.full(len(face), np.inf)
         some = np.flatnonzero(self.rim_share(face, weights) > 0.0)
         corners, rims = self._balls[0][face[some]], self._rims[face[some]]
         parts = weights[some] * rims
