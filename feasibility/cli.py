@@ -20,6 +20,7 @@ from feasibility.console import prepare, say, tell
 
 INTERRUPTED = 130
 TRACEBACK = "COVERABLE_TRACEBACK"
+NO_CACHE = "cannot cache function"  # numba's words
 
 STATUSES = """exit status of check: 0 feasible, 1 infeasible, 3 undecided, 2 bad input,
 130 interrupted"""
@@ -142,6 +143,12 @@ def _failed(error: Exception) -> int:
         tell(
             f"coverable: a library is missing or broken ({error}); install coverable into a fresh "
             "virtual environment"
+        )
+    elif isinstance(error, RuntimeError) and NO_CACHE in str(error):
+        tell(
+            "coverable: the compiled search kernels can be kept nowhere: neither the folder of the "
+            "installation nor the cache in the home folder can be written to; set NUMBA_CACHE_DIR "
+            "to a folder of yours"
         )
     else:
         text = " ".join(str(error).split())
