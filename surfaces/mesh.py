@@ -66,14 +66,15 @@ class MeshSurface(Surface):
         """The points of the mesh nearest to `points` (..., 3) m; see `Foot`.
 
         `height` is the whole distance, positive where the point lies on the outer side of the
-        face; the mesh ends at its border, so every foot is inside.
+        surface; the mesh ends at its border, so every foot is inside.
         """
         points = points_of(points)
         flat = (points.reshape(-1, 3) - self.position) @ self.rotation
         face, weights = self._nearest(flat)
         corners = self.mesh.vertices[self.mesh.faces[face]]
         off = flat - np.einsum("kc,kci->ki", weights, corners)
-        outer = np.einsum("ki,ki->k", off, self.mesh.face_normals[face]) >= 0.0
+        normals = self.normals_at(face, weights)
+        outer = np.einsum("ki,ki->k", off, normals @ self.rotation) >= 0.0
         distance = np.linalg.norm(off, axis=1)
         shape = points.shape[:-1]
         nowhere = np.full(shape, np.nan)
@@ -81,7 +82,7 @@ class MeshSurface(Surface):
             u=nowhere,
             v=nowhere,
             height=np.where(outer, distance, -distance).reshape(shape),
-            normal=self.normals_at(face, weights).reshape(*shape, 3),
+            normal=normals.reshape(*shape, 3),
             inside=np.ones(shape, dtype=bool),
         )
 
@@ -98,10 +99,12 @@ class MeshSurface(Surface):
         local = (points - self.position) @ self.rotation
         off = local - np.einsum("kc,kci->ki", weights, self._balls[0][face])
         distance = np.linalg.norm(off, axis=1)
-        flat = self.mesh.face_normals[face]
-        outer = np.where(np.einsum("ki,ki->k", off, flat) >= 0.0, 1.0, -1.0)
+        # Not by the face's own normal: beyond a sharp edge a point may lie under its plane.
+        mean = self.normals_at(face, weights) @ self.rotation
+        outer = np.where(np.einsum("ki,ki->k", off, mean) >= 0.0, 1.0, -1.0)
         on = distance <= ON * self.grain
         direction = off * (outer / np.where(on, 1.0, distance))[:, None]
+        flat = self.mesh.face_normals[face]
         return distance, np.where(on[:, None], flat, direction) @ self.rotation.T
 
     @property

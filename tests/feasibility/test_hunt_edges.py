@@ -40,3 +40,16 @@ def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) 
     if name not in ("smooth", "hollow"):  # where normals are interpolated
         cosine = ((foot - tips) * axes).sum(axis=1) / away
         assert np.arccos(np.clip(cosine, -1, 1)).max() <= certificate.max_angle + 1e-9
+
+
+@pytest.mark.parametrize("angle", [95, 120, 150, 170])
+def test_what_is_over_a_sharp_edge_is_outside(angle: int) -> None:
+    """It may lie under the plane of either face."""
+    surface = mesh(roof(angle)).cells(20).surface
+    turn = np.radians(np.linspace(-0.49, 0.49, 25) * angle)
+    over = np.column_stack([np.sin(turn), np.zeros(len(turn)), np.cos(turn)])
+    for y in np.linspace(0.01, 0.29, 8):
+        foot = surface.closest([0.0, y, 0.0] + 0.05 * over)
+        np.testing.assert_allclose(foot.height, 0.05, rtol=1e-12)
+        foot = surface.closest([0.0, y, 0.0] - 0.01 * over)
+        assert (foot.height <= 0.0).all()
