@@ -47,6 +47,7 @@ def check(
         compiles the kernels, which takes a while and says so on stderr.
 
     Raises:
+        TypeError: an argument is something else, such as a surface that is not cut into cells.
         RobotError: the arm is no serial chain of one-dof joints.
         SurfaceError: the greedy search does not know this kind of surface.
 
@@ -59,12 +60,30 @@ def check(
         (True, 9)
     """
     search = Search() if search is None else search
+    _refuse_other_types(robot, cells, task, search)
     if search.method == "greedy":
         from feasibility.greedy import greedy_check
         from surfaces.grid import charted_grid
 
         return greedy_check(robot, charted_grid(cells), task, search, progress)
     return _complete_check(robot, cells, task, search, progress)
+
+
+def _refuse_other_types(*given: object) -> None:
+    """Refuse what is no robot, cells, task or search, all of it at once."""
+    expected = (
+        ("robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
+        ("cells", Cells, "a surface cut into cells, such as surface.cells(9, 10)"),
+        ("task", Task, "a Task, such as Task(standoff=0.02, cone_deg=20)"),
+        ("search", Search, "a Search, such as Search(seed=1)"),
+    )
+    faults = [
+        f"{name}: expected {words}, got {value!r:.60}"
+        for value, (name, kind, words) in zip(given, expected, strict=True)
+        if not isinstance(value, kind)
+    ]
+    if faults:
+        raise TypeError("; ".join(faults))
 
 
 @dataclass(frozen=True, slots=True)

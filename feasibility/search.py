@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from numbers import Integral, Real
 from typing import Literal
 
 Progress = Callable[[int, int | None, str], None]
@@ -16,7 +17,7 @@ class Search:
     """Settings of a search; `Search()` is what `feasibility.check` does when nothing is said.
 
     Raises:
-        ValueError: a setting is out of its range.
+        ValueError: settings are out of their range; all of them are named.
     """
 
     method: Literal["complete", "greedy"] = "complete"
@@ -38,19 +39,30 @@ class Search:
 
     def __post_init__(self) -> None:
         """Refuse settings that describe no search."""
+        limit, faults = self.time_limit, list[str]()
         if self.method not in ("complete", "greedy"):
-            raise ValueError(f"method must be 'complete' or 'greedy', got {self.method!r}")
-        if self.seed < 0:
-            raise ValueError(f"seed must be >= 0, got {self.seed}")
-        if self.time_limit is not None and not (
-            math.isfinite(self.time_limit) and self.time_limit > 0
-        ):
-            raise ValueError(f"time_limit must be a finite number > 0 (s), got {self.time_limit}")
-        if not 1e-4 <= self.step_deg <= 30.0:
-            raise ValueError(f"step_deg must lie in 0.0001 .. 30 (degrees), got {self.step_deg}")
+            faults.append(f"method must be 'complete' or 'greedy', got {self.method!r}")
+        if not _is_whole(self.seed, 0):
+            faults.append(f"seed must be a whole number >= 0, got {self.seed!r}")
+        if limit is not None and not (_is_real(limit) and 0.0 < limit < math.inf):
+            faults.append(f"time_limit must be a finite number > 0 (s), got {limit!r}")
+        if not (_is_real(self.step_deg) and 1e-4 <= self.step_deg <= 30.0):
+            faults.append(f"step_deg must lie in 0.0001 .. 30 (degrees), got {self.step_deg!r}")
         if self.moves not in ("single", "all"):
-            raise ValueError(f"moves must be 'single' or 'all', got {self.moves!r}")
-        if self.starts != "all" and not (isinstance(self.starts, int) and self.starts >= 1):
-            raise ValueError(f"starts must be 'all' or a whole number >= 1, got {self.starts!r}")
-        if self.cap is not None and self.cap < 1:
-            raise ValueError(f"cap must be >= 1, got {self.cap}")
+            faults.append(f"moves must be 'single' or 'all', got {self.moves!r}")
+        if self.starts != "all" and not _is_whole(self.starts, 1):
+            faults.append(f"starts must be 'all' or a whole number >= 1, got {self.starts!r}")
+        if self.cap is not None and not _is_whole(self.cap, 1):
+            faults.append(f"cap must be a whole number >= 1, got {self.cap!r}")
+        if faults:
+            raise ValueError("; ".join(faults))
+
+
+def _is_real(value: object) -> bool:
+    """Is it a number? No truth value is one."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _is_whole(value: object, low: int) -> bool:
+    """Is it a whole number, `low` or more?"""
+    return isinstance(value, Integral) and _is_real(value) and int(value) >= low

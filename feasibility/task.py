@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ class Task:
 
     Raises:
         ValueError: standoff or tolerance is negative or not finite, or the cone is outside
-            0 to 180 degrees.
+            0 to 180 degrees; all that is wrong is named.
     """
 
     standoff: float
@@ -50,16 +51,15 @@ class Task:
 
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task."""
-        if not (math.isfinite(self.standoff) and self.standoff >= 0.0):
-            raise ValueError(f"standoff must be a finite number >= 0 (metres), got {self.standoff}")
-        if not 0.0 <= self.cone_deg <= 180.0:
-            raise ValueError(f"cone_deg must lie in 0 .. 180 (degrees), got {self.cone_deg}")
-        if self.tolerance is not None and not (
-            math.isfinite(self.tolerance) and self.tolerance > 0.0
-        ):
-            raise ValueError(
-                f"tolerance must be a finite number > 0 (metres), got {self.tolerance}"
-            )
+        tolerance, faults = self.tolerance, list[str]()
+        if not 0.0 <= _number(self.standoff) < math.inf:
+            faults.append(f"standoff must be a finite number >= 0 (metres), got {self.standoff!r}")
+        if not 0.0 <= _number(self.cone_deg) <= 180.0:
+            faults.append(f"cone_deg must lie in 0 .. 180 (degrees), got {self.cone_deg!r}")
+        if tolerance is not None and not 0.0 < _number(tolerance) < math.inf:
+            faults.append(f"tolerance must be a finite number > 0 (metres), got {tolerance!r}")
+        if faults:
+            raise ValueError("; ".join(faults))
 
     @property
     def cone(self) -> float:
@@ -83,3 +83,8 @@ class Task:
             points=cells.centres + sign * self.standoff * cells.normals,
             approaches=-sign * cells.normals,
         )
+
+
+def _number(value: object) -> float:
+    """A number as it is; NaN for anything else, which no comparison accepts."""
+    return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
