@@ -125,6 +125,7 @@ _TEMPLATE = """<!DOCTYPE html>
 body {{ margin: 0; font: 13px/1.45 system-ui, sans-serif; color: #222; }}
 #meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
 #legend {{ position: absolute; left: 12px; bottom: 12px; max-width: 21em; padding: 10px 14px;
+  max-height: calc(100vh - 44px); overflow: auto; overflow-wrap: anywhere;
   background: rgba(255, 255, 255, 0.86); border-radius: 6px; box-shadow: 0 1px 4px #0003; }}
 #legend summary {{ font-size: 15px; font-weight: 600; cursor: pointer; }}
 #legend p {{ margin: 2px 0 6px; color: #444; }}

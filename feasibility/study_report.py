@@ -129,12 +129,15 @@ def share_text(row: Row) -> str:
 
 
 def groups_of(study: Study, rows: Sequence[Row]) -> dict[str, dict[str, list[Row]]]:
-    """Rows by value, for each key that takes a few values."""
+    """Rows by value, for each key that takes a few values; numbers in their order."""
     found: dict[str, dict[str, list[Row]]] = {}
     for label in study.labels:
         groups: dict[str, list[Row]] = {}
-        for row in rows:
-            groups.setdefault(short(row.parameters[label]), []).append(row)
+        values = [row.parameters[label] for row in rows]
+        numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+        order = sorted(range(len(rows)), key=values.__getitem__) if numbers else range(len(rows))
+        for k in order:
+            groups.setdefault(short(values[k]), []).append(rows[k])
         if 2 <= len(groups) <= BEST:
             found[label] = groups
     return found

@@ -9,6 +9,9 @@ import pytest
 
 from feasibility.placement_bounds import Reach
 from feasibility.reconfigure import Reconfiguration
+from feasibility.study import Row
+from feasibility.study_file import Study
+from feasibility.study_report import groups_of, short
 from feasibility.task import Task
 from robots import load_robot
 from surfaces import sphere
@@ -37,3 +40,21 @@ def test_a_share_is_never_more_than_all() -> None:
         reach = Reach.of(arm, cells, task)
         assert reach.within(pose).all()
         assert 1.0 - 1e-12 <= reach.share(pose)[0] <= 1.0
+
+
+def test_groups_of_numbers_stand_in_their_order() -> None:
+    """Samples come in the order in which they were drawn; words stay as they were given."""
+    rng = np.random.default_rng(1)
+    depths = (rng.permutation(9) - 4) / 100.0
+    arms = ["ur5", "panda", "kinova"]
+    points = [{"robot": arm, "z": float(z), "on": bool(z > 0)} for z in depths for arm in arms]
+    rows = [Row(point, "done", {}, 0.0) for point in points]
+    study = Study("a study", "", (), ("robot", "z", "on"))
+    groups = groups_of(study, rows)
+    assert list(groups["robot"]) == arms
+    assert list(map(float, groups["z"])) == sorted(depths.tolist())
+    assert list(groups["on"]) == list(dict.fromkeys("true" if z > 0 else "false" for z in depths))
+    for label, by_value in groups.items():
+        assert sum(map(len, by_value.values())) == len(rows)
+        for value, group in by_value.items():
+            assert all(short(row.parameters[label]) == value for row in group)
