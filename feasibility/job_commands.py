@@ -79,8 +79,9 @@ def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: floa
 
     reason = f"no path over this surface is known. {verdict!r}"
     tell(f"coverable path: {name}: {reason}")
-    if str(verdict.answer) == "infeasible":
-        tell("`coverable explain` says what would help, `coverable divide` how to split it.")
+    if str(verdict.answer) == "undecided" and "time limit" in verdict.message:
+        tell("`--set search.time_limit=...` gives the search more time.")
+    tell("`coverable explain` says what would help, `coverable divide` how to split it.")
     for flag, files in (("--out", args.out), ("--html", [args.html])):
         for file in files:
             if file is not None:

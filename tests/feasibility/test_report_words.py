@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
+from feasibility.cli import main
 from feasibility.placement_bounds import Reach
 from feasibility.reconfigure import Reconfiguration
 from feasibility.study import Row
@@ -58,3 +59,9 @@ def test_groups_of_numbers_stand_in_their_order() -> None:
         assert sum(map(len, by_value.values())) == len(rows)
         for value, group in by_value.items():
             assert all(short(row.parameters[label]) == value for row in group)
+
+
+@pytest.mark.parametrize(("setting", "told"), [("search.seed=0", 0), ("search.time_limit=1e-6", 1)])
+def test_more_time_is_advised_where_time_ran_out(setting, told, capsys) -> None:
+    assert main(["path", "paper/4d", "--set", setting]) == (3 if told else 1)
+    assert capsys.readouterr().err.count("--set search.time_limit=") == told
