@@ -200,9 +200,9 @@ def closed_courses(cells: Cells, task: Task) -> str:
         return (
             f"The surface is creased, or rougher than the task allows, "
             f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
-            f"of a mesh it can, but not into a hollow one, or past a corner){parted}; use a finer "
-            "or smoother mesh, cut it along its creases, or allow a wider cone or a larger "
-            "tolerance."
+            f"of a mesh it can, but not into a hollow one, or past a corner){parted}; use smaller "
+            "cells, a finer or smoother mesh, cut it along its creases, or allow a wider cone or a "
+            "larger tolerance."
         )
     return ""
 

@@ -8,6 +8,7 @@ from dense_replay import tools
 from test_creases import PER_SEGMENT, nearest, roof
 
 from feasibility import Task, check
+from feasibility.target_courses import beside_facets
 from robots import load_robot
 from surfaces.mesh import mesh
 
@@ -52,3 +53,19 @@ def test_what_is_over_a_sharp_edge_is_outside(angle: int) -> None:
         foot = surface.closest([0.0, y, 0.0] + 0.05 * over)
         np.testing.assert_allclose(foot.height, 0.05, rtol=1e-12)
         assert surface.closest([0.0, y, -0.01]).height < 0.0
+
+
+@pytest.mark.parametrize("angle", [25, 60, 120, 150])
+def test_the_cells_of_a_course_say_what_the_whole_mesh_says(angle: int) -> None:
+    """Where nothing else is near: the search asks the former, the replay the latter."""
+    cells = mesh(roof(angle)).cells(20)
+    t = (np.arange(32) + 0.5) / 32
+    places = np.repeat(np.arange(len(cells.pairs)), len(t)), np.tile(t, len(cells.pairs))
+    near, all_over = (
+        beside_facets(cells, 0.02, 3e-4, *places, everywhere=everywhere)
+        for everywhere in (False, True)
+    )
+    np.testing.assert_allclose(near.off, all_over.off, atol=1e-12)
+    np.testing.assert_allclose(near.leans, all_over.leans, atol=1e-9)
+    assert near.leans.max() < 0.1
+    assert (near.leans.max() > 0.0) == (angle > 30)
