@@ -12,7 +12,7 @@ from feasibility.task import Task
 from surfaces import Cells
 from surfaces.mesh import MeshSurface
 
-TELLING = 0.1  # [1] a course whose normal strays no further knows how the surface bends
+TELLING = 0.03  # [1] a course whose normal strays no further knows how the surface bends
 ASIDE = 1.1  # [1] the normal may turn that much faster between the places looked at
 FEW, MANY = 3, 32  # places on a course over a mesh; and on one over a crease, or off its facets by
 OFF = 0.05  # [1] of the tolerance

@@ -161,6 +161,7 @@ def courses_of(cells: Cells) -> Courses:
             break
     creased = np.zeros(len(pairs), dtype=bool)
     if grain:
+        from surfaces.bent import over_bends
         from surfaces.creased import over_creases
         from surfaces.mesh_cells import MeshCells
 
@@ -169,6 +170,7 @@ def courses_of(cells: Cells) -> Courses:
             for some, cubics in over_creases(cells, rough, close, strays):
                 fitted.append((some, cubics))
                 creased[some] = True
+            fitted += over_bends(cells, fitted, rough[~creased[rough]], close, strays)
     return _joined(fitted, strays, creased)
 
 

@@ -1,4 +1,4 @@
-"""Motions over sharp edges, looked at again by the exact distance from the triangles.
+"""Motions over sharp edges and tight bends, looked at by the exact distance from the triangles.
 
 Over a convex edge the tool goes round in an arc of the standoff. The nearest place of a convex body
 tells the true approach direction too: from the tool point to its foot.
@@ -71,10 +71,14 @@ def nearest(triangles, points):
 def test_a_motion_over_edges_keeps_standoff_and_cone(name, task):
     part, position, count = PARTS[name]
     task = TASKS[task]
-    surface = mesh(part, position=position)
-    verdict = check(load_robot("ur5"), surface.cells(count), task)
+    verdict = check(load_robot("ur5"), mesh(part, position=position).cells(count), task)
+    assert_held(verdict, part, position, 1e-6)
+
+
+def assert_held(verdict, part, position, lean):
+    """A motion over all cells, at the standoff and in the cone, but for `lean` rad."""
     assert verdict.feasible
-    walk = verdict.witness
+    walk, task = verdict.witness, verdict.task
     share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
     q = np.concatenate(
         [(walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share).reshape(-1, 6), walk.q[-1:]]
@@ -85,8 +89,43 @@ def test_a_motion_over_edges_keeps_standoff_and_cone(name, task):
     tolerance = 1e-3 if task.tolerance is None else task.tolerance
     assert np.abs(away - task.standoff).max() <= tolerance
     cosine = ((foot - tips) * axes).sum(axis=1) / away
-    assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + 1e-6
+    assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + lean
     assert set(walk.cell[walk.cell >= 0].tolist()) == set(range(len(verdict.cells)))
+
+
+def folded_sheet(radius, facets):
+    """A sheet that bends down at a right angle over a rounded edge, 300 mm wide."""
+    t = np.linspace(0.0, np.pi / 2, facets + 1)
+    bend = 0.3 + radius * np.column_stack([np.sin(t) - 1, np.cos(t) - 1])
+    flat = [(y, 0.3) for y in np.linspace(0.0, 0.3 - radius, 7)[:-1]]
+    flange = [(0.3, z) for z in np.linspace(0.3 - radius, 0.24, 3)[1:]]
+    profile = np.array([*flat, *bend, *flange])
+    x, k = np.meshgrid(np.linspace(0.0, 0.3, 9), np.arange(len(profile)), indexing="ij")
+    vertices = np.column_stack([x.ravel(), profile[k.ravel()]])
+    a = (np.arange(8)[:, None] * len(profile) + np.arange(len(profile) - 1)).ravel()
+    b = a + len(profile)
+    faces = np.concatenate([np.column_stack([a, b, b + 1]), np.column_stack([a, b + 1, a + 1])])
+    return TriangleMesh(vertices, faces)
+
+
+@pytest.mark.parametrize(
+    ("radius", "facets", "standoff", "tolerance"),
+    [
+        (0.006, 5, 0.03, 2e-3),
+        (0.006, 20, 0.03, 1e-3),
+        (0.006, 20, 0.15, 5e-3),
+        (0.02, 5, 0.15, 1e-3),
+        (0.02, 20, 0.15, 1e-3),
+    ],
+)
+def test_a_motion_over_a_rounded_edge_far_smaller_than_the_standoff(
+    radius, facets, standoff, tolerance
+):
+    part, position = folded_sheet(radius, facets), (0.45, -0.15, -0.2)
+    task = Task(standoff=standoff, cone_deg=20, tolerance=tolerance)
+    verdict = check(load_robot("ur10"), mesh(part, position=position).cells(60), task)
+    # Normals are interpolated: they lean from the facets' own by half a facet's turn.
+    assert_held(verdict, part, position, np.pi / 4 / facets)
 
 
 @pytest.mark.parametrize("standoff", [0.01, 0.05])
