@@ -7,7 +7,8 @@ hand: |f''| and |n''| are largest at the ends of the pieces, because second deri
 are straight lines.
 
 The curves are fitted to samples of `Surface.trace`: exactly through few samples of a smooth patch,
-by least squares through many of a mesh, whose facets they so smooth out. How far they stray from
+by least squares through many of a mesh, whose facets they so smooth out. (`surfaces.creased` and
+`surfaces.bent` make those that lead over sharp edges and tight bends.) How far they stray from
 the samples is measured between them too, and counted against tolerance and cone by those who use
 them.
 """

@@ -6,6 +6,7 @@ tells the true approach direction too: from the tool point to its foot.
 
 from __future__ import annotations
 
+import mesh_patches
 import numpy as np
 import pytest
 import trimesh
@@ -93,21 +94,6 @@ def assert_held(verdict, part, position, lean):
     assert set(walk.cell[walk.cell >= 0].tolist()) == set(range(len(verdict.cells)))
 
 
-def folded_sheet(radius, facets):
-    """A sheet that bends down at a right angle over a rounded edge, 300 mm wide."""
-    t = np.linspace(0.0, np.pi / 2, facets + 1)
-    bend = 0.3 + radius * np.column_stack([np.sin(t) - 1, np.cos(t) - 1])
-    flat = [(y, 0.3) for y in np.linspace(0.0, 0.3 - radius, 7)[:-1]]
-    flange = [(0.3, z) for z in np.linspace(0.3 - radius, 0.24, 3)[1:]]
-    profile = np.array([*flat, *bend, *flange])
-    x, k = np.meshgrid(np.linspace(0.0, 0.3, 9), np.arange(len(profile)), indexing="ij")
-    vertices = np.column_stack([x.ravel(), profile[k.ravel()]])
-    a = (np.arange(8)[:, None] * len(profile) + np.arange(len(profile) - 1)).ravel()
-    b = a + len(profile)
-    faces = np.concatenate([np.column_stack([a, b, b + 1]), np.column_stack([a, b + 1, a + 1])])
-    return TriangleMesh(vertices, faces)
-
-
 @pytest.mark.parametrize(
     ("radius", "facets", "standoff", "tolerance"),
     [
@@ -121,7 +107,7 @@ def folded_sheet(radius, facets):
 def test_a_motion_over_a_rounded_edge_far_smaller_than_the_standoff(
     radius, facets, standoff, tolerance
 ):
-    part, position = folded_sheet(radius, facets), (0.45, -0.15, -0.2)
+    part, position = TriangleMesh(*mesh_patches.folded_sheet(radius, facets)), (0.45, -0.15, -0.2)
     task = Task(standoff=standoff, cone_deg=20, tolerance=tolerance)
     verdict = check(load_robot("ur10"), mesh(part, position=position).cells(60), task)
     # Normals are interpolated: they lean from the facets' own by half a facet's turn.

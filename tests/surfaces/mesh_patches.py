@@ -177,3 +177,15 @@ CONNECTED: dict[str, Callable[[], Mesh]] = {
 """Each in one piece."""
 
 PATCHES: dict[str, Callable[[], Mesh]] = {**CONNECTED, "islands": islands}
+
+
+def folded_sheet(radius: float, facets: int) -> Mesh:
+    """A sheet that bends down at a right angle over a rounded edge, 300 mm wide."""
+    t = np.linspace(0.0, np.pi / 2, facets + 1)
+    bend = 0.3 + radius * np.column_stack([np.sin(t) - 1, np.cos(t) - 1])
+    flat = [(y, 0.3) for y in np.linspace(0.0, 0.3 - radius, 7)[:-1]]
+    flange = [(0.3, z) for z in np.linspace(0.3 - radius, 0.24, 3)[1:]]
+    profile = np.array([*flat, *bend, *flange])
+    u, v, faces = grid(8, len(profile) - 1)
+    place = np.round(v * (len(profile) - 1)).astype(np.int64)
+    return Mesh(np.column_stack([0.3 * u, profile[place]]), faces)
