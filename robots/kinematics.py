@@ -59,8 +59,8 @@ class Kinematics:
         ).reshape(6, self.robot.n)  # Pinocchio flattens a single column
         pin.updateFramePlacement(self._model, self._data, self._frame)
         axis = self._rotation @ self._approach
-        # w x a for each column w; `np.cross` takes longer than all the rest.
-        return jacobian[:3].copy(), -pin.skew(axis) @ jacobian[3:]
+        # w x a = [a]x^T w for each column w; `np.cross` takes longer than all the rest.
+        return jacobian[:3].copy(), pin.skew(axis).T @ jacobian[3:]
 
     def tool_velocities(self, q: ArrayLike, dq: ArrayLike) -> NDArray[np.float64]:
         """Velocities (m, 3) of the tool point at configurations q (m, n) with dq (m, n).
