@@ -204,15 +204,8 @@ class MeshSurface(Surface):
 
         if not isinstance(cells, MeshCells):
             raise TypeError("the cells are not of a mesh")
-        corners = self.mesh.vertices[self.mesh.faces]
-        # On the strip along a crease the normal turns as over a face that is so much smaller; half
-        # way from one unit normal to the other, their mean is shorter, and turns faster.
-        halves = 0.5 * np.linalg.norm(self.corner_normals + self.rim_normals, axis=2).min(axis=1)
-        strip = WIDTH / (1.0 + WIDTH) * halves
-        size = np.where(self._rims.any(axis=1), strip, 1.0)[:, None, None]
-        turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]  # along two sides
-        slopes = size * (corners[:, 1:] - corners[:, :1]) + height * turns
-        face = sharpest_turn(slopes, turns)
+        sides, turns = self._sides
+        face = sharpest_turn(sides + height * turns, turns)
         sharpest = np.zeros(len(cells))
         np.maximum.at(sharpest, cells.labels, face)
         return sharpest
@@ -253,6 +246,20 @@ class MeshSurface(Surface):
     def _rims(self) -> NDArray[np.bool_]:
         """(F, 3) corners that lie on a crease."""
         return np.asarray((self.corner_normals != self.rim_normals).any(axis=2))
+
+    @cached_property
+    def _sides(self) -> tuple[Array, Array]:
+        """Two sides of each face (F, 2, 3) m, and what the normal turns by along them, own frame.
+
+        On the strip along a crease it turns as over a face that is so much smaller; half way from
+        one unit normal to the other, their mean is shorter, and turns faster.
+        """
+        corners = self._balls[0]
+        halves = 0.5 * np.linalg.norm(self.corner_normals + self.rim_normals, axis=2).min(axis=1)
+        strip = WIDTH / (1.0 + WIDTH) * halves
+        size = np.where(self._rims.any(axis=1), strip, 1.0)[:, None, None]
+        turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]
+        return size * (corners[:, 1:] - corners[:, :1]), turns
 
     @cached_property
     def _balls(self) -> tuple[Array, Array, Array]:
