@@ -300,7 +300,7 @@ class MeshSurface(Surface):
             least = away[:, -1] - radii.max()
             sure = np.linalg.norm(points[left] - spot, axis=1) <= least
             left = left[~sure] if wanted < len(middles) else left[:0]
-            wanted *= 8
+            wanted *= 2
         return faces, weights
 
     def __repr__(self) -> str:
