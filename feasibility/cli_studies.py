@@ -19,6 +19,13 @@ def add_studies(subcommands: argparse._SubParsersAction, add_case: Callable[...,
         subcommands: of the command line.
         add_case: adds the arguments of a command about one case.
     """
+    _add_study(subcommands)
+    _add_compare(subcommands, add_case)
+    _add_place(subcommands, add_case)
+
+
+def _add_study(subcommands: argparse._SubParsersAction) -> None:
+    """Add `coverable study`."""
     study = subcommands.add_parser(
         "study",
         help="many cases at once, kept as they come",
@@ -35,6 +42,9 @@ def add_studies(subcommands: argparse._SubParsersAction, add_case: Callable[...,
     _add_workers(study)
     study.set_defaults(run=_run("study_commands", "study"))
 
+
+def _add_compare(subcommands: argparse._SubParsersAction, add_case: Callable[..., None]) -> None:
+    """Add `coverable compare`."""
     compare = subcommands.add_parser(
         "compare",
         help="one case, several arms side by side",
@@ -52,6 +62,9 @@ def add_studies(subcommands: argparse._SubParsersAction, add_case: Callable[...,
     _add_workers(compare)
     compare.set_defaults(run=_run("study_commands", "compare"))
 
+
+def _add_place(subcommands: argparse._SubParsersAction, add_case: Callable[..., None]) -> None:
+    """Add `coverable place`."""
     place = subcommands.add_parser(
         "place",
         help="where the surface may stand",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.courses import BLOCK, PIECES, PLACES, Array, fitted_to
+from surfaces.courses import BLOCK, PIECES, PLACES, Array, slopes_of, through
 
 if TYPE_CHECKING:
     from surfaces.mesh_cells import MeshCells
@@ -48,6 +48,8 @@ def over_bends(
     ends = cells.normals[cells.pairs[courses]]
     turned = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > TURNED
     courses = courses[turned & (strays[courses, 1] > ROUGH)]
+    if len(courses) == 0:
+        return []
     weights = np.array([1.0, FAR * cells.surface.grain])
     side = cells.surface.side_sign
     hollow = np.empty(len(strays))
@@ -72,8 +74,7 @@ def _hollow(cubics: Array, side: float) -> Array:
     """(m,) 1/m, the largest curvature of m courses (m, count, 4, 6) that is hollow to a side."""
     most = np.zeros(len(cubics))
     for s in np.linspace(0.0, 1.0, PLACES):
-        slope = cubics[:, :, 1] + 2.0 * s * cubics[:, :, 2] + 3.0 * s * s * cubics[:, :, 3]
-        foot, normal = slope[..., :3], slope[..., 3:]
+        foot, normal = np.split(slopes_of(cubics, s), 2, axis=2)
         square = (foot**2).sum(axis=2)
         turn = -side * (foot * normal).sum(axis=2)
         curvature = np.divide(turn, square, out=np.full_like(turn, np.inf), where=square > 0.0)
@@ -104,7 +105,4 @@ def _by_pace(
         for axis in range(3):
             places[row, :, axis] = np.interp(tau, time, line[:, axis])
     points, normals = cells.surface.beneath(cells, pairs, places)
-    values = np.concatenate([points, normals], axis=2).swapaxes(0, 1).copy()
-    values[0] = np.hstack([cells.centres[pairs[:, 0]], cells.normals[pairs[:, 0]]])
-    values[-1] = np.hstack([cells.centres[pairs[:, 1]], cells.normals[pairs[:, 1]]])
-    return fitted_to(cells, pairs, values, count)
+    return through(cells, pairs, points, normals, count)

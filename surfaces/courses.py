@@ -115,9 +115,7 @@ class Courses:
         resting = np.flatnonzero(self.rests)
         whole = self.cubics[resting, 1:].sum(axis=1)
         for s in np.linspace(0.0, 1.0, PLACES):
-            slope = (
-                self.cubics[:, 1] + 2.0 * s * self.cubics[:, 2] + 3.0 * s * s * self.cubics[:, 3]
-            )
+            slope = slopes_of(self.cubics, s)
             slope[resting] = whole
             yield slope[:, :3], slope[:, 3:]
 
@@ -191,6 +189,19 @@ def _fit(cells: Cells, pairs: NDArray[np.int64], count: int, parts: int) -> tupl
     """Cubics (m, count, 4, 6) through samples of m courses, and how far they stray (m, 2)."""
     t = np.linspace(0.0, 1.0, 2 * parts + 1)
     points, normals = cells.surface.trace(cells, pairs, t)
+    return through(cells, pairs, points, normals, count)
+
+
+def slopes_of(cubics: Array, s: float) -> Array:
+    """(..., 6) derivatives by s of foot and normal of cubics (..., 4, 6)."""
+    b, c, d = (cubics[..., power, :] for power in (1, 2, 3))
+    return np.asarray(b + 2.0 * s * c + 3.0 * s * s * d)
+
+
+def through(
+    cells: Cells, pairs: NDArray[np.int64], points: Array, normals: Array, count: int
+) -> tuple[Array, Array]:
+    """See `fitted_to`: whole courses from samples (m, 2 parts + 1, 3), ends at the two centres."""
     # Places first, so that both maps are products of two matrices: (2 parts + 1, m, 6).
     values = np.concatenate([points, normals], axis=2).swapaxes(0, 1).copy()
     values[0] = np.hstack([cells.centres[pairs[:, 0]], cells.normals[pairs[:, 0]]])

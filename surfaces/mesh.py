@@ -139,7 +139,7 @@ class MeshSurface(Surface):
 
     def faces_below(self, points: ArrayLike) -> Ints:
         """(k,) the face nearest to each of `points` (k, 3) m."""
-        return self._nearest((points_of(points) - self.position) @ self.rotation)[0]
+        return self.nearest(points_of(points))[0]
 
     def normals_at(self, face: Ints, weights: Array) -> Array:
         """(..., 3) unit normals in the root frame at places of faces, by their weights."""
