@@ -10,34 +10,6 @@
 (True, 90, 305)
 """
 
-from __future__ import annotations
+from lazy_loader import attach_stub
 
-from typing import TYPE_CHECKING, Any
-
-from feasibility.search import Search
-
-if TYPE_CHECKING:
-    from feasibility.checking import check
-    from feasibility.task import Task
-    from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
-
-__all__ = ["Answer", "Cause", "CauseKind", "Evidence", "Search", "Task", "Verdict", "check"]
-
-_HOMES = {
-    "Answer": "feasibility.verdict",
-    "Cause": "feasibility.verdict",
-    "CauseKind": "feasibility.verdict",
-    "Evidence": "feasibility.verdict",
-    "Task": "feasibility.task",
-    "Verdict": "feasibility.verdict",
-    "check": "feasibility.checking",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """Import the heavier names when they are first used, so that the command line starts fast."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'feasibility' has no attribute {name!r}")
-    import importlib
-
-    return getattr(importlib.import_module(_HOMES[name]), name)
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

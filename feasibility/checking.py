@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feasibility.search import Progress, Search
-from feasibility.target_courses import closed_courses
+from feasibility.target_curves import closed_courses
 from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence, Verdict, Walk, deferred
 from robots import Robot
@@ -18,8 +18,8 @@ from surfaces import Cells
 if TYPE_CHECKING:
     import networkx as nx
 
-    from feasibility.certificate import Replay
-    from feasibility.explorer import Explorer
+    from feasibility.certification import Replay
+    from feasibility.roadmap import Explorer
 
 
 NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
@@ -62,8 +62,8 @@ def check(
     search = Search() if search is None else search
     _refuse_other_types(robot, cells, task, search)
     if search.method == "greedy":
-        from feasibility.greedy import greedy_check
-        from surfaces.grid import charted_grid
+        from feasibility.paper import greedy_check
+        from surfaces.patches import charted_grid
 
         return greedy_check(robot, charted_grid(cells), task, search, progress)
     return _complete_check(robot, cells, task, search, progress)
@@ -114,13 +114,12 @@ def _complete_check(
     robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
 ) -> Verdict:
     """Run the complete search, replay its walk, and word the verdict."""
-    from feasibility.warmup import compiling_notice, warm_up
+    from feasibility.notices import compiling_notice
+    from feasibility.roadmap import warm_up
 
     called = time.monotonic()
     with compiling_notice():
-        from feasibility.causes import causes_of
-        from feasibility.explorer import Explorer
-        from feasibility.problem import problem_of
+        from feasibility.roadmap import Explorer, causes_of, problem_of
 
         warm_up()
     cells.courses  # noqa: B018 - part of the cells, made once
@@ -177,10 +176,8 @@ def _complete_check(
 
 def _attempt(explorer: Explorer, task: Task, began: float) -> _Attempt:
     """Search since `began` (s), and replay the motion found against a task."""
-    from feasibility.certificate import replay
-    from feasibility.complete import close, explore
-    from feasibility.explorer import OutOfTime
-    from feasibility.walk import covering_walk
+    from feasibility.certification import replay
+    from feasibility.roadmap import OutOfTime, close, covering_walk, explore
 
     in_time = True
     try:
@@ -211,7 +208,7 @@ def _answer(
     explorer: Explorer, task: Task, replayed: Replay | None, in_time: bool
 ) -> tuple[Answer, Evidence, str]:
     """Answer, evidence and the sentences that say what was done."""
-    from feasibility.proof import Ruling
+    from feasibility.roadmap import Ruling
 
     total = len(explorer.cells)
     covered = int(explorer.covered.sum())
@@ -282,9 +279,7 @@ def graph_of(explorer: Explorer) -> nx.Graph:
     """
     import networkx as nx
 
-    from feasibility.complete import pair_edges
-    from feasibility.roadmap import NODES, root_of
-    from feasibility.walk import edge_motion
+    from feasibility.roadmap import NODES, edge_motion, pair_edges, root_of
 
     roadmap, best = explorer.roadmap, explorer.best
     graph: nx.Graph = nx.Graph()

@@ -1,6 +1,5 @@
-"""What an arm is: its chain, tool and limits, read from a URDF through Pinocchio."""
+"""What an arm is: a Pinocchio model of its free joints, a tool, and real limits."""
 
-from robots.library import RobotInfo, list_robots, load_robot
-from robots.robot import Robot, RobotError
+from lazy_loader import attach_stub
 
-__all__ = ["Robot", "RobotError", "RobotInfo", "list_robots", "load_robot"]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

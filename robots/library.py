@@ -19,7 +19,7 @@ from types import MappingProxyType
 
 from numpy.typing import ArrayLike
 
-from robots.reduce import robot_from_urdf, suggestion
+from robots.pinocchio_model import robot_from_urdf, suggestion
 from robots.robot import Robot, RobotError
 
 HERE = Path(__file__).parent

@@ -1,35 +1,7 @@
-"""What is to be covered: surfaces, their pose and working side, and their E-cells."""
+"""What is to be covered: surfaces, their pose and working side, their E-cells, and the curves
+between them.
+"""
 
-from surfaces.cells import Cells
-from surfaces.cone import cone
-from surfaces.ellipsoid import ellipsoid
-from surfaces.mesh import MeshSurface, mesh
-from surfaces.net_file import read_net
-from surfaces.parametric import cylinder, hyperboloid, plane, sphere
-from surfaces.patch import Patch
-from surfaces.piecewise import Piecewise, piecewise
-from surfaces.revolution import revolution
-from surfaces.spline import bspline
-from surfaces.surface import Surface, SurfaceError
-from surfaces.torus import torus
+from lazy_loader import attach_stub
 
-__all__ = [
-    "Cells",
-    "MeshSurface",
-    "Patch",
-    "Piecewise",
-    "Surface",
-    "SurfaceError",
-    "bspline",
-    "cone",
-    "cylinder",
-    "ellipsoid",
-    "hyperboloid",
-    "mesh",
-    "piecewise",
-    "plane",
-    "read_net",
-    "revolution",
-    "sphere",
-    "torus",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.neighbours import Neighbours
+from surfaces.adjacency import Neighbours
 from surfaces.surface import Surface
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from surfaces.courses import Courses
+    from surfaces.cell_curves import Courses
 
 
 class Triangles(NamedTuple):
@@ -103,7 +103,7 @@ class Cells(ABC):
     @cached_property
     def courses(self) -> Courses:
         """The ways between the centres of the M `pairs`, as smooth curves."""
-        from surfaces.courses import courses_of
+        from surfaces.cell_curves import courses_of
 
         return courses_of(self)
 

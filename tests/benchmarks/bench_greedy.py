@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 from paper_cases import PAPER_CASES
 
-from feasibility.greedy import greedy_check
+from feasibility.paper import greedy_check
 from feasibility.search import Search
 
 

@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "surfaces"))
 
 from mesh_patches import PATCHES, Mesh, blade, hood
 
-from surfaces.cell_figures import Figures, figures
-from surfaces.clusters import cells_for
+from surfaces.meshes.cells.clustering import cells_for
+from surfaces.meshes.cells.properties import Figures, figures
 
 CASES: tuple[tuple[str, Mesh, int], ...] = (
     *((name, make(), count) for name, make in PATCHES.items() for count in (60, 500)),

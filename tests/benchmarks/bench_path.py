@@ -7,9 +7,9 @@ import time
 import numpy as np
 from paper_cases import PAPER_CASES
 
-from feasibility import check
-from feasibility.coverage import coverage_path
-from feasibility.route import ORDERS
+from feasibility.checking import check
+from feasibility.paths import coverage_path
+from feasibility.paths.order import ORDERS
 from feasibility.timing import trajectory
 
 SPEED = 0.1  # [m/s]

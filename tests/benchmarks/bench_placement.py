@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import time
 
-from feasibility.case import load_case
-from feasibility.placement import Local, place
-from feasibility.placement_bounds import Reach
-from feasibility.placement_region import Pose, Region
-from feasibility.placement_trial import Stage
-from feasibility.placer import Placer
+from feasibility.cases import load_case
+from feasibility.placement import Pose, Region, Stage, place
+from feasibility.placement.place import Local
+from feasibility.placement.placer import Placer
+from feasibility.placement.reach_bound import Reach
 
 REGIONS = {
     "within 0.3 m, 40 deg": {

@@ -41,10 +41,8 @@ def run(kind: str, count: int) -> dict[str, Any]:
     """One study in this process's workers."""
     import tempfile
 
-    from feasibility.study import StudyTask, run_tasks
-    from feasibility.study_file import read_study
-    from feasibility.study_store import Store
-    from feasibility.study_workers import open_workers
+    from feasibility.studies import Store, StudyTask, open_workers, run_tasks
+    from feasibility.studies.file import read_study
 
     began = time.perf_counter()
     tasks = read_study(STUDY).tasks

@@ -9,8 +9,8 @@ import numpy as np
 
 from feasibility.task import Task
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
-from robots.kinematics import Kinematics
-from surfaces import sphere
+from robots import Kinematics
+from surfaces.patches.sphere import sphere
 
 STEPS = 13
 DOME = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")

@@ -19,14 +19,17 @@ from oracle_build import built
 from oracle_cases import Problem
 from random_cases import draw, draw_ur5
 
-from feasibility import Search, Task, check
-from feasibility.case import load_case
-from feasibility.certificate import replay
-from feasibility.explorer import BUDGET
+from feasibility.cases import load_case
+from feasibility.certification import replay
+from feasibility.checking import check
+from feasibility.roadmap import warm_up
+from feasibility.roadmap.exploration import BUDGET
+from feasibility.search import Search
+from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
-from feasibility.warmup import warm_up
 from robots import load_robot
-from surfaces import plane, sphere
+from surfaces.patches import plane
+from surfaces.patches.sphere import sphere
 
 DRAWN = [("puma560", number) for number in range(24)] + [("ur5", number) for number in range(12)]
 
@@ -271,7 +274,7 @@ class Clock:
 @pytest.mark.parametrize("looks", [1, 2, 5, 40, 120])
 def test_a_time_limit_is_honoured(looks: int, monkeypatch) -> None:
     clock = Clock(looks)
-    monkeypatch.setattr("feasibility.explorer.time", clock)
+    monkeypatch.setattr("feasibility.roadmap.exploration.time", clock)
     verdict = check(*hard(), Search(time_limit=3600.0))
     assert (verdict.answer, verdict.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
     assert "time limit" in verdict.message
@@ -378,7 +381,8 @@ def test_ctrl_c_ends_a_hard_search(tmp_path) -> None:
 
 def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
     """The search is made to use more than the tolerance; the second time it keeps to less."""
-    from feasibility import checking, problem
+    from feasibility import checking
+    from feasibility.roadmap import problem
 
     made = problem.problem_of
     asked = []

@@ -8,12 +8,13 @@ import mesh_patches
 import numpy as np
 import pytest
 
-from feasibility import Task, check
-from feasibility.case import load_case
-from feasibility.certificate import replay
+from feasibility.cases import load_case
+from feasibility.certification import replay
+from feasibility.checking import check
+from feasibility.task import Task
 from robots import load_robot
-from surfaces.mesh import mesh
-from surfaces.mesh_cells import MeshCells
+from surfaces.meshes import mesh
+from surfaces.meshes.cells import MeshCells
 
 CASES = ["4a", "4b", "4c", "4d", "4e", "4f", "5a", "5b", "5c", "5d", "5e", "5f"]
 FINE = (90, 100)  # rows and columns of facets
@@ -105,7 +106,7 @@ def test_a_rigid_motion_of_arm_and_mesh_changes_nothing(tmp_path):
 def box_mesh():
     """A closed box of twelve triangles."""
     made = mesh_patches.box()
-    from surfaces.triangles import TriangleMesh
+    from surfaces.meshes import TriangleMesh
 
     return TriangleMesh(0.2 * made.vertices, made.faces)
 
@@ -125,7 +126,7 @@ def test_a_closed_box_is_covered_or_told_why():
 
 def test_a_dent_smaller_than_the_standoff_folds_and_is_said_so():
     """A groove of 30 mm radius, and a standoff of 50 mm."""
-    from surfaces.triangles import TriangleMesh
+    from surfaces.meshes import TriangleMesh
 
     u, v, faces = mesh_patches.grid(120, 40)
     angle = np.pi * (u - 0.5)

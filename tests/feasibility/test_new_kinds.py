@@ -11,21 +11,22 @@ from dense_replay import tools
 from paper_cases import PAPER_CASES
 from spline_nets import hood
 
-from feasibility import Search, Task, check
+from feasibility.checking import check
+from feasibility.search import Search
+from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence, Verdict
 from robots import load_robot
-from surfaces import Cells
-from surfaces.cone import cone
-from surfaces.ellipsoid import ellipsoid
-from surfaces.mesh import mesh
-from surfaces.parametric import cylinder, plane, sphere
-from surfaces.patch import Patch
+from surfaces import Cells, Surface, rotation_from_rpy
+from surfaces.meshes import TriangleMesh, mesh
+from surfaces.patches import Patch, plane
+from surfaces.patches.cone import cone
+from surfaces.patches.cylinder import cylinder
+from surfaces.patches.ellipsoid import ellipsoid
+from surfaces.patches.nurbs.bspline import bspline
+from surfaces.patches.revolution import revolution
+from surfaces.patches.sphere import sphere
+from surfaces.patches.torus import torus
 from surfaces.piecewise import piecewise
-from surfaces.revolution import revolution
-from surfaces.spline import bspline
-from surfaces.surface import Surface, rotation_from_rpy
-from surfaces.torus import torus
-from surfaces.triangles import TriangleMesh
 
 HOOD = 0.5 * hood()
 SPRAY = Task(standoff=0.01, cone_deg=30)
@@ -231,7 +232,7 @@ def test_a_rigid_motion_of_arm_and_patch_changes_nothing(name: str) -> None:
     assert said(one) == said(other)
     held(other)
     # The motion found here, turned, is one there.
-    from feasibility.certificate import replay
+    from feasibility.certification import replay
 
     walk = one.witness
     assert walk is not None

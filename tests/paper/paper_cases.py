@@ -6,7 +6,10 @@ from typing import NamedTuple
 
 from feasibility.task import Task
 from robots import Robot, load_robot
-from surfaces import Cells, cylinder, hyperboloid, sphere
+from surfaces import Cells
+from surfaces.patches.cylinder import cylinder
+from surfaces.patches.hyperboloid import hyperboloid
+from surfaces.patches.sphere import sphere
 
 
 class PaperCase(NamedTuple):

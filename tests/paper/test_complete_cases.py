@@ -12,7 +12,8 @@ import pytest
 from dense_replay import assert_motion, assert_over, assert_witness
 from paper_cases import PAPER_CASES
 
-from feasibility import Search, check
+from feasibility.checking import check
+from feasibility.search import Search
 from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
 
 INFEASIBLE = {"4d": 60, "4f": 6}

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from paper_cases import PAPER_CASES
 
-from feasibility.greedy import greedy_check
-from feasibility.jsteps import Steps
+from feasibility.paper import greedy_check
+from feasibility.paper.jcell_steps import Steps
 from feasibility.search import Search
 from feasibility.verdict import Answer, Evidence, Verdict
-from robots.kinematics import Kinematics
+from robots import Kinematics
 
 STEP_DEG = {"single": 0.02, "all": 0.5}
 
@@ -68,7 +68,7 @@ def test_sphere_as_published() -> None:
 
 
 def branches(verdict: Verdict) -> list[np.ndarray]:
-    from feasibility.starts import starts
+    from feasibility.paper.starts import starts
 
     points, approaches = verdict.task.targets(verdict.cells)
     return list(

@@ -7,9 +7,7 @@ import pytest
 from arm_urdfs import arm, joint, load_text, random_arm, random_q
 
 import robots.chain
-from robots import Robot, RobotError, list_robots, load_robot
-from robots.chain import Chain, frames, jacobians
-from robots.kinematics import Kinematics
+from robots import Chain, Kinematics, Robot, RobotError, frames, jacobians, list_robots, load_robot
 
 NAMES = [info.name for info in list_robots()]
 

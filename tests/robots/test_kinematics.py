@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from arm_urdfs import arm, joint, load_text, placement, random_arm, random_q
 
-from robots import list_robots, load_robot
-from robots.kinematics import Kinematics
+from robots import Kinematics, list_robots, load_robot
 from robots.urdf import check_urdf
 
 

@@ -10,8 +10,7 @@ import pytest
 from arm_urdfs import arm, joint, load_text, random_q
 
 import robots.urdf
-from robots import RobotError, list_robots, load_robot
-from robots.kinematics import Kinematics
+from robots import Kinematics, RobotError, list_robots, load_robot
 from robots.urdf import check_urdf
 
 ROBOTS = {info.name: info for info in list_robots()}
@@ -343,7 +342,7 @@ def test_meshes_in_packages_need_their_folder(tmp_path):
 
 
 def test_what_pinocchio_prints_is_in_the_error(capfd):
-    from robots.native import parse
+    from robots.pinocchio_model import parse
 
     with pytest.raises(RobotError, match=r"x\.urdf: Pinocchio refuses this URDF: .*\w+"):
         parse("<robot name='x'><link name='a'/><link name='b'/></robot>", "x.urdf")

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from arm_urdfs import arm, joint, load_text, random_arm, random_q
 
-from robots import RobotError, list_robots, load_robot
-from robots.kinematics import Kinematics
+from robots import Kinematics, RobotError, list_robots, load_robot
 
 
 @pytest.fixture(scope="module")

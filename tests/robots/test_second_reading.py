@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import yourdfpy
 
-from robots import load_robot
-from robots.kinematics import Kinematics
+from robots import Kinematics, load_robot
 
 NAMES = ("puma560", "ur5", "panda", "kinova", "xarm7", "z1", "tiago", "baxter_left")
 

@@ -15,9 +15,9 @@ from smooth_probes import (
 )
 
 from surfaces import Cells, SurfaceError
-from surfaces.cone import cone
-from surfaces.ellipsoid import ellipsoid
-from surfaces.torus import torus
+from surfaces.patches.cone import cone
+from surfaces.patches.ellipsoid import ellipsoid
+from surfaces.patches.torus import torus
 
 PATCHES = {
     "funnel": cone(0.2, 1.0, angle_deg=(0, 360), height=(-0.1, 0.4), **POSE),
@@ -175,7 +175,8 @@ def test_ellipsoid_area_is_thomas_closed_form_for_spheroids():
 
 
 def test_a_ball_is_an_ellipsoid_and_a_cone_of_slope_zero_is_a_cylinder():
-    from surfaces import cylinder, sphere
+    from surfaces.patches.cylinder import cylinder
+    from surfaces.patches.sphere import sphere
 
     ball = ellipsoid((0.7, 0.7, 0.7), (10, 170), (-50, 60), **POSE)
     assert same_surface(sphere(0.7, (10, 170), (-50, 60), **POSE), ball, 1e-13)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
-from surfaces.cone import cone
-from surfaces.courses import courses_of
-from surfaces.ellipsoid import ellipsoid
-from surfaces.revolution import revolution
-from surfaces.spline import bspline
-from surfaces.torus import torus
+from surfaces.cell_curves import courses_of
+from surfaces.patches.cone import cone
+from surfaces.patches.ellipsoid import ellipsoid
+from surfaces.patches.nurbs.bspline import bspline
+from surfaces.patches.revolution import revolution
+from surfaces.patches.torus import torus
 
 
 def nurbs_pipe():

@@ -1,0 +1,269 @@
+"""A case: one question written down as TOML, and read back with every fault named."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from feasibility.cases.edits import as_read, make_absolute, override
+from feasibility.cases.robot_table import RobotPart, read_robot
+from feasibility.cases.surface_kinds import CHARTED
+from feasibility.cases.surface_table import (
+    SurfacePart,
+    faults_of_building,
+    named_file,
+    read_surface,
+)
+from feasibility.cases.table_reader import (
+    BuildError,
+    CaseError,
+    Fault,
+    alternatives,
+    close,
+    printable,
+)
+from feasibility.cases.task_tables import read_search, read_task
+from feasibility.cases.toml import TomlError, parse_toml, toml_document
+from feasibility.safe_files import FileError, read_regular, shown_path
+from feasibility.search import Search
+from feasibility.task import Task
+
+if TYPE_CHECKING:
+    from robots import Robot
+    from surfaces import Cells
+
+__all__ = ["Case", "CaseError", "Fault", "Setup", "builtin_cases", "load_case"]
+
+BUILT_IN = Path(__file__).with_name("built_in.toml")
+LARGEST_FILE = 256 * 1024  # bytes
+TABLES = ("robot", "surface", "task", "search")
+
+Tables = dict[str, Any]
+
+
+class Setup(NamedTuple):
+    """What `feasibility.check` is called with."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    search: Search
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A robot, a surface, a task and a search, as plain checked numbers.
+
+    Example:
+        >>> case = load_case("paper/4a").with_overrides(["task.cone_deg=10"])
+        >>> case.task.cone_deg
+        10.0
+        >>> Case.from_toml(case.to_toml()) == case
+        True
+    """
+
+    robot: RobotPart
+    surface: SurfacePart
+    task: Task
+    search: Search = field(default_factory=Search)
+    name: str = field(default="case", compare=False)
+    """What it is called in reports: the built-in name, or the file's."""
+    description: str = field(default="", compare=False)
+
+    def build(self) -> Setup:
+        """Load the arm and cut the surface.
+
+        Raises:
+            CaseError: the robot cannot be loaded as asked, or the surface not be read or cut.
+        """
+        from robots import RobotError
+
+        faults, robot, cells = [], None, None
+        try:
+            robot = self.robot.build()
+        except RobotError as error:
+            faults.append(Fault("robot", str(error)))
+        try:
+            cells = self.surface.cut()
+        except BuildError as error:
+            faults.append(error.fault)
+        if robot is None or cells is None:
+            raise CaseError(self.name, faults)
+        return Setup(robot, cells, self.task, self.search)
+
+    def to_tables(self) -> Tables:
+        """The case as the tables of its TOML; what is None is left out."""
+        task = {name: getattr(self.task, name) for name in ("standoff", "cone_deg", "tolerance")}
+        search = {name: getattr(self.search, name) for name in Search.__dataclass_fields__}
+        tables = {
+            "robot": self.robot.table(),
+            "surface": self.surface.table(),
+            "task": task,
+            "search": search,
+        }
+        return {
+            title: {key: value for key, value in table.items() if value is not None}
+            for title, table in tables.items()
+        }
+
+    def to_toml(self) -> str:
+        """The case as text that `from_toml` reads back as an equal case; paths are absolute."""
+        return toml_document(self.to_tables())
+
+    @staticmethod
+    def from_toml(
+        text: str,
+        base_dir: str | os.PathLike[str] | None = None,
+        name: str = "case",
+        overrides: Iterable[str] = (),
+    ) -> Case:
+        """Read a case.
+
+        Args:
+            text: TOML.
+            base_dir: folder that its paths are relative to; default the working directory.
+            name: what the case is called.
+            overrides: settings like "task.cone_deg=10" that replace what the text says; an empty
+                value removes a key. Their paths are relative to the working directory.
+
+        Raises:
+            CaseError: with everything that is wrong.
+        """
+        try:
+            tables = parse_toml(text)
+        except TomlError as error:
+            raise CaseError(name, [Fault("", str(error))]) from error
+        make_absolute(tables, base_dir)
+        return _from_tables(tables, name, overrides)
+
+    def with_overrides(self, overrides: Iterable[str]) -> Case:
+        """The case with some keys replaced, as `--set` does; see `from_toml`.
+
+        Raises:
+            CaseError: a setting, or the case with the settings, is wrong.
+        """
+        tables = {
+            title: {key: as_read(value) for key, value in table.items()}
+            for title, table in self.to_tables().items()
+        }
+        made = _from_tables(tables, self.name, overrides)
+        return replace(made, description=self.description)
+
+
+def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = ()) -> Case:
+    """Load a built-in case by its name, or a case file.
+
+    Args:
+        name_or_path: a name of `builtin_cases()`, or the path of a TOML file.
+        overrides: see `Case.from_toml`.
+
+    Raises:
+        CaseError: with everything that is wrong.
+    """
+    name = os.fspath(name_or_path)
+    if isinstance(name_or_path, str) and name in builtin_cases():
+        return builtin_cases()[name].with_overrides(overrides)
+    known = tuple(builtin_cases())
+    if not os.path.lexists(name) and not name.endswith(".toml"):
+        guess = close(name, known)
+        hint = f"did you mean {guess}? " if guess else ""
+        raise CaseError(
+            shown_path(name),
+            [
+                Fault(
+                    "",
+                    f"is neither a built-in case nor a file; {hint}`coverable cases` lists the "
+                    "built-in ones",
+                )
+            ],
+        )
+    try:
+        data = read_regular(name, LARGEST_FILE, "a case file (TOML)")
+        text = data.decode("utf-8-sig")
+    except FileError as error:
+        source, _, message = str(error).partition(": ")
+        raise CaseError(source, [Fault("", message)]) from error
+    except UnicodeDecodeError as error:
+        message = f"is not UTF-8 text (byte {error.start}); expected a case file (TOML)"
+        raise CaseError(shown_path(name), [Fault("", message)]) from error
+    return Case.from_toml(text, os.path.dirname(os.path.abspath(name)), shown_path(name), overrides)
+
+
+@cache
+def builtin_cases() -> Mapping[str, Case]:
+    """The built-in cases by name, in the order of their file."""
+    entries = parse_toml(BUILT_IN.read_text(encoding="utf-8"))
+    tables: dict[str, Tables] = {}
+    cases = {}
+    for name, entry in entries.items():
+        base = tables[entry["like"]] if "like" in entry else {}
+        tables[name] = {
+            title: {**base.get(title, {}), **entry.get(title, {})}
+            for title in TABLES
+            if title in base or title in entry
+        }
+        case = _from_tables(tables[name], name, ())
+        cases[name] = replace(case, description=entry["description"])
+    return cases
+
+
+def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
+    """Apply overrides, then check everything."""
+    faults: list[Fault] = []
+    for setting in overrides:
+        override(tables, setting, faults)
+    for title in tables:
+        if title not in TABLES:
+            guess = close(title, TABLES)
+            hint = f"did you mean {guess}?" if guess else f"known are {', '.join(TABLES)}"
+            faults.append(Fault(printable(title), f"is not known here; {hint}"))
+    for title in TABLES[:3]:
+        if title not in tables:
+            faults.append(Fault(title, f"is missing; expected a table [{title}]"))
+    robot = read_robot(tables["robot"], faults) if "robot" in tables else None
+    surface = read_surface(tables["surface"], faults) if "surface" in tables else None
+    task = read_task(tables["task"], faults) if "task" in tables else None
+    search = read_search(tables.get("search", {}), faults)
+    if surface and search and search.method == "greedy" and surface.kind not in CHARTED:
+        faults.append(_no_greedy(surface.kind))
+    if faults and "robot" in tables:
+        faults += _robot_faults(robot or _named_robot(tables["robot"]))
+    if faults and "surface" in tables:
+        part = surface or named_file(tables["surface"])
+        faults += faults_of_building(part) if part is not None else []
+    if faults or robot is None or surface is None or task is None or search is None:
+        raise CaseError(name, faults)
+    return Case(robot, surface, task, search, name)
+
+
+def _no_greedy(kind: str) -> Fault:
+    """The greedy search is asked for a surface that it does not know."""
+    kinds = alternatives(CHARTED)
+    return Fault(
+        "search.method",
+        f'"greedy" works on {kinds} only, not on a surface of kind {kind}; use "complete"',
+    )
+
+
+def _named_robot(table: Any) -> RobotPart | None:
+    """The robot as far as a faulty table names it."""
+    if not isinstance(table, dict) or "urdf" in table or "name" not in table:
+        return None
+    return read_robot({"name": table["name"]}, [])
+
+
+def _robot_faults(part: RobotPart | None) -> list[Fault]:
+    """What loading the arm would say, so that it comes together with the other faults."""
+    from robots import RobotError
+
+    if part is None:
+        return []
+    try:
+        part.build()
+    except RobotError as error:
+        return [Fault("robot", str(error))]
+    return []

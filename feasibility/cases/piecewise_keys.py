@@ -1,0 +1,141 @@
+"""Piecewise surfaces in a case: patches joined along their seams, each with its own cells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+from feasibility.cases.patch_keys import MOST_CELLS, PATCHES, build_patch, read_grid, read_patch
+from feasibility.cases.surface_kinds import OWN_KEYS, foreign_keys
+from feasibility.cases.table_reader import ORIGIN, BuildError, Fault, Section, Triple
+
+if TYPE_CHECKING:
+    from surfaces.patches import Patch
+    from surfaces.piecewise import PieceCells, Piecewise
+
+MOST_PIECES = 200  # as `surfaces.piecewise` has it
+
+
+@dataclass(frozen=True, slots=True)
+class PiecePart:
+    """One entry of `surface.pieces`."""
+
+    kind: str
+    values: Mapping[str, Any]
+    """The kind's own keys, as in `SurfacePart`."""
+    cells: tuple[int, int]
+    position: Triple = ORIGIN
+    """m, in the frame of the whole."""
+    rpy_deg: Triple = ORIGIN
+
+    def table(self) -> dict[str, Any]:
+        """The entry as a table."""
+        own = {key: self.values[key] for key in OWN_KEYS[self.kind] if key in self.values}
+        pose = {"position": self.position, "rpy_deg": self.rpy_deg}
+        return {"kind": self.kind, **own, **pose, "cells": self.cells}
+
+    def build(self, place: str) -> Patch:
+        """Build the patch; a control net is read from its file.
+
+        Args:
+            place: of the entry in the case, for messages.
+
+        Raises:
+            BuildError: the values describe no patch.
+        """
+        pose = {"position": self.position, "rpy_deg": self.rpy_deg}
+        return build_patch(self.kind, self.values, pose, place)
+
+
+def read_pieces(section: Section) -> dict[str, Any]:
+    """The values of the keys of a piecewise surface; those left out or wrong are missing.
+
+    What needs no file is built to try it.
+    """
+    values: dict[str, Any] = {}
+    expected = f"1 to {MOST_PIECES} tables [[{section.name}.pieces]], a patch each"
+    if section.wants("pieces", expected, required=True):
+        entries = section.table["pieces"]
+        if isinstance(entries, list) and 1 <= len(entries) <= MOST_PIECES:
+            found = [_piece(section, k, entry) for k, entry in enumerate(entries)]
+            values["pieces"] = tuple(piece for piece in found if piece is not None)
+        else:
+            section.wrong("pieces", expected)
+    gap = section.positive("gap", "a number > 0 (metres), how far apart two borders may be")
+    if gap is not None:
+        values["gap"] = gap
+    pieces = values.get("pieces", ())
+    if sum(piece.cells[0] * piece.cells[1] for piece in pieces) > MOST_CELLS:
+        section.fault("pieces", f"make more than {MOST_CELLS:,} cells; use coarser grids")
+    return values
+
+
+def build_pieces(values: Mapping[str, Any], pose: Mapping[str, Any]) -> Piecewise:
+    """Build the pieces and join them.
+
+    Args:
+        values: `pieces`, and perhaps `gap`.
+        pose: `side`, `position` and `rpy_deg`.
+
+    Raises:
+        BuildError: a piece cannot be built, or they cannot be joined.
+    """
+    from surfaces import SurfaceError
+    from surfaces.piecewise import piecewise
+
+    patches = [
+        piece.build(f"surface.pieces[{k}]")
+        for k, piece in enumerate(cast("tuple[PiecePart, ...]", values["pieces"]))
+    ]
+    try:
+        return piecewise(patches, gap=values.get("gap"), **pose)
+    except SurfaceError as error:
+        message = str(error).removeprefix("piecewise: ")
+        raise BuildError(Fault("surface", message)) from error
+
+
+def cut_pieces(surface: Piecewise, values: Mapping[str, Any]) -> PieceCells:
+    """Cut each piece into its grid.
+
+    Raises:
+        BuildError: they cannot be cut so.
+    """
+    from surfaces import SurfaceError
+
+    try:
+        return surface.cells([piece.cells for piece in values["pieces"]])
+    except SurfaceError as error:
+        raise BuildError(Fault("surface.pieces", str(error))) from error
+
+
+def _piece(whole: Section, k: int, entry: Any) -> PiecePart | None:
+    """One entry; None where it has faults."""
+    place = f"{whole.name}.pieces[{k}]"
+    section = Section(place, entry, whole.faults)
+    before = len(whole.faults)
+    kind = section.choice("kind", tuple(PATCHES), required=True)
+    position = section.numbers("position", 3, "three finite numbers (metres)")
+    rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
+    if kind is None:  # which other keys belong here is not known
+        return None
+    values = read_patch(section, kind)
+    cells = read_grid(section)
+    own_side = f"is that of the whole; write it as {whole.name}.side, and leave it out here"
+    section.done({**foreign_keys(kind), "side": own_side})
+    if len(whole.faults) > before or cells is None:
+        return None
+    part = PiecePart(
+        kind=kind,
+        values=values,
+        cells=cells,
+        position=cast("Triple", position or ORIGIN),
+        rpy_deg=cast("Triple", rpy_deg or ORIGIN),
+    )
+    if "file" not in values:
+        try:
+            part.build(place)
+        except BuildError as error:
+            whole.faults.append(error.fault)
+            return None
+    return part

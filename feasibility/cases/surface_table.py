@@ -1,0 +1,160 @@
+"""The [surface] table of a case: which surface, where, and how it is cut into cells."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, cast
+
+from feasibility.cases.mesh_keys import build_mesh, cut_mesh, read_count, read_mesh_keys
+from feasibility.cases.patch_keys import PATCHES, build_patch, read_grid, read_patch
+from feasibility.cases.piecewise_keys import PiecePart, build_pieces, cut_pieces, read_pieces
+from feasibility.cases.surface_kinds import OWN_KEYS, foreign_keys
+from feasibility.cases.table_reader import ORIGIN, BuildError, Fault, Section, Triple
+
+if TYPE_CHECKING:
+    from surfaces import Cells, Surface
+    from surfaces.meshes import MeshSurface
+    from surfaces.patches import Patch
+    from surfaces.piecewise import Piecewise
+
+
+@dataclass(frozen=True, slots=True)
+class SurfacePart:
+    """The [surface] table of a case."""
+
+    kind: str
+    values: Mapping[str, Any]
+    """The kind's own keys, in the units of the case; arrays as tuples, paths absolute."""
+    cells: tuple[int, int] | int | None
+    """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given; None
+    for pieces, which have their own."""
+    side: Literal["inside", "outside"] = "inside"
+    position: Triple = ORIGIN
+    rpy_deg: Triple = ORIGIN
+
+    @property
+    def label(self) -> str:
+        """What the surface is called in notes: its file's name, or its kind."""
+        file = self.values.get("file")
+        return self.kind if file is None else os.path.basename(file)
+
+    @property
+    def counts(self) -> list[int]:
+        """The number of cells along u and v, or of all cells of a mesh; empty if not known yet."""
+        cells = self.cells
+        return [] if cells is None else [cells] if isinstance(cells, int) else list(cells)
+
+    def table(self) -> dict[str, Any]:
+        """The keys of the [surface] table; what is None is not written."""
+        return {
+            "kind": self.kind,
+            **{key: _written(self.values.get(key)) for key in OWN_KEYS[self.kind]},
+            "position": self.position,
+            "rpy_deg": self.rpy_deg,
+            "side": self.side,
+            "cells": self.cells,
+        }
+
+    def build(self) -> Surface:
+        """Build the surface; its file, if it has one, is read.
+
+        Raises:
+            BuildError: the numbers or the file describe no surface.
+        """
+        pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
+        if self.kind == "mesh":
+            return build_mesh(self.values, pose)
+        if self.kind == "piecewise":
+            return build_pieces(self.values, pose)
+        return build_patch(self.kind, self.values, pose)
+
+    def cut(self) -> Cells:
+        """Build the surface and cut it into its cells.
+
+        Raises:
+            BuildError: there is no such surface, or it cannot be cut so.
+        """
+        surface = self.build()
+        if self.kind == "mesh":
+            count = cast("int | None", self.cells)
+            return cut_mesh(cast("MeshSurface", surface), count, self.values.get("cell_size"))
+        if self.kind == "piecewise":
+            return cut_pieces(cast("Piecewise", surface), self.values)
+        return cast("Patch", surface).cells(*cast("tuple[int, int]", self.cells))
+
+
+def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
+    """Read the [surface] table; None where it has faults.
+
+    Patches that need no file are built to try them; files are read, and pieces joined, by
+    `SurfacePart.build` only.
+    """
+    section = Section("surface", table, faults)
+    before = len(faults)
+    kind = section.choice("kind", tuple(OWN_KEYS), required=True)
+    side = section.choice("side", ("inside", "outside"))
+    position = section.numbers("position", 3, "three finite numbers (metres)")
+    rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
+    if kind is None:  # which other keys belong here is not known
+        return None
+    values, cells = _values(section, kind)
+    section.done(_hints(kind))
+    if len(faults) > before:
+        return None
+    part = SurfacePart(
+        kind=kind,
+        values=values,
+        cells=cells,
+        side=cast(Literal["inside", "outside"], side or "inside"),
+        position=cast("Triple", position or ORIGIN),
+        rpy_deg=cast("Triple", rpy_deg or ORIGIN),
+    )
+    if kind in PATCHES and "file" not in values:
+        faults += faults_of_building(part)
+    return part if len(faults) == before else None
+
+
+def faults_of_building(part: SurfacePart) -> list[Fault]:
+    """What building the surface would say."""
+    try:
+        part.build()
+    except BuildError as error:
+        return [error.fault]
+    return []
+
+
+def named_file(table: Any) -> SurfacePart | None:
+    """The surface in the file that a faulty table names, if it names one."""
+    if not isinstance(table, Mapping) or table.get("kind") not in ("mesh", "bspline"):
+        return None
+    plain: dict[str, Any] = {"kind": table["kind"], "file": table.get("file"), "side": "outside"}
+    plain["cells"] = 1 if table["kind"] == "mesh" else [1, 1]
+    if table["kind"] == "mesh" and "scale" in table:
+        plain["scale"] = table["scale"]
+    return read_surface(plain, [])
+
+
+def _values(section: Section, kind: str) -> tuple[dict[str, Any], tuple[int, int] | int | None]:
+    """What the kind's own keys say, and how many cells there are."""
+    if kind == "mesh":
+        return read_mesh_keys(section), read_count(section)
+    if kind == "piecewise":
+        return read_pieces(section), None
+    return read_patch(section, kind), read_grid(section)
+
+
+def _hints(kind: str) -> dict[str, str]:
+    """What to say about keys that belong elsewhere."""
+    hints = foreign_keys(kind)
+    if kind == "piecewise":
+        hints["cells"] = "is given for each piece; write cells = [3, 4] in each of surface.pieces"
+    return hints
+
+
+def _written(value: Any) -> Any:
+    """A value as TOML has it."""
+    if isinstance(value, PiecePart):
+        return value.table()
+    return tuple(map(_written, value)) if isinstance(value, tuple) else value

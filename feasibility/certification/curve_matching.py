@@ -1,0 +1,283 @@
+"""Where on the courses a given motion is, found from the motion alone, for its replay.
+
+Between two marked waypoints a walk either stays over one cell, or goes to a neighbouring cell along
+the course between the two. For each waypoint in between, the place on that course is taken that is
+nearest to the tool point. Any places would do for a proof; these show the least error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.target_curves import TargetCourses, beside_facets, target_courses
+from feasibility.task import Task
+from feasibility.verdict import Walk
+from surfaces import Cells
+
+Array = NDArray[np.float64]
+
+GUESSES = 4  # places tried first on each piece of a course
+REFINEMENTS = 16  # Newton steps from the best of them, at most
+SETTLED = 1e-7  # [1] of a course: a step so small is the last
+BLOCK = 4096  # waypoints at once, to bound the memory
+LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
+MOST_LOOKS = 400  # times that many places on a course over a mesh
+ARRIVED = 0.02  # [1] share of the tolerance: a tool point so near to a centre is at it
+STAYS = -1  # in place of a course
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Following:
+    """A walk of m waypoints beside the targets that it follows."""
+
+    error: Array
+    """(m,) m, distance of each tool point from its target point."""
+    chord: Array
+    """(m,) |a - b| of tool axis and approach direction."""
+    bends: Array
+    """(m - 1, 3) largest second derivatives of target point and approach direction along each
+    segment, by the segment's own parameter in 0..1; and how fast the direction turns along the
+    target surface there, 1/m."""
+    strays: Array
+    """(m - 1, 2) how far target point and approach direction are from the surface's own."""
+    standing: float
+    """1/m, how fast the direction turns next to the cells' centres."""
+    fault: str
+    """What makes the walk no motion along courses; empty when nothing does."""
+
+
+def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> Following:
+    """Lay a walk beside the courses of its cells.
+
+    Args:
+        cells: the cells.
+        task: standoff.
+        walk: the motion, its marks within range.
+        points: (m, 3) its tool points, m.
+        axes: (m, 3) its approach axes.
+    """
+    m = len(points)
+    segments = np.zeros((max(m - 1, 0), 3))
+    nothing = Following(np.zeros(m), np.zeros(m), segments, segments[:, :2], 0.0, "")
+    if m == 0:
+        return nothing
+    marks = np.flatnonzero(walk.cell >= 0)
+    if len(marks) == 0 or marks[0] != 0 or marks[-1] != m - 1:
+        return _faulty(nothing, "the motion begins or ends away from every cell's centre")
+    start, end = walk.cell[marks[:-1]], walk.cell[marks[1:]]
+    course = _courses(cells, start, end)
+    if (course < STAYS).any():
+        k = int(np.flatnonzero(course < STAYS)[0])
+        names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
+        return _faulty(nothing, f"the motion goes from cell {names}, which do not touch")
+    tolerance = task.leeway
+    ways = target_courses(cells, task.standoff, tolerance)
+
+    # Each segment, and each waypoint between marks, belongs to one stretch from mark to mark.
+    stretch = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
+    backwards = (start > end)[stretch]
+    inner = np.flatnonzero(walk.cell < 0)
+    along = inner[course[stretch[inner]] != STAYS]
+    places, arrived = np.zeros(m), walk.cell >= 0
+    places[along], arrived[along] = _places(
+        ways, course[stretch[along]], points[along], ARRIVED * tolerance
+    )
+    t0, t1 = places[:-1].copy(), places[1:].copy()
+    t0[marks[:-1]] = backwards[marks[:-1]]
+    t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
+
+    aims = task.targets(cells)
+    target, approach = np.empty((m, 3)), np.empty((m, 3))
+    target[marks], approach[marks] = (
+        aims.points[walk.cell[marks]],
+        aims.approaches[walk.cell[marks]],
+    )
+    still = inner[course[stretch[inner]] == STAYS]
+    over = start[stretch[still]]
+    target[still], approach[still] = aims.points[over], aims.approaches[over]
+    target[along], approach[along] = _at(ways, course[stretch[along]], places[along])
+
+    bends, strays = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
+    bends[:, 2] = ways.standing
+    # A motion over one centre, at the end of a course, is none along it.
+    stands = (t0 == t1) & arrived[:-1] & arrived[1:]
+    moves = np.flatnonzero((course[stretch] != STAYS) & ~stands)
+    used, which = np.unique(course[stretch[moves]], return_inverse=True)
+    bends[moves] = _bends(ways, course[stretch[moves]], t0[moves], t1[moves])
+    found, fault = _strays(cells, task.standoff, used, tolerance)
+    strays[moves] = found[which]
+    return Following(
+        error=np.linalg.norm(points - target, axis=1),
+        chord=np.linalg.norm(axes - approach, axis=1),
+        bends=bends,
+        strays=strays,
+        standing=ways.standing,
+        fault=fault,
+    )
+
+
+def _faulty(following: Following, fault: str) -> Following:
+    """The same with a fault."""
+    return replace(following, fault=fault)
+
+
+def _courses(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(k,) the course between two cells; STAYS where they are one, less where there is none."""
+    pairs, count = cells.pairs, len(cells)
+    keys = pairs[:, 0] * count + pairs[:, 1]
+    asked = np.minimum(start, end) * count + np.maximum(start, end)
+    row = np.searchsorted(keys, asked)
+    known = row < len(keys)
+    known[known] = keys[row[known]] == asked[known]
+    return np.where(start == end, STAYS, np.where(known, row, STAYS - 1))
+
+
+def _pieces(
+    ways: TargetCourses, course: NDArray[np.int64], t: Array
+) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+    """Piece (k,) that holds at t, place s (k,) on it, and number of pieces (k,) of the course."""
+    count = np.diff(ways.first)[course]
+    piece = np.clip((t * count).astype(np.int64), 0, count - 1)
+    return ways.first[course] + piece, t * count - piece, count
+
+
+def _at(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    """Target points and approach directions (k, 3) at t."""
+    piece, s, _ = _pieces(ways, course, t)
+    values = np.einsum("kp,kpd->kd", _powers(s), ways.cubics[piece])
+    return values[:, :3], values[:, 3:]
+
+
+def _powers(s: Array) -> Array:
+    """(k, 4) 1, s, s^2, s^3."""
+    return np.column_stack([np.ones(len(s)), s, s * s, s * s * s])
+
+
+def _places(
+    ways: TargetCourses, course: NDArray[np.int64], points: Array, near: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """(k,) t on each course for a tool point, and whether that is at one of its centres.
+
+    A tool point so `near` (m) to a centre is taken to be there, which puts it off by that way;
+    only where that is less than what it strays beside the course.
+    """
+    t = _nearest(ways, course, points)
+    arrived = np.zeros(len(course), dtype=bool)
+    pays = ways.strays[course, 1] > ways.standing * near
+    for place in (0.0, 1.0):
+        centre, _ = _at(ways, course, np.full(len(course), place))
+        there = pays & (np.linalg.norm(points - centre, axis=1) <= near)
+        t[there], arrived[there] = place, True
+    return t, arrived
+
+
+def _slopes(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> Array:
+    """(k, 3) m, derivatives of target points by t."""
+    piece, s, count = _pieces(ways, course, t)
+    by_s = _powers(s)[:, :3] * [1.0, 2.0, 3.0]
+    slopes = np.einsum("kp,kpd->kd", by_s, ways.cubics[piece, 1:, :3])
+    return np.asarray(slopes * count[:, None])
+
+
+def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> Array:
+    """(k,) t of the place on each course that is nearest to a point."""
+    t = np.empty(len(course))
+    counts = np.diff(ways.first)[course]
+    for count in np.unique(counts):
+        alike = np.flatnonzero(counts == count)
+        # Not where two pieces meet: a course may be at rest there, and Newton's method with it.
+        inner = (np.arange(GUESSES * count) + 0.5) / (GUESSES * count)
+        grid = np.concatenate([[0.0], inner, [1.0]])
+        for first in range(0, len(alike), BLOCK):
+            some = alike[first : first + BLOCK]
+            places, _ = _at(ways, np.repeat(course[some], len(grid)), np.tile(grid, len(some)))
+            away = places.reshape(len(some), len(grid), 3) - points[some, None]
+            t[some] = grid[np.argmin((away**2).sum(axis=2), axis=1)]
+    # Newton's steps, shortened where one leads further away: next to a place where a course is at
+    # rest they go too far.
+    left, width = np.arange(len(t)), 1.0 / (GUESSES * counts)
+    off = _at(ways, course, t)[0] - points
+    for _ in range(REFINEMENTS):
+        slope = _slopes(ways, course[left], t[left])
+        square = (slope**2).sum(axis=1)
+        step = (off[left] * slope).sum(axis=1)
+        step = np.divide(step, square, out=np.zeros(len(left)), where=square > 0.0)
+        step = np.clip(step, -width[left], width[left])
+        tried = np.clip(t[left] - step, 0.0, 1.0)
+        there = _at(ways, course[left], tried)[0] - points[left]
+        nearer = (there**2).sum(axis=1) < (off[left] ** 2).sum(axis=1)
+        t[left[nearer]], off[left[nearer]] = tried[nearer], there[nearer]
+        width[left[~nearer]] = 0.25 * np.abs(step[~nearer])
+        left = left[np.abs(step) > SETTLED]
+        if len(left) == 0:
+            break
+    return t
+
+
+def _bends(ways: TargetCourses, course: NDArray[np.int64], t0: Array, t1: Array) -> Array:
+    """(k, 3) see `Following.bends`, of segments from t0 to t1 on courses."""
+    low, _, _ = _pieces(ways, course, np.minimum(t0, t1))
+    high, _, _ = _pieces(ways, course, np.maximum(t0, t1))
+    known = np.column_stack([ways.bends, ways.turning])
+    most = known[low]
+    for ahead in range(1, int((high - low).max(initial=0)) + 1):
+        piece = np.minimum(low + ahead, high)
+        most = np.maximum(most, known[piece])
+    with np.errstate(invalid="ignore"):  # a fold, and no way at all: NaN, which is refused
+        most[:, :2] *= ((t1 - t0) ** 2)[:, None]
+    return most
+
+
+def _strays(
+    cells: Cells, standoff: float, used: NDArray[np.int64], tolerance: float
+) -> tuple[Array, str]:
+    """How far target points and directions of courses are from the surface's, and a fault.
+
+    The surface itself is asked for its nearest points, at places that the fit of the courses did
+    not look at; what the courses say of themselves counts where it is more. On a mesh the places
+    are half a tolerance apart, and the targets are compared with the triangles themselves too,
+    which may be nearer to them than the standoff: a thorn beside the course, another part of the
+    mesh, or facets that are not square to the interpolated normal.
+    """
+    courses, surface = cells.courses, cells.surface
+    owner, t = _looks(cells, used, 0.5 * tolerance)
+    foot, normal = courses.at(used[owner], t)
+    feet = surface.closest(foot)
+    strays = courses.strays[used].copy()
+    np.maximum.at(strays[:, 0], owner, np.abs(feet.height))
+    np.maximum.at(strays[:, 1], owner, np.linalg.norm(normal - feet.normal, axis=1))
+    if not np.isfinite(strays).all():
+        return strays, "a course between two cells is not known"
+    if not feet.inside.all():
+        return strays, "a course between two cells leaves the surface"
+    strays[:, 0] += standoff * strays[:, 1]
+    if surface.grain > 0.0:
+        found = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)
+        np.maximum.at(strays[:, 0], owner, found.off)
+        np.maximum.at(strays[:, 1], owner, found.leans)
+        if not found.off.max(initial=0.0) <= tolerance:
+            away = found.away.min()
+            return strays, (
+                f"on its way the tool point would come within {1e3 * away:.3g} mm of the "
+                f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something stands out "
+                "of it there, or its facets are too coarse for this standoff"
+            )
+    return strays, ""
+
+
+def _looks(cells: Cells, used: NDArray[np.int64], apart: float) -> tuple[NDArray[np.int64], Array]:
+    """Places (k,) to look at: which of the used courses, and t on it."""
+    courses = cells.courses
+    count = np.diff(courses.first)[used]
+    if cells.surface.grain > 0.0:
+        ends = cells.centres[cells.pairs[used]]
+        length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        fine = np.ceil(length / apart / len(LOOKS)).astype(np.int64)
+        count = np.maximum(count, np.minimum(fine, MOST_LOOKS))
+    owner = np.repeat(np.arange(len(used)), count)
+    part = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
+    t = ((part[:, None] + LOOKS) / count[owner][:, None]).reshape(-1)
+    return np.repeat(owner, len(LOOKS)), t

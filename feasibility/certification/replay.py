@@ -1,0 +1,210 @@
+"""The independent replay: what must accept a motion before the word "feasible" is said.
+
+It shares no code with the search but the courses between cell centres, and compares these with the
+surface's own nearest points and normals (`feasibility.following`). Besides, it knows Pinocchio's
+frame placements and joint Jacobians, and the bound between samples; it sees only the walk, not how
+it was found. The bound is derived in `feasibility.segment`; here it is evaluated again from
+Pinocchio's Jacobian: the column of joint j moved to the tool point has the length r_j (the lever
+arm), and the length of its turn of the axis is s_j.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from feasibility.certification.curve_matching import follow
+from feasibility.task import Task
+from feasibility.verdict import Certificate, Walk
+from robots import Kinematics, Robot
+from surfaces import Cells
+
+CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on metres and unit vectors
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Placements:
+    """What Pinocchio says of m configurations."""
+
+    points: NDArray[np.float64]
+    """(m, 3) tool points, m."""
+    axes: NDArray[np.float64]
+    """(m, 3) approach axes."""
+    levers: NDArray[np.float64]
+    """(m, n) distance of the tool point from each revolute axis, m; 1 for a prismatic joint."""
+    sines: NDArray[np.float64]
+    """(m, n) sine of the angle between each revolute axis and the approach axis; 0 if prismatic."""
+
+
+def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
+    """Ask Pinocchio for tool points, axes and lever arms at q (m, n)."""
+    kinematics = Kinematics(robot)
+    model, data = robot.model, robot.model.createData()
+    frame = robot.tool_frame_id
+    placement = data.oMf[frame]
+    translation, rotation = placement.translation, placement.rotation  # live views
+    m = len(q)
+    points, axes = np.empty((m, 3)), np.empty((m, 3))
+    columns = np.empty((m, 6, robot.n))
+    plain = model.nq == model.nv
+    rotations = np.empty((m, 3, 3))
+    for k in range(m):
+        configuration = q[k] if plain else kinematics.configuration(q[k])
+        # Columns are the joints' twists at the root's origin: (velocity there, angular velocity).
+        # Pinocchio flattens a single column.
+        columns[k] = pin.computeJointJacobians(model, data, configuration).reshape(6, -1)
+        pin.updateFramePlacement(model, data, frame)
+        points[k] = translation
+        rotations[k] = rotation
+    axes = rotations @ robot.approach_axis
+    linear = columns[:, :3].transpose(0, 2, 1)
+    angular = columns[:, 3:].transpose(0, 2, 1)
+    levers = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
+    sines = np.linalg.norm(np.cross(angular, axes[:, None]), axis=2)
+    return Placements(points, axes, levers, sines)
+
+
+def second_derivatives(
+    steps: NDArray[np.float64],
+    prismatic: NDArray[np.bool_],
+    levers: NDArray[np.float64],
+    cap: float,
+) -> NDArray[np.float64]:
+    """Bound D of |p''| (or Da of |a''|) along straight segments.
+
+    Args:
+        steps: (m, n) absolute joint changes.
+        prismatic: (n,) which joints slide.
+        levers: (m + 1, n) r_j (or s_j) at the ends of the segments.
+        cap: no lever is ever longer than this (1 for sines, inf for lengths).
+
+    Returns:
+        (m,) bounds.
+    """
+    m, n = steps.shape
+    is_length = cap > 1.0
+    turns = np.where(prismatic, 0.0, steps)
+    before = np.cumsum(turns, axis=1) - turns  # turn of the revolute joints before j
+    total, behind = np.zeros(m), np.zeros(m)
+    ends = np.maximum(levers[:-1], levers[1:])
+    for j in range(n - 1, -1, -1):
+        d = steps[:, j]
+        if prismatic[j]:
+            if is_length:
+                total += 2.0 * d * before[:, j]
+                behind += d
+            continue
+        lever = np.minimum(ends[:, j] + 0.5 * behind, cap)
+        total += lever * d * (d + 2.0 * before[:, j])
+        behind += lever * d
+    return total
+
+
+def _peaks(
+    a: NDArray[np.float64], b: NDArray[np.float64], most: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(m,) largest values along m segments of a norm with the values a and b (m,) at their ends.
+
+    `most` (m,) bounds the second derivative, so the norm is at most
+    (1 - s) a + s b + s (1 - s) most / 2, whose largest value this is. NaN comes out as NaN.
+    """
+    slope = np.abs(b - a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inner = 0.5 * (a + b) + most / 8.0 + slope**2 / (2.0 * most)
+    return np.where(2.0 * slope >= most, np.maximum(a, b), inner)
+
+
+def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
+    """What makes a walk no motion of this arm over these cells; empty when nothing does."""
+    if walk.q.ndim != 2 or walk.q.shape[1] != robot.n or walk.cell.shape != walk.q.shape[:1]:
+        return (
+            f"waypoints of shape {walk.q.shape} and cells of shape {walk.cell.shape} are no "
+            f"motion of {robot.n} joints"
+        )
+    if not np.isfinite(walk.q).all():
+        return "a joint value is not finite"
+    if ((walk.cell < -1) | (walk.cell >= len(cells))).any():
+        return f"a waypoint is marked with a cell that is not one of the {len(cells)}"
+    return ""
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """The outcome of a replay."""
+
+    certificate: Certificate
+    refusal: str
+    """Why the motion is refused; empty when it is accepted."""
+
+    @property
+    def accepted(self) -> bool:
+        """True when every constraint holds along the whole motion and every cell is visited."""
+        return not self.refusal
+
+
+def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]) -> Replay:
+    """Check a walk: limits, tool point and cone at and between waypoints, and the cells it visits.
+
+    Args:
+        robot: the arm.
+        cells: the cells.
+        task: the task; its tolerance and cone are taken as they are.
+        walk: the motion.
+        needed: (N,) cells that must be visited.
+
+    Returns:
+        What was measured, and the reason if the walk is refused. NaN anywhere refuses.
+    """
+    fault = _malformed(robot, cells, walk)
+    if fault:
+        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
+    tolerance = task.leeway
+    rim = task.rim
+    poses = placements(robot, walk.q)
+    beside = follow(cells, task, walk, poses.points, poses.axes)
+    if beside.fault:
+        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), beside.fault)
+    steps = np.abs(np.diff(walk.q, axis=0))
+    bend = second_derivatives(steps, robot.prismatic, poses.levers, np.inf) + beside.bends[:, 0]
+    turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0) + beside.bends[:, 1]
+    error, chord, aside = beside.error, beside.chord, beside.bends[:, 2]
+    with np.errstate(invalid="ignore", over="ignore"):  # a fold: inf * 0 is NaN, and refused
+        turn = turn + aside * bend
+        # At the tool point's own foot the normal is another than at its target.
+        before, after = chord[:-1] + aside * error[:-1], chord[1:] + aside * error[1:]
+    strayed = _peaks(error[:-1], error[1:], bend) + beside.strays[:, 0]
+    tilted = _peaks(before, after, turn) + beside.strays[:, 1]
+    position = np.max(strayed, initial=np.max(error, initial=0.0))
+    alone = chord + beside.standing * error if len(chord) == 1 else chord
+    worst = np.max(tilted, initial=np.max(alone, initial=0.0))
+    margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
+    certificate = Certificate(
+        waypoints=len(walk.q),
+        max_position_error=float(position),
+        max_angle=float(2.0 * np.arcsin(min(0.5 * worst, 1.0))) if worst == worst else np.nan,
+        min_limit_margin=margin,
+    )
+
+    visited = np.zeros(len(cells), dtype=bool)
+    visited[walk.cell[walk.cell >= 0]] = True
+    refusals = []
+    if not margin >= 0.0:
+        refusals.append(f"a joint passes its limit by {-margin:.3g}")
+    if not position <= tolerance:
+        refusals.append(f"the tool point strays {position:.3g} m, more than {tolerance:.3g} m")
+    if not worst <= rim + CLOSE_TO_ZERO:
+        refusals.append(
+            f"the tool axis tilts {np.degrees(certificate.max_angle):.4f} deg, "
+            f"more than {task.cone_deg:g} deg"
+        )
+    at = walk.cell >= 0
+    if not (position <= tolerance and worst <= rim + CLOSE_TO_ZERO) and (
+        (beside.error[at] > tolerance).any() or (beside.chord[at] > rim).any()
+    ):
+        refusals.append("a marked waypoint is not at its cell's centre target")
+    if not visited[needed].all():
+        refusals.append(f"{int((needed & ~visited).sum())} cells are never visited")
+    return Replay(certificate, "; ".join(refusals))

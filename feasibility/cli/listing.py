@@ -1,0 +1,149 @@
+"""What can be named on the command line: the built-in cases and the robots."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from feasibility.cases import builtin_cases
+
+WIDE = 240  # columns, where nothing shall be wrapped
+
+
+def case_rows() -> list[dict[str, Any]]:
+    """The built-in cases, one object each."""
+    return [
+        {
+            "name": name,
+            "robot": case.robot.name,
+            "limits": case.robot.limits,
+            "surface": case.surface.kind,
+            "position": list(case.surface.position),
+            "cone_deg": case.task.cone_deg,
+            "standoff": case.task.standoff,
+            "cells": case.surface.counts,
+            "description": case.description,
+        }
+        for name, case in builtin_cases().items()
+    ]
+
+
+def robot_rows() -> list[dict[str, Any]]:
+    """The robots of the library, one object each; every URDF is read."""
+    from robots import list_robots, load_robot
+
+    rows = []
+    for info in list_robots():
+        robot = load_robot(info.name)
+        joints = [
+            {"name": name, "kind": kind, **_limits(kind, low, high)}
+            for name, kind, low, high in zip(
+                robot.joint_names,
+                robot.joint_kinds,
+                robot.lower.tolist(),
+                robot.upper.tolist(),
+                strict=True,
+            )
+        ]
+        rows.append(
+            {
+                "name": info.name,
+                "description": info.description,
+                "source": info.source,
+                "tool_frame": robot.tool_frame,
+                "reach_m": robot.reach if math.isfinite(robot.reach) else None,
+                "limit_sets": sorted(robot.limit_sets),
+                "joints": joints,
+            }
+        )
+    return rows
+
+
+def _limits(kind: str, low: float, high: float) -> dict[str, Any]:
+    """Limits of one joint in degrees or metres; null where it turns freely."""
+    unit = "m" if kind == "prismatic" else "deg"
+    ends = (low, high) if kind == "prismatic" else (math.degrees(low), math.degrees(high))
+    free = not any(map(math.isfinite, ends))
+    return {f"limits_{unit}": None if free else [_finite(end) for end in ends]}
+
+
+def _finite(end: float) -> float | None:
+    """A limit, null where there is none on this side."""
+    return round(end, 9) if math.isfinite(end) else None
+
+
+def cases_table(rows: Sequence[dict[str, Any]]) -> str:
+    """The built-in cases for people."""
+    return _table(
+        ["case", "robot", "limits", "surface", "cells", "cone", "description"],
+        [
+            [
+                row["name"],
+                row["robot"],
+                row["limits"],
+                row["surface"],
+                " x ".join(map(str, row["cells"])),
+                f"{row['cone_deg']:g} deg",
+                row["description"],
+            ]
+            for row in rows
+        ],
+    )
+
+
+def robots_table(rows: Sequence[dict[str, Any]]) -> str:
+    """The robots for people: joints by kind, reach, limits in order of the joints."""
+    return _table(
+        ["robot", "joints", "reach", "limits (deg, or m where it says so)", "limit sets"],
+        [
+            [
+                row["name"],
+                _kinds(row["joints"]),
+                "any" if row["reach_m"] is None else f"{row['reach_m']:.2f} m",
+                ", ".join(map(_limits_text, row["joints"])),
+                ", ".join(row["limit_sets"]),
+            ]
+            for row in rows
+        ],
+    )
+
+
+def _kinds(joints: Sequence[dict[str, Any]]) -> str:
+    """'6' or '6 (3 continuous)'."""
+    kinds = [joint["kind"] for joint in joints]
+    special = [
+        f"{kinds.count(kind)} {kind}" for kind in ("continuous", "prismatic") if kind in kinds
+    ]
+    return f"{len(kinds)}" + (f" ({', '.join(special)})" if special else "")
+
+
+def _limits_text(joint: dict[str, Any]) -> str:
+    """'-170..170', '0..0.4 m' or 'free'."""
+    unit = " m" if "limits_m" in joint else ""
+    limits = joint["limits_m" if unit else "limits_deg"]
+    if limits is None:
+        return "free"
+    low, high = ("" if end is None else f"{end:.3g}" if unit else f"{end:.0f}" for end in limits)
+    return f"{low}..{high}{unit}"
+
+
+def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table whose columns are as wide as they need to be, on a terminal as wide as it is."""
+    import io
+    import sys
+
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    text = io.StringIO()
+    console = Console(file=text, width=None if terminal else WIDE, color_system=None)
+    table = Table(box=box.ASCII2 if terminal else None, pad_edge=False, show_edge=False)
+    for heading in headings:
+        table.add_column(heading, overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table, highlight=False, markup=False)
+    return "\n".join(line.rstrip() for line in text.getvalue().splitlines())

@@ -1,0 +1,90 @@
+"""More components than a verdict needs: improving what a division is made of.
+
+The search for a verdict works on its largest components. A division needs those that fill the gaps
+of the others, so further rounds work on the components that the present best cover uses: cells that
+only some of them reach are seeded, their borders are stirred, and where two meet they may join. A
+round has gained something when the cover has fewer components, or one of them covers more. Some
+rounds in a row without gain end it.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.division.set_cover import set_cover
+from feasibility.roadmap import Explorer, root_of
+
+DRY_ROUNDS = 10  # rounds without gain after which components are taken as they are
+MOST_ROUNDS = 60
+SEEDS = 6  # guesses at a cell, each round
+TOP = 6  # components of a cover that one round works on
+COVER_SECONDS = 2.0  # for the cover of one round, which need not be the best
+ELSEWHERE = 2  # state of a pair of cells that is not to be joined
+
+
+def table_of(explorer: Explorer) -> tuple[list[int], NDArray[np.bool_]]:
+    """The root components, and (K, N) the cells that each covers."""
+    roots = [r for r in explorer.roots() if explorer.roadmap.size[r] > 0]
+    return roots, explorer.roadmap.cover[roots].astype(bool)
+
+
+def gather(explorer: Explorer) -> None:
+    """Improve the components that the best cover uses, until some rounds in a row gain nothing.
+
+    Raises:
+        OutOfTime: the deadline passed; what was found until then stands.
+    """
+    dry, before = 0, (0, 0, 0)
+    for _ in range(MOST_ROUNDS):
+        chosen = _chosen(explorer)
+        sizes = sum(int(explorer.roadmap.size[root]) for root in chosen)
+        standing = (int(explorer.reached.sum()), -len(chosen), sizes)
+        dry = dry + 1 if standing == before else 0
+        before = standing
+        if len(chosen) < 2 or dry >= DRY_ROUNDS:
+            return
+        _round(explorer, chosen)
+        explorer.rounds += 1
+
+
+def _chosen(explorer: Explorer) -> list[int]:
+    """Components of a least cover of all reached cells."""
+    roots, covers = table_of(explorer)
+    left = min(COVER_SECONDS, explorer.deadline - time.monotonic())
+    return [roots[row] for row in set_cover(covers[:, explorer.reached], left).rows]
+
+
+def _round(explorer: Explorer, chosen: list[int]) -> None:
+    """Seed cells that few of the components reach, stir their borders, join where they meet."""
+    rng = explorer.rng
+    explorer.tick("looking for components that cover more")
+    counts = explorer.roadmap.cover[chosen].sum(axis=0)
+    rare = np.flatnonzero(explorer.reached & (counts < len(chosen)))
+    explorer.plant(int(rng.choice(rare)), explorer.guesses(SEEDS))
+    some = rng.permutation(chosen)[:TOP].tolist()
+    for component in some:
+        explorer.tick("stirring the borders of components")
+        border = explorer.border(component)
+        if len(border):
+            explorer.stir(int(rng.choice(border)))
+    for a in range(len(some)):
+        for b in range(a):
+            one, other = (int(root_of(explorer.roadmap, some[k])) for k in (a, b))
+            if one == other or (len(some) > 3 and rng.random() > 0.3):
+                continue
+            explorer.tick("joining components where they meet")
+            explorer.meet(one, other)
+            shared = np.flatnonzero(explorer.covers(one) & explorer.covers(other))
+            if len(shared):
+                explorer.stir(int(rng.choice(shared)))
+
+
+def tie(explorer: Explorer, component: int, wanted: NDArray[np.bool_]) -> None:
+    """Look for a motion of a component between every two neighbouring cells that are wanted."""
+    pairs = explorer.cells.pairs
+    state = np.zeros(len(pairs) + 1, dtype=np.int64)
+    state[:-1][~wanted[pairs].all(axis=1)] = ELSEWHERE
+    explorer.join(state, component)

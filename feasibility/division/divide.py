@@ -1,0 +1,218 @@
+"""How a surface is divided: `divide` gathers components, shares the cells out, and walks them."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.division.division import Division, Plan
+from feasibility.search import Progress, Search
+from feasibility.task import Task
+from feasibility.verdict import Cause
+from robots import Robot
+from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.roadmap import Explorer
+
+MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
+
+
+def divide(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    search: Search | None = None,
+    progress: Progress | None = None,
+) -> Division:
+    """Divide a surface into the fewest patches that one continuous motion each covers.
+
+    Every cell that some motion covers is in exactly one patch; the others are left out, each with
+    its cause. "Fewest" is proved for the components that the search found; that there are no
+    larger ones is as certain as the search is exhaustive.
+
+    Args:
+        robot: the arm, with its limits.
+        cells: the surface, cut into E-cells.
+        task: standoff, cone and tolerance.
+        search: settings of the complete search; where its time limit strikes, the patches are the
+            fewest known.
+        progress: called as progress(done, total, text) some times a second.
+
+    Raises:
+        ValueError: the search is the greedy one, which keeps a single tree of motions.
+        RobotError: the arm is no serial chain of one-dof joints.
+
+    Example:
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> patch = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+        >>> division = divide(load_robot("ur5"), patch.cells(3, 3), Task(0.02, cone_deg=30))
+        >>> len(division.patches), division.optimal, division.whole
+        (1, True, True)
+    """
+    search = Search() if search is None else search
+    if search.method != "complete":
+        raise ValueError(
+            f"a division needs search.method 'complete', got {search.method!r}: the greedy search "
+            "keeps one tree of motions, not all components"
+        )
+    from feasibility.notices import compiling_notice
+    from feasibility.roadmap import warm_up
+
+    called = time.monotonic()
+    with compiling_notice():
+        from feasibility.division.plans import plans
+
+        warm_up()
+    began = time.monotonic()
+    explorer, ended = _searched(robot, cells, task, search, progress)
+    searched = time.monotonic()
+    blocked = _no_room(explorer) if len(cells) else ""
+    nothing = Plan((), (), 0)
+    fewest, connected = (nothing, nothing) if blocked else plans(explorer, task)
+    folded = bool(_folds(explorer).any())
+    missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
+    causes = _causes(explorer, missing, ended)
+    return Division(
+        robot=robot,
+        cells=cells,
+        task=task,
+        seed=search.seed,
+        fewest=fewest,
+        connected=connected,
+        left_out=causes,
+        unsettled=np.setdiff1d(missing, [cause.cell for cause in causes]),
+        ended=ended and not blocked and not folded,
+        message=blocked or _message(fewest, connected, len(missing), len(cells), ended, folded),
+        timing=_timing(called, began, searched),
+        statistics=_statistics(explorer),
+    )
+
+
+def _searched(
+    robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
+) -> tuple[Explorer, bool]:
+    """The search with all components that it found, and whether it ran to its end."""
+    from feasibility.division.components import gather
+    from feasibility.roadmap import Explorer, OutOfTime, explore, problem_of
+
+    deadline = np.inf if search.time_limit is None else time.monotonic() + search.time_limit
+    problem = problem_of(robot, cells, task)
+    explorer = Explorer(robot, cells, problem, search.seed, deadline, progress)
+    ended = True
+    try:
+        explore(explorer)
+        gather(explorer)
+    except OutOfTime:
+        ended = False
+    explorer.deadline = np.inf
+    return explorer, ended
+
+
+def _timing(called: float, began: float, searched: float) -> dict[str, float]:
+    """Seconds from the three times until now."""
+    done = time.monotonic()
+    return {
+        "load_s": began - called,
+        "search_s": searched - began,
+        "divide_s": done - searched,
+        "total_s": done - called,
+    }
+
+
+def _statistics(explorer: Explorer) -> dict[str, int]:
+    """Counts of the work done."""
+    return {
+        "fk": int(explorer.work.counts[0]),
+        "nodes": int(explorer.roadmap.counters[0]),
+        "components": len(explorer.roots()),
+        "boxes": explorer.boxes,
+        "rounds": explorer.rounds,
+    }
+
+
+def _causes(explorer: Explorer, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
+    """Why cells are in no patch; of a search that did not end, only what is proved."""
+    from feasibility.roadmap import Ruling, causes_of, diagnose, disconnected
+
+    if not ended:
+        proved = [c for c in missing.tolist() if explorer.rulings.get(c) is Ruling.PROVED]
+        return tuple(diagnose(explorer, cell) for cell in proved[:MOST_EXPLAINED])
+    known = {cause.cell: cause for cause in causes_of(explorer)}
+    return tuple(
+        known.get(c) or (disconnected if explorer.reached[c] else diagnose)(explorer, c)
+        for c in missing.tolist()
+    )
+
+
+def _no_room(explorer: Explorer) -> str:
+    """Why no motion at all can be certified; empty where one can."""
+    problem = explorer.problem
+    if not problem.rim > 0.0:
+        return (
+            "A cone of 0 degrees leaves a motion no room between samples, so none can be "
+            "certified; allow a small angle."
+        )
+    if len(problem.bends) and _folds(explorer).all():
+        return (
+            "The offset surface folds: the standoff reaches the surface's radius of curvature on "
+            "its hollow side, so no motion can be certified; use a smaller standoff."
+        )
+    if (
+        len(problem.strays)
+        and (problem.strays >= (problem.tolerance, problem.rim)).any(axis=1).all()
+    ):
+        return (
+            "The surface is rougher than the task allows, so no motion can be certified; use a "
+            "finer or smoother mesh, a larger tolerance or a wider cone."
+        )
+    return ""
+
+
+def _folds(explorer: Explorer) -> NDArray[np.bool_]:
+    """Ways from cell to cell on which the offset surface folds, so that no motion follows them."""
+    return np.asarray(np.isinf(explorer.problem.bends).any(axis=1), dtype=bool)
+
+
+def _message(
+    fewest: Plan, connected: Plan, left_out: int, total: int, ended: bool, folded: bool
+) -> str:
+    """One or two sentences: what was found, and on what it rests."""
+    refused = [p.refusal for p in (*fewest.patches, *connected.patches) if not p.accepted]
+    if refused:
+        return (
+            f"{len(refused)} patch{'es have' if len(refused) > 1 else ' has'} a walk that the "
+            f"independent replay refuses: {refused[0]}."
+        )
+    covered = total - left_out
+    number = len(fewest.patches)
+    if total == 0:
+        return "There are no cells to cover."
+    if number == 0:
+        return (
+            "No motion covers any cell."
+            if ended
+            else "The time limit ran out before any cell was covered."
+        )
+    what = f"{number} continuous motion{'s' if number > 1 else ''}"
+    proof = (
+        "" if number == 1 else "; no fewer of the components found would do"
+        if fewest.optimal else f"; at least {fewest.bound} of the components found are needed"
+    )  # fmt: skip
+    sentence = f"{what} cover{'' if number > 1 else 's'} {covered} of {total} cells{proof}."
+    if connected is not fewest:
+        most = len(connected.patches)
+        least = "" if connected.optimal else f" (at least {connected.bound})"
+        sentence += f" Patches that are each connected on the surface: {most}{least}."
+    if folded:
+        sentence += (
+            " Where the standoff reaches the surface's radius of curvature its offset folds and no "
+            "motion can be certified: these are the fewest known."
+        )
+    if not ended:
+        sentence += " The time limit ran out: these are the fewest known."
+    return sentence

@@ -1,0 +1,146 @@
+"""The answer to "how many motions, then?": patches, their walks, and the moves between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.task import Task
+from feasibility.verdict import Cause, Certificate, Walk
+from robots import Robot
+from surfaces import Cells
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SubPatch:
+    """Cells that one continuous motion covers, and that motion."""
+
+    cells: NDArray[np.int64]
+    """(k,) flat indices, sorted."""
+    area: float
+    """m^2."""
+    pieces: int
+    """Connected pieces of the surface that the cells make; the motion leads from one to the next
+    over cells of other patches."""
+    walk: Walk
+    """One continuous motion over these cells; on its way it may cross others."""
+    certificate: Certificate
+    """What the independent replay measured along the walk."""
+    refusal: str
+    """Why the replay refuses the walk; empty when it is accepted."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the cells."""
+        cells = np.array(self.cells, dtype=np.int64)
+        cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+
+    @property
+    def accepted(self) -> bool:
+        """True when the replay accepts the walk: constraints everywhere, every cell visited."""
+        return not self.refusal
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plan:
+    """Patches in the order in which they are worked on, and the moves from one to the next."""
+
+    patches: tuple[SubPatch, ...]
+    moves: tuple[Reconfiguration, ...]
+    """From the end of each patch's walk to the start of the next one's; one fewer than patches."""
+    bound: int
+    """The components that the search found cannot be shared out in fewer patches."""
+
+    @property
+    def optimal(self) -> bool:
+        """Is the number of patches proved to be the least, given the components found?"""
+        return len(self.patches) <= self.bound
+
+    @property
+    def accepted(self) -> bool:
+        """Are all walks accepted by the replay?"""
+        return all(patch.accepted for patch in self.patches)
+
+    def patch_of(self, n: int) -> NDArray[np.int64]:
+        """(n,) index of the patch that each of n cells is in; -1 for cells left out."""
+        result = np.full(n, -1, dtype=np.int64)
+        for k, patch in enumerate(self.patches):
+            result[patch.cells] = k
+        return result
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Division:
+    """A surface divided into the fewest patches; see `feasibility.dividing.divide`."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    seed: int
+    fewest: Plan
+    """The fewest continuous motions; a patch may be in several pieces on the surface."""
+    connected: Plan
+    """The fewest patches that are each connected on the surface; the same object as `fewest`
+    where that costs no patch."""
+    left_out: tuple[Cause, ...]
+    """Cells that are in no patch, in order of index, and why."""
+    unsettled: NDArray[np.int64]
+    """Cells that are in no patch because the time limit ran out before anything could be said."""
+    ended: bool
+    """Did the search run to its end, free to move everywhere? Otherwise the patches are the fewest
+    known: a time limit struck, or no motion can be certified over a part of the surface."""
+    message: str
+    """What was found, and on what it rests."""
+    timing: Mapping[str, float] = field(default_factory=dict)
+    """Seconds: load_s, search_s, divide_s, total_s."""
+    statistics: Mapping[str, Any] = field(default_factory=dict)
+    """Counts of work done."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the cells."""
+        cells = np.array(self.unsettled, dtype=np.int64)
+        cells.flags.writeable = False
+        object.__setattr__(self, "unsettled", cells)
+
+    @property
+    def patches(self) -> tuple[SubPatch, ...]:
+        """The patches of the plan with the fewest motions."""
+        return self.fewest.patches
+
+    @property
+    def moves(self) -> tuple[Reconfiguration, ...]:
+        """The moves between these patches."""
+        return self.fewest.moves
+
+    @property
+    def optimal(self) -> bool:
+        """Fewest of all that the search can find: it ended, and the optimum is proved."""
+        return self.ended and self.fewest.optimal
+
+    @property
+    def decided(self) -> bool:
+        """Did the search end, and is every walk accepted by the replay?"""
+        return self.ended and self.fewest.accepted and self.connected.accepted
+
+    @property
+    def n_covered(self) -> int:
+        """Number of cells that are in a patch whose walk is accepted."""
+        return sum(len(patch.cells) for patch in self.patches if patch.accepted)
+
+    @property
+    def whole(self) -> bool:
+        """Is every cell in a patch whose walk is accepted?"""
+        return self.n_covered == len(self.cells)
+
+    def __repr__(self) -> str:
+        """The division in one line."""
+        number = len(self.patches)
+        return (
+            f"{number} patch{'' if number == 1 else 'es'}, {self.n_covered} of {len(self.cells)} "
+            f"cells. {self.message}"
+        )

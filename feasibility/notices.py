@@ -1,0 +1,85 @@
+"""A word to whoever waits while the kernels are compiled."""
+
+from __future__ import annotations
+
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+NOTICE = "compiling the search kernels (first run only, up to a minute) ..."
+WAITING = (
+    "waiting for the workers to load the search kernels (compiled on their first run, up to a "
+    "minute) ..."
+)
+PATIENCE = 3.0  # [s]: loading them from the cache takes less, unless the machine is busy
+
+
+def notify(notice: str = NOTICE) -> None:
+    """Write a line to stderr, if there is one."""
+    if sys.stderr is not None:
+        sys.stderr.write(notice + "\n")
+        sys.stderr.flush()
+
+
+@contextmanager
+def slow_notice() -> Iterator[None]:
+    """Say something on stderr if the block takes longer than `PATIENCE` seconds."""
+    timer = threading.Timer(PATIENCE, notify, [WAITING])
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+@contextmanager
+def compiling_notice(
+    patience: float = PATIENCE, say: Callable[[], None] = notify
+) -> Iterator[None]:
+    """Say that kernels are being compiled, if they are, and the block takes longer than `patience`.
+
+    Args:
+        patience: seconds.
+        say: called once, from any thread.
+
+    Example:
+        >>> with compiling_notice():
+        ...     kernels = "loaded from the cache"
+    """
+    from numba.core import event
+
+    class Watch(event.Listener):
+        """Knows when both have come: a compilation, and the end of patience."""
+
+        def __init__(self) -> None:
+            """Neither has come."""
+            self.lock, self.compiling, self.late, self.said = threading.Lock(), False, False, False
+
+        def on_start(self, about: Any) -> None:
+            """A kernel that is in no cache begins to be compiled."""
+            self.look(compiling=True)
+
+        def on_end(self, about: Any) -> None:
+            """It has been."""
+
+        def look(self, compiling: bool = False, late: bool = False) -> None:
+            """Say it when it is time to."""
+            with self.lock:
+                self.compiling, self.late = self.compiling or compiling, self.late or late
+                due = self.compiling and self.late and not self.said
+                self.said |= due
+            if due:
+                say()
+
+    watch = Watch()
+    timer = threading.Timer(patience, watch.look, kwargs={"late": True})
+    timer.daemon = True
+    timer.start()
+    try:
+        with event.install_listener("numba:compile", watch):
+            yield
+    finally:
+        timer.cancel()

@@ -1,0 +1,231 @@
+"""Algorithm 1 of the paper: continuity between two neighbouring E-cells, searched over J-cells.
+
+`extend_search` is the paper's procedure CONT, and differs from the printed one only where that
+cannot run: its recursion is an explicit stack, the checked J-cells are an exact hash table, it
+stops at a cap, and the result of the inner calls is kept.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from feasibility.paper.jcell_grid import (
+    HAIR,
+    cell_of,
+    distance,
+    move_tool,
+    neighbour,
+    place_joints,
+    place_tool,
+)
+
+RUNNING, FOUND, EXHAUSTED, CAPPED, FULL = 0, 1, 2, 3, 4  # what a call is doing: counters[STATE]
+STATE, DEPTH, NODES, PLACED, CALL = 0, 1, 2, 3, 4  # places in `Memory.counters`
+
+REFRESH = 256  # levels of the stack between full evaluations of the tool: keeps rounding below HAIR
+
+
+class Memory(NamedTuple):
+    """Working memory of one call; all that it takes to stop it and go on later."""
+
+    counters: NDArray[np.int64]
+    """(5,) STATE, DEPTH, NODES (the first, and those checked), PLACED (joint frames), CALL."""
+    table: NDArray[np.int64]
+    """(2^k,) open-addressing hash table over `nodes`: CALL << 32 | node."""
+    nodes: NDArray[np.int32]
+    """(m, n) offsets of every J-cell checked in this call; row 0 is where it began."""
+    stack_node: NDArray[np.int64]
+    """(s,) J-cells from the first to the one being expanded."""
+    stack_next: NDArray[np.int64]
+    """(s,) number of the next neighbour to look at, for each of them."""
+    stack_tool: NDArray[np.float64]
+    """(s, 7) tool point, approach axis, distance from the target point, for each of them."""
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _mixed(key):  # type: ignore[no-untyped-def]
+    """Spread the bits of a linear key over the word."""
+    key ^= key >> 29
+    key *= -7046029254386353131
+    key ^= key >> 32
+    return key
+
+
+@njit(cache=True, error_model="numpy")
+def _key(offsets):  # type: ignore[no-untyped-def]
+    """A linear key of a J-cell: a neighbour's follows by adding one term per moved joint."""
+    key = 0
+    for i in range(offsets.shape[0]):
+        key += np.int64(offsets[i]) * _weight(i)
+    return key
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _weight(i):  # type: ignore[no-untyped-def]
+    """An odd 64-bit factor for joint i (wraps around on purpose)."""
+    return (2 * i + 1) * -7070675565921424023 + 2 * i
+
+
+@njit(cache=True, error_model="numpy")
+def rehash(memory):  # type: ignore[no-untyped-def]
+    """Enter all nodes of the running call into a new, empty table."""
+    counters, table, nodes = memory.counters, memory.table, memory.nodes
+    mask = table.shape[0] - 1
+    for node in range(counters[NODES]):
+        slot = _mixed(_key(nodes[node])) & mask
+        while table[slot] >> 32 == counters[CALL]:
+            slot = (slot + 1) & mask
+        table[slot] = counters[CALL] << 32 | node
+
+
+@njit(cache=True, error_model="numpy")
+def begin_search(chain, grid, offsets, target, memory):  # type: ignore[no-untyped-def]
+    """Start a call of Algorithm 1 at the J-cell `offsets` (n,) towards the point `target` (3,)."""
+    counters = memory.counters
+    counters[STATE], counters[DEPTH], counters[NODES] = RUNNING, 0, 1
+    counters[PLACED] = offsets.shape[0]
+    counters[CALL] += 1
+    memory.nodes[0] = offsets
+    slot = _mixed(_key(offsets)) & (memory.table.shape[0] - 1)
+    memory.table[slot] = counters[CALL] << 32
+    memory.stack_node[0] = 0
+    memory.stack_next[0] = 0
+    place_tool(chain, grid, offsets, memory.stack_tool[0, :6])
+    memory.stack_tool[0, 6] = distance(memory.stack_tool[0], target)
+
+
+@njit(cache=True, error_model="numpy")
+def _first_visit(table, nodes, call, count, offsets, delta, key):  # type: ignore[no-untyped-def]
+    """Enter the J-cell offsets + delta as nodes[count]; False when it was checked already."""
+    n = offsets.shape[0]
+    mask = table.shape[0] - 1
+    for i in range(n):
+        key += delta[i] * _weight(i)
+    slot = _mixed(key) & mask
+    while table[slot] >> 32 == call:
+        node = table[slot] & 0xFFFFFFFF
+        same = True
+        for i in range(n):
+            same &= nodes[node, i] == offsets[i] + delta[i]
+        if same:
+            return False
+        slot = (slot + 1) & mask
+    table[slot] = call << 32 | count
+    for i in range(n):
+        nodes[count, i] = offsets[i] + delta[i]
+    return True
+
+
+@njit(cache=True, error_model="numpy")
+def _inside(lowest, highest, offsets, delta):  # type: ignore[no-untyped-def]
+    """True when the J-cell offsets + delta obeys the joint limits."""
+    inside = True
+    for i in range(offsets.shape[0]):
+        inside &= lowest[i] <= offsets[i] + delta[i] <= highest[i]
+    return inside
+
+
+@njit(cache=True, error_model="numpy")
+def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
+    """Go on with a call of Algorithm 1 for at most `budget` more neighbours.
+
+    Leaves counters[STATE] at FOUND (the stack and the last node are the path), EXHAUSTED (no
+    unchecked neighbour is left), CAPPED (`cap` J-cells were checked), RUNNING (call again) or
+    FULL (enlarge the memory, and call again).
+
+    Args:
+        chain, chart, grid: a `Chain`, a `Chart` and a `Grid`.
+        target, target_cell: (3,) p_T, m, and the flat index of ec_T.
+        budget, cap: neighbours to look at now, and J-cells that the whole call may check.
+        memory: a `Memory`, started by `begin_search`.
+    """
+    # Arrays are read out of their tuples once, here: numba counts references each time it is done.
+    rotations, translations, prismatic = chain.rotations, chain.translations, chain.prismatic
+    origin, step, sine, cosine = grid.origin, grid.step, grid.sine, grid.cosine
+    lowest, highest, height = grid.lowest, grid.highest, grid.height
+    moves_all, tolerance, cone_cosine = grid.moves_all, grid.tolerance, grid.cone_cosine
+    counters, table, nodes = memory.counters, memory.table, memory.nodes
+    stack_node, stack_next, stack_tool = memory.stack_node, memory.stack_next, memory.stack_tool
+    n = nodes.shape[1]
+    base, partial = np.empty((n, 12)), np.empty((n + 1, 6))
+    offsets, delta, held = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
+    call, count, depth = counters[CALL], counters[NODES], counters[DEPTH]
+    tool, last = partial[0], min(cap + 1, nodes.shape[0])
+    placed = 0  # joints, from the base on, whose frames in `base` are those of the present J-cell
+    state = EXHAUSTED
+    while depth >= 0:
+        shared = _expand(nodes, stack_node[depth], stack_tool[depth], offsets, held, partial)
+        placed = min(placed, shared)
+        key, away = _key(offsets), stack_tool[depth, 6]
+        number, deeper, nearer = stack_next[depth], False, away
+        while not deeper and neighbour(number, moves_all, delta):
+            if count == last or depth + 1 == stack_node.shape[0] or budget == 0:
+                state = RUNNING if budget == 0 else (CAPPED if count > cap else FULL)
+                break
+            budget -= 1
+            number += 1
+            if not _inside(lowest, highest, offsets, delta) or not _first_visit(
+                table, nodes, call, count, offsets, delta, key
+            ):
+                continue
+            count += 1
+            top = _last_move(delta)
+            if top >= placed:
+                place_joints(
+                    rotations, translations, prismatic, origin, step, offsets, placed, top, base
+                )
+                counters[PLACED] += top + 1 - placed
+                placed = top + 1
+            move_tool(prismatic, step, sine, cosine, base, delta, held, partial)
+            cell = cell_of(chart, height, tolerance, cone_cosine, tool)
+            if cell == target_cell:
+                state = FOUND
+                break
+            nearer = distance(tool, target)
+            deeper = cell >= 0 and nearer < away - HAIR
+        stack_next[depth] = number
+        if state != EXHAUSTED:
+            break
+        depth += 1 if deeper else -1
+        if deeper:
+            stack_node[depth], stack_next[depth] = count - 1, 0
+            for k in range(6):
+                stack_tool[depth, k] = tool[k]
+            stack_tool[depth, 6] = nearer
+            if depth % REFRESH == 0:
+                place_tool(chain, grid, nodes[count - 1], stack_tool[depth, :6])
+                counters[PLACED] += n
+    counters[STATE], counters[DEPTH], counters[NODES] = state, depth, count
+
+
+@njit(cache=True, error_model="numpy")
+def _last_move(delta):  # type: ignore[no-untyped-def]
+    """The last joint that moves."""
+    top = delta.shape[0] - 1
+    while delta[top] == 0:
+        top -= 1
+    return top
+
+
+@njit(cache=True, error_model="numpy")
+def _expand(nodes, node, tool, offsets, held, partial):  # type: ignore[no-untyped-def]
+    """Make `node`, with its tool (7,), the present J-cell.
+
+    Returns:
+        How many joint frames, from the base on, it shares with the J-cell before it: a joint's own
+        motion leaves its frame (before that motion) where it is.
+    """
+    n = offsets.shape[0]
+    shared = 1
+    while shared < n and offsets[shared - 1] == nodes[node, shared - 1]:
+        shared += 1
+    for i in range(n):
+        offsets[i] = nodes[node, i]
+        held[i] = 2
+    for k in range(6):
+        partial[n, k] = tool[k]
+    return shared

@@ -1,0 +1,259 @@
+"""Continuity between neighbouring E-cells, from Python: one arm, one start, one call at a time."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility.paper import algorithm_1 as jcells
+from feasibility.paper.jcell_grid import Grid, cell_of, place_tool
+from feasibility.paper.jcell_steps import Steps
+from feasibility.search import Search
+from feasibility.task import Task
+from robots import Chain, Robot
+from surfaces.patches import GridCells
+
+CAP = 20_000  # J-cells of one call at the step below, unless the search says otherwise
+CAP_STEP_DEG = 0.01
+BUDGET = 500_000  # neighbours between two looks at the clock: 0.2 s at most, so Ctrl-C is heard
+MOST_JCELLS = 20_000_000  # of one call, whatever its cap: about 1 GB
+FAR = 2**30  # offset that stands for "no limit": 100,000 degrees at the smallest step
+
+
+class Outcome(StrEnum):
+    """How a call of Algorithm 1 ended."""
+
+    FOUND = "found"
+    """A path of J-cells enters the target cell."""
+    EXHAUSTED = "exhausted"
+    """No unchecked neighbour was left: the paper's `Continuity = false`."""
+    CAPPED = "capped"
+    """The cap was reached first: unknown, not "no"."""
+    OUT_OF_TIME = "out of time"
+    """The time limit was reached first."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Continuity:
+    """What one call of Algorithm 1 found."""
+
+    outcome: Outcome
+    jcells: NDArray[np.int32]
+    """(k, n) offsets of the path from the J-cell it began at to the first in the target cell; no
+    rows unless found."""
+    q: NDArray[np.float64]
+    """(k, n) their configurations, rad or m."""
+    checked: int
+    """J-cells evaluated."""
+    fk: float
+    """Forward kinematics computed, in whole chains: joint frames placed, divided by n."""
+
+    @property
+    def found(self) -> bool:
+        """True when the neighbouring cell was entered."""
+        return self.outcome is Outcome.FOUND
+
+
+class JSpace:
+    """The J-cells around one start configuration of one robot, with Algorithm 1 on them.
+
+    Holds the working memory of the search, so use one per thread.
+
+    Attributes:
+        start: (n,) q_start, rad or m.
+        steps: the moves between neighbouring J-cells, and the tolerance.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        cells: GridCells,
+        task: Task,
+        start: ArrayLike,
+        search: Search | None = None,
+        chain: Chain | None = None,
+        steps: Steps | None = None,
+    ) -> None:
+        """Lay the grid of J-cells through `start` (n,).
+
+        Args:
+            robot: the arm.
+            cells: the E-cells.
+            task: what makes a J-cell feasible.
+            start: (n,) q_start, rad or m.
+            search: step, moves and cap; the defaults of `Search` without it.
+            chain: the compiled chain of `robot`, when it is at hand.
+            steps: `Steps.of` the same, when they are at hand.
+        """
+        search = Search(method="greedy") if search is None else search
+        origin = np.array(start, dtype=float)
+        if origin.shape != (robot.n,) or not np.isfinite(origin).all():
+            raise ValueError(f"start must be {robot.n} finite joint values, got {origin.tolist()}")
+        self.start = origin
+        self.steps = Steps.of(robot, cells.charted, task, search) if steps is None else steps
+        size = self.steps.size
+        self._chain = Chain.checked(robot) if chain is None else chain
+        self._chart = cells.chart
+        self._points = task.targets(cells).points
+        cap = search.cap or round(CAP * max(1.0, CAP_STEP_DEG / search.step_deg))
+        self._cap = min(cap, MOST_JCELLS)
+        self._grid = Grid(
+            origin=origin,
+            step=size,
+            sine=np.sin(size),
+            cosine=np.cos(size),
+            lowest=-_last_offset(-origin, size, -robot.lower),
+            highest=_last_offset(origin, size, robot.upper),
+            moves_all=search.moves == "all",
+            height=float(cells.surface.side_sign) * task.standoff,
+            tolerance=self.steps.tolerance - self.steps.sag,
+            cone_cosine=self.steps.cone_cosine,
+        )
+        self._memory = _memory(robot.n, nodes=4096, stack=4096)
+
+    def load(self) -> None:
+        """Load the compiled kernels, or compile them, before anything is timed."""
+        here = np.zeros(len(self.start), dtype=np.int32)
+        self.cell_of(here)
+        target = np.zeros(3)
+        jcells.begin_search(self._chain, self._grid, here, target, self._memory)
+        jcells.extend_search(
+            self._chain, self._chart, self._grid, target, 0, 0, self._cap, self._memory
+        )
+
+    def q(self, jcells: ArrayLike) -> NDArray[np.float64]:
+        """Configurations (..., n) of J-cells given as offsets (..., n)."""
+        return self.start + np.asarray(jcells) * self.steps.size
+
+    def cell_of(self, jcell: ArrayLike) -> int:
+        """Flat index of the E-cell of a feasible J-cell (n,); -1 for one that is not feasible."""
+        offsets = np.asarray(jcell, dtype=np.int32)
+        if (offsets < self._grid.lowest).any() or (offsets > self._grid.highest).any():
+            return -1
+        tool = np.empty(6)
+        place_tool(self._chain, self._grid, offsets, tool)
+        grid = self._grid
+        return int(cell_of(self._chart, grid.height, grid.tolerance, grid.cone_cosine, tool))
+
+    def continuity(
+        self, jcell: ArrayLike, target_cell: int, deadline: float = math.inf
+    ) -> Continuity:
+        """Algorithm 1: search a path of J-cells from `jcell` into `target_cell`.
+
+        Args:
+            jcell: (n,) offsets of a feasible J-cell.
+            target_cell: flat index of ec_T.
+            deadline: value of `time.perf_counter` at which to give up.
+        """
+        offsets = np.ascontiguousarray(jcell, dtype=np.int32)
+        target = self._points[target_cell]
+        jcells.begin_search(self._chain, self._grid, offsets, target, self._memory)
+        while True:
+            jcells.extend_search(
+                self._chain, self._chart, self._grid, target, target_cell, BUDGET, self._cap,
+                self._memory,
+            )  # fmt: skip
+            state = self._memory.counters[jcells.STATE]
+            if state == jcells.FULL:
+                self._memory = _enlarged(self._memory)
+            elif state != jcells.RUNNING:
+                break
+            if time.perf_counter() > deadline:
+                return self._result(Outcome.OUT_OF_TIME)
+        outcomes = {
+            jcells.FOUND: Outcome.FOUND,
+            jcells.EXHAUSTED: Outcome.EXHAUSTED,
+            jcells.CAPPED: Outcome.CAPPED,
+        }
+        return self._result(outcomes[int(state)])
+
+    def _result(self, outcome: Outcome) -> Continuity:
+        """Read the result of the call out of the working memory."""
+        memory = self._memory
+        counters = memory.counters
+        path = np.empty((0, memory.nodes.shape[1]), dtype=np.int32)
+        if outcome is Outcome.FOUND:
+            stack = memory.stack_node[: counters[jcells.DEPTH] + 1]
+            path = memory.nodes[np.append(stack, counters[jcells.NODES] - 1)]
+        return Continuity(
+            outcome=outcome,
+            jcells=path,
+            q=self.q(path),
+            checked=int(counters[jcells.NODES]) - 1,
+            fk=float(counters[jcells.PLACED]) / memory.nodes.shape[1],
+        )
+
+
+def continuity(
+    robot: Robot,
+    cells: GridCells,
+    task: Task,
+    q: ArrayLike,
+    target_cell: int,
+    search: Search | None = None,
+) -> Continuity:
+    """Algorithm 1 once: is there a feasible path of J-cells from q into a neighbouring E-cell?
+
+    Args:
+        robot: the arm.
+        cells: the E-cells.
+        task: standoff, cone, tolerance.
+        q: (n,) feasible configuration, the origin of the J-cells, rad or m.
+        target_cell: flat index of ec_T.
+        search: step, moves, cap and time limit.
+
+    Raises:
+        ValueError: q is not a feasible configuration over one of the cells, or the target is no
+            cell.
+    """
+    space = JSpace(robot, cells, task, q, search)
+    here = np.zeros(robot.n, dtype=np.int32)
+    if not 0 <= target_cell < len(cells):
+        raise ValueError(f"target_cell must be 0 to {len(cells) - 1}, got {target_cell}")
+    if space.cell_of(here) < 0:
+        raise ValueError("q must satisfy limits, cone and tolerance over one of the cells")
+    limit = math.inf if search is None or search.time_limit is None else search.time_limit
+    return space.continuity(here, target_cell, time.perf_counter() + limit)
+
+
+def _last_offset(
+    origin: NDArray[np.float64], step: NDArray[np.float64], upper: NDArray[np.float64]
+) -> NDArray[np.int64]:
+    """The greatest whole k (n,) with origin + k * step <= upper, as floating point rounds it."""
+    last = np.clip(np.floor((upper - origin) / step), -FAR, FAR).astype(np.int64)
+    last[origin + last * step > upper] -= 1
+    last[(origin + (last + 1) * step <= upper) & (last < FAR)] += 1
+    return last
+
+
+def _memory(n: int, nodes: int, stack: int) -> jcells.Memory:
+    """Empty working memory for `nodes` J-cells of n joints and a stack of `stack` levels."""
+    return jcells.Memory(
+        counters=np.zeros(5, dtype=np.int64),
+        table=np.zeros(4 * nodes, dtype=np.int64),
+        nodes=np.empty((nodes, n), dtype=np.int32),
+        stack_node=np.empty(stack, dtype=np.int64),
+        stack_next=np.empty(stack, dtype=np.int64),
+        stack_tool=np.empty((stack, 7)),
+    )
+
+
+def _enlarged(memory: jcells.Memory) -> jcells.Memory:
+    """The same running call with more room for what is full: J-cells, stack, or both."""
+    nodes, n = memory.nodes.shape
+    stack = len(memory.stack_node)
+    full_nodes = memory.counters[jcells.NODES] >= nodes
+    full_stack = memory.counters[jcells.DEPTH] + 1 >= stack
+    larger = _memory(n, 4 * nodes if full_nodes else nodes, 4 * stack if full_stack else stack)
+    larger.counters[:] = memory.counters
+    larger.nodes[:nodes] = memory.nodes
+    larger.stack_node[:stack] = memory.stack_node
+    larger.stack_next[:stack] = memory.stack_next
+    larger.stack_tool[:stack] = memory.stack_tool
+    jcells.rehash(larger)
+    return larger

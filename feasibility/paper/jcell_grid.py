@@ -1,0 +1,216 @@
+"""J-cells: the grid in joint space that the paper searches, and what makes one of them feasible.
+
+A J-cell is a point of a grid in joint space, written as whole numbers: q = q_start + offset * step.
+So two J-cells are equal or they are not, and a set of J-cells is exact.
+
+A neighbour needs no forward kinematics of its own. When joint i moves by one step, the tool point p
+turns about the axis (o_i, z_i) that the joint already has:
+
+    p' = o_i + Rot(z_i, +-step) (p - o_i),    a' = Rot(z_i, +-step) a
+
+(p' = p +- step z_i for a prismatic joint), with one sine and one cosine for a whole search. Several
+joints at once are the same thing from the last joint inwards, and neighbours that move their last
+joints alike share that part of the work.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from robots import frames
+from surfaces.patches import cell_at, foot
+
+HAIR = 1e-12  # [m], [1]: asked beyond the task, so that another rounding of the same q agrees
+
+
+class Grid(NamedTuple):
+    """The J-cells of one arm around one start configuration, and what makes them feasible."""
+
+    origin: NDArray[np.float64]
+    """(n,) q_start, rad or m."""
+    step: NDArray[np.float64]
+    """(n,) delta q, rad or m."""
+    sine: NDArray[np.float64]
+    """(n,) sin(delta q)."""
+    cosine: NDArray[np.float64]
+    """(n,) cos(delta q)."""
+    lowest: NDArray[np.int64]
+    """(n,) least offset inside the joint limits."""
+    highest: NDArray[np.int64]
+    """(n,) greatest offset inside the joint limits."""
+    moves_all: bool
+    """True: any joints may move at once (3^n - 1 neighbours); False: one of them (2 n)."""
+    height: float
+    """m, signed height of the tool point over the surface: side sign times standoff."""
+    tolerance: float
+    """m, allowed distance of a J-cell from the offset surface."""
+    cone_cosine: float
+    """Least cosine between approach axis and approach direction; -2 when any angle will do."""
+
+
+@njit(cache=True, error_model="numpy")
+def place_joints(  # type: ignore[no-untyped-def]
+    rotations, translations, prismatic, origin, step, offsets, placed, wanted, base
+):
+    """Bring the frames of joints `placed` .. `wanted` up to date, each before its own motion.
+
+    Args:
+        rotations: (n, 3, 3) of a `Chain`.
+        translations: (n + 1, 3) of a `Chain`.
+        prismatic: (n,) of a `Chain`.
+        origin: (n,) of a `Grid`.
+        step: (n,) of a `Grid`.
+        offsets: (n,) the J-cell.
+        placed: number of joints, from the base on, whose frames are right already.
+        wanted: the last joint that is needed.
+        base: (n, 12) in and out; columns x, y, z of the joint frame, and its origin.
+    """
+    for i in range(placed, wanted + 1):
+        if i == 0:
+            for k in range(3):
+                base[0, k] = rotations[0, k, 0]
+                base[0, 3 + k] = rotations[0, k, 1]
+                base[0, 6 + k] = rotations[0, k, 2]
+                base[0, 9 + k] = translations[0, k]
+            continue
+        value = origin[i - 1] + offsets[i - 1] * step[i - 1]
+        c, s, slide = 1.0, 0.0, value
+        if not prismatic[i - 1]:
+            c, s, slide = np.cos(value), np.sin(value), 0.0
+        for k in range(3):
+            x = c * base[i - 1, k] + s * base[i - 1, 3 + k]
+            y = c * base[i - 1, 3 + k] - s * base[i - 1, k]
+            z = base[i - 1, 6 + k]
+            base[i, k] = x * rotations[i, 0, 0] + y * rotations[i, 1, 0] + z * rotations[i, 2, 0]
+            base[i, 3 + k] = (
+                x * rotations[i, 0, 1] + y * rotations[i, 1, 1] + z * rotations[i, 2, 1]
+            )
+            base[i, 6 + k] = (
+                x * rotations[i, 0, 2] + y * rotations[i, 1, 2] + z * rotations[i, 2, 2]
+            )
+            base[i, 9 + k] = (
+                base[i - 1, 9 + k]
+                + z * slide
+                + x * translations[i, 0]
+                + y * translations[i, 1]
+                + z * translations[i, 2]
+            )
+
+
+@njit(cache=True, error_model="numpy")
+def _turn(x, y, z, vx, vy, vz, sine, cosine):  # type: ignore[no-untyped-def]
+    """Rotate the vector v about the unit axis (x, y, z)."""
+    along = (x * vx + y * vy + z * vz) * (1.0 - cosine)
+    return (
+        cosine * vx + sine * (y * vz - z * vy) + along * x,
+        cosine * vy + sine * (z * vx - x * vz) + along * y,
+        cosine * vz + sine * (x * vy - y * vx) + along * z,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def cell_of(chart, height, tolerance, cosine, tool):  # type: ignore[no-untyped-def]
+    """E-cell of a tool point and axis (6,) that satisfy the task constraints; -1 where they do not.
+
+    The paper's eqs. (5) and (7), with a tolerance, and with the angle of its prose: a.b >= cos.
+
+    Args:
+        chart: a `Chart`.
+        height: m, signed height of the tool point over the surface; of a `Grid`, as the next two.
+        tolerance: m.
+        cosine: least cosine of the angle between axis and approach direction.
+        tool: (6,) tool point and axis.
+    """
+    side = chart.side_sign
+    u, v, over, nx, ny, nz = foot(chart, tool[0], tool[1], tool[2])
+    if not abs(over - height) <= tolerance - HAIR:
+        return -1
+    if not -side * (tool[3] * nx + tool[4] * ny + tool[5] * nz) >= cosine + HAIR:
+        return -1
+    return cell_at(chart, u, v)
+
+
+@njit(cache=True, error_model="numpy")
+def place_tool(chain, grid, offsets, tool):  # type: ignore[no-untyped-def]
+    """Tool point and axis (6,) of one J-cell, by forward kinematics of the whole chain."""
+    n = offsets.shape[0]
+    q = np.empty(n)
+    for i in range(n):
+        q[i] = grid.origin[i] + offsets[i] * grid.step[i]
+    frames(chain, q, np.empty((n, 3)), np.empty((n, 3)), tool[:3], tool[3:])
+
+
+@njit(cache=True, error_model="numpy")
+def distance(tool, target):  # type: ignore[no-untyped-def]
+    """|p - p_T|, m."""
+    dx, dy, dz = tool[0] - target[0], tool[1] - target[1], tool[2] - target[2]
+    return np.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@njit(cache=True, error_model="numpy")
+def neighbour(number, moves_all, delta):  # type: ignore[no-untyped-def]
+    """Write neighbour `number` (0, 1, ...) as moves -1, 0, +1 of the joints; False past the last.
+
+    Single moves: +joint 0, -joint 0, +joint 1, ... All moves count in base 3 with digits 0, +1, -1,
+    joint 0 fastest; number 0 is the first that moves something.
+    """
+    n = delta.shape[0]
+    for i in range(n):
+        delta[i] = 0
+    if not moves_all:
+        if number >= 2 * n:
+            return False
+        delta[number >> 1] = 1 - 2 * (number & 1)
+        return True
+    rest = number + 1
+    for i in range(n):
+        digit = rest % 3
+        rest //= 3
+        delta[i] = digit if digit < 2 else -1
+    return rest == 0
+
+
+@njit(cache=True, error_model="numpy")
+def move_tool(prismatic, step, sine, cosine, base, delta, held, partial):  # type: ignore[no-untyped-def]
+    """Tool of a neighbour, left in partial[0], given the tool of the J-cell in partial[n].
+
+    Args:
+        prismatic: (n,) of a `Chain`.
+        step: (n,) of a `Grid`.
+        sine: (n,) of a `Grid`.
+        cosine: (n,) of a `Grid`.
+        base: (n, 12) joint frames of the J-cell, right up to the last joint that moves.
+        delta: (n,) moves -1, 0, +1.
+        held: (n,) in and out; the moves for which partial[i] is right, 2 where there are none.
+        partial: (n + 1, 6) in and out; partial[i] is the tool after joints i, i + 1, ... moved.
+    """
+    top = delta.shape[0] - 1
+    while top >= 0 and delta[top] == held[top]:
+        top -= 1
+    for i in range(top, -1, -1):
+        held[i] = delta[i]
+        if delta[i] == 0:
+            for k in range(6):
+                partial[i, k] = partial[i + 1, k]
+            continue
+        x, y, z = base[i, 6], base[i, 7], base[i, 8]
+        if prismatic[i]:
+            slide = delta[i] * step[i]
+            partial[i, 0] = partial[i + 1, 0] + slide * x
+            partial[i, 1] = partial[i + 1, 1] + slide * y
+            partial[i, 2] = partial[i + 1, 2] + slide * z
+            for k in range(3, 6):
+                partial[i, k] = partial[i + 1, k]
+            continue
+        s, c = delta[i] * sine[i], cosine[i]
+        ox, oy, oz = base[i, 9], base[i, 10], base[i, 11]
+        px, py, pz = _turn(
+            x, y, z, partial[i + 1, 0] - ox, partial[i + 1, 1] - oy, partial[i + 1, 2] - oz, s, c
+        )
+        ax, ay, az = _turn(x, y, z, partial[i + 1, 3], partial[i + 1, 4], partial[i + 1, 5], s, c)
+        partial[i, 0], partial[i, 1], partial[i, 2] = ox + px, oy + py, oz + pz
+        partial[i, 3], partial[i, 4], partial[i, 5] = ax, ay, az

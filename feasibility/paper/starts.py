@@ -1,0 +1,204 @@
+"""Start configurations over one cell: projection from random ones, one per distinct branch.
+
+The paper starts at "a feasible J-cell" and says that the choice may affect the result, so that one
+can run the method with every candidate. A candidate here has its tool point at the target of the
+start cell and its tool axis along the approach direction; what freedom is left (roll, redundancy)
+is used to stay near the middle of the joint limits. An arm that cannot align its tool (a planar
+one, say) gets starts with the axis inside the cone.
+
+Two candidates are the same branch when a self-motion joins them: a motion that keeps the tool point
+and the alignment, inside the limits. It is followed straight from one towards the other, so
+branches joined only by a detour count as two; that costs time, never an answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import Kinematics, Robot
+
+ACCURACY = 1e-9  # [m], [1]: of a start's tool point and axis
+CLOSE = 1e-3  # [rad], [m]: configurations nearer than this are taken as one
+STALLED = 1e-7  # [rad], [m]: a Newton step this short, away from the fibre, leads nowhere
+LONGEST_STEP = 0.5  # [rad], [m]: of one joint, per Newton step
+STRIDE = 0.2  # [rad], [m]: of one joint, per step of a self-motion
+STRIDES = 60  # at most, in one self-motion
+DRY_SEEDS = 40  # random configurations in a row that bring nothing new, before the search ends
+MOST_STARTS = 32  # windings of joints with several turns make branches without end
+
+
+class Fibre:
+    """The configurations that hold the tool at one target: projection onto it, motion along it."""
+
+    def __init__(
+        self, robot: Robot, point: NDArray[np.float64], approach: NDArray[np.float64], cone: float
+    ) -> None:
+        """Configurations of `robot` with the tool at `point` (3,) m and its axis at `approach`.
+
+        Args:
+            robot: the arm.
+            point: (3,) target of the tool point, m.
+            approach: (3,) unit approach direction.
+            cone: angle (rad) that the axis may deviate from it where it cannot be aligned.
+        """
+        self._kinematics = Kinematics(robot)
+        self._point, self._approach = point, approach
+        self._cone_cosine = float(np.cos(0.98 * cone))  # starts keep off the rim of the cone
+        self._lower, self._upper = robot.lower, robot.upper
+        self._middle = _window(robot).mean(axis=0)
+        reach = robot.reach
+        self._length = 0.3 * reach if 0.0 < reach < np.inf else 1.0  # m per rad of misalignment
+
+    def _rows(
+        self, q: NDArray[np.float64], align: bool
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Residuals (m,) and their Jacobian (m, n): tool point, then alignment or violated cone."""
+        point, axis = self._kinematics.tool(q)
+        point_rows, axis_rows = self._kinematics.jacobians(q)
+        error = self._point - point
+        if align:
+            return (
+                np.concatenate([error, self._length * (self._approach - axis)]),
+                np.vstack([point_rows, self._length * axis_rows]),
+            )
+        short = self._cone_cosine - self._approach @ axis
+        if short <= 0.0:
+            return error, point_rows
+        return (
+            np.append(error, self._length * short),
+            np.vstack([point_rows, self._length * self._approach @ axis_rows]),
+        )
+
+    def project(
+        self, q: NDArray[np.float64], align: bool, steps: int = 60
+    ) -> NDArray[np.float64] | None:
+        """Damped Newton steps from q (n,) onto the fibre, joints stopping at their limits.
+
+        Returns:
+            A configuration (n,) on the fibre; without one, None.
+        """
+        q = np.clip(q, self._lower, self._upper)
+        damping = 1e-2
+        residual, jacobian = self._rows(q, align)
+        for _ in range(steps):
+            size = np.abs(residual).max()
+            if size < ACCURACY:
+                return q
+            free = self._free(q, jacobian.T @ residual)
+            j = jacobian[:, free]
+            gram = j @ j.T
+            scale = damping * np.trace(gram) / len(gram) + 1e-15
+            move = j.T @ np.linalg.solve(gram + scale * np.eye(len(gram)), residual)
+            if np.abs(move).max(initial=0.0) < STALLED:
+                return None
+            trial = q.copy()
+            trial[free] += move * min(1.0, LONGEST_STEP / max(np.abs(move).max(initial=0.0), 1e-12))
+            trial = np.clip(trial, self._lower, self._upper)
+            next_residual, next_jacobian = self._rows(trial, align)
+            if np.linalg.norm(next_residual) < np.linalg.norm(residual) or len(
+                next_residual
+            ) != len(residual):
+                q, residual, jacobian = trial, next_residual, next_jacobian
+                damping = max(damping * 0.1, 1e-12)
+            else:
+                damping *= 10.0
+                if damping > 1e4:
+                    return None
+        return q if np.abs(residual).max() < ACCURACY else None
+
+    def _free(self, q: NDArray[np.float64], pull: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(n,) joints that are not held at a limit by a pull (n,) beyond it."""
+        return ~(((q <= self._lower) & (pull < 0)) | ((q >= self._upper) & (pull > 0)))
+
+    def toward(
+        self, q: NDArray[np.float64], goal: NDArray[np.float64], align: bool
+    ) -> NDArray[np.float64]:
+        """Follow the fibre from q (n,) straight towards `goal` (n,), until it comes no nearer."""
+        for _ in range(STRIDES):
+            _, jacobian = self._rows(q, align)
+            pull = goal - q
+            free = self._free(q, pull)
+            # The part of the pull that leaves the residuals alone: directions whose singular
+            # value is nil belong to the fibre's tangent.
+            _, values, basis = np.linalg.svd(jacobian[:, free], full_matrices=True)
+            rank = int((values > 1e-8 * max(values[0], 1e-300)).sum()) if len(values) else 0
+            along = np.zeros(len(q))
+            along[free] = basis[rank:].T @ (basis[rank:] @ pull[free])
+            size = np.abs(along).max(initial=0.0)
+            if size < 1e-2 * CLOSE:
+                break
+            landed = self.project(q + along * min(1.0, STRIDE / size), align, steps=8)
+            if landed is None or not (np.linalg.norm(goal - landed) < np.linalg.norm(pull)):
+                break
+            q = landed
+        return q
+
+    def settle(self, q: NDArray[np.float64], align: bool) -> NDArray[np.float64]:
+        """Move along the fibre towards the middle of the limits (zero for endless joints)."""
+        return self.toward(q, self._middle, align)
+
+    def joined(self, a: NDArray[np.float64], b: NDArray[np.float64], align: bool) -> bool:
+        """True when a self-motion from a (n,) straight towards b (n,) arrives there."""
+        return bool(np.abs(self.toward(a, b, align) - b).max(initial=0.0) < CLOSE)
+
+
+def starts(
+    robot: Robot,
+    point: NDArray[np.float64],
+    approach: NDArray[np.float64],
+    cone: float,
+    seed: int = 0,
+    patience: int = DRY_SEEDS,
+) -> Iterator[NDArray[np.float64]]:
+    """Configurations (n,) over one target, one per distinct branch, as they are found.
+
+    Args:
+        robot: the arm.
+        point: (3,) target of the tool point, m.
+        approach: (3,) unit approach direction.
+        cone: angle (rad) the tool axis may deviate from it.
+        seed: of the random configurations.
+        patience: random configurations to try before the first is found.
+    """
+    fibre = Fibre(robot, point, approach, cone)
+    for align in (True, False):
+        rng = np.random.default_rng(seed)
+        found: list[NDArray[np.float64]] = []
+        left = patience
+        while left > 0 and len(found) < MOST_STARTS:
+            left -= 1
+            q = fibre.project(random_configuration(robot, rng), align)
+            if q is None:
+                continue
+            q = fibre.settle(q, align)
+            if not any(fibre.joined(q, other, align) for other in found):
+                found.append(q)
+                left = DRY_SEEDS
+                yield q
+        if found:
+            return
+
+
+def random_configuration(robot: Robot, rng: np.random.Generator) -> NDArray[np.float64]:
+    """A configuration (n,), even over the middle turn of each joint's limits."""
+    low, high = _window(robot)
+    return rng.uniform(low, high)
+
+
+def _window(robot: Robot) -> NDArray[np.float64]:
+    """(2, n) the part of the limits that starts are drawn from, rad or m.
+
+    At most one turn of each joint, about the middle of its limits (about zero, or next to its only
+    limit, where it has none): further windings place the arm alike, and are nearer to a limit.
+    """
+    low, high = robot.lower.copy(), robot.upper.copy()
+    free = np.isinf(low) & np.isinf(high)
+    low[free], high[free] = -np.pi, np.pi
+    low = np.where(np.isinf(low), high - 2.0 * np.pi, low)
+    high = np.where(np.isinf(high), low + 2.0 * np.pi, high)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    half = np.where(robot.prismatic, half, np.minimum(half, np.pi))
+    return np.stack([middle - half, middle + half])

@@ -1,0 +1,152 @@
+"""Replay of the greedy search's paths by Pinocchio, J-cell by J-cell.
+
+Nothing of the search is used here: tool points come from Pinocchio, not from the compiled chain,
+and the questions asked are those of the paper's definitions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from feasibility.paper.jcell_steps import Steps
+from feasibility.task import Task
+from feasibility.verdict import Certificate
+from robots import Kinematics, Robot
+from surfaces.patches import GridCells
+
+SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one number meet
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Path:
+    """One edge of the search: J-cells from one E-cell into a neighbouring one."""
+
+    cell: int
+    neighbour: int
+    q: NDArray[np.float64]
+    """(k, n) configurations of its J-cells, rad or m."""
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """What the replay found."""
+
+    certificate: Certificate
+    faults: tuple[str, ...]
+    """One sentence for each thing that does not hold; empty when all does."""
+
+
+def replay(
+    robot: Robot, cells: GridCells, task: Task, steps: Steps, paths: Sequence[Path]
+) -> Replay:
+    """Check that each path is what the search says: every J-cell, every step, both end cells.
+
+    - each step is one J-cell move: of one joint, or of any for all moves;
+    - every J-cell is inside the joint limits, the tolerance, the cone and the patch, with the room
+      to spare that makes this true between J-cells too;
+    - a path begins in its cell, where and how that cell was first entered, and ends in the
+      neighbour.
+
+    Args:
+        robot: the arm.
+        cells: the E-cells.
+        task: standoff and cone.
+        steps: size of the moves, tolerance, and the room between J-cells.
+        paths: the edges of a tree, each after the edge that enters its cell.
+    """
+    faults: list[str] = []
+    q = np.concatenate([path.q for path in paths]) if paths else np.empty((0, robot.n))
+    last = np.cumsum([len(path.q) for path in paths], dtype=int) - 1
+    first = last + 1 - np.array([len(path.q) for path in paths], dtype=int)
+
+    moves = np.delete(np.diff(q, axis=0) / steps.size, last[:-1], axis=0)
+    whole = np.abs(moves - np.round(moves)) * steps.size
+    moved = np.abs(np.round(moves))
+    count = moved.sum(axis=1)
+    one = count >= 1 if steps.moves == "all" else count == 1
+    if (whole > SAME).any() or (moved > 1).any() or not one.all():
+        faults.append("a step is not one J-cell move")
+
+    margin = np.minimum(q - robot.lower, robot.upper - q).min(initial=np.inf)
+    if not margin >= 0.0:
+        faults.append(f"a joint passes its limit by {-margin:.3g}")
+
+    points, axes = tool_poses(robot, q)
+    foot = cells.surface.closest(points)
+    sign = cells.surface.side_sign
+    error = np.abs(foot.height - sign * task.standoff).max(initial=0.0) + steps.sag
+    chord = np.linalg.norm(axes + sign * foot.normal, axis=1).max(initial=0.0) + steps.turn
+    angle = 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+    if not foot.inside.all():
+        faults.append("the tool point leaves the patch")
+    if not error <= steps.tolerance:
+        faults.append(f"the tool point strays {error:.3g} m, beyond {steps.tolerance:.3g} m")
+    if task.cone_deg < 180.0 and not angle <= task.cone:
+        faults.append(f"the tool axis tilts {np.degrees(angle):.4f} degrees out of the cone")
+
+    within = Borders(cells)
+    begins = within(foot.u[first], foot.v[first], [path.cell for path in paths])
+    ends = within(foot.u[last], foot.v[last], [path.neighbour for path in paths])
+    if not begins.all() or not ends.all():
+        faults.append("a path does not begin or end in the cell it claims")
+    if not _continuous(paths):
+        faults.append("a path does not begin where its cell was entered")
+    return Replay(Certificate(len(q), float(error), float(angle), float(margin)), tuple(faults))
+
+
+def tool_poses(
+    robot: Robot, q: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Tool points (k, 3) m and approach axes (k, 3) at q (k, n), by Pinocchio."""
+    model, data = robot.model, robot.model.createData()
+    frame = robot.tool_frame_id
+    points, rotations = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+    kinematics = Kinematics(robot)
+    plain = model.nq == model.nv
+    placement = data.oMf[frame]
+    translation, rotation = placement.translation, placement.rotation  # live views
+    for k in range(len(q)):
+        pin.forwardKinematics(model, data, q[k] if plain else kinematics.configuration(q[k]))
+        pin.updateFramePlacement(model, data, frame)
+        points[k] = translation
+        rotations[k] = rotation
+    return points, rotations @ robot.approach_axis
+
+
+class Borders:
+    """The parameter ranges of cells."""
+
+    def __init__(self, cells: GridCells) -> None:
+        """Read them from the centres and the number of cells."""
+        surface = cells.surface
+        self._centres = np.column_stack([cells.u, cells.v])  # (N, 2) rad or m
+        ranges = np.array([surface.u_range, surface.v_range])
+        self._half = 0.5 * np.diff(ranges, axis=1)[:, 0] / np.maximum(cells.shape, 1)
+        self._closed = np.array([surface.u_closed, surface.v_closed])
+
+    def __call__(
+        self, u: NDArray[np.float64], v: NDArray[np.float64], cell: Sequence[int]
+    ) -> NDArray[np.bool_]:
+        """(k,) whether the points u, v (k,) lie in the cells (k,)."""
+        away = np.column_stack([u, v]) - self._centres[np.asarray(cell, dtype=int)]
+        away = np.where(self._closed, (away + np.pi) % (2.0 * np.pi) - np.pi, away)
+        return np.asarray((np.abs(away) <= self._half + SAME).all(axis=1))
+
+
+def _continuous(paths: Sequence[Path]) -> bool:
+    """True when each path begins where an earlier one entered its cell, or where all began."""
+    if not paths:
+        return True
+    entered = {paths[0].cell: paths[0].q[0]}
+    for path in paths:
+        if path.cell not in entered or path.neighbour in entered:
+            return False
+        if not np.abs(path.q[0] - entered[path.cell]).max() <= SAME:
+            return False
+        entered[path.neighbour] = path.q[-1]
+    return True

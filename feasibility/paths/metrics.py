@@ -1,0 +1,139 @@
+"""The figures of a path: lengths on the surface, travel of the joints, and what it keeps free."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification import placements
+from feasibility.paths.order import least_length
+from feasibility.task import Task
+from feasibility.verdict import Certificate, Walk
+from robots import Kinematics, Robot
+from surfaces import Cells
+
+BETWEEN = 4  # places along each straight line of joints at which the tool point is asked for
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PathFigures:
+    """What a path does, measured along it."""
+
+    length: float
+    """m, way of the tool's foot on the surface."""
+    revisited: float
+    """m, the part of it that leads to cells visited before."""
+    least_length: float
+    """m, no path through all the centres is shorter; see `route.least_length`."""
+    travel: NDArray[np.float64]
+    """(n,) rad or m, way of each joint, back and forth."""
+    turn_margin: float
+    """rad, smallest distance of a turning joint from its limits; inf without such limits."""
+    slide_margin: float
+    """m, the same for sliding joints."""
+    cone_margin: float
+    """rad, what the cone leaves free at least, between waypoints too."""
+    singular_value: float
+    """Smallest singular value along the path of the Jacobian of tool point (over the arm's reach)
+    and approach axis: 0 where the tool cannot be moved in some direction. For arms of fewer than
+    five joints the smallest of as many as there are joints."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the array."""
+        travel = np.array(self.travel, dtype=float)
+        travel.flags.writeable = False
+        object.__setattr__(self, "travel", travel)
+
+    @property
+    def covered(self) -> float:
+        """m, the way that leads to cells not visited before."""
+        return self.length - self.revisited
+
+    @property
+    def revisited_share(self) -> float:
+        """Revisited length over covered length; 0 where there is neither."""
+        return self.revisited / self.covered if self.covered > 0.0 else 0.0
+
+    @property
+    def ratio(self) -> float:
+        """Length over the least that there could be; nan for a single cell."""
+        return self.length / self.least_length if self.least_length > 0.0 else math.nan
+
+
+def figures_of(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    walk: Walk,
+    certificate: Certificate,
+    needed: NDArray[np.bool_],
+) -> PathFigures:
+    """Measure a path that a replay has accepted.
+
+    Args:
+        robot: the arm.
+        cells: the cells.
+        task: the task.
+        walk: the path.
+        certificate: what the replay of the walk measured.
+        needed: (N,) cells that the path is for.
+    """
+    along, owner = _denser(walk.q)
+    points = placements(robot, along).points
+    foot = cells.surface.closest(points)
+    places = points - foot.height[:, None] * foot.normal
+    way = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    margins = np.minimum(walk.q - robot.lower, robot.upper - walk.q)
+    turns, slides = margins[:, ~robot.prismatic], margins[:, robot.prismatic]
+    return PathFigures(
+        length=float(way.sum()),
+        revisited=float(way[again(walk)[owner]].sum()),
+        least_length=least_length(cells.centres[needed]),
+        travel=np.abs(np.diff(walk.q, axis=0)).sum(axis=0),
+        turn_margin=float(turns.min(initial=np.inf)),
+        slide_margin=float(slides.min(initial=np.inf)),
+        cone_margin=task.cone - certificate.max_angle,
+        singular_value=min(_singular_value(robot, walk.q), math.inf),
+    )
+
+
+def again(walk: Walk) -> NDArray[np.bool_]:
+    """(m - 1,) segments of a walk that lead to a cell visited before.
+
+    The segments from one marked waypoint to the next lead to the cell of the latter.
+    """
+    result = np.zeros(max(len(walk.q) - 1, 0), dtype=bool)
+    marks = np.flatnonzero(walk.cell >= 0)
+    seen: set[int] = set()
+    for k, mark in enumerate(marks.tolist()):
+        cell = int(walk.cell[mark])
+        if cell in seen and k > 0:
+            result[marks[k - 1] : mark] = True
+        seen.add(cell)
+    return result
+
+
+def _denser(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Places along the segments of a walk, and the segment that each step between them is on."""
+    if len(q) < 2:
+        return q, np.empty(0, dtype=np.int64)
+    share = np.arange(BETWEEN)[None, :, None] / BETWEEN
+    inner = q[:-1, None] + share * np.diff(q, axis=0)[:, None]
+    rows = np.vstack([inner.reshape(-1, q.shape[1]), q[-1:]])
+    return rows, np.repeat(np.arange(len(q) - 1), BETWEEN)
+
+
+def _singular_value(robot: Robot, q: NDArray[np.float64]) -> float:
+    """Smallest singular value at waypoints; see `PathFigures.singular_value`."""
+    kinematics = Kinematics(robot)
+    reach = robot.reach if np.isfinite(robot.reach) else 1.0
+    rows = np.empty((len(q), 6, robot.n))
+    for k, configuration in enumerate(q):
+        point, axis = kinematics.jacobians(configuration)
+        rows[k, :3], rows[k, 3:] = point / reach, axis
+    values = np.linalg.svd(rows, compute_uv=False)
+    # The axis is of unit length: its three rows have two directions, so five values count.
+    return float(values[:, min(robot.n, 5) - 1].min(initial=np.inf))

@@ -1,0 +1,229 @@
+"""The order in which a path visits cells: rows, columns, a spiral, or the shortest that was found.
+
+Only cells and the steps between them are known here, nothing of an arm. A step between two cells
+that touch costs the distance of their centres; cells that do not touch are joined by the shortest
+way over others, which are then visited again.
+"""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import pdist, squareform
+
+from feasibility.paths.two_opt import improved, tour_length
+from surfaces import Cells
+
+Order = Literal["rows", "columns", "spiral", "shortest"]
+ORDERS: tuple[Order, ...] = get_args(Order)
+GRID_ORDERS: tuple[Order, ...] = ("rows", "columns", "spiral")
+
+MOST_IMPROVED = 600  # cells up to which an order is improved; it takes their cube
+MOST_CANDIDATES = 2  # orders that are improved, the shortest first
+MOST_SPANNED = 3000  # cells whose smallest spanning tree is found; beyond, the nearest are summed
+TIE = 1e-9  # [1], share of a length below which two lengths are alike
+
+
+class PathError(ValueError):
+    """A path or a trajectory that cannot be made as asked: why, and what would do."""
+
+
+def grid_order(
+    order: Order,
+    rows: int,
+    columns: int,
+    begin: tuple[int, int] = (0, 0),
+    turned: tuple[bool, bool] = (False, False),
+) -> NDArray[np.int64]:
+    """Flat indices of rows x columns cells in the order of a path.
+
+    Args:
+        order: "rows" runs along each row (v) and back along the next, "columns" along each column
+            (u), "spiral" from the rim to the middle.
+        rows: number of rows (u).
+        columns: number of columns (v).
+        begin: row and column that count as the first ones, where a grid closes on itself.
+        turned: whether rows, and whether columns, are taken from the last to the first.
+
+    Example:
+        >>> grid_order("rows", 2, 3).tolist(), grid_order("columns", 2, 3).tolist()
+        ([0, 1, 2, 5, 4, 3], [0, 3, 4, 1, 2, 5])
+        >>> grid_order("spiral", 3, 3).tolist()
+        [0, 1, 2, 5, 8, 7, 6, 3, 4]
+        >>> grid_order("rows", 1, 4, begin=(0, 1)).tolist()
+        [1, 2, 3, 0]
+    """
+    table = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
+    table = np.roll(table, (-begin[0], -begin[1]), axis=(0, 1))
+    table = table[:: -1 if turned[0] else 1, :: -1 if turned[1] else 1]
+    if order == "spiral":
+        parts = []
+        while table.size:
+            parts.append(table[0])
+            table = np.rot90(table[1:])
+        return np.concatenate(parts) if parts else np.empty(0, dtype=np.int64)
+    if order == "columns":
+        table = table.T
+    snake = table.copy()
+    snake[1::2] = table[1::2, ::-1]
+    return snake.reshape(-1)
+
+
+def closed_sides(cells: Cells) -> tuple[bool, bool]:
+    """Whether the last row of a grid touches the first one all along; and the columns too.
+
+    Example:
+        >>> from surfaces import cylinder
+        >>> closed_sides(cylinder(0.5, (0, 360), (0, 1)).cells(6, 3))
+        (True, False)
+    """
+    rows, columns = int(cells.shape[0]), int(cells.shape[1])
+    table = np.arange(len(cells)).reshape(rows, columns)
+    known = set(map(tuple, np.sort(cells.pairs, axis=1).tolist()))
+
+    def close(first: NDArray[np.int64], last: NDArray[np.int64]) -> bool:
+        pairs = np.sort(np.column_stack([first, last]), axis=1)
+        return all(tuple(pair) in known for pair in pairs.tolist())
+
+    return (
+        rows > 2 and close(table[0], table[-1]),
+        columns > 2 and close(table[:, 0], table[:, -1]),
+    )
+
+
+def route(
+    cells: Cells,
+    order: Order,
+    needed: NDArray[np.bool_] | None = None,
+    pairs: NDArray[np.int64] | None = None,
+) -> NDArray[np.int64]:
+    """The order in which a path visits cells.
+
+    Args:
+        cells: the cells.
+        order: one of `ORDERS`; all but "shortest" need a grid.
+        needed: (N,) cells to visit; all by default.
+        pairs: (M, 2) pairs of cells between which a step is possible; those that touch by default.
+
+    Returns:
+        (k,) flat indices, each needed cell once.
+
+    Raises:
+        PathError: no such order, or one that these cells do not have.
+    """
+    if order not in ORDERS:
+        raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
+    grid = len(cells.shape) == 2
+    if order in GRID_ORDERS and not grid:
+        raise PathError(
+            f"the order {order!r} follows the rows and columns of a grid, which these "
+            f"{len(cells)} cells of a {cells.surface.kind} are not; use order 'shortest'"
+        )
+    wanted = np.ones(len(cells), dtype=bool) if needed is None else needed
+    steps = step_lengths(cells, cells.pairs if pairs is None else pairs)
+    if order != "shortest":
+        found = grid_order(order, int(cells.shape[0]), int(cells.shape[1]))
+        return found[wanted[found]]
+    candidates = []
+    if grid:
+        shape = int(cells.shape[0]), int(cells.shape[1])
+        candidates = [grid_order(name, *shape) for name in GRID_ORDERS]
+        candidates = [found[wanted[found]] for found in candidates]
+    candidates.append(_greedy(steps, wanted))
+    return _shortest(steps, candidates)
+
+
+def step_lengths(cells: Cells, pairs: NDArray[np.int64]) -> csr_array:
+    """(N, N) symmetric: distance (m) of the centres of each pair, nothing elsewhere."""
+    length = np.linalg.norm(cells.centres[pairs[:, 0]] - cells.centres[pairs[:, 1]], axis=1)
+    length = np.maximum(length, np.finfo(float).tiny)  # a zero would be no step at all
+    both = np.vstack([pairs, pairs[:, ::-1]])
+    shape = (len(cells), len(cells))
+    return csr_array((np.concatenate([length, length]), (both[:, 0], both[:, 1])), shape=shape)
+
+
+def route_length(steps: csr_array, order: NDArray[np.int64]) -> float:
+    """m, length of the shortest way that visits cells in this order; inf where there is none."""
+    if len(order) < 2:
+        return 0.0
+    direct = np.asarray(steps[order[:-1], order[1:]]).reshape(-1)
+    total = float(direct.sum())
+    for k in np.flatnonzero(direct == 0.0):
+        total += float(dijkstra(steps, indices=int(order[k]))[order[k + 1]])
+    return total
+
+
+def _shortest(steps: csr_array, candidates: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """The shortest of some orders, each improved where there are not too many cells."""
+    lengths = [route_length(steps, order) for order in candidates]
+    best = candidates[int(np.argmin(lengths))]
+    cells = np.sort(best)
+    if len(best) > MOST_IMPROVED or len(best) < 3:
+        return best
+    distance = dijkstra(steps, indices=cells)[:, cells]
+    if not np.isfinite(distance).all():
+        return best  # some cells cannot be reached from others; which, the caller will find
+    alike = np.round(np.array(lengths) / min(lengths), 9)  # of equal ones the first
+    promising = np.argsort(alike, kind="stable")[:MOST_CANDIDATES]
+    tours = [improved(distance, np.searchsorted(cells, candidates[k])) for k in promising]
+    shortened = np.array([tour_length(distance, tour) for tour in tours])
+    first = int(np.flatnonzero(shortened <= shortened.min() * (1.0 + TIE))[0])
+    return cells[tours[first]]
+
+
+def _greedy(steps: csr_array, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """An order that goes on to the unvisited neighbour with the fewest open ends, or the nearest.
+
+    Corners are so not left behind (Warnsdorff's rule); from a dead end the nearest unvisited cell
+    over visited ones comes next.
+    """
+    left = wanted.copy()
+    ends = [steps.indices[steps.indptr[k] : steps.indptr[k + 1]] for k in range(len(wanted))]
+    if not left.any():
+        return np.empty(0, dtype=np.int64)
+    degree = np.array([left[near].sum() for near in ends])
+    here = int(np.flatnonzero(left)[np.argmin(degree[left])])
+    found = [here]
+    left[here] = False
+    while left.any():
+        near = ends[here][left[ends[here]]]
+        if len(near):
+            open_ends = np.array([left[ends[k]].sum() for k in near])
+            away = np.asarray(steps[[here], near]).reshape(-1)
+            here = int(near[np.lexsort((away, open_ends))[0]])
+        else:
+            away = np.where(left, dijkstra(steps, indices=here), np.inf)
+            # Where no way leads any further, go on elsewhere; it is not this function's to judge.
+            here = int(np.argmin(away)) if np.isfinite(away).any() else int(np.argmax(left))
+        found.append(here)
+        left[here] = False
+    return np.array(found, dtype=np.int64)
+
+
+def least_length(centres: NDArray[np.float64]) -> float:
+    """m, no path through all of these points is shorter.
+
+    A path through all points is a tree that spans them, so it is at least as long as the smallest
+    such tree, with straight lines between the points. For very many points a smaller bound is
+    taken: each step of a path is at least as long as the way from where it begins to the nearest
+    other point, and all points but the last begin one.
+
+    Args:
+        centres: (N, 3) m.
+
+    Example:
+        >>> least_length(np.array([[0.0, 0, 0], [1, 0, 0], [3, 0, 0], [1, 1, 0]]))
+        4.0
+    """
+    if len(centres) < 2:
+        return 0.0
+    if len(centres) <= MOST_SPANNED:
+        apart = np.maximum(pdist(centres), np.finfo(float).tiny)
+        return float(minimum_spanning_tree(squareform(apart)).sum())
+    nearest = cKDTree(centres).query(centres, k=2)[0][:, 1]
+    return float(nearest.sum() - nearest.max())

@@ -1,0 +1,121 @@
+"""A map of placements: covered share and margin over two or three axes of a region."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.placement.place import Placements
+from feasibility.placement.refinement import BATCH, Judge
+from feasibility.placement.region import AXES, Array, PlacementError, Pose, Region
+from feasibility.placement.trial import Stage
+from feasibility.search import Progress
+
+SIDE = 15  # places along each of the first two axes
+PANELS = 3  # places along the third
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PlacementMap:
+    """A raster of placements; what is not among its axes is held at one pose."""
+
+    axes: tuple[str, ...]
+    """Two or three of `AXES`."""
+    held: Pose
+    ticks: tuple[Array, ...]
+    """Places along each axis, m or degrees."""
+    share: Array
+    """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
+    margin: Array
+    """Likewise the margin, see `placement_room`; 0 where not every cell is covered."""
+    known: NDArray[np.bool_]
+    """Likewise, where a search was run; elsewhere share and margin are NaN."""
+
+    def __post_init__(self) -> None:
+        """Write-protect the arrays."""
+        for array in (*self.ticks, self.share, self.margin, self.known):
+            array.flags.writeable = False
+
+
+def axes_of(region: Region) -> tuple[str, ...]:
+    """The axes that a map is most often wanted over: two shifts and a rotation, where they vary."""
+    shifts = [name for name in region.varies if not name.endswith("_deg")]
+    turns = [name for name in reversed(region.varies) if name.endswith("_deg")]
+    chosen = shifts[:2] + turns[:1] + shifts[2:] + turns[1:]
+    return tuple(chosen[:3] if len(shifts) >= 2 else chosen[:2])
+
+
+def placement_map(
+    judge: Judge,
+    region: Region,
+    held: Pose,
+    axes: Sequence[str] | None = None,
+    shape: Sequence[int] | None = None,
+    progress: Progress | None = None,
+) -> PlacementMap:
+    """Search every placement of a raster.
+
+    Args:
+        judge: who tries placements.
+        region: its ranges are the map's.
+        held: where the axes that are not mapped stand, such as the best placement.
+        axes: two or three of those that vary; default `axes_of`. One is mapped as a strip.
+        shape: places along each.
+        progress: called as progress(done, total, text); what it raises ends it.
+
+    Raises:
+        PlacementError: there are no such axes, or the shape does not fit them.
+    """
+    names = axes_of(region) if axes is None else tuple(axes)
+    faults = [f"{name}: does not vary in the region" for name in names if name not in region.varies]
+    if not 1 <= len(names) <= 3 or len(set(names)) < len(names):
+        faults.append(f"axes: expected one to three different ones of {', '.join(region.varies)}")
+    counts = [SIDE, SIDE, PANELS][: len(names)] if shape is None else list(shape)
+    if len(counts) != len(names) or min(counts, default=0) < 1:
+        faults.append(f"shape: expected {len(names)} whole numbers >= 1, got {counts}")
+    if faults:
+        raise PlacementError("map: " + "; ".join(faults))
+    if len(names) == 1:
+        other = next(name for name in AXES if name not in names)
+        names, counts = (*names, other), [*counts, 1]
+    where = [AXES.index(name) for name in names]
+    ticks = tuple(
+        np.linspace(region.low[k], region.high[k], count)
+        if count > 1
+        else np.array([0.5 * (region.low[k] + region.high[k])])
+        for k, count in zip(where, counts, strict=True)
+    )
+    values = np.tile(held.values, (int(np.prod(counts)), 1))
+    grid = np.meshgrid(*ticks, indexing="ij")
+    for k, places in zip(where, grid, strict=True):
+        values[:, k] = places.ravel()
+    trials = []
+    for start in range(0, len(values), BATCH):
+        if progress is not None:
+            progress(start, len(values), "searching the map")
+        poses = [Pose.of_values(row) for row in values[start : start + BATCH]]
+        trials += judge.tried(poses, early=False)
+    known = np.array([trial.stage is not Stage.FAILED for trial in trials])
+    share = np.where(known, [trial.share for trial in trials], np.nan)
+    margin = np.where(known, [trial.margin for trial in trials], np.nan)
+    return PlacementMap(
+        axes=names,
+        held=held,
+        ticks=ticks,
+        share=share.reshape(counts),
+        margin=margin.reshape(counts),
+        known=known.reshape(counts),
+    )
+
+
+def map_around_best(
+    placements: Placements, judge: Judge, progress: Progress | None = None
+) -> PlacementMap:
+    """The map of a region through the best placement found there, or through its middle."""
+    region = placements.region
+    middle = Pose.of_values(0.5 * (region.low + region.high))
+    held = middle if placements.best is None else placements.best.pose
+    return placement_map(judge, region, held, progress=progress)

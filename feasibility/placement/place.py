@@ -1,0 +1,298 @@
+"""Where may the surface stand? A search over the poses of a region, coarse to fine.
+
+1. The reach bound is asked about the whole region; where it shows that every placement has a target
+   out of reach, that is the answer, and no search is run.
+2. Poses are spread evenly over the region (Sobol). The same bound discards most hopeless ones for
+   next to nothing; of the others, Newton's method is tried at a few cells that differ most. A
+   short search is run only where it succeeds at all of them.
+3. Around the best few, more poses are tried in ever smaller boxes: larger covered share first, then
+   larger margin (see `feasibility.placement_room`).
+4. The best placements are asked about as any other case: `feasibility.check` searches and replays.
+   Only what it calls feasible is an answer.
+
+The poses tried depend on the region, the counts and the seed alone, not on who tries them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from feasibility.placement.placer import Placer
+from feasibility.placement.reach_bound import Beyond, Reach
+from feasibility.placement.refinement import Hunt, Judge
+from feasibility.placement.region import PlacementError, Pose, Region
+from feasibility.placement.trial import Stage, Trial
+from feasibility.search import Progress, Search
+from feasibility.target_curves import closed_courses
+from feasibility.task import Task
+from feasibility.verdict import Answer, CauseKind, Evidence
+from robots import Robot
+from surfaces import Cells
+
+MISSED = {
+    CauseKind.OUT_OF_REACH: "out of reach",
+    CauseKind.JOINT_LIMITS: "missed for joint limits",
+    CauseKind.ORIENTATION: "missed for orientation",
+    CauseKind.COLLISION: "missed for collision",
+    CauseKind.DISCONNECTED: "reachable by another motion only",
+}
+
+COUNT = 256  # poses spread over the region
+AROUND = 8  # poses tried around each of the best, a round
+KEEP = 5
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Placements:
+    """What a search for placements found."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    region: Region
+    answer: Answer
+    evidence: Evidence
+    message: str
+    """What was found or tried, and on what it rests."""
+    found: tuple[Trial, ...]
+    """Placements that `feasibility.check` calls feasible, the largest margin first; they differ
+    from each other by some share of the region."""
+    trials: tuple[Trial, ...]
+    """All placements tried, the best first."""
+    cause: CauseKind | None
+    """What dominates where there is none: the cause of most missed cells of the best placement, or
+    out of reach where the bound leaves none."""
+    causes: dict[str, int] = field(default_factory=dict)
+    """Missed cells of the best placement by cause."""
+    timing: dict[str, float] = field(default_factory=dict)
+    """Seconds: total_s."""
+    statistics: dict[str, Any] = field(default_factory=dict)
+    """fk: evaluations of the arm; drawn, bound, probe, search, check: placements by the stage that
+    they came to; boxes: of the region's bound."""
+
+    @property
+    def best(self) -> Trial | None:
+        """The feasible placement with the largest margin, or else the one that covers most."""
+        return self.found[0] if self.found else (self.trials[0] if self.trials else None)
+
+    @property
+    def share(self) -> float:
+        """The largest share of the area that one motion was found to cover."""
+        return 0.0 if self.best is None else self.best.share
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
+
+
+class Local:
+    """A judge in this process."""
+
+    def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
+        """Load the kernels."""
+        from feasibility.notices import compiling_notice
+        from feasibility.roadmap import warm_up
+
+        with compiling_notice():
+            warm_up()
+        self.placer = Placer(robot, cells, task, search)
+
+    def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
+        """See `Judge`."""
+        return [self.placer.try_at(pose, early) for pose in poses]
+
+    def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+        """See `Judge`."""
+        return [self.placer.check_at(pose, causes) for pose in poses]
+
+
+def place(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    region: Region,
+    search: Search | None = None,
+    *,
+    count: int = COUNT,
+    around: int = AROUND,
+    keep: int = KEEP,
+    early: bool = True,
+    time_limit: float | None = None,
+    judge: Judge | None = None,
+    progress: Progress | None = None,
+) -> Placements:
+    """Where in a region may the surface stand, so that one continuous motion covers it?
+
+    Args:
+        robot: the arm.
+        cells: the surface, wherever it stands now, cut into cells.
+        task: standoff, cone and tolerance.
+        region: the poses of the surface's frame to look at.
+        search: of each verdict; its seed also spreads the poses.
+        count: poses spread over the region; refinement comes on top.
+        around: poses tried around each of the best, a round; 0 for no refinement.
+        keep: feasible placements to verify, at most.
+        early: whether bounds and probes may discard placements before a search is run.
+        time_limit: s, looked at between batches; the verdicts asked for at the end come on top.
+        judge: who tries placements; default this process.
+        progress: called as progress(done, total, text); what it raises ends the search.
+
+    Returns:
+        The placements. That there are none is a result, not an error.
+
+    Raises:
+        PlacementError: there is nothing to place, or the settings make no sense.
+
+    Example:
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> plate = plane((-0.1, 0.1), (-0.1, 0.1), position=(1.2, 0, 0.3), side="outside")
+        >>> region = Region.around(Pose.of_surface(plate), {"x": (0.3, 1.2), "yaw_deg": (0, 90)})
+        >>> task = Task(standoff=0.02, cone_deg=30)
+        >>> placements = place(load_robot("ur5"), plate.cells(3, 3), task, region, count=16, keep=1)
+        >>> placements.answer, region.holds(placements.best.pose)
+        (<Answer.FEASIBLE: 'feasible'>, True)
+    """
+    search = Search() if search is None else search
+    _check_settings(cells, search, count, around, keep, time_limit)
+    began = time.monotonic()
+    reach = Reach.of(robot, cells, task)
+    beyond = reach.beyond(region)
+    if beyond is not None:
+        return _beyond(robot, cells, task, region, reach, beyond, began)
+    hunt = Hunt(
+        judge=Local(robot, cells, task, search) if judge is None else judge,
+        reach=reach,
+        region=region,
+        seed=search.seed,
+        early=early,
+        deadline=np.inf if time_limit is None else began + time_limit,
+        progress=progress,
+    )
+    hunt.sweep(count)
+    hunt.refine(around)
+    found = hunt.verified(keep)
+    return _told(robot, cells, task, region, hunt, found, began)
+
+
+def _check_settings(
+    cells: Cells, search: Search, count: int, around: int, keep: int, time_limit: float | None
+) -> None:
+    """Refuse what makes no question."""
+    faults = []
+    if len(cells) == 0:
+        faults.append("there are no cells to cover; cut the surface into some")
+    if search.method != "complete":
+        faults.append(
+            f'the search for placements works with method "complete", not {search.method!r}'
+        )
+    if count < 1:
+        faults.append(f"count: expected a whole number >= 1 of poses to try, got {count}")
+    if around < 0:
+        faults.append(f"around: expected a whole number >= 0 of poses, got {around}")
+    if keep < 1:
+        faults.append(f"keep: expected a whole number >= 1 of placements, got {keep}")
+    if time_limit is not None and not 0.0 < time_limit < np.inf:
+        faults.append(f"time_limit: expected a finite number > 0 (s), got {time_limit}")
+    if faults:
+        raise PlacementError("; ".join(faults))
+
+
+def _beyond(
+    robot: Robot, cells: Cells, task: Task, region: Region, reach: Reach, beyond: Beyond,
+    began: float,
+) -> Placements:  # fmt: skip
+    """The answer where the reach bound leaves no placement."""
+    values = region.samples(0, 0)  # its middle
+    trials = [
+        Trial(Pose.of_values(row), Stage.BOUND, float(reach.share(row[None])[0])) for row in values
+    ]
+    message = (
+        f"No placement in the region: wherever the surface stands in it, some target is at least "
+        f"{beyond.distance:.3f} m from the first joint, and the arm reaches at most "
+        f"{beyond.reach:.3f} m (proved for the whole region, {beyond.boxes} "
+        f"box{'es' if beyond.boxes > 1 else ''})."
+    )
+    return Placements(
+        robot=robot,
+        cells=cells,
+        task=task,
+        region=region,
+        answer=Answer.INFEASIBLE,
+        evidence=Evidence.PROOF,
+        message=message,
+        found=(),
+        trials=tuple(trials),
+        cause=CauseKind.OUT_OF_REACH,
+        timing={"total_s": time.monotonic() - began},
+        statistics={"fk": 0, "drawn": 0, "bound": 0, "probe": 0, "search": 0, "check": 0,
+                    "boxes": beyond.boxes},
+    )  # fmt: skip
+
+
+def _told(
+    robot: Robot, cells: Cells, task: Task, region: Region, hunt: Hunt, found: list[Trial],
+    began: float,
+) -> Placements:  # fmt: skip
+    """The answer of a search."""
+    trials = sorted(hunt.trials, key=lambda trial: trial.rank, reverse=True)
+    failed = [trial for trial in trials if trial.stage is Stage.FAILED]
+    stages = Counter(trial.stage for trial in trials)
+    looked = stages[Stage.SEARCH] + stages[Stage.CHECK]
+    tried = (
+        f"{hunt.drawn} placements were drawn: {hunt.bound} have a target out of reach, "
+        f"{stages[Stage.PROBE]} failed a few Newton starts, {looked} were searched"
+    ) + (f", {len(failed)} could not be tried ({failed[0].message})" if failed else "")
+    causes: dict[str, int] = {}
+    cause = None
+    if found:
+        answer, evidence = Answer.FEASIBLE, Evidence.WITNESS
+        message = (
+            f"{len(found)} feasible placement{'s' if len(found) > 1 else ''}, each with a replayed "
+            f"motion; the best leaves a margin of {found[0].margin:.3f}. {tried}."
+        )
+    else:
+        undecided = hunt.late or bool(failed)
+        undecided |= any(trial.answer is Answer.UNDECIDED for trial in trials)
+        answer = Answer.UNDECIDED if undecided else Answer.INFEASIBLE
+        evidence = Evidence.BUDGET if undecided else Evidence.EXHAUSTED
+        causes = next((dict(t.causes) for t in trials if t.causes), {})
+        cause = CauseKind(max(causes, key=lambda kind: causes[kind])) if causes else None
+        best = trials[0].share if trials else 0.0
+        message = (
+            f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
+            + (f", and most of the rest is {MISSED[cause]}" if cause else "")
+            + ("; the time limit ran out." if hunt.late else ". This is no proof.")
+        )
+        closed = closed_courses(cells, task)
+        if closed and answer is Answer.UNDECIDED:
+            message += f" Wherever it stands: {closed}"
+    return Placements(
+        robot=robot,
+        cells=cells,
+        task=task,
+        region=region,
+        answer=answer,
+        evidence=evidence,
+        message=message,
+        found=tuple(found),
+        trials=tuple(trials),
+        cause=cause,
+        causes=causes,
+        timing={"total_s": time.monotonic() - began},
+        statistics={
+            "fk": sum(trial.fk for trial in trials),
+            "drawn": hunt.drawn,
+            "bound": hunt.bound,
+            "probe": stages[Stage.PROBE],
+            "search": stages[Stage.SEARCH],
+            "check": stages[Stage.CHECK],
+            "boxes": 0,
+        },
+    )

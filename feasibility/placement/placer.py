@@ -1,0 +1,177 @@
+"""Placements of one surface tried, one at a time.
+
+Moving the surface moves targets and courses rigidly; how much they bend stays. So a placement is
+the same problem with its arrays turned and shifted, and the cells need not be cut again. Only
+`feasibility.check`, whose word counts in the end, is asked about cells that have really been moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.division import undominated
+from feasibility.placement.margins import least_room
+from feasibility.placement.quick_search import MOST_COVERS, covers_of, probe, skim, spread_cells
+from feasibility.placement.reach_bound import Reach
+from feasibility.placement.region import Array, Pose, moved_cells
+from feasibility.placement.trial import Margins, Stage, Trial
+from feasibility.roadmap import Explorer, Problem, cause_counts, problem_of
+from feasibility.search import Search
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
+
+
+class Placer:
+    """Tries placements of one surface for one arm and task."""
+
+    def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
+        """Gather what all placements share."""
+        self.robot, self.cells, self.task, self.search = robot, cells, task, search
+        self.problem = problem_of(robot, cells, task)
+        self.reach = Reach.of(robot, cells, task)
+        self.probes = spread_cells(cells)
+
+    def problem_at(self, pose: Pose) -> Problem:
+        """The problem with the surface's frame at a pose."""
+        here, surface = self.problem, self.cells.surface
+        turn = pose.rotation @ surface.rotation.T
+        shift = np.array(pose.position) - turn @ surface.position
+        targets = np.concatenate(
+            [here.targets[..., :3] @ turn.T, here.targets[..., 3:] @ turn.T], axis=2
+        )
+        targets[:, 0, :3] += shift
+        # As `problem_of` has them: for other arrays all kernels would be compiled once more.
+        targets.flags.writeable = False
+        return here._replace(
+            points=np.ascontiguousarray(here.points @ turn.T + shift),
+            approaches=np.ascontiguousarray(here.approaches @ turn.T),
+            targets=targets,
+        )
+
+    def try_at(self, pose: Pose, early: bool = True) -> Trial:
+        """Look into one placement.
+
+        Args:
+            pose: where the surface's frame stands.
+            early: whether bounds and probes may end it before a search.
+        """
+        distances = self.reach.distances(pose.values[None])[0]
+        in_reach = float(self.reach.share(pose.values[None])[0])
+        if early and distances.max() > self.reach.reach + self.reach.tolerance:
+            return Trial(pose, Stage.BOUND, in_reach)
+        explorer = Explorer(self.robot, self.cells, self.problem_at(pose), self.search.seed)
+        probed = self._searched(explorer, distances, early)
+        if probed < 1.0:
+            fk = int(explorer.work.counts[0])
+            return Trial(pose, Stage.PROBE, in_reach, probed, fk=fk)
+        return replace(self.trial_of(explorer, pose, in_reach, probed), early=early)
+
+    def _searched(self, explorer: Explorer, distances: Array, early: bool) -> float:
+        """Probe and search; returns the share of probed cells that were reached."""
+        if early:
+            ends = [int(distances.argmax()), int(distances.argmin())]
+            some = np.array(list(dict.fromkeys([*ends, *self.probes])), dtype=np.int64)
+            hits = probe(explorer, some)
+            if not hits.all():
+                return float(hits.mean())
+        skim(explorer, early)
+        return 1.0
+
+    def replayed(self, trial: Trial, component: int) -> str:
+        """Replay the motion behind one of a trial's `covers`, which is found again for that.
+
+        Returns:
+            Empty where the independent replay accepts one continuous motion over these cells;
+            otherwise why it does not.
+        """
+        from feasibility.certification import replay
+        from feasibility.roadmap import covering_walk, explore
+
+        cells = moved_cells(self.cells, trial.pose)
+        if trial.stage is Stage.CHECK:
+            problem = problem_of(self.robot, cells, self.task)
+            explorer = Explorer(self.robot, cells, problem, self.search.seed)
+            explore(explorer)
+        else:
+            problem = self.problem_at(trial.pose)
+            explorer = Explorer(self.robot, self.cells, problem, self.search.seed)
+            distances = self.reach.distances(trial.pose.values[None])[0]
+            self._searched(explorer, distances, trial.early)
+        cover = trial.covers[component]
+        for root in explorer.roots():
+            if (explorer.covers(root) >= cover).all():
+                walk = covering_walk(explorer.roadmap, root)
+                told = replay(self.robot, cells, self.task, walk, explorer.covers(root))
+                return "" if told.accepted else told.refusal
+        return "the search did not find this motion again"
+
+    def check_at(self, pose: Pose, causes: bool = False) -> Trial:
+        """Ask `feasibility.check` about one placement.
+
+        Args:
+            pose: where the surface's frame stands.
+            causes: whether to look for the causes of missed cells.
+        """
+        from feasibility.checking import check
+
+        cells = moved_cells(self.cells, pose)
+        verdict = check(self.robot, cells, self.task, self.search)
+        tried = self.try_at(pose, early=False) if verdict.feasible else None
+        if tried is not None and not tried.complete:
+            tried = self._explored(cells, pose)
+        covers = np.zeros((len(verdict.components), len(cells)), dtype=bool)
+        for row, component in zip(covers, verdict.components, strict=True):
+            row[component] = True
+        covers = covers[undominated(covers)][:MOST_COVERS]
+        return Trial(
+            pose=pose,
+            stage=Stage.CHECK,
+            in_reach=float(self.reach.share(pose.values[None])[0]),
+            probed=1.0 if verdict.feasible else 0.0,
+            share=self.share_of(verdict.covered),
+            margins=None if tried is None else tried.margins,
+            covers=covers,
+            answer=verdict.answer,
+            evidence=verdict.evidence,
+            message=verdict.message,
+            causes=cause_counts(verdict).cells if causes else {},
+            fk=int(verdict.statistics["fk"]) + (0 if tried is None else tried.fk),
+        )
+
+    def _explored(self, cells: Cells, pose: Pose) -> Trial:
+        """The search of `check` again, for the room that its motion leaves."""
+        from feasibility.roadmap import explore
+
+        problem = problem_of(self.robot, cells, self.task)
+        explorer = Explorer(self.robot, cells, problem, self.search.seed)
+        explore(explorer)
+        return self.trial_of(explorer, pose, 1.0, 1.0)
+
+    def share_of(self, cover: NDArray[np.bool_]) -> float:
+        """Share of the area that some cells (N,) have."""
+        areas = self.cells.areas
+        return 1.0 if cover.all() else float(areas[cover].sum() / areas.sum())
+
+    def trial_of(self, explorer: Explorer, pose: Pose, in_reach: float, probed: float) -> Trial:
+        """What a search found."""
+        covers = covers_of(explorer)
+        margins = self._margins(explorer, pose) if explorer.complete else None
+        return Trial(
+            pose=pose,
+            stage=Stage.SEARCH,
+            in_reach=in_reach,
+            probed=probed,
+            share=self.share_of(covers[0]) if len(covers) else 0.0,
+            margins=margins,
+            covers=covers,
+            fk=int(explorer.work.counts[0]),
+        )
+
+    def _margins(self, explorer: Explorer, pose: Pose) -> Margins:
+        """The room that the component which covers every cell leaves."""
+        limits, cone = least_room(explorer).tolist()
+        return Margins(limits, cone, max(0.0, min(1.0, self.reach.slack(pose.values))))

@@ -1,0 +1,125 @@
+"""Placements that no search need look at: targets beyond the arm's reach, one pose or a region.
+
+The tool point is never further from the first joint than the reach bound R (see `robots.reach`).
+So a pose is hopeless where a target lies further off than R and the tolerance. For a whole box of
+poses, let c be a target in the surface's frame, B the box of positions, and Q the rotation in the
+middle of the ranges of roll, pitch and yaw, whose half widths add up to at most t (angles of
+rotations that follow each other add up at most). Then for every pose in the box
+
+    |R c + p - o|  >=  dist(o - Q c, B) - 2 |c| sin(min(t, pi) / 2).
+
+Boxes for which this leaves a target in reach are halved, until none is left or too many are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.placement.region import Array, Pose, Region
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells, rotation_from_rpy
+
+MOST_BOXES = 4096  # boxes of poses looked at before the region is called open
+MOST_TARGETS = 200  # targets that boxes are asked about; a bound on some is one on all
+
+
+class Beyond(NamedTuple):
+    """A region whose every placement has a target out of reach."""
+
+    distance: float
+    """m, in every placement some target is at least so far from the first joint."""
+    reach: float
+    """m, the tool point never is."""
+    boxes: int
+    """Boxes of poses that this was shown for."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Reach:
+    """The targets of a task in the surface's own frame, and how far the arm reaches."""
+
+    targets: Array
+    """(N, 3) m, in the surface's frame."""
+    areas: Array
+    """(N,) m^2 of the cells."""
+    origin: Array
+    """(3,) m, the first joint in the root frame."""
+    reach: float
+    """m."""
+    tolerance: float
+    """m."""
+
+    @staticmethod
+    def of(robot: Robot, cells: Cells, task: Task) -> Reach:
+        """What is asked about placements of these cells."""
+        surface = cells.surface
+        return Reach(
+            targets=(task.targets(cells).points - surface.position) @ surface.rotation,
+            areas=np.array(cells.areas),
+            origin=np.array(robot.model.jointPlacements[1].translation),
+            reach=robot.reach,
+            tolerance=task.leeway,
+        )
+
+    def distances(self, values: Array) -> Array:
+        """(k, N) m, of the targets from the first joint, with the surface at poses (k, 6)."""
+        turns = np.array([Pose.of_values(row).rotation for row in values]).reshape(-1, 3, 3)
+        offset = values[:, None, :3] - self.origin
+        return np.asarray(np.linalg.norm(np.einsum("kij,nj->kni", turns, self.targets) + offset,
+                                         axis=2))  # fmt: skip
+
+    def within(self, values: Array) -> NDArray[np.bool_]:
+        """(k, N) False where a target is proved out of reach."""
+        return self.distances(values) <= self.reach + self.tolerance
+
+    def share(self, values: Array) -> Array:
+        """(k,) share of the area within reach, at most: nothing beyond can be covered."""
+        share = self.within(values) @ self.areas / self.areas.sum()
+        return np.minimum(share, 1.0)  # sums in another order may round to a little more
+
+    def slack(self, values: Array) -> float:
+        """Share of the reach that the furthest target leaves, at one pose (6,); 1 for any reach."""
+        return float(1.0 - self.distances(values[None]).max() / self.reach)
+
+    def beyond(self, region: Region) -> Beyond | None:
+        """Whether every placement in a region has a target out of reach; None where not shown."""
+        some = np.unique(np.linspace(0, len(self.targets) - 1, MOST_TARGETS).astype(np.int64))
+        boxes = [(region.low, region.high)]
+        nearest, looked = np.inf, 0
+        while boxes:
+            low, high = boxes.pop()
+            looked += 1
+            least = self._least(low, high, self.targets[some])
+            if least > self.reach + self.tolerance:
+                nearest = min(nearest, least)
+                continue
+            middle = 0.5 * (low + high)
+            # A pose in reach ends it at once, and so do boxes too many or too small.
+            if looked + len(boxes) >= MOST_BOXES or self.within(middle[None]).all():
+                return None
+            effect = (high - low) * self._effects()
+            axis = int(np.argmax(effect))
+            for start, end in ((low[axis], middle[axis]), (middle[axis], high[axis])):
+                one, other = low.copy(), high.copy()
+                one[axis], other[axis] = start, end
+                boxes.append((one, other))
+        return Beyond(nearest, self.reach, looked)
+
+    def _effects(self) -> Array:
+        """(6,) how far a metre or a degree of each axis moves the furthest target, m."""
+        furthest = float(np.linalg.norm(self.targets, axis=1).max())
+        return np.array([1.0, 1.0, 1.0, *[np.radians(furthest)] * 3])
+
+    def _least(self, low: Array, high: Array, targets: Array) -> float:
+        """m: in every pose of the box some target is at least so far from the first joint."""
+        turn = rotation_from_rpy(*np.radians(0.5 * (low[3:] + high[3:])))
+        half = float(np.radians(0.5 * (high[3:] - low[3:])).sum())
+        wanted = self.origin - targets @ turn.T
+        apart = np.linalg.norm(wanted - np.clip(wanted, low[:3], high[:3]), axis=1)
+        sway = 2.0 * np.linalg.norm(targets, axis=1) * np.sin(0.5 * min(half, np.pi))
+        return float((apart - sway).max())

@@ -1,0 +1,163 @@
+"""A search for placements in progress: which poses are tried, and in which order."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from feasibility.placement.reach_bound import Reach
+from feasibility.placement.region import Array, Pose, Region
+from feasibility.placement.trial import Stage, Trial
+from feasibility.search import Progress
+
+DRAWS = 16  # as many times more are drawn where the bound leaves few
+FEW = 32  # poses within reach that refinement should start from
+DESPERATE = 4  # placements that are searched although bound or probe speak against them
+ELITES = 4  # placements that are refined
+WIDTHS = (0.5, 0.35, 0.25, 0.17, 0.12, 0.08)  # [1] of the region, around the best
+CYCLES = 3  # times through the widths, as long as nothing is feasible
+APART = 0.05  # [1] of the region's widths: placements nearer to each other are alike
+BATCH = 64  # poses between two looks at the clock
+
+
+class Judge(Protocol):
+    """Tries placements, here or elsewhere; results come in the order of the poses."""
+
+    def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
+        """See `placer.Placer.try_at`."""
+
+    def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+        """See `placer.Placer.check_at`."""
+
+
+@dataclass(slots=True)
+class Hunt:
+    """A search for placements in progress."""
+
+    judge: Judge
+    reach: Reach
+    region: Region
+    seed: int
+    early: bool
+    deadline: float
+    progress: Progress | None
+    trials: list[Trial] = field(default_factory=list)
+    drawn: int = 0
+    bound: int = 0
+    """Placements that the reach bound discarded."""
+    checks: dict[Pose, Trial] = field(default_factory=dict)
+    late: bool = False
+    """Has the time run out?"""
+    streams: int = 0
+    """Random sequences used so far, so that each is another one."""
+
+    def sweep(self, count: int) -> None:
+        """Spread poses over the region, and look into those that the bound leaves."""
+        values = self.region.samples(count, self._stream())[:count]
+        self.drawn = len(values)
+        if not self.early:
+            self._try(values, early=False)
+            return
+        inside = values[self.reach.within(values).all(axis=1)]
+        if len(inside) < min(FEW, count):
+            more = self.region.samples(DRAWS * count, self._stream())[1:]
+            self.drawn += len(more)
+            fits = self.reach.within(more).all(axis=1)
+            inside = np.vstack([inside, more[fits][: min(FEW, count) - len(inside)]])
+            values = np.vstack([values, more])
+        self.bound = self.drawn - len(inside)
+        self._try(inside, early=True)
+        if not any(trial.stage is Stage.SEARCH for trial in self.trials):
+            self._hope(values)
+
+    def _hope(self, values: Array) -> None:
+        """Search where the least speaks against it, for the best share that can be had."""
+        self.trials.sort(key=lambda trial: trial.rank, reverse=True)
+        rows = [trial.pose.values for trial in self.trials[:DESPERATE]]
+        self.trials = self.trials[DESPERATE:]
+        if not rows:
+            rows = list(values[np.argsort(-self.reach.share(values), kind="stable")[:DESPERATE]])
+        self._try(np.array(rows), early=False)
+
+    def refine(self, around: int) -> None:
+        """Try poses around the best, nearer and nearer."""
+        for _ in range(CYCLES if around else 0):
+            for width in WIDTHS:
+                rows = [
+                    self.region.near(trial.pose.values, width, around, self._stream())[:around]
+                    for trial in self._elites(ELITES)
+                ]
+                if self.late or not rows:
+                    return
+                values = np.vstack(rows)
+                self.drawn += len(values)
+                if self.early:
+                    fits = self.reach.within(values).all(axis=1)
+                    self.bound += int((~fits).sum())
+                    values = values[fits]
+                self._try(values, self.early)
+            if any(trial.complete for trial in self.trials):
+                return
+            # The short search may have missed what the full one finds.
+            self._check([trial.pose for trial in self._elites(1)])
+            if any(trial.feasible for trial in self.checks.values()):
+                return
+
+    def verified(self, keep: int) -> list[Trial]:
+        """The best placements that `check` calls feasible."""
+        likely = self._elites(3 * keep, lambda trial: trial.complete)
+        while likely and sum(trial.feasible for trial in self.checks.values()) < keep:
+            some, likely = likely[:keep], likely[keep:]
+            self._check([trial.pose for trial in some])
+        found = [trial for trial in self.checks.values() if trial.feasible]
+        if not found and not self.late:
+            self._check([trial.pose for trial in self._elites(1)], causes=True)
+            found = [trial for trial in self.checks.values() if trial.feasible]
+        return sorted(found, key=lambda trial: -trial.margin)[:keep]
+
+    def _elites(
+        self, most: int, wanted: Callable[[Trial], bool] = lambda trial: True
+    ) -> list[Trial]:
+        """The best placements that are not alike, of those searched."""
+        widths = np.maximum(self.region.high - self.region.low, 1e-12)
+        chosen: list[Trial] = []
+        pool = [t for t in self.trials if t.stage in (Stage.SEARCH, Stage.CHECK) and wanted(t)]
+        for trial in sorted(pool, key=lambda trial: trial.rank, reverse=True):
+            apart = [
+                np.abs((trial.pose.values - other.pose.values) / widths).max() for other in chosen
+            ]
+            if min(apart, default=1.0) >= APART:
+                chosen.append(trial)
+                if len(chosen) == most:
+                    break
+        return chosen
+
+    def _try(self, values: Array, early: bool) -> None:
+        """Look into poses (k, 6), a batch at a time."""
+        for start in range(0, len(values), BATCH):
+            if time.monotonic() > self.deadline:
+                self.late = True
+                return
+            rows = values[start : start + BATCH]
+            self.trials += self.judge.tried([Pose.of_values(row) for row in rows], early)
+            if self.progress is not None:
+                done = sum(trial.complete for trial in self.trials)
+                self.progress(len(self.trials), None, f"trying placements, {done} covered")
+
+    def _check(self, poses: list[Pose], causes: bool = False) -> None:
+        """Ask `check` about poses; what it says replaces what was known."""
+        poses = [pose for pose in poses if causes or pose not in self.checks]
+        if self.progress is not None:
+            self.progress(len(self.trials), None, "checking the best placements")
+        for trial in self.judge.checked(poses, causes):
+            self.checks[trial.pose] = trial
+            self.trials = [t for t in self.trials if t.pose != trial.pose] + [trial]
+
+    def _stream(self) -> int:
+        """A seed that was not used before."""
+        self.streams += 1
+        return int(np.random.SeedSequence([self.seed, self.streams]).generate_state(1)[0])

@@ -1,0 +1,206 @@
+"""Where a surface may stand: one pose of its frame, and regions of poses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces import Cells, Surface, rotation_from_rpy
+from surfaces.patches import GridCells
+
+Array = NDArray[np.float64]
+Triple = tuple[float, float, float]
+
+AXES = ("x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg")
+FURTHEST = 1e3  # [m] and [deg]: nothing sensible lies beyond
+DIGITS = 6  # of the numbers of a pose that is tried
+UPRIGHT = 1e-9  # [1], cosine of the pitch below which roll and yaw turn about one axis
+
+
+class PlacementError(ValueError):
+    """A region, or a question about it, that makes no sense: what was wrong, and what would do."""
+
+
+class Pose(NamedTuple):
+    """Where a surface's frame stands in the root frame, in the numbers of a case file."""
+
+    position: Triple
+    """m."""
+    rpy_deg: Triple
+    """Fixed-axis roll, pitch, yaw in degrees."""
+
+    @property
+    def rotation(self) -> Array:
+        """(3, 3) axes of the frame, as columns, in the root frame."""
+        return rotation_from_rpy(*np.radians(self.rpy_deg))
+
+    @property
+    def values(self) -> Array:
+        """(6,) in the order of `AXES`."""
+        return np.array([*self.position, *self.rpy_deg])
+
+    @staticmethod
+    def of_values(values: Sequence[float] | Array) -> Pose:
+        """The pose with six numbers in the order of `AXES`."""
+        x, y, z, roll, pitch, yaw = (float(value) for value in values)
+        return Pose((x, y, z), (roll, pitch, yaw))
+
+    @staticmethod
+    def of_surface(surface: Surface) -> Pose:
+        """Where a surface stands. Standing upright (pitch +-90 degrees) it is given roll 0."""
+        r = surface.rotation
+        flat = math.hypot(r[0, 0], r[1, 0])
+        pitch = math.atan2(-r[2, 0], flat)
+        if flat > UPRIGHT:
+            roll, yaw = math.atan2(r[2, 1], r[2, 2]), math.atan2(r[1, 0], r[0, 0])
+        else:
+            roll, yaw = 0.0, math.atan2(-r[0, 1], r[1, 1])
+        return Pose.of_values([*surface.position, *np.degrees([roll, pitch, yaw])])
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """All poses between two ends, one range for each of `AXES`; what does not vary has equal ends.
+
+    Example:
+        >>> from surfaces import plane
+        >>> plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3))
+        >>> region = Region.around(Pose.of_surface(plate), {"x": (-0.3, 0.3), "yaw_deg": (0, 90)})
+        >>> region.varies
+        ('x', 'yaw_deg')
+
+    Raises:
+        PlacementError: with everything that is wrong with the ranges.
+    """
+
+    ranges: tuple[tuple[float, float], ...]
+    """Six pairs (lowest, highest), m and degrees."""
+
+    def __post_init__(self) -> None:
+        """Refuse ranges that hold nothing."""
+        faults = []
+        if len(self.ranges) != len(AXES):
+            raise PlacementError(f"a region has {len(AXES)} ranges, got {len(self.ranges)}")
+        for name, (low, high) in zip(AXES, self.ranges, strict=True):
+            degrees = name.endswith("_deg")
+            unit = "degrees" if degrees else "metres"
+            shown = f"{low:g} .. {high:g}"
+            if not (math.isfinite(low) and math.isfinite(high)):
+                faults.append(f"{name}: {shown} is no range; expected two finite numbers ({unit})")
+            elif low > high:
+                faults.append(
+                    f"{name}: {shown} is empty; the lowest comes first: {high:g} .. {low:g}"
+                )
+            elif max(abs(low), abs(high)) > FURTHEST:
+                faults.append(f"{name}: {shown} is too far; at most {FURTHEST:g} ({unit})")
+            elif degrees and high - low > 360.0:
+                faults.append(f"{name}: {shown} is more than a full turn; at most 360 degrees wide")
+        if not faults and not self.varies:
+            faults.append(f"nothing varies; give a range of {', '.join(AXES)} whose ends differ")
+        if faults:
+            raise PlacementError("region: " + "; ".join(faults))
+
+    @staticmethod
+    def around(pose: Pose, ranges: Mapping[str, Any]) -> Region:
+        """The region with the ranges given by name; all else stays as at `pose`.
+
+        Args:
+            pose: what the axes that are not named are held at.
+            ranges: (lowest, highest) for some of `AXES`, absolute: m and degrees in the root frame.
+
+        Raises:
+            PlacementError: with everything that is wrong.
+        """
+        held = dict(zip(AXES, ((v, v) for v in pose.values.tolist()), strict=True))
+        faults = []
+        for name, given in ranges.items():
+            if name not in held:
+                faults.append(f"{name}: is not known here; known are {', '.join(AXES)}")
+                continue
+            try:
+                low, high = (float(value) for value in given)
+            except (TypeError, ValueError):
+                faults.append(f"{name}: expected two numbers, got {given!r}")
+                continue
+            held[name] = (low, high)
+        if faults:
+            raise PlacementError("region: " + "; ".join(faults))
+        return Region(tuple(held[name] for name in AXES))
+
+    @property
+    def low(self) -> Array:
+        """(6,) m and degrees."""
+        return np.array([low for low, _ in self.ranges])
+
+    @property
+    def high(self) -> Array:
+        """(6,) m and degrees."""
+        return np.array([high for _, high in self.ranges])
+
+    @property
+    def varies(self) -> tuple[str, ...]:
+        """The axes whose ends differ."""
+        return tuple(
+            name for name, (low, high) in zip(AXES, self.ranges, strict=True) if low < high
+        )
+
+    def holds(self, pose: Pose, slack: float = 1e-9) -> bool:
+        """Does the pose lie in the region?"""
+        values = pose.values
+        return bool(((values >= self.low - slack) & (values <= self.high + slack)).all())
+
+    def samples(self, count: int, seed: int) -> Array:
+        """(k, 6) poses, the middle first, then spread evenly by a Sobol sequence; k >= count."""
+        return self._rounded(np.vstack([0.5 * (self.low + self.high), self._spread(count, seed)]))
+
+    def near(self, values: Array, share: float, count: int, seed: int) -> Array:
+        """(k, 6) poses within `share` of the region's widths of a pose (6,); k >= count."""
+        half = 0.5 * share * (self.high - self.low)
+        centre = np.clip(values, self.low + half, self.high - half)
+        inner = Region(tuple(zip((centre - half).tolist(), (centre + half).tolist(), strict=True)))
+        return self._rounded(inner._spread(count, seed))
+
+    def _rounded(self, values: Array) -> Array:
+        """Poses that people can write down, inside the region still."""
+        return np.clip(np.round(values, DIGITS), self.low, self.high)
+
+    def _spread(self, count: int, seed: int) -> Array:
+        """(k, 6) the first points of a scrambled Sobol sequence; k is a power of two >= count.
+
+        None for a count of 0, and then without loading scipy.stats, which takes its time.
+        """
+        if count == 0:
+            return np.empty((0, len(AXES)))
+        from scipy.stats import qmc
+
+        free = self.high > self.low
+        sampler = qmc.Sobol(int(free.sum()), scramble=True, seed=np.random.default_rng(seed))
+        unit = sampler.random_base2(max(count - 1, 0).bit_length())
+        values = np.tile(self.low, (len(unit), 1))
+        values[:, free] += unit * (self.high - self.low)[free]
+        return values
+
+
+def moved_cells(cells: Cells, pose: Pose) -> Cells:
+    """The same cells with the surface's frame at another pose."""
+    old = cells.surface
+    rotation, position = pose.rotation, np.array(pose.position)
+    surface = replace(old, rotation=rotation, position=position)
+    if isinstance(cells, GridCells):
+        # Cut anew: to the last bit what a case with this pose builds.
+        return GridCells.cut(surface, *cells.shape)  # type: ignore[arg-type]
+    turn = rotation @ old.rotation.T
+    made = replace(
+        cells,
+        surface=surface,
+        centres=(cells.centres - old.position) @ turn.T + position,
+        normals=cells.normals @ turn.T,
+    )
+    if "figures" in vars(cells):  # of a mesh: known in its own frame
+        vars(made)["figures"] = vars(cells)["figures"]
+    return made

@@ -1,0 +1,138 @@
+"""Placements tried as the tasks of a study: by many workers, and kept, so that a run can go on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from feasibility.cases import TABLES, Case, toml_document
+from feasibility.placement.placer import Placer
+from feasibility.placement.region import Pose
+from feasibility.placement.trial import Margins, Stage, Trial
+from feasibility.search import Progress
+from feasibility.studies import Store, StudyTask, Workers, bits_of, cells_of, run_tasks
+from feasibility.verdict import Answer, Evidence
+
+KEPT = 4  # surfaces that one worker keeps
+
+Tables = dict[str, Any]
+
+
+class StudyJudge:
+    """Tries placements of a case's surface as tasks of a study; see `placement_hunt.Judge`."""
+
+    def __init__(
+        self,
+        case: Case,
+        workers: Workers,
+        store: Store | None = None,
+        progress: Progress | None = None,
+    ) -> None:
+        """Placements of this case's surface.
+
+        Args:
+            case: the robot, the surface, the task and the search.
+            workers: who does it.
+            store: where what was tried is kept and found again.
+            progress: called as progress(done, total, text) several times a second, with the
+                tasks of the present batch; what it raises ends the run.
+        """
+        self.tables, self.workers, self.store = case.to_tables(), workers, store
+        self.progress = progress
+
+    def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
+        """See `placement_hunt.Judge`."""
+        return self._all(poses, {"early": early})
+
+    def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+        """See `placement_hunt.Judge`."""
+        return self._all(poses, {"causes": causes})
+
+    def _all(self, poses: Sequence[Pose], how: Tables) -> list[Trial]:
+        """One task for each pose."""
+        tasks = [
+            StudyTask({**self.tables, "placement": {"pose": pose.values.tolist(), **how}},
+                      {"position": pose.position, "rpy_deg": pose.rpy_deg}, work=try_placement)
+            for pose in poses
+        ]  # fmt: skip
+        rows = run_tasks(tasks, self.workers, self.store, self.progress)
+        return [
+            trial_from(row.result)
+            if row.status == "done"
+            else Trial(pose, Stage.FAILED, 0.0, message=str(row.result["message"]))
+            for pose, row in zip(poses, rows, strict=True)
+        ]
+
+
+def try_placement(tables: Tables) -> Tables:
+    """Try one placement; what a worker does.
+
+    Args:
+        tables: a case, as `Case.to_tables` gives it, and `placement`: `pose`, six numbers, and
+            either `early`, see `placer.Placer.try_at`, or `causes`, see `placer.Placer.check_at`.
+
+    Returns:
+        See `trial_table`.
+    """
+    placer = _placer(toml_document({title: tables[title] for title in TABLES if title in tables}))
+    asked = tables["placement"]
+    pose = Pose.of_values(asked["pose"])
+    if "early" in asked:
+        return trial_table(placer.try_at(pose, asked["early"]))
+    return trial_table(placer.check_at(pose, asked["causes"]))
+
+
+@lru_cache(maxsize=KEPT)
+def _placer(text: str) -> Placer:
+    """What tries placements of a case, made once."""
+    return Placer(*Case.from_toml(text).build())
+
+
+def trial_table(trial: Trial) -> Tables:
+    """A trial as JSON values; `trial_from` reads it back."""
+    margins = trial.margins
+    return {
+        "position": list(trial.pose.position),
+        "rpy_deg": list(trial.pose.rpy_deg),
+        "stage": str(trial.stage),
+        "in_reach": trial.in_reach,
+        "probed": trial.probed,
+        "share": trial.share,
+        "margin": trial.margin,
+        "margins": None
+        if margins is None
+        else {"limits": margins.limits, "cone": margins.cone, "reach": margins.reach},
+        "cells": trial.covers.shape[1],
+        "components": [bits_of(cover) for cover in trial.covers],
+        "verdict": None if trial.answer is None else str(trial.answer),
+        "evidence": None if trial.evidence is None else str(trial.evidence),
+        "message": trial.message,
+        "causes": dict(trial.causes),
+        "early": trial.early,
+        "fk": trial.fk,
+    }
+
+
+def trial_from(table: Any) -> Trial:
+    """The trial that `trial_table` wrote."""
+    margins = table["margins"]
+    n = int(table["cells"])
+    covers = [cells_of(bits, n) for bits in table["components"]]
+    return Trial(
+        pose=Pose.of_values([*table["position"], *table["rpy_deg"]]),
+        stage=Stage(table["stage"]),
+        in_reach=float(table["in_reach"]),
+        probed=float(table["probed"]),
+        share=float(table["share"]),
+        margins=None if margins is None else Margins(**margins),
+        covers=np.array(covers, dtype=bool).reshape(len(covers), n),
+        answer=None if table["verdict"] is None else Answer(table["verdict"]),
+        evidence=None if table["evidence"] is None else Evidence(table["evidence"]),
+        message=str(table["message"]),
+        causes=dict(table["causes"]),
+        early=bool(table["early"]),
+        fk=int(table["fk"]),
+    )

@@ -1,0 +1,188 @@
+"""A division as one JSON object, and as text for people."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from feasibility.division import Division, Plan, Reconfiguration, SubPatch
+from feasibility.reports.text import filled
+from feasibility.reports.verdict import causes_listed
+from feasibility.results import plain
+from feasibility.version import version
+from surfaces import Cells
+
+STATUS = {"complete": 0, "partial": 1, "undecided": 3}
+SENTENCES = {
+    "complete": "divided: every cell is in a patch that one continuous motion covers.",
+    "partial": "divided in part: the patches cover all cells that can be covered.",
+    "undecided": "undecided: the division is the best known, or could not be certified.",
+}
+NOTHING = "not divided: no cell can be covered."
+
+
+def answer_of(division: Division) -> str:
+    """One word: 'complete', 'partial' (cells are left out) or 'undecided'."""
+    if not division.decided:
+        return "undecided"
+    return "complete" if division.whole else "partial"
+
+
+def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
+    """The division as the object that `coverable divide --json` prints.
+
+    Args:
+        division: the division.
+        before_s: seconds of imports and files before it was asked for; they count as loading.
+    """
+    cells, fewest, connected = division.cells, division.fewest, division.connected
+    return {
+        "answer": answer_of(division),
+        "cells": len(cells),
+        "covered": division.n_covered,
+        "ended": division.ended,
+        **_plan_json(fewest, division),
+        "connected": None if connected is fewest else _plan_json(connected, division),
+        "left_out": [
+            {
+                "cell": list(cells.unravel(cause.cell)),
+                "cause": str(cause.kind),
+                "proved": bool(cause.proved),
+                "detail": cause.detail,
+            }
+            for cause in division.left_out
+        ],
+        "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
+        "message": division.message,
+        "timing": {key: round(value, 6) for key, value in _seconds(division, before_s).items()},
+        "robot": division.robot.name,
+        "seed": int(division.seed),
+        "version": version(),
+    }
+
+
+def _plan_json(plan: Plan, division: Division) -> dict[str, Any]:
+    """Patches in the order of work, the moves between them, and how good their number is."""
+    return {
+        "optimal": division.ended and plan.optimal,
+        "at_least": plan.bound,
+        "patches": [_patch_json(patch, division.cells) for patch in plan.patches],
+        "moves": [_move_json(move, k) for k, move in enumerate(plan.moves)],
+        "patch_of_cell": plan.patch_of(len(division.cells)).tolist(),
+    }
+
+
+def _patch_json(patch: SubPatch, cells: Cells) -> dict[str, Any]:
+    """One patch; figures that the replay could not measure are null."""
+    found = patch.certificate
+    return {
+        "cells": [list(cells.unravel(k)) for k in patch.cells.tolist()],
+        "area_m2": plain(patch.area),
+        "pieces": patch.pieces,
+        "accepted": patch.accepted,
+        "refusal": patch.refusal or None,
+        "certificate": {
+            "waypoints": int(found.waypoints),
+            "max_position_error_m": plain(float(found.max_position_error)),
+            "max_angle_deg": plain(math.degrees(found.max_angle)),
+            "min_limit_margin": plain(float(found.min_limit_margin)),
+        },
+    }
+
+
+def _move_json(move: Reconfiguration, k: int) -> dict[str, Any]:
+    """The move from patch k to the next: where each joint goes, rad or m."""
+    return {
+        "from": k,
+        "to": k + 1,
+        "start": move.start.tolist(),
+        "end": move.end.tolist(),
+        "joints": [
+            {"joint": name, **({"by_m": by} if slides else {"by_deg": math.degrees(by)})}
+            for name, slides, by in zip(
+                move.joint_names, move.prismatic.tolist(), move.moves.tolist(), strict=True
+            )
+        ],
+    }
+
+
+def _seconds(division: Division, before_s: float) -> dict[str, float]:
+    """The four times of a division."""
+    keys = ("load_s", "search_s", "divide_s", "total_s")
+    seconds = {key: float(division.timing.get(key, 0.0)) for key in keys}
+    return seconds | {key: seconds[key] + before_s for key in ("load_s", "total_s")}
+
+
+def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
+    """The division for people: the answer, the patches and moves in order, what is left out.
+
+    Args:
+        division: the division.
+        title: the case's name and description.
+        before_s: as in `as_json`.
+    """
+    head = SENTENCES[answer_of(division)]
+    if division.decided and not division.patches and len(division.cells):
+        head = NOTHING
+    seconds = _seconds(division, before_s)
+    rows = [
+        ("case", title),
+        (
+            "covered",
+            f"{division.n_covered:,} of {len(division.cells):,} cells, in {_motions(division)}",
+        ),
+        ("found", division.message),
+        (
+            "time",
+            f"{seconds['total_s']:.2f} s (loading {seconds['load_s']:.2f}, search "
+            f"{seconds['search_s']:.3f}, division {seconds['divide_s']:.3f})",
+        ),
+    ]
+    lines = [head, "", *(filled(f"  {name:<12}", text) for name, text in rows)]
+    if division.patches:
+        lines += ["", "In this order:", *_steps(division.fewest, division)]
+    if division.connected is not division.fewest:
+        lines += ["", "With patches that are each connected on the surface:"]
+        lines += _steps(division.connected, division)
+    if division.left_out:
+        lines += ["", "Left out:", *causes_listed(division.left_out, division.cells)]
+    if len(division.unsettled):
+        open_cells = f"{len(division.unsettled):,} cells: the time limit ran out before they were"
+        lines += ["", "Not settled:", f"  {open_cells}"]
+    return "\n".join(lines)
+
+
+def _motions(division: Division) -> str:
+    """How many motions, and how sure that is."""
+    number = len(division.patches)
+    what = f"{number} motion{'' if number == 1 else 's'}"
+    if division.optimal or not number:
+        return what
+    return f"{what} (the fewest known)"
+
+
+def _steps(plan: Plan, division: Division) -> Iterator[str]:
+    """Patches and the moves between them, a line each."""
+    for k, patch in enumerate(plan.patches):
+        number = len(patch.cells)
+        text = (
+            f"{number:,} cell{'' if number == 1 else 's'} ({patch.area:.3g} m2"
+            + (f", in {patch.pieces} pieces" if patch.pieces > 1 else "")
+            + f"), around cell {_middle(patch, division.cells)}; "
+        )
+        waypoints = patch.certificate.waypoints
+        text += f"{waypoints:,} waypoint{'' if waypoints == 1 else 's'}, "
+        text += f"refused: {patch.refusal}" if patch.refusal else "accepted by the replay"
+        yield filled(f"  {f'patch {k + 1}':<12}", text)
+        if k < len(plan.moves):
+            yield filled(f"  {'move':<12}", plan.moves[k].described())
+
+
+def _middle(patch: SubPatch, cells: Cells) -> list[int]:
+    """The cell of a patch that is nearest to the mean of all."""
+    centres = cells.centres[patch.cells]
+    away = np.linalg.norm(centres - centres.mean(axis=0), axis=1)
+    return list(cells.unravel(int(patch.cells[np.argmin(away)])))

@@ -1,0 +1,263 @@
+"""An explanation as sentences for people, and as one JSON object."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from feasibility.reports.text import filled
+from feasibility.sensitivity import Dropped, Explanation, Finding, Kind, Quantity, Threshold
+from feasibility.verdict import Answer, Evidence
+from feasibility.version import version
+
+HEADS = {
+    Answer.FEASIBLE: "feasible. How far it can be tightened, one thing at a time:",
+    Answer.INFEASIBLE: "infeasible. What would make it feasible, one thing at a time:",
+    Answer.UNDECIDED: "undecided. What was found to make it feasible, one thing at a time:",
+}
+
+
+def as_text(explanation: Explanation, case_name: str) -> str:
+    """The thresholds for people: what helps first, then what does not."""
+    verdict = explanation.verdict
+    head = HEADS[verdict.answer] if explanation.thresholds else f"{verdict.answer}."
+    lines = [f"{case_name}: {head}", filled("  ", verdict.message)]
+    if len(verdict.cells) == 0:
+        return f"{case_name}: there are no cells to cover, so there is nothing to explain."
+    helps = [t for t in explanation.thresholds if t.feasible is not None]
+    others = [t for t in explanation.thresholds if t.feasible is None]
+    if not verdict.feasible:
+        helps.sort(key=_effort)
+    lines += [""] if helps or others else []
+    for threshold in helps:
+        lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
+    if not helps and others:
+        lines.append(
+            filled("  ", "No single change that was looked at was found to make it feasible.")
+        )
+    if others:
+        lines += ["", "What does not help alone:"]
+        ruled_out = [_helpless_label(t.quantity) for t in others if t.ruled_out]
+        if ruled_out:
+            lines.append(filled("  - ", f"proved: {'; '.join(ruled_out)}."))
+        for threshold in (t for t in others if not t.ruled_out):
+            lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
+    if explanation.dropped is not None:
+        lines += ["", filled("  ", _dropped(explanation, explanation.dropped))]
+    if explanation.left_out:
+        lines += ["", filled("  ", _unknown(explanation))]
+    return "\n".join(lines)
+
+
+def _unknown(explanation: Explanation) -> str:
+    """Which thresholds the time limit left no time for."""
+    names, number = ", ".join(explanation.left_out), len(explanation.left_out)
+    if not explanation.thresholds:
+        return f"The time limit ran out before any threshold was looked for: unknown are {names}."
+    return f"The time limit ran out; {number} thresholds are unknown: {names}."
+
+
+def _dropped(explanation: Explanation, dropped: Dropped) -> str:
+    """What would have to be given up, unless the search for it was cut short."""
+    verdict = explanation.verdict
+    if verdict.answer is Answer.UNDECIDED and dropped.waypoints is None:
+        found = f"{verdict.n_covered} of {len(verdict.cells)} cells"
+        return f"The best motion so far covers {found}; what would have to be dropped is unknown."
+    return dropping(dropped, len(verdict.cells))
+
+
+def _effort(threshold: Threshold) -> float:
+    """How far along its range a change has to go: the smallest is told first."""
+    quantity, found = threshold.quantity, threshold.feasible
+    way = abs(quantity.end - quantity.given)
+    return abs(found.value - quantity.given) / way if found is not None and way > 0.0 else 1.0
+
+
+def sentence(threshold: Threshold, tightened: bool) -> str:
+    """One threshold as a sentence.
+
+    Args:
+        threshold: what was found.
+        tightened: the case is feasible, and this is a margin.
+    """
+    quantity, found = threshold.quantity, threshold.feasible
+    if found is None:
+        return _helpless(threshold)
+    value, now = shown(quantity, found.value, True), shown(quantity, quantity.given)
+    text = (_margin if tightened else _remedy)(quantity, value, now)
+    if threshold.span is not None:
+        text += f", and on to {shown(quantity, threshold.span.feasible.value)}"
+        if threshold.span.other is not None:
+            text += f" ({_against(quantity, threshold.span.other)})"
+    if threshold.other is not None:
+        text += f"; {_against(quantity, threshold.other)}"
+    elif tightened and found.value == quantity.end:
+        text += ", the furthest that was looked at"
+    return text + "."
+
+
+def _margin(quantity: Quantity, value: str, now: str) -> str:
+    """How far a feasible case can be tightened."""
+    if quantity.kind is Kind.CONE:
+        return f"alpha can tighten to {value} ({now} now)"
+    if quantity.kind in (Kind.LOWER, Kind.UPPER):
+        return f"the {quantity.name} can tighten to {value} ({now} now)"
+    if quantity.kind is Kind.STANDOFF:
+        return f"the standoff can {_change(quantity)} to {value} ({now} now)"
+    return f"the surface can shift by {value} {quantity.name.removeprefix('shift ')}"
+
+
+def _remedy(quantity: Quantity, value: str, now: str) -> str:
+    """What would make a case feasible."""
+    if quantity.kind is Kind.CONE:
+        return f"feasible from alpha = {value} on ({now} now)"
+    if quantity.kind in (Kind.LOWER, Kind.UPPER):
+        joint, side, _ = quantity.name.rsplit(" ", 2)
+        way = "down" if side == "lower" else "up"
+        return f"{joint} would need {way} to {value}; it stops at {now}"
+    if quantity.kind is Kind.STANDOFF:
+        return f"feasible when the standoff {_change(quantity)}s to {value} ({now} now)"
+    way = quantity.name.removeprefix("shift ")
+    return f"feasible when the surface shifts by {value} {way}"
+
+
+def _helpless(threshold: Threshold) -> str:
+    """No value was found to help."""
+    quantity, other = threshold.quantity, threshold.other
+    text = _helpless_label(quantity)
+    if threshold.tried:
+        text += f" ({threshold.tried})"
+    if other is not None:
+        text += f": {_against(quantity, other)}"
+    return text + "."
+
+
+def _helpless_label(quantity: Quantity) -> str:
+    """A quantity and how far it was looked at."""
+    end = shown(quantity, quantity.end)
+    return {
+        Kind.CONE: f"a wider cone, up to {end}",
+        Kind.LOWER: f"the {quantity.name}, down to {end}",
+        Kind.UPPER: f"the {quantity.name}, up to {end}",
+        Kind.STANDOFF: f"a {quantity.name}, as far as {end}",
+        Kind.SHIFT: f"a {quantity.name}, up to {end}",
+    }[quantity.kind]
+
+
+def _change(quantity: Quantity) -> str:
+    """Whether a standoff becomes larger or smaller."""
+    return "grow" if quantity.end > quantity.given else "shrink"
+
+
+def _against(quantity: Quantity, other: Finding) -> str:
+    """What speaks against a value."""
+    if other.value == quantity.given and (
+        other.evidence is not Evidence.PROOF or other.cell is None
+    ):
+        return f"{other.answer} as it is, at {shown(quantity, other.value)}"
+    return f"at {shown(quantity, other.value, False)} {other.detail}"
+
+
+def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str:
+    """A value with its unit: degrees or millimetres, to two digits.
+
+    A limit or a cone that is said to be feasible is rounded to where it allows more, and one that
+    is not to where it allows less, so that what was found holds for the number printed too.
+    """
+    value, unit = (math.degrees(value), "deg") if quantity.unit == "rad" else (1e3 * value, "mm")
+    if feasible is None or not quantity.monotone:
+        return f"{round(value, 2):.10g} {unit}"
+    up = feasible != (quantity.kind is Kind.LOWER)
+    cents = round(100.0 * value, 4)  # what conversions leave behind is no reason to round
+    return f"{(math.ceil(cents) if up else math.floor(cents)) / 100.0:.10g} {unit}"
+
+
+def dropping(dropped: Dropped, cells: int) -> str:
+    """Which part of the surface would have to be given up."""
+    number, percent = len(dropped.cells), f"{100.0 * dropped.share:.3g} % of the area"
+    if number == cells:
+        return f"No cell is covered; all {cells} would have to be dropped."
+    one = number == 1
+    which = f"the cell that the best motion misses ({percent})"
+    if not one:
+        which = f"the {number:,} cells that the best motion misses ({percent})"
+    if dropped.waypoints is None:
+        return f"Dropping {which} may leave one motion, but none was certified."
+    rest = cells - number
+    return (
+        f"Dropping {which} leaves one motion over the other {rest:,}, of {dropped.waypoints:,} "
+        "waypoints, replayed."
+    )
+
+
+def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
+    """The explanation as the object that `coverable explain --json` prints."""
+    verdict = explanation.verdict
+    dropped = explanation.dropped
+    return {
+        "case": case_name,
+        "verdict": str(verdict.answer),
+        "evidence": str(verdict.evidence),
+        "cells": len(verdict.cells),
+        "covered": verdict.n_covered,
+        "thresholds": [_threshold(t, verdict.feasible) for t in explanation.thresholds],
+        "not_looked_at": list(explanation.left_out),
+        "dropped": None
+        if dropped is None
+        else {
+            "cells": [list(verdict.cells.unravel(int(k))) for k in dropped.cells],
+            "area_m2": dropped.area,
+            "share": dropped.share,
+            "waypoints": dropped.waypoints,
+        },
+        "evaluations": explanation.evaluations,
+        "seconds": round(explanation.seconds, 6),
+        "robot": verdict.robot.name,
+        "seed": int(verdict.seed),
+        "version": version(),
+    }
+
+
+def _threshold(threshold: Threshold, tightened: bool) -> dict[str, Any]:
+    """One threshold as an object; keys say the unit."""
+    quantity, span = threshold.quantity, threshold.span
+    found = dict(_numbers(quantity, "given", quantity.given))
+    found |= _numbers(quantity, "furthest", quantity.end)
+    if threshold.resolution is not None:
+        found |= _numbers(quantity, "resolution", threshold.resolution)
+    return {
+        "quantity": quantity.name,
+        "kind": str(quantity.kind),
+        **found,
+        "feasible": _finding(quantity, threshold.feasible),
+        "other": _finding(quantity, threshold.other),
+        "until": None
+        if span is None
+        else {
+            "feasible": _finding(quantity, span.feasible),
+            "other": _finding(quantity, span.other),
+        },
+        "tried": threshold.tried,
+        "sentence": sentence(threshold, tightened),
+    }
+
+
+def _finding(quantity: Quantity, finding: Finding | None) -> dict[str, Any] | None:
+    """A verdict at one value; null where there is none."""
+    if finding is None:
+        return None
+    return {
+        **dict(_numbers(quantity, "value", finding.value)),
+        "verdict": str(finding.answer),
+        "evidence": str(finding.evidence),
+        "detail": finding.detail,
+    }
+
+
+def _numbers(quantity: Quantity, name: str, value: float) -> Iterator[tuple[str, float]]:
+    """A number under a key with its unit, free of the dust of conversions."""
+    if quantity.unit == "rad":
+        yield f"{name}_deg", round(math.degrees(value), 6)
+    else:
+        yield f"{name}_m", round(value, 9)

@@ -1,0 +1,227 @@
+"""A coverage path and its timing as one JSON object, and as text for people."""
+
+from __future__ import annotations
+
+import math
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
+from typing import Any
+
+import numpy as np
+
+from feasibility.paths import CoveragePath, PathFigures
+from feasibility.reports.text import filled
+from feasibility.reports.verdict import as_json as verdict_json
+from feasibility.results import plain
+from feasibility.timing import MotionLimits, Trajectory, used
+from feasibility.verdict import Verdict
+from feasibility.version import version
+from robots import Robot
+
+
+def as_json(
+    path: CoveragePath, trajectory: Trajectory | None = None, limits: MotionLimits | None = None
+) -> dict[str, Any]:
+    """The object that `coverable path --json` prints, without NaN.
+
+    Units stand in the keys; velocities and accelerations are in rad or m, and seconds.
+
+    Args:
+        path: the path.
+        trajectory: its timing, if it was asked for.
+        limits: what the timing keeps to.
+    """
+    figures = path.figures
+    sliding = path.robot.prismatic
+    return {
+        "verdict": "feasible",
+        "order": path.order,
+        "cells": int(path.needed.sum()),
+        "visits": path.visits.tolist(),
+        "length_m": figures.length,
+        "covered_m": figures.covered,
+        "revisited_m": figures.revisited,
+        "revisited_share": figures.revisited_share,
+        "least_length_m": figures.least_length,
+        "length_ratio": plain(figures.ratio),
+        "joint_travel": {
+            name: {"travel_m": float(way)} if slides else {"travel_deg": math.degrees(way)}
+            for name, way, slides in zip(
+                path.robot.joint_names, figures.travel.tolist(), sliding.tolist(), strict=True
+            )
+        },
+        "margins": {
+            "limit_deg": plain(math.degrees(figures.turn_margin)),
+            "limit_m": plain(figures.slide_margin),
+            "cone_deg": plain(math.degrees(figures.cone_margin)),
+            "singular_value": plain(figures.singular_value),
+        },
+        "certificate": {
+            "waypoints": int(path.certificate.waypoints),
+            "max_position_error_m": plain(float(path.certificate.max_position_error)),
+            "max_angle_deg": plain(math.degrees(path.certificate.max_angle)),
+        },
+        "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
+        "robot": path.robot.name,
+        "version": version(),
+    }
+
+
+def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[str, Any]:
+    """What `coverable path --json` prints where there is no path: the verdict's object, and why.
+
+    Args:
+        verdict: infeasible or undecided.
+        reason: one sentence.
+        before_s: as in `report.as_json`.
+    """
+    return verdict_json(verdict, before_s) | {"message": reason, "trajectory": None}
+
+
+def at_most(value: float, digits: int) -> str:
+    """A number to some significant digits that is no less: a bound that still holds as printed.
+
+    Example:
+        >>> at_most(0.12341, 3), at_most(0.5, 3), at_most(0.0, 3)
+        ('0.124', '0.5', '0')
+    """
+    return _rounded(value, digits, ROUND_CEILING)
+
+
+def at_least(value: float, digits: int) -> str:
+    """A number to some significant digits that is no more.
+
+    Example:
+        >>> at_least(12.999, 3), at_least(-0.12341, 3)
+        ('12.9', '-0.124')
+    """
+    return _rounded(value, digits, ROUND_FLOOR)
+
+
+def _rounded(value: float, digits: int, rounding: str) -> str:
+    """A number with so many significant digits, rounded one way; inf stays inf."""
+    if math.isfinite(value):
+        value = float(Context(prec=digits, rounding=rounding).create_decimal(Decimal(value)))
+    return f"{value:.{digits}g}"
+
+
+def _timing(
+    path: CoveragePath, trajectory: Trajectory, limits: MotionLimits | None
+) -> dict[str, Any]:
+    """Duration and the largest of everything, with the limits where they are known.
+
+    With limits the largest is over all that a controller may make of the samples.
+    """
+    names = path.robot.joint_names
+    fastest, quickest = np.abs(trajectory.dq).max(axis=0), np.abs(trajectory.ddq).max(axis=0)
+    speed = float(trajectory.tool_speed.max())
+    if limits is not None:
+        most = used(path.robot, trajectory, limits)
+        fastest = most.velocity * limits.velocity
+        quickest = most.acceleration * limits.acceleration
+        speed = most.tool_speed * limits.tool_speed
+    found: dict[str, Any] = {
+        "duration_s": trajectory.duration,
+        "samples": len(trajectory),
+        "tool_way_m": trajectory.tool_way,
+        "max_tool_speed": speed,
+        "max_velocity": dict(zip(names, fastest.tolist(), strict=True)),
+        "max_acceleration": dict(zip(names, quickest.tolist(), strict=True)),
+    }
+    if limits is not None:
+        found["limits"] = {
+            "tool_speed": limits.tool_speed,
+            "velocity": dict(zip(names, limits.velocity.tolist(), strict=True)),
+            "acceleration": dict(zip(names, limits.acceleration.tolist(), strict=True)),
+        }
+    return found
+
+
+def as_text(
+    path: CoveragePath, trajectory: Trajectory | None = None, limits: MotionLimits | None = None
+) -> str:
+    """The path for people: how long it is and what it is compared with, margins, and times.
+
+    Args:
+        path: the path.
+        trajectory: its timing, if it was asked for.
+        limits: what the timing keeps to.
+    """
+    count, figures = int(path.needed.sum()), path.figures
+    rows = [
+        ("order", f"{path.order}, {count:,} cells, {len(path.visits):,} centres passed"),
+        ("length", _length_text(figures)),
+        ("joint travel", _travel_text(path)),
+        ("margins", _margins_text(figures)),
+        (
+            "certificate",
+            f"{path.certificate.waypoints:,} waypoints replayed, between them too: tool within "
+            f"{at_most(1e3 * path.certificate.max_position_error, 3)} mm, axis within "
+            f"{at_most(math.degrees(path.certificate.max_angle), 4)} deg",
+        ),
+    ]
+    if trajectory is not None:
+        rows.append(
+            (
+                "time",
+                f"{trajectory.duration:.4g} s in {len(trajectory):,} samples, tool at up to "
+                f"{at_most(float(trajectory.tool_speed.max()), 4)} m/s",
+            )
+        )
+        rows += _limit_rows(path.robot, trajectory, limits)
+    head = f"path: one continuous motion over {count:,} cell{'s' if count > 1 else ''}."
+    return "\n".join([head, "", *(filled(f"  {name:<14}", text) for name, text in rows)])
+
+
+def _length_text(figures: PathFigures) -> str:
+    """Length, what is gone over again, and the least there could be."""
+    text = f"{figures.length:.4g} m on the surface"
+    if figures.revisited > 0.0:
+        share = f"{100 * figures.revisited_share:.2g} % of the rest"
+        text += f", {figures.revisited:.3g} m of it again ({share})"
+    if figures.least_length > 0.0:
+        text += (
+            f"; no path through all centres is shorter than {at_least(figures.least_length, 4)} m "
+            f"(ratio {figures.ratio:.3f})"
+        )
+    return text
+
+
+def _travel_text(path: CoveragePath) -> str:
+    """How far each joint travels."""
+    parts = []
+    for name, way, slides in zip(
+        path.robot.joint_names, path.figures.travel, path.robot.prismatic, strict=True
+    ):
+        parts.append(f"{name} {way:.3g} m" if slides else f"{name} {math.degrees(way):.0f} deg")
+    return ", ".join(parts)
+
+
+def _margins_text(figures: PathFigures) -> str:
+    """What the path keeps free."""
+    parts = []
+    if math.isfinite(figures.turn_margin):
+        parts.append(f"{at_least(math.degrees(figures.turn_margin), 3)} deg to a limit")
+    if math.isfinite(figures.slide_margin):
+        parts.append(f"{at_least(1e3 * figures.slide_margin, 3)} mm to a limit")
+    parts.append(f"{at_least(math.degrees(figures.cone_margin), 3)} deg of the cone")
+    parts.append(f"smallest singular value {at_least(figures.singular_value, 3)}")
+    return ", ".join(parts)
+
+
+def _limit_rows(
+    robot: Robot, trajectory: Trajectory, limits: MotionLimits | None
+) -> list[tuple[str, str]]:
+    """How much of its limits a trajectory uses, between samples too."""
+    if limits is None:
+        return []
+    most = used(robot, trajectory, limits)
+    velocity, acceleration = (100 * float(s.max()) for s in (most.velocity, most.acceleration))
+    return [
+        (
+            "limits",
+            f"at most {at_most(velocity, 3)} % of the joints' velocities, "
+            f"{at_most(acceleration, 3)} % of their accelerations, "
+            f"{at_most(100 * most.tool_speed, 3)} % of the tool's {limits.tool_speed:g} m/s, "
+            "between samples too, as quintics or cubics",
+        )
+    ]

@@ -1,0 +1,266 @@
+"""Placements as one JSON object, as text for people, and as a table of all that were tried."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from feasibility.placement import (
+    AXES,
+    PlacementMap,
+    Placements,
+    Pose,
+    Stage,
+    StationPlan,
+    Trial,
+    trial_table,
+)
+from feasibility.reports.text import filled
+from feasibility.reports.verdict import CAUSES, EVIDENCE
+from feasibility.verdict import Answer, CauseKind, Evidence
+from feasibility.version import version
+
+SENTENCES = {
+    Answer.FEASIBLE: "feasible: the surface can be covered in one motion from placements below.",
+    Answer.INFEASIBLE: "none in the region: no placement there was found to be feasible.",
+    Answer.UNDECIDED: "undecided: the search for a placement was stopped.",
+}
+PROVED = "none in the region: no placement there is feasible."
+COLUMNS = (*AXES, "stage", "in_reach", "probed", "share", "margin", "limits", "cone", "reach",
+           "verdict")  # fmt: skip
+
+
+def settings_of(pose: Pose) -> list[str]:
+    """What `--set` takes to put a case's surface there."""
+    position, rpy = (", ".join(repr(v) for v in part) for part in pose)
+    return [f"surface.position=[{position}]", f"surface.rpy_deg=[{rpy}]"]
+
+
+def as_json(
+    placements: Placements,
+    plan: StationPlan | None = None,
+    chart: PlacementMap | None = None,
+) -> dict[str, Any]:
+    """Placements as the object that `coverable place --json` prints.
+
+    Args:
+        placements: the answer.
+        plan: the fewest stations, where that was asked.
+        chart: the map, where that was asked.
+    """
+    best = placements.best
+    return {
+        "answer": str(placements.answer),
+        "evidence": str(placements.evidence),
+        "message": placements.message,
+        "region": {
+            name: list(pair) for name, pair in zip(AXES, placements.region.ranges, strict=True)
+        },
+        "placements": [_found_json(trial) for trial in placements.found],
+        "best": None if best is None else _found_json(best),
+        "share": placements.share if _searched(best) else None,
+        "cause": None if placements.cause is None else str(placements.cause),
+        "causes": dict(placements.causes),
+        "stations": None if plan is None else _stations_json(plan),
+        "map": None if chart is None else _map_json(chart),
+        "statistics": dict(placements.statistics),
+        "timing": {key: round(value, 6) for key, value in placements.timing.items()},
+        "robot": placements.robot.name,
+        "version": version(),
+    }
+
+
+def _found_json(trial: Trial) -> dict[str, Any]:
+    """One placement, without its components."""
+    table = trial_table(trial)
+    for key in ("components", "early", "fk"):
+        del table[key]
+    return table
+
+
+def _stations_json(plan: StationPlan) -> dict[str, Any]:
+    """The stations and their cells; cells as flat indices."""
+    stations = plan.stations
+    return {
+        "optimal": stations.optimal,
+        "at_least": stations.bound,
+        "left_out": stations.left_out.tolist(),
+        "stations": [
+            {
+                "position": list(trial.pose.position),
+                "rpy_deg": list(trial.pose.rpy_deg),
+                "cells": station.cells.tolist(),
+                "certified": not refusal,
+            }
+            for station, trial, refusal in zip(
+                stations.stations, plan.trials, plan.refusals, strict=True
+            )
+        ],
+    }
+
+
+def _map_json(chart: PlacementMap) -> dict[str, Any]:
+    """The map; null where no search was run."""
+    nothing = ~chart.known
+    return {
+        "axes": list(chart.axes),
+        "ticks": [ticks.tolist() for ticks in chart.ticks],
+        "held": dict(zip(AXES, chart.held.values.tolist(), strict=True)),
+        "share": _nulled(chart.share, nothing),
+        "margin": _nulled(chart.margin, nothing),
+    }
+
+
+def _nulled(values: Any, nothing: Any) -> Any:
+    """Nested lists with None where there is nothing."""
+    plain = values.astype(object)
+    plain[nothing] = None
+    return plain.tolist()
+
+
+def as_text(
+    placements: Placements,
+    case: str = "",
+    plan: StationPlan | None = None,
+) -> str:
+    """Placements for people: the answer, where the surface may stand, or what stands against it."""
+    proved = placements.answer is Answer.INFEASIBLE and placements.evidence == "proof"
+    ranges = [
+        f"{name.removesuffix('_deg')} {low:g} .. {high:g} {'deg' if name.endswith('_deg') else 'm'}"
+        for name, (low, high) in zip(AXES, placements.region.ranges, strict=True)
+        if low < high
+    ]
+    evidence = EVIDENCE[placements.evidence]
+    if placements.answer is Answer.INFEASIBLE:
+        evidence = (
+            "the reach bound, over the whole region"
+            if proved
+            else "placements spread over the region and refined; one between them may do"
+        )
+    rows = [
+        ("case", case),
+        ("region", ", ".join(ranges)),
+        ("evidence", f"{placements.evidence}: {evidence}"),
+        ("found", _found_text(placements)),
+        ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
+        ("missed", _causes_text(placements)),
+        ("share", "" if _searched(placements.best) else _unsearched_text(placements)),
+        ("check", "" if placements.found else _checked_text(placements)),
+        ("time", _time_text(placements)),
+    ]
+    lines = [PROVED if proved else SENTENCES[placements.answer], ""]
+    lines += [filled(f"  {name:<10}", text) for name, text in rows if text]
+    if placements.found:
+        lines += ["", *_table(placements.found)]
+        put = " ".join(f"--set '{setting}'" for setting in settings_of(placements.found[0].pose))
+        lines += ["", f"the best as a case: {put}"]
+    elif placements.best is not None and _searched(placements.best):
+        lines += ["", "the best of them:", *_table([placements.best])]
+    if plan is not None:
+        lines += ["", *_stations_text(plan)]
+    return "\n".join(lines)
+
+
+def _time_text(placements: Placements) -> str:
+    """Seconds of the search, and those of the whole command where it did more."""
+    whole = placements.timing.get("command_s")
+    more = "" if whole is None else f" ({whole:.2f} s with all that was asked for beside it)"
+    return f"{placements.timing['total_s']:.2f} s{more}"
+
+
+def _searched(trial: Trial | None) -> bool:
+    """Was a covering motion looked for at a placement? Else its share is unknown, not 0."""
+    return trial is not None and trial.stage in (Stage.SEARCH, Stage.CHECK)
+
+
+def _found_text(placements: Placements) -> str:
+    """What was found; of placements that were not searched no share is told."""
+    if _searched(placements.best) or placements.evidence is Evidence.PROOF:
+        return placements.message
+    number = placements.statistics
+    return (
+        f"None found in the region: of {number['drawn']} placements {number['bound']} have a "
+        f"target out of reach, {number['probe']} failed a few Newton starts, and none was searched"
+        + ("; the search was stopped before." if placements.answer is Answer.UNDECIDED else ".")
+    )
+
+
+def _unsearched_text(placements: Placements) -> str:
+    """Why it is not known what share could be covered."""
+    if placements.evidence is Evidence.PROOF:
+        return "not known: what the bound rules out is not searched"
+    return "not known: no placement was searched"
+
+
+def _checked_text(placements: Placements) -> str:
+    """What the full search says of the best placement."""
+    return next((f"of the best: {t.message}" for t in placements.trials[:1] if t.message), "")
+
+
+def _causes_text(placements: Placements) -> str:
+    """Missed cells of the best placement by cause."""
+    return "; ".join(
+        f"{count} cell{'s' if count > 1 else ''}: {CAUSES[CauseKind(kind)]}"
+        for kind, count in placements.causes.items()
+    )
+
+
+def _table(trials: Sequence[Trial]) -> list[str]:
+    """Placements as aligned lines; the margins only where there are some."""
+    heads = ["x (m)", "y (m)", "z (m)", "roll", "pitch", "yaw (deg)", "share"]
+    with_margins = any(trial.margins is not None for trial in trials)
+    rows = [heads + (["margin", "limits", "cone", "reach"] if with_margins else [])]
+    for trial in trials:
+        row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
+        row.append(f"{100.0 * trial.share:.1f} %")
+        margins = trial.margins
+        if margins is not None:
+            shares = (margins.least, margins.limits, margins.cone, margins.reach)
+            row += [f"{v:.3f}" for v in shares]
+        rows.append(row + ["-"] * (len(rows[0]) - len(row)))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return [
+        "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+        for row in rows
+    ]
+
+
+def _stations_text(plan: StationPlan) -> list[str]:
+    """The stations, one a line."""
+    stations, number = plan.stations, len(plan.stations)
+    if number == 0:
+        return ["no stations: no motion found covers any cell"]
+    plural = "" if number == 1 else "s"
+    proof = "proved fewest of what was found" if stations.optimal else f"at least {stations.bound}"
+    poses = len({trial.pose for trial in plan.trials})
+    where = f", at {poses} placement{'' if poses == 1 else 's'}" if poses < number else ""
+    lines = [f"{number} station{plural}{where} ({proof}):"]
+    for station, trial, refusal in zip(stations.stations, plan.trials, plan.refusals, strict=True):
+        lines.append(
+            f"  {len(station.cells):5d} cell{'' if len(station.cells) == 1 else 's'} at "
+            f"{', '.join(f'{v:.3f}' for v in trial.pose.position)} m, "
+            f"{', '.join(f'{v:.2f}' for v in trial.pose.rpy_deg)} deg"
+            + (f" (not certified: {refusal})" if refusal else "")
+        )
+    if len(stations.left_out):
+        lines.append(f"  {len(stations.left_out):5d} cells are covered from no placement tried")
+    return lines
+
+
+def as_csv(placements: Placements) -> str:
+    """All placements tried, the best first; m and degrees."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for trial in placements.trials:
+        margins = trial.margins
+        shares = ("", "", "") if margins is None else (margins.limits, margins.cone, margins.reach)
+        writer.writerow(
+            [
+                *trial.pose.values.tolist(), trial.stage, trial.in_reach, trial.probed,
+                trial.share, trial.margin, *shares, trial.answer or "",
+            ]
+        )  # fmt: skip
+    return stream.getvalue()

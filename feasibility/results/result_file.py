@@ -1,0 +1,265 @@
+"""Result files: a verdict with its case in one file that loads again, without pickles.
+
+The file is a zip of .npy arrays and one `meta.json` (see `feasibility.archive`). The robot and the
+cells are not stored: they are built again from the case, and compared with numbers in the file, so
+that a result is never shown on another arm or surface than the ones it was found for.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.cases import CHARTED, Case, CaseError, shown
+from feasibility.results.archive import Archive, ArchiveError, write_archive
+from feasibility.results.result_fields import Fields
+from feasibility.results.result_graph import pack_graph, ragged, unpack_graph, unpack_ragged
+from feasibility.results.result_identity import check_cells, check_robot, places, probes
+from feasibility.safe_files import FileError
+from feasibility.task import Task
+from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
+from feasibility.version import version
+
+if TYPE_CHECKING:
+    from robots import Robot
+
+FORMAT = "coverable-result"
+FORMAT_VERSION = 2  # 1 had no `places`, and the kinds `CHARTED` alone
+
+
+class ResultError(ValueError):
+    """A result file that cannot be written or read: which one, why, and what would do."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Result:
+    """What a result file holds."""
+
+    case: Case
+    verdict: Verdict
+    version: str
+    """Of coverable, when the file was written."""
+
+
+def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> Path:
+    """Write a verdict and its case to one file, whole or not at all.
+
+    Args:
+        verdict: what was said about `case`.
+        case: the question.
+        path: the file; what it held before is replaced once the new content is complete.
+
+    Raises:
+        ResultError: the file cannot be written.
+
+    Returns:
+        The path.
+    """
+    n = verdict.robot.n
+    meta = {
+        "format": FORMAT,
+        "format_version": FORMAT_VERSION,
+        "version": version(),
+        "case": {
+            "name": case.name,
+            "description": case.description,
+            "toml": case.to_toml(),
+        },
+        "robot": {
+            "name": verdict.robot.name,
+            "tool_frame": verdict.robot.tool_frame,
+            "joints": list(verdict.robot.joint_names),
+        },
+        "task": asdict(verdict.task),
+        "answer": str(verdict.answer),
+        "evidence": str(verdict.evidence),
+        "message": verdict.message,
+        "method": verdict.method,
+        "seed": int(verdict.seed),
+        "start": None if verdict.start is None else int(verdict.start),
+        "causes": [
+            {"cell": int(c.cell), "kind": str(c.kind), "proved": bool(c.proved), "detail": c.detail}
+            for c in verdict.causes
+        ],
+        "certificate": None if verdict.certificate is None else plain(asdict(verdict.certificate)),
+        "timing": plain(verdict.timing),
+        "statistics": plain(verdict.statistics),
+        "has_tree": verdict.tree is not None,
+        "has_witness": verdict.witness is not None,
+    }
+    arrays = {
+        "probes": probes(verdict.robot),
+        "places": places(verdict.cells),
+        "covered": np.flatnonzero(verdict.covered),
+        **ragged("components", verdict.components),
+        **pack_graph("graph", verdict.graph, n),
+    }
+    if verdict.tree is not None:
+        arrays |= pack_graph("tree", verdict.tree, n)
+    if verdict.witness is not None:
+        arrays |= {"witness_q": verdict.witness.q, "witness_cell": verdict.witness.cell}
+    try:
+        write_archive(Path(path), meta, arrays)
+    except FileError as error:
+        raise ResultError(str(error)) from error
+    return Path(path)
+
+
+def load_result(path: str | os.PathLike[str]) -> Result:
+    """Read a result file; nothing in it is trusted.
+
+    Args:
+        path: a file written by `save_result`.
+
+    Raises:
+        ResultError: it is no such file, is damaged, is of a newer format, or its robot or
+            surface is not to be had here as it was.
+    """
+    try:
+        archive = Archive(Path(path), "a result file of `coverable check --save`")
+        fields = Fields(archive, archive.meta(), "")
+        found = _format(fields)
+        written = fields.text("version")
+        case = _case(fields.table("case"), archive)
+        setup = case.build()
+        check_robot(setup.robot, fields.table("robot"), archive)
+        if found > 1 or case.surface.kind not in CHARTED:
+            check_cells(setup.cells, case.surface.label, archive)
+        verdict = _verdict(fields, archive, setup.robot, setup.cells)
+    except CaseError as error:
+        raise ResultError(f"{os.fspath(path)!r}: its case cannot be used: {error}") from error
+    except ArchiveError as error:
+        raise ResultError(str(error)) from error
+    return Result(case, verdict, written)
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON can hold it; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value)
+
+
+def _format(fields: Fields) -> int:
+    """The version of the format; files of something else, or of a later coverable, are refused."""
+    if fields.entries.get("format") != FORMAT:
+        raise fields.archive.error("is not a result file of `coverable check --save`")
+    found = fields.get("format_version", int, "a whole number")
+    if not 1 <= found <= FORMAT_VERSION:
+        raise fields.archive.error(
+            f"is of format {found}, written by coverable {shown(fields.entries.get('version'))}; "
+            f"coverable {version()} reads formats 1 to {FORMAT_VERSION}"
+        )
+    return int(found)
+
+
+def _case(fields: Fields, archive: Archive) -> Case:
+    """The case of the file."""
+    name = fields.text("name")
+    case = Case.from_toml(fields.text("toml"), name=f"{archive.name}: case {shown(name)}")
+    return replace(case, name=name, description=fields.text("description"))
+
+
+def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verdict:
+    """The verdict, every index and number checked."""
+    count, n = len(cells), robot.n
+    graph = unpack_graph(archive, "graph", count, n)
+    covered = np.zeros(count, dtype=bool)
+    covered[unpack_indices(archive, "covered", count)] = True
+    witness = None
+    if fields.flag("has_witness"):
+        q = archive.array("witness_q", np.float64, (None, n))
+        at = archive.array("witness_cell", np.int64, (len(q),))
+        if ((at < -1) | (at >= count)).any():
+            raise archive.error("'witness_cell' holds numbers that are no cells")
+        witness = Walk(q=q, cell=at)
+    start = None if fields.entries.get("start") is None else fields.cell("start", count)
+    return Verdict(
+        answer=fields.member("answer", Answer),
+        evidence=fields.member("evidence", Evidence),
+        message=fields.text("message"),
+        robot=robot,
+        cells=cells,
+        task=_task(fields.table("task")),
+        method=fields.text("method"),
+        seed=int(fields.get("seed", int, "a whole number")),
+        graph=graph,
+        n_edges=graph.number_of_edges(),
+        covered=covered,
+        causes=_causes(fields, count),
+        components=unpack_ragged(archive, "components", count),
+        tree=unpack_graph(archive, "tree", count, n, tree=True)
+        if fields.flag("has_tree")
+        else None,
+        start=start,
+        witness=witness,
+        certificate=_certificate(fields),
+        timing=_seconds(fields.table("timing")),
+        statistics=dict(fields.table("statistics").entries),
+    )
+
+
+def unpack_indices(archive: Archive, name: str, count: int) -> NDArray[np.int64]:
+    """An array of cells."""
+    indices = archive.array(name, np.int64, (None,))
+    if ((indices < 0) | (indices >= count)).any():
+        raise archive.error(f"{name!r} holds numbers that are no cells")
+    return indices
+
+
+def _task(fields: Fields) -> Task:
+    """The task with the tolerance that was used."""
+    tolerance = None if fields.entries.get("tolerance") is None else fields.number("tolerance")
+    try:
+        return Task(fields.number("standoff"), fields.number("cone_deg"), tolerance)
+    except ArchiveError:
+        raise
+    except ValueError as error:
+        raise fields.archive.error(f"meta.json: task.{error}") from error
+
+
+def _causes(fields: Fields, count: int) -> tuple[Cause, ...]:
+    """Why cells are missed."""
+    causes = []
+    for k, entry in enumerate(fields.get("causes", list, "an array")):
+        if not isinstance(entry, dict):
+            raise fields.archive.error(f"meta.json: causes[{k}] is {shown(entry)}, not an object")
+        row = Fields(fields.archive, entry, f"causes[{k}].")
+        cell, kind = row.cell("cell", count), row.member("kind", CauseKind)
+        causes.append(Cause(cell, kind, row.flag("proved"), row.text("detail")))
+    return tuple(causes)
+
+
+def _certificate(fields: Fields) -> Certificate | None:
+    """The certificate; an infinite margin was written as null."""
+    if fields.entries.get("certificate") is None:
+        return None
+    row = fields.table("certificate")
+    margin = row.entries.get("min_limit_margin")
+    return Certificate(
+        waypoints=row.get("waypoints", int, "a whole number"),
+        max_position_error=row.number("max_position_error"),
+        max_angle=row.number("max_angle"),
+        min_limit_margin=np.inf if margin is None else row.number("min_limit_margin"),
+    )
+
+
+def _seconds(fields: Fields) -> dict[str, float]:
+    """The timing."""
+    return {key: fields.number(key) for key in fields.entries}

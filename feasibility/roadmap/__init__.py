@@ -1,0 +1,7 @@
+"""The complete search: configurations over cells, certified motions between them, proofs,
+causes.
+"""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

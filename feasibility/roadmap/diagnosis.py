@@ -1,0 +1,338 @@
+"""Why a cell is missed: what would have to give for the arm to cover it.
+
+A cell that no component reaches is asked three relaxed questions, each by Newton from random
+starts and a descent of what is in the way:
+
+- joint limits and cone dropped: how near does the tool point get?   -> out of reach, by how much
+- only the cone dropped: how small does the angle get?               -> orientation, which angle
+- only the limits dropped: how little does a joint have to pass its limit?  -> which joint, how far
+
+Where dropping the cone or dropping the limits would each do, the cause is the cone if the tool
+point is reached inside the limits, and the detail names both. A cell that another component
+reaches is disconnected: the detail says what that component covers and what stops the motion. So is
+one where the arm turns out to fit after all, as after a search that was stopped early.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.compiled import kernel, put
+from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.expansion import CONNECT_STEPS
+from feasibility.roadmap.exploration import Explorer
+from feasibility.roadmap.graph import root_of
+from feasibility.roadmap.problem import (
+    CONE,
+    FOLD,
+    LIMIT,
+    LONG,
+    NEXT,
+    SINGULAR,
+    Problem,
+    Work,
+    look_at,
+    place,
+)
+from feasibility.roadmap.projection import LANDING_STEPS, cholesky_solve, land
+from feasibility.roadmap.search import evenly
+from feasibility.roadmap.self_motion import connect
+from feasibility.verdict import Cause, CauseKind
+from robots import Kinematics, Robot, jacobians
+
+STARTS = 16  # Newton starts of each relaxed question
+MOST_EXAMINED = 400  # cells that are examined one by one
+ENOUGH = 5  # solutions among which the least violation is looked for
+UNPROVED = "not proved: off its target, within the tolerance, the tool point may do better"
+MOST_DECIMALS = 6
+
+
+def _solve(
+    problem: Problem, work: Work, cell: int, guesses: NDArray[np.float64],
+    solutions: NDArray[np.float64],
+) -> int:  # fmt: skip
+    """Fill `solutions` with configurations of a relaxed problem over one cell; returns how many."""
+    found = 0
+    for guess in guesses:
+        solutions[found] = guess
+        if land(problem, work, cell, solutions[found], LANDING_STEPS):
+            found += 1
+            if found == len(solutions):
+                break
+    return found
+
+
+@kernel
+def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def]
+    """Smallest distance of the tool point from the target, by damped descent from guesses."""
+    n = guesses.shape[1]
+    best = np.inf
+    q, step = np.empty(n), np.empty(n)
+    square, pull = np.empty((4, 4)), np.empty(4)
+    look_at(problem, work, problem.points[cell], problem.approaches[cell])
+    for g in range(guesses.shape[0]):
+        put(q, guesses[g])
+        damping = 0.1
+        place(problem, work, NEXT, q)
+        error = work.error[1, 0]
+        for _ in range(80):
+            jacobians(
+                problem.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
+                work.point_rows, work.axis_rows,
+            )  # fmt: skip
+            trace = 0.0
+            for i in range(3):
+                pull[i] = work.target[0, i] - work.point[1, i]
+                for k in range(i + 1):
+                    total = 0.0
+                    for j in range(n):
+                        total += work.point_rows[i, j] * work.point_rows[k, j]
+                    square[i, k] = total
+                trace += square[i, i]
+            for i in range(3):
+                square[i, i] += damping * trace + 1e-12
+            if not cholesky_solve(square, pull, 3):
+                break
+            for j in range(n):
+                step[j] = q[j]
+                for k in range(3):
+                    step[j] += work.point_rows[k, j] * pull[k]
+                step[j] = min(max(step[j], problem.lower[j]), problem.upper[j])
+            place(problem, work, NEXT, step)
+            if work.error[1, 0] < error:
+                gain = error - work.error[1, 0]
+                error = work.error[1, 0]
+                put(q, step)
+                damping *= 0.5
+                if gain < 1e-7 * problem.scale:
+                    break
+            else:
+                damping = 4.0 * damping + 1e-3
+                place(problem, work, NEXT, q)
+                if damping > 1e3:
+                    break
+        best = min(best, error)
+    return best
+
+
+def _within(problem: Problem, rim: float) -> Problem:
+    """The same problem with another cone, asked at one cell's centre: nothing strays there."""
+    return problem._replace(rim=rim, inner_rim=rim)
+
+
+def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """q with each turning joint at the winding that passes its limits least."""
+    best, least = q, np.full(robot.n, np.inf)
+    for k in (-1.0, 0.0, 1.0):
+        value = q + np.where(robot.prismatic, 0.0, 2.0 * np.pi * k)
+        past = np.abs(value - np.clip(value, robot.lower, robot.upper))
+        best = np.where(past < least, value, best)
+        least = np.minimum(past, least)
+    return best
+
+
+def _nearest_to_limits(
+    explorer: Explorer, relaxed: Problem, cell: int, solutions: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n,) the configuration over a cell that passes the limits least, among what is found."""
+    robot = explorer.robot
+    ways = np.empty((64, robot.n))
+    target, approach = relaxed.points[cell], relaxed.approaches[cell]
+    best, least = solutions[0], np.inf
+    for q in solutions:
+        here = _wrapped(robot, q)
+        goal = np.clip(here, robot.lower, robot.upper)
+        connect(relaxed, explorer.work, target, approach, here, goal, ways, 0, CONNECT_STEPS)
+        here = _wrapped(robot, here)
+        past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
+        if past < least:
+            best, least = here, past
+    return best
+
+
+def _one(explorer: Explorer) -> NDArray[np.float64]:
+    """Room for one solution."""
+    return np.empty((1, explorer.robot.n))
+
+
+def _smallest_angle(explorer: Explorer, relaxed: Problem, cell: int) -> float:
+    """Smallest angle (rad) between tool axis and approach direction with the point reached."""
+    kinematics, approach = Kinematics(explorer.robot), relaxed.approaches[cell]
+    found = np.empty((STARTS, explorer.robot.n))
+    count = _solve(relaxed, explorer.work, cell, explorer.guesses(2 * STARTS), found)
+    chords = [float(np.linalg.norm(kinematics.tool(q)[1] - approach)) for q in found[:count]]
+    low, high = 0.0, 2.0 * np.arcsin(min(0.5 * min(chords, default=2.0), 1.0))
+    # Bisect on the cone: is there a configuration inside a narrower one?
+    for _ in range(9):
+        middle = 0.5 * (low + high)
+        narrowed = _within(relaxed, 2.0 * np.sin(0.5 * middle))
+        if _solve(narrowed, explorer.work, cell, explorer.guesses(STARTS), _one(explorer)):
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+def _past_limits(robot: Robot, q: NDArray[np.float64]) -> str:
+    """Which joints of q pass their limits, and how far, in words; empty when none does."""
+    limit = np.clip(q, robot.lower, robot.upper)
+    parts = []
+    for j in np.argsort(-np.abs(q - limit)):
+        if abs(q[j] - limit[j]) > 1e-6:
+            scale, unit = (1e3, "mm") if robot.prismatic[j] else (np.degrees(1.0), "deg")
+            parts.append(
+                f"{robot.joint_names[j]} would need {scale * q[j]:.1f} {unit}; "
+                f"it stops at {scale * limit[j]:.1f} {unit}"
+            )
+    return ", and ".join(parts)
+
+
+def decimals(value: float, bound: float, least: int) -> int:
+    """How many decimals, `least` or more, tell a value from the bound that it passes.
+
+    Example:
+        >>> decimals(3.02, 3.0, 1)
+        2
+    """
+    for count in range(least, MOST_DECIMALS):
+        if f"{value:.{count}f}" != f"{bound:.{count}f}":
+            return count
+    return MOST_DECIMALS
+
+
+def diagnose(explorer: Explorer, cell: int) -> Cause:
+    """Why nothing reaches a cell.
+
+    The questions are asked with the tool point at its target, as the search asks them. A proof
+    takes the whole tolerance into account; without one the detail says that this was not done.
+
+    Args:
+        explorer: a finished search.
+        cell: a cell that no component covers.
+
+    Returns:
+        The cause; proved where branch and bound or the reach bound ruled the cell out.
+    """
+    cause = _cause(explorer, cell)
+    told = cause.proved or cause.kind is CauseKind.DISCONNECTED
+    if told or not explorer.problem.rim > 0.0:
+        return cause
+    return replace(cause, detail=f"{cause.detail}; {UNPROVED}")
+
+
+def _cause(explorer: Explorer, cell: int) -> Cause:
+    """The same without a word on what was not proved."""
+    problem, robot, work = explorer.problem, explorer.robot, explorer.work
+    proved = explorer.rulings.get(cell) is Ruling.PROVED
+    n = robot.n
+    solutions = np.empty((ENOUGH, n))
+    turning = ~robot.prismatic
+    unlimited = problem._replace(
+        lower=np.where(turning, -np.inf, robot.lower), upper=np.where(turning, np.inf, robot.upper)
+    )
+    slack_cone = _within(problem, np.inf)
+    anything = _within(unlimited, np.inf)
+    guesses = explorer.guesses(STARTS)
+    if not problem.rim > 0.0 and not proved:
+        detail = "a cone of 0 degrees leaves no room that a motion could be certified in"
+        return Cause(cell, CauseKind.ORIENTATION, False, detail)
+    if not _solve(anything, work, cell, guesses, _one(explorer)):
+        distance = _nearest_point(unlimited, work, cell, guesses[:6])
+        origin = robot.model.jointPlacements[1].translation
+        away = float(np.linalg.norm(problem.points[cell] - origin))
+        reach = robot.reach
+        short, far = decimals(1e3 * distance, 0.0, 0), decimals(away, reach, 3)
+        detail = (
+            f"the tool point stays {1e3 * distance:.{short}f} mm short; the target is "
+            f"{away:.{far}f} m from the first joint, "
+        )
+        detail += (
+            f"the arm reaches at most {reach:.{far}f} m"
+            if away > reach
+            else f"inside its outer reach of {reach:.{far}f} m but where the arm cannot fold "
+            "itself to"
+        )
+        return Cause(cell, CauseKind.OUT_OF_REACH, proved, detail)
+    found = _solve(unlimited, work, cell, guesses, solutions)
+    past = ""
+    if found:
+        past = _past_limits(robot, _nearest_to_limits(explorer, unlimited, cell, solutions[:found]))
+    if _solve(slack_cone, work, cell, guesses, _one(explorer)):
+        angle = np.degrees(_smallest_angle(explorer, slack_cone, cell))
+        alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.rim, 1.0)))
+        if angle <= alpha and not proved:
+            detail = "the arm can stand there, but the search ended before it found a motion to it"
+            return Cause(cell, CauseKind.DISCONNECTED, False, detail)
+        fine = decimals(angle, alpha, 1)
+        detail = f"the tool tilts {angle:.{fine}f} deg there at best, the cone allows {alpha:g} deg"
+        if past:
+            detail += f"; or {past}"
+        return Cause(cell, CauseKind.ORIENTATION, proved, detail)
+    if not past:
+        found = _solve(anything, work, cell, guesses, solutions)
+        past = _past_limits(robot, _nearest_to_limits(explorer, anything, cell, solutions[:found]))
+        past = (
+            f"for the tool point alone {past}; inside the cone nothing was found at all"
+            if past
+            else "the target lies past the limits by no more than the tolerance"
+        )
+    return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
+
+
+def disconnected(explorer: Explorer, cell: int) -> Cause:
+    """Why the best component misses a cell that another one covers."""
+    roadmap, robot = explorer.roadmap, explorer.robot
+    roots, node = set[int](), int(roadmap.first_node[cell])
+    while node >= 0:
+        roots.add(int(root_of(roadmap, roadmap.component[node])))
+        node = int(roadmap.following[node])
+    other = max(roots, key=lambda root: int(roadmap.size[root]))
+    code, joint, stopped = (int(v) for v in roadmap.blocked[cell])
+    name = robot.joint_names[joint]
+    reason = {
+        LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
+        CONE: "the tool axis is stopped at the rim of the cone",
+        SINGULAR: "the arm is stopped at a singularity",
+        LONG: "the motion takes too many steps",
+        FOLD: "the surface is creased, or its offset folds",
+    }.get(code)
+    detail = (
+        f"reached by another motion only, which covers {int(roadmap.size[other])} of "
+        f"{len(explorer.cells)} cells"
+    )
+    if reason and stopped >= 0 and root_of(roadmap, stopped) == explorer.best:
+        detail += f"; on the way there from the covered cells {reason}"
+    return Cause(cell, CauseKind.DISCONNECTED, False, detail)
+
+
+def causes_of(explorer: Explorer) -> tuple[Cause, ...]:
+    """One cause for each cell that the best component misses, in order of index.
+
+    On fine grids `MOST_EXAMINED` cells, spread evenly, are examined one by one; the others are
+    given the cause of the nearest of them, not proved, and say so.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    reached, points = explorer.reached, explorer.problem.points
+    missed = np.flatnonzero(~explorer.covered)
+    causes: dict[int, Cause] = {}
+    for cell in missed[reached[missed]].tolist():
+        causes[cell] = disconnected(explorer, cell)
+    lost = missed[~reached[missed]]
+    examined = evenly(lost)[:MOST_EXAMINED]
+    for cell in examined.tolist():
+        explorer.tick("finding causes")
+        causes[cell] = diagnose(explorer, cell)
+    for cell in lost.tolist():
+        if cell not in causes:
+            near = int(examined[np.argmin(np.linalg.norm(points[examined] - points[cell], axis=1))])
+            proved = explorer.rulings.get(cell) is Ruling.PROVED
+            index = list(explorer.cells.unravel(near))
+            alike = causes[near].detail.removesuffix(f"; {UNPROVED}")
+            detail = f"like {index}, the nearest cell examined: {alike}"
+            causes[cell] = Cause(cell, causes[near].kind, proved, detail)
+    return tuple(causes[cell] for cell in missed.tolist())

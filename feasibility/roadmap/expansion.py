@@ -1,0 +1,351 @@
+"""How the roadmap grows: seeds, spreading over the surface, stirring a fibre, closing pairs."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.compiled import kernel, put
+from feasibility.roadmap.graph import (
+    BUDGET,
+    COMPONENTS,
+    COVERED,
+    CURSOR,
+    DONE,
+    EDGES,
+    FULL,
+    HEAD,
+    NODES,
+    TAIL,
+    WAYS,
+    Roadmap,
+    add_edge,
+    add_node,
+    root_of,
+    unite,
+)
+from feasibility.roadmap.problem import Problem, Work
+from feasibility.roadmap.projection import LANDING_STEPS, land
+from feasibility.roadmap.self_motion import SETTLE_STEPS, connect, settle
+from feasibility.roadmap.tracking import track
+
+MOST_FAILURES = np.int64(12)  # failed connections after which a pair of components is left alone
+MOST_RIVALS = 6  # other components that an arrival tries to join, the nearest first
+CONNECT_STEPS = np.int64(60)  # steps of one self-motion
+AIM_STEPS = np.int64(30)  # Newton steps that put a random point onto the fibre
+NOBODY, NONE = np.int64(-1), np.int64(0)
+FREE = np.bool_(False)  # a track without a goal
+
+
+@kernel
+def _rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyped-def]
+    """The node over `cell` nearest to q in a component that is neither `own` nor tried; or -1."""
+    best, nearest = -1, np.inf
+    node = roadmap.first_node[cell]
+    while node >= 0:
+        component = root_of(roadmap, roadmap.component[node])
+        fresh = component != own
+        for k in range(tried.shape[0]):
+            if tried[k] == component:
+                fresh = False
+        if fresh and (own < 0 or roadmap.failures[own, component] < most):
+            distance = 0.0
+            for j in range(q.shape[0]):
+                distance += ((roadmap.q[node, j] - q[j]) * roadmap.effect[node, j]) ** 2
+            if distance < nearest:
+                best, nearest = node, distance
+        node = roadmap.following[node]
+    return best
+
+
+@kernel
+def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-untyped-def]
+    """Try to reach, by self-motion from q over `cell`, a node of another component.
+
+    Waypoints go to `ways` behind the `rows` rows that are pending there.
+
+    Returns:
+        (node, rows written), or (-1, 0); (-1, -2) when `ways` is full.
+    """
+    tried = np.empty(MOST_RIVALS, dtype=np.int64)
+    here = np.empty(q.shape[0])
+    for k in range(MOST_RIVALS):
+        tried[k] = -1
+    for k in range(MOST_RIVALS):
+        node = _rival(roadmap, cell, q, own, tried, most)
+        if node < 0:
+            break
+        tried[k] = root_of(roadmap, roadmap.component[node])
+        put(here, q)
+        written, reached = connect(
+            problem, work, problem.points[cell], problem.approaches[cell], here, roadmap.q[node],
+            roadmap.ways, roadmap.counters[WAYS] + rows, CONNECT_STEPS,
+        )  # fmt: skip
+        if written == -2:
+            return -1, -2
+        if reached:
+            return node, written
+        if own >= 0:
+            roadmap.failures[own, tried[k]] += 1
+            roadmap.failures[tried[k], own] += 1
+    return -1, 0
+
+
+@kernel
+def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type: ignore[no-untyped-def]
+    """Spread every queued node into the neighbouring cells that its component does not cover yet.
+
+    Args:
+        problem: the `Problem`.
+        work: the `Work`.
+        roadmap: the `Roadmap`.
+        indptr: (N + 1,) where each cell's neighbours begin in `indices`.
+        indices: (k,) neighbours.
+        links: (k,) the course to each, see `Neighbours.links`.
+        budget: evaluations of the arm before coming back.
+
+    Returns DONE when the queue is empty, COVERED when a component covers every cell, BUDGET after
+    `budget` evaluations of the arm, FULL when an array has no room left; call again to go on.
+    """
+    count = roadmap.counters
+    cells = roadmap.first_node.shape[0]
+    q = np.empty(roadmap.q.shape[1])
+    stop = work.counts[0] + budget
+    while count[HEAD] < count[TAIL]:
+        x = roadmap.queue[count[HEAD]]
+        cell = roadmap.cell[x]
+        first, last = indptr[cell], indptr[cell + 1]
+        while first + count[CURSOR] < last:
+            if work.counts[0] > stop:
+                return BUDGET
+            if count[NODES] + 2 > roadmap.cell.shape[0] or count[EDGES] + 2 > len(roadmap.ends):
+                return FULL
+            if count[TAIL] + 2 > roadmap.queue.shape[0]:
+                return FULL
+            target = indices[first + count[CURSOR]]
+            own = root_of(roadmap, roadmap.component[x])
+            if roadmap.cover[own, target]:
+                count[CURSOR] += 1
+                continue
+            put(q, roadmap.q[x])
+            begin, end = (0.0, 1.0) if cell < target else (1.0, 0.0)
+            rows = track(
+                problem, work, links[first + count[CURSOR]], begin, end, q, q, FREE,
+                roadmap.ways, count[WAYS],
+            )  # fmt: skip
+            if rows == -2:
+                return FULL
+            count[CURSOR] += 1
+            if rows < 0:
+                former = roadmap.blocked[target, 2]
+                if former < 0 or roadmap.size[own] >= roadmap.size[root_of(roadmap, former)]:
+                    roadmap.blocked[target, 0] = work.blame[0]
+                    roadmap.blocked[target, 1] = work.blame[1]
+                    roadmap.blocked[target, 2] = own
+                continue
+            node, more = join(problem, work, roadmap, target, q, own, rows, MOST_FAILURES)
+            if more == -2:
+                count[CURSOR] -= 1
+                return FULL
+            if node >= 0:
+                add_edge(roadmap, x, node, rows + more)
+                own = unite(roadmap, own, roadmap.component[node])
+            else:
+                node = add_node(problem, work, roadmap, target, q, own)
+                add_edge(roadmap, x, node, rows)
+            if roadmap.size[own] == cells:
+                return COVERED
+        count[HEAD] += 1
+        count[CURSOR] = 0
+    return DONE
+
+
+def seed_cell(
+    problem: Problem, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
+) -> tuple[int, int]:
+    """Newton from guesses to configurations over one cell's centre; new ones become components.
+
+    Args:
+        problem: the `Problem`.
+        work: the `Work`.
+        roadmap: the `Roadmap`; needs room for a node and a component per guess, see `grown`.
+        cell: the cell.
+        guesses: (k, n) configurations inside the limits.
+
+    Returns:
+        (configurations found, new components made).
+    """
+    count = roadmap.counters
+    target, approach = problem.points[cell], problem.approaches[cell]
+    found, made = 0, 0
+    for guess in guesses:
+        if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
+            break
+        if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
+            break
+        q = guess.copy()
+        if not land(problem, work, cell, q, LANDING_STEPS):
+            continue
+        found += 1
+        settle(problem, work, target, approach, q, SETTLE_STEPS)
+        node, _ = join(problem, work, roadmap, cell, q, -1, 0, 0)
+        if node >= 0:
+            continue
+        component = int(count[COMPONENTS])
+        count[COMPONENTS] += 1
+        add_node(problem, work, roadmap, cell, q, component)
+        made += 1
+    return found, made
+
+
+@kernel
+def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
+    """Explore the fibre over one cell from the nodes there, and join the components that meet.
+
+    A rapidly exploring tree for each component: the node nearest to a random point of the fibre
+    moves towards it as far as the fibre lets it, and from there tries to reach the other
+    components. New nodes are queued, because they may reach a neighbouring cell that the old ones
+    could not.
+
+    Args:
+        problem: the `Problem`.
+        work: the `Work`.
+        roadmap: the `Roadmap`.
+        cell: the cell.
+        guesses: (k, n) random configurations.
+        most: failed connections after which two components are left alone.
+
+    Returns:
+        (status, guesses used, mergers): status is DONE, or FULL when an array has no room.
+    """
+    count = roadmap.counters
+    merged = 0
+    q = np.empty(guesses.shape[1])
+    tried = np.empty(MOST_RIVALS, dtype=np.int64)
+    aimed = np.empty(guesses.shape[1])
+    for g in range(guesses.shape[0]):
+        for k in range(MOST_RIVALS):
+            tried[k] = -1
+        for k in range(MOST_RIVALS):
+            if count[NODES] + 2 > roadmap.cell.shape[0] or count[EDGES] + 3 > len(roadmap.ends):
+                return FULL, g, merged
+            if count[TAIL] + 2 > roadmap.queue.shape[0]:
+                return FULL, g, merged
+            if k == 0:
+                # Aim at a point of the fibre: a random guess, put onto it.
+                put(aimed, guesses[g])
+                if not land(problem, work, cell, aimed, AIM_STEPS):
+                    break
+            node = _rival(roadmap, cell, aimed, NOBODY, tried, NONE)
+            if node < 0:
+                break
+            own = root_of(roadmap, roadmap.component[node])
+            tried[k] = own
+            put(q, roadmap.q[node])
+            rows, _ = connect(
+                problem, work, problem.points[cell], problem.approaches[cell], q, aimed,
+                roadmap.ways, count[WAYS], CONNECT_STEPS,
+            )  # fmt: skip
+            if rows == -2:
+                return FULL, g, merged
+            if rows < 2:
+                continue
+            new = add_node(problem, work, roadmap, cell, q, own)
+            add_edge(roadmap, node, new, rows)
+            rival, more = join(problem, work, roadmap, cell, q, own, NONE, most)
+            if more == -2:
+                return FULL, g, merged
+            if rival >= 0:
+                add_edge(roadmap, new, rival, more)
+                unite(roadmap, own, roadmap.component[rival])
+                merged += 1
+    return DONE, guesses.shape[0], merged
+
+
+@kernel
+def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
+    """The two nodes of a component over cells i and j that are nearest to each other; or -1, -1."""
+    best_x, best_y, nearest = -1, -1, np.inf
+    x = roadmap.first_node[i]
+    while x >= 0:
+        if root_of(roadmap, roadmap.component[x]) == component:
+            y = roadmap.first_node[j]
+            while y >= 0:
+                if root_of(roadmap, roadmap.component[y]) == component:
+                    distance = 0.0
+                    for k in range(roadmap.q.shape[1]):
+                        distance += (roadmap.q[x, k] - roadmap.q[y, k]) ** 2
+                    if distance < nearest:
+                        best_x, best_y, nearest = x, y, distance
+                y = roadmap.following[y]
+        x = roadmap.following[x]
+    return best_x, best_y
+
+
+@kernel
+def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # type: ignore[no-untyped-def]
+    """Try to join every neighbouring pair of cells inside one component by a motion of its own.
+
+    Args:
+        problem: the `Problem`.
+        work: the `Work`.
+        roadmap: the `Roadmap`; an edge that ends nowhere near a node makes a new one.
+        pairs: (M, 2) neighbouring cells, one for each course.
+        state: (M + 1,) 1 where the pair has an edge, 2 where none was found; the last entry is
+            the next pair to look at. Filled here.
+        component: the root component.
+        budget: evaluations of the arm before coming back.
+
+    Returns:
+        DONE, BUDGET or FULL, as `spread_out`.
+    """
+    count = roadmap.counters
+    stop = work.counts[0] + budget
+    q = np.empty(roadmap.q.shape[1])
+    arrival = np.empty(roadmap.q.shape[1])
+    m = pairs.shape[0]
+    while state[m] < m:
+        k = state[m]
+        if state[k] == 0:
+            if work.counts[0] > stop:
+                return BUDGET
+            if count[EDGES] + 2 > len(roadmap.ends) or count[NODES] + 2 > len(roadmap.cell):
+                return FULL
+            if count[TAIL] + 2 > len(roadmap.queue):
+                return FULL
+            best_x, best_y = _nearest_nodes(roadmap, pairs[k, 0], pairs[k, 1], component)
+            state[k] = 2
+            if best_x >= 0:
+                for attempt in range(4):
+                    a, b = (best_x, best_y) if attempt % 2 == 0 else (best_y, best_x)
+                    begin, end = (0.0, 1.0) if attempt % 2 == 0 else (1.0, 0.0)
+                    j = roadmap.cell[b]
+                    put(q, roadmap.q[a])
+                    rows = track(
+                        problem, work, k, begin, end, q, roadmap.q[b], attempt < 2,
+                        roadmap.ways, count[WAYS],
+                    )  # fmt: skip
+                    if rows == -2:
+                        state[k] = 0
+                        return FULL
+                    if rows < 0:
+                        continue
+                    put(arrival, q)
+                    more, reached = connect(
+                        problem, work, problem.points[j], problem.approaches[j], q, roadmap.q[b],
+                        roadmap.ways, count[WAYS] + rows, CONNECT_STEPS,
+                    )  # fmt: skip
+                    if more == -2:
+                        state[k] = 0
+                        return FULL
+                    if reached:
+                        add_edge(roadmap, a, b, rows + more)
+                        state[k] = 1
+                        break
+                    if attempt == 3:
+                        # The motion leads there all the same, to a configuration of its own.
+                        new = add_node(problem, work, roadmap, j, arrival, component)
+                        add_edge(roadmap, a, new, rows)
+                        state[k] = 1
+        state[m] += 1
+    return DONE

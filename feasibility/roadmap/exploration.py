@@ -1,0 +1,272 @@
+"""One exploration in progress: the roadmap, what it covers, and the ways to make it grow."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
+from feasibility.roadmap.bridging import NARROWEST, WIDEST, meet, nearest_pairs
+from feasibility.roadmap.expansion import close_pairs, seed_cell, spread_out, stir
+from feasibility.roadmap.graph import (
+    BEST,
+    COMPONENTS,
+    COVERED,
+    DONE,
+    FULL,
+    HEAD,
+    TAIL,
+    WAYS,
+    Roadmap,
+    empty_roadmap,
+    grown,
+    joined_pairs,
+    root_of,
+)
+from feasibility.roadmap.problem import Problem, Work, work_for
+from feasibility.search import Progress
+from robots import Robot
+from surfaces import Cells
+
+BUDGET = 8_000  # evaluations of the arm between two looks at the clock
+GUESSES = 4  # of one stir
+MEETINGS = 6  # pairs of nodes that one round tries to join between two centres
+PATIENCE = 60  # failed connections of two components that stirring allows
+
+
+class OutOfTime(Exception):
+    """The time limit has run out."""
+
+
+@dataclass
+class Explorer:
+    """The state of one search; `explore` drives it and `checking` reads it."""
+
+    robot: Robot
+    cells: Cells
+    problem: Problem
+    seed: int
+    deadline: float = np.inf
+    """`time.monotonic()` after which `OutOfTime` is raised."""
+    progress: Progress | None = None
+    work: Work = field(init=False)
+    roadmap: Roadmap = field(init=False)
+    rulings: dict[int, Ruling] = field(default_factory=dict)
+    """What branch and bound said of the cells that it was asked about."""
+    boxes: int = 0
+    rounds: int = 0
+    met: dict[tuple[int, int], int] = field(default_factory=dict)
+    """How often two nodes were tried for a meeting."""
+    pairs: NDArray[np.int64] = field(init=False)
+    """(M + 1,) state of each neighbouring pair, see `close_pairs`."""
+
+    def __post_init__(self) -> None:
+        """Set up the empty roadmap, the random numbers and the neighbours."""
+        n = self.robot.n
+        self.work = work_for(n)
+        self.roadmap = empty_roadmap(len(self.cells), n)
+        self.rng = np.random.default_rng(self.seed)
+        lower, upper = np.array(self.robot.lower), np.array(self.robot.upper)
+        wide = ~(upper - lower <= 2.0 * np.pi) & ~self.robot.prismatic
+        bounded = np.isfinite(lower) & np.isfinite(upper)
+        middle = 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0))
+        # A joint of more than a full turn is seeded over one turn: other windings are reached by
+        # motion, or not at all.
+        self.low: NDArray[np.float64] = np.where(wide, middle - np.pi, lower)
+        self.high = np.where(wide, middle + np.pi, upper)
+        # A slide is seeded as far as the cells, the arm and its other slides reach.
+        ends = np.where(bounded & self.robot.prismatic, np.maximum(abs(lower), abs(upper)), 0.0)
+        far = self.problem.scale + np.abs(self.problem.points).sum(axis=1).max(initial=0.0)
+        far = far + ends.sum() - ends
+        self.low = np.where(self.robot.prismatic, np.clip(-far, lower, upper), self.low)
+        self.high = np.where(self.robot.prismatic, np.clip(far, lower, upper), self.high)
+        self.indptr, self.indices = self.cells.neighbours
+        self.links = self.cells.neighbours.links
+        self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
+
+    # -- reading the roadmap -------------------------------------------------------------------
+
+    @property
+    def best(self) -> int:
+        """Root of the component that covers most cells (0 when there is none)."""
+        return int(root_of(self.roadmap, self.roadmap.counters[BEST]))
+
+    @property
+    def covered(self) -> NDArray[np.bool_]:
+        """(N,) cells of the best component."""
+        return self.roadmap.cover[self.best].astype(bool)
+
+    @property
+    def complete(self) -> bool:
+        """Does the best component cover every cell?"""
+        return int(self.roadmap.size[self.best]) == len(self.cells)
+
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """(N,) cells that some component covers."""
+        return self.roadmap.first_node >= 0
+
+    @property
+    def n_edges(self) -> int:
+        """Neighbouring pairs of cells that `close` found a motion for."""
+        return int((self.pairs[:-1] == 1).sum())
+
+    def roots(self) -> list[int]:
+        """Root components, the largest first."""
+        slots = np.arange(self.roadmap.counters[COMPONENTS])
+        roots = slots[self.roadmap.parent[slots] == slots]
+        return [int(r) for r in roots[np.argsort(-self.roadmap.size[roots], kind="stable")]]
+
+    def covers(self, component: int) -> NDArray[np.bool_]:
+        """(N,) cells of a component."""
+        return self.roadmap.cover[root_of(self.roadmap, component)].astype(bool)
+
+    # -- growing it ----------------------------------------------------------------------------
+
+    def tick(self, text: str) -> None:
+        """Report progress, and stop when the time is up.
+
+        Raises:
+            OutOfTime: the deadline has passed.
+        """
+        if self.progress is not None:
+            self.progress(int(self.roadmap.size[self.best]), len(self.cells), text)
+        if time.monotonic() > self.deadline:
+            raise OutOfTime
+
+    def before_next_look(self) -> int:
+        """Evaluations of the arm that compiled loops may take before they come back to `tick`."""
+        return BUDGET
+
+    def guesses(self, k: int) -> NDArray[np.float64]:
+        """(k, n) random configurations inside the limits."""
+        return self.rng.uniform(self.low, self.high, (k, self.robot.n))
+
+    def spread(self) -> bool:
+        """Spread all queued nodes; True when one component covers every cell."""
+        while True:
+            status = spread_out(
+                self.problem,
+                self.work,
+                self.roadmap,
+                self.indptr,
+                self.indices,
+                self.links,
+                self.before_next_look(),
+            )
+            if status == COVERED:
+                return True
+            if status == DONE:
+                self.roadmap.counters[HEAD] = self.roadmap.counters[TAIL] = 0
+                return False
+            if status == FULL:
+                self.roadmap = grown(self.roadmap)
+            self.tick("spreading over the surface")
+
+    def plant(self, cell: int, guesses: NDArray[np.float64]) -> int:
+        """Seed a cell and spread what is new; returns how many guesses led onto the fibre."""
+        found = 0
+        for guess in guesses:
+            self.roadmap = grown(self.roadmap)
+            hits, made = seed_cell(self.problem, self.work, self.roadmap, cell, guess[None])
+            found += hits
+            if made and self.spread():
+                break
+        return found
+
+    def stir(self, cell: int) -> None:
+        """Explore the fibre over one cell and spread what is new."""
+        guesses = self.guesses(GUESSES)
+        while True:
+            status, used, _ = stir(self.problem, self.work, self.roadmap, cell, guesses, PATIENCE)
+            guesses = guesses[used:]
+            if status != FULL:
+                break
+            self.roadmap = grown(self.roadmap)
+        self.spread()
+
+    def meet(self, one: int, other: int) -> None:
+        """Try to join two components between cell centres, where they come nearest first."""
+        tries = 0
+        nodes = nearest_pairs(self.roadmap, self.cells.pairs, one, other)
+        for x, y in nodes[: 2 * MEETINGS * (1 + self.rounds)].tolist():
+            if self.met.get((x, y), 0) > self.rounds // 4:
+                continue
+            self.met[x, y] = self.met.get((x, y), 0) + 1
+            share = float(self.rng.uniform(NARROWEST, WIDEST))
+            course = self.course(int(self.roadmap.cell[x]), int(self.roadmap.cell[y]))
+            if meet(self.problem, self.work, self.room, x, y, course, share):
+                self.spread()
+                return
+            tries += 1
+            if tries == MEETINGS:
+                return
+
+    def course(self, cell: int, other: int) -> int:
+        """The course between two neighbouring cells."""
+        entries = slice(self.indptr[cell], self.indptr[cell + 1])
+        return int(self.links[entries][self.indices[entries] == other][0])
+
+    def join(self, state: NDArray[np.int64], component: int) -> None:
+        """Look for a motion of a component between every two neighbouring cells.
+
+        Args:
+            state: (M + 1,) of each pair, see `close_pairs`; filled here.
+            component: its root.
+        """
+        pairs = self.cells.pairs
+        joined_pairs(self.roadmap, pairs, component, state)
+        while True:
+            status = close_pairs(
+                self.problem,
+                self.work,
+                self.roadmap,
+                pairs,
+                state,
+                component,
+                self.before_next_look(),
+            )
+            if status == DONE:
+                return
+            if status == FULL:
+                self.roadmap = grown(self.roadmap)
+            self.tick("joining neighbouring cells")
+
+    def room(self, rows: int) -> Roadmap:
+        """The roadmap, grown until an edge and so many rows of `ways` fit."""
+        self.roadmap = grown(self.roadmap)
+        while self.roadmap.counters[WAYS] + rows > len(self.roadmap.ways):
+            self.roadmap = grown(self.roadmap)
+        return self.roadmap
+
+    def border(self, component: int) -> NDArray[np.int64]:
+        """Cells of a component that have a neighbour which it does not cover."""
+        inside = self.covers(component)
+        owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
+        return np.unique(owners[inside[owners] & ~inside[self.indices]])
+
+    def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
+        """Branch and bound on one cell; a configuration that it finds is planted."""
+        ruling, looked = Ruling.OPEN, int(boxes.counts[1])
+        while ruling is Ruling.OPEN and boxes.counts[1] < most:
+            budget = min(most, self.before_next_look())
+            ruling, q = rule(self.problem, self.work, cell, boxes, budget)
+            self.tick("proving cells out of reach")
+        self.boxes += int(boxes.counts[1]) - looked
+        self.rulings[cell] = ruling
+        # A box that is left undecided mostly straddles the tolerance: Newton starts well from it.
+        # (A slide without ends has boxes without a middle.)
+        if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and np.isfinite(q).all():
+            self.plant(cell, wound(self.problem, q)[None])
+        return ruling
+
+
+def wound(problem: Problem, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) the same placement of the arm, joints brought inside their limits by full turns."""
+    turn = np.where(problem.chain.prismatic, 0.0, 2.0 * np.pi)
+    q = q + turn * np.ceil(np.maximum(problem.lower - q, 0.0) / (2.0 * np.pi))
+    q = q - turn * np.ceil(np.maximum(q - problem.upper, 0.0) / (2.0 * np.pi))
+    return np.clip(q, problem.lower, problem.upper)  # rounding

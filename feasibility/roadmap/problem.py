@@ -1,0 +1,277 @@
+"""What the compiled search reads: arm, surface and task as plain arrays, and its working memory."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.compiled import kernel
+from feasibility.target_curves import target_courses
+from feasibility.task import Task
+from robots import Chain, Robot, frames
+from surfaces import Cells
+
+NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
+NEWTON_RIM = 1e-4  # [1] share of the cone that it costs, by way of the turning of the normal
+ORDINARY = 0.01  # [1] share of the rim that an ordinary course may stray
+# The replay takes the place on the course that is nearest to the tool point, up to twice `near`
+# from the one aimed at, and wants the cone to hold at the tool point's own foot.
+ASIDE = 0.05  # [1] share of a piece by which that nearest place may lie off the one aimed at
+STANDING = 0.999  # [1] share of the tolerance that motions over a centre may use: courses stray too
+SPARE = 1.1  # [1] courses over a mesh may stray that much more where the replay looks than was seen
+NEAR_COSTS = 3.0  # [1], times `near` and the turning of the normal: what that may cost of the rim
+
+# Why a motion stopped: the constraint that left no room.
+NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD = 0, 1, 2, 3, 4, 5
+
+HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
+
+
+class Problem(NamedTuple):
+    """Everything the compiled search reads: arm, surface and task as plain arrays."""
+
+    chain: Chain
+    lower: NDArray[np.float64]
+    """(n,) rad or m, -inf where free."""
+    upper: NDArray[np.float64]
+    """(n,) rad or m, +inf where free."""
+    points: NDArray[np.float64]
+    """(N, 3) target points of the cell centres."""
+    approaches: NDArray[np.float64]
+    """(N, 3) approach directions of the cell centres."""
+    first_piece: NDArray[np.int64]
+    """(M + 1,) where the pieces of each course begin, see `surfaces.courses`."""
+    targets: NDArray[np.float64]
+    """(P, 4, 6) cubics of target point and approach direction along each piece."""
+    bends: NDArray[np.float64]
+    """(P, 3) largest second derivatives of both (m, 1) by t, inf where the offset folds; and how
+    fast the approach direction turns along the target surface (1/m)."""
+    strays: NDArray[np.float64]
+    """(M, 2) how far both may be from the surface's own on each course (m, 1)."""
+    rim: float
+    """2 sin(alpha / 2): the largest |a - b|; inf when every direction will do."""
+    tolerance: float
+    """m."""
+    inner_rim: float
+    """What motions over one cell's centre keep to of the rim, less what follows from `near`."""
+    turning: float
+    """1/m, how fast the approach direction turns next to the cells' centres, at most."""
+    near: float
+    """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_RIM."""
+    scale: float
+    """m, length that turns metres into comparable radians (the arm's reach)."""
+
+
+def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
+    """Gather arm, cells and task for the compiled search."""
+    tolerance = task.leeway
+    targets = task.targets(cells)
+    ways = target_courses(cells, task.standoff, tolerance)
+    chain = Chain.checked(robot)
+    rim = task.rim
+    strays = ways.strays[:, 1]
+    ordinary = float(strays[strays <= ORDINARY * rim].max(initial=0.0)) if rim < np.inf else 0.0
+    near = NEWTON * tolerance
+    if ways.standing > 0.0 and rim < np.inf:
+        near = min(near, NEWTON_RIM * rim / ways.standing)
+    return Problem(
+        chain=chain,
+        lower=np.array(robot.lower),
+        upper=np.array(robot.upper),
+        points=np.ascontiguousarray(targets.points),
+        approaches=np.ascontiguousarray(targets.approaches),
+        first_piece=ways.first,
+        targets=ways.cubics,
+        bends=np.column_stack([ways.bends, ways.turning]),
+        strays=ways.strays * (SPARE if cells.surface.grain else 1.0),
+        rim=rim,
+        tolerance=float(tolerance),
+        inner_rim=float(rim - ordinary - NEAR_COSTS * ways.standing * near),
+        turning=ways.standing,
+        near=float(near),
+        # A gantry may have no links at all: its strokes are as good as any length then.
+        scale=float(np.linalg.norm(chain.translations, axis=1).sum()) or 1.0,
+    )
+
+
+class Work(NamedTuple):
+    """Working memory of one thread; slot 0 is where the arm is, slot 1 where it tries to go."""
+
+    origins: NDArray[np.float64]
+    """(2, n, 3)"""
+    axes: NDArray[np.float64]
+    """(2, n, 3)"""
+    point: NDArray[np.float64]
+    """(2, 3)"""
+    axis: NDArray[np.float64]
+    """(2, 3)"""
+    error: NDArray[np.float64]
+    """(2, 2) distance of the tool point from its target, and |a - b|, in each slot."""
+    point_rows: NDArray[np.float64]
+    """(3, n)"""
+    axis_rows: NDArray[np.float64]
+    """(3, n)"""
+    rows: NDArray[np.float64]
+    """(4, n) constraint rows of the step."""
+    rhs: NDArray[np.float64]
+    """(4,)"""
+    wish: NDArray[np.float64]
+    """(n,) where the free directions would like to go."""
+    step: NDArray[np.float64]
+    """(n,)"""
+    held: NDArray[np.bool_]
+    """(n,) joints that the step holds at a limit."""
+    trial: NDArray[np.float64]
+    """(n,)"""
+    target: NDArray[np.float64]
+    """(2, 3) target point and approach direction."""
+    bend: NDArray[np.float64]
+    """(5,) largest second derivatives of target point and approach direction over the present
+    step, by its own parameter in 0..1, zero while the target stands still; how fast the direction
+    turns there (1/m); and how fast the target goes by that parameter at both ends (m)."""
+    room: NDArray[np.float64]
+    """(2,) what the present step keeps to of tolerance (m) and rim; 0 where it has no room."""
+    counts: NDArray[np.int64]
+    """(1,) forward kinematics evaluated."""
+    blame: NDArray[np.int64]
+    """(2,) why the last motion stopped: a code, and the joint for LIMIT."""
+
+
+def work_for(n: int) -> Work:
+    """Working memory for an arm of n joints."""
+    return Work(
+        origins=np.zeros((2, n, 3)),
+        axes=np.zeros((2, n, 3)),
+        point=np.zeros((2, 3)),
+        axis=np.zeros((2, 3)),
+        error=np.zeros((2, 2)),
+        point_rows=np.zeros((3, n)),
+        axis_rows=np.zeros((3, n)),
+        rows=np.zeros((4, n)),
+        rhs=np.zeros(4),
+        wish=np.zeros(n),
+        step=np.zeros(n),
+        held=np.zeros(n, dtype=np.bool_),
+        trial=np.zeros(n),
+        target=np.zeros((2, 3)),
+        bend=np.zeros(5),
+        room=np.zeros(2),
+        counts=np.zeros(1, dtype=np.int64),
+        blame=np.zeros(2, dtype=np.int64),
+    )
+
+
+@kernel
+def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
+    """Evaluate the arm at q into a slot, and its errors against `work.target`."""
+    frames(problem.chain, q, work.origins[slot], work.axes[slot], work.point[slot], work.axis[slot])
+    work.counts[0] += 1
+    distance = 0.0
+    chord = 0.0
+    for k in range(3):
+        distance += (work.point[slot, k] - work.target[0, k]) ** 2
+        chord += (work.axis[slot, k] - work.target[1, k]) ** 2
+    work.error[slot, 0] = np.sqrt(distance)
+    work.error[slot, 1] = np.sqrt(chord)
+
+
+@kernel
+def look_at(problem, work, target, approach):  # type: ignore[no-untyped-def]
+    """Set `work.target`, and let it stand still."""
+    work.bend[0] = 0.0
+    work.bend[1] = 0.0
+    work.bend[2] = problem.turning
+    work.bend[3] = 0.0
+    work.bend[4] = 0.0
+    work.room[0] = STANDING * problem.tolerance
+    work.room[1] = problem.inner_rim
+    for k in range(3):
+        work.target[0, k] = target[k]
+        work.target[1, k] = approach[k]
+
+
+@kernel
+def accept(work):  # type: ignore[no-untyped-def]
+    """Make the trial slot the current one."""
+    for i in range(work.axes.shape[1]):
+        for k in range(3):
+            work.origins[0, i, k] = work.origins[1, i, k]
+            work.axes[0, i, k] = work.axes[1, i, k]
+    for k in range(3):
+        work.point[0, k] = work.point[1, k]
+        work.axis[0, k] = work.axis[1, k]
+    work.error[0, 0] = work.error[1, 0]
+    work.error[0, 1] = work.error[1, 1]
+
+
+@kernel
+def aim(problem, work, course, t):  # type: ignore[no-untyped-def]
+    """Set `work.target` to the place on a course at t in [0, 1]."""
+    first = problem.first_piece[course]
+    count = problem.first_piece[course + 1] - first
+    piece = min(np.int64(t * count), count - 1)
+    s = t * count - piece
+    for k in range(3):
+        for part in range(2):
+            value = problem.targets[first + piece, 3, 3 * part + k]
+            for power in range(2, -1, -1):
+                value = value * s + problem.targets[first + piece, power, 3 * part + k]
+            work.target[part, k] = value
+
+
+@kernel
+def speed_at(problem, course, t):  # type: ignore[no-untyped-def]
+    """How far the target goes along a course for each unit of t, at t, m."""
+    first = problem.first_piece[course]
+    count = problem.first_piece[course + 1] - first
+    piece = min(np.int64(t * count), count - 1)
+    s = t * count - piece
+    square = 0.0
+    for k in range(3):
+        slope = 3.0 * s * problem.targets[first + piece, 3, k]
+        slope = problem.targets[first + piece, 1, k] + s * (
+            2.0 * problem.targets[first + piece, 2, k] + slope
+        )
+        square += slope * slope
+    return np.sqrt(square) * count
+
+
+@kernel
+def bend_between(problem, work, course, t0, t1):  # type: ignore[no-untyped-def]
+    """Set `work.bend` and `work.room` for a step along a course from t0 to t1, either way."""
+    first = problem.first_piece[course]
+    count = problem.first_piece[course + 1] - first
+    low = min(np.int64(max(min(t0, t1) * count - ASIDE, 0.0)), count - 1)
+    high = min(np.int64(max(t0, t1) * count + ASIDE), count - 1)
+    for part in range(3):
+        most = 0.0
+        for piece in range(low, high + 1):
+            most = max(most, problem.bends[first + piece, part])
+        work.bend[part] = most * (t1 - t0) ** 2 if part < 2 else most
+    work.bend[3] = speed_at(problem, course, t0) * abs(t1 - t0)
+    work.bend[4] = speed_at(problem, course, t1) * abs(t1 - t0)
+    # No more room than over the centres, and no less on an ordinary course: every configuration
+    # that works over a cell can set out from it.
+    lost = problem.rim - problem.strays[course, 1] - NEAR_COSTS * work.bend[2] * problem.near
+    work.room[0] = max(problem.tolerance - problem.strays[course, 0], 0.0)
+    work.room[1] = max(min(problem.inner_rim, lost), 0.0)
+
+
+@kernel
+def copy_slot(work):  # type: ignore[no-untyped-def]
+    """Let slot 1 start from slot 0."""
+    for i in range(work.axes.shape[1]):
+        for k in range(3):
+            work.origins[1, i, k] = work.origins[0, i, k]
+            work.axes[1, i, k] = work.axes[0, i, k]
+    chord = 0.0
+    distance = 0.0
+    for k in range(3):
+        work.point[1, k] = work.point[0, k]
+        work.axis[1, k] = work.axis[0, k]
+        distance += (work.point[0, k] - work.target[0, k]) ** 2
+        chord += (work.axis[0, k] - work.target[1, k]) ** 2
+    work.error[1, 0] = np.sqrt(distance)
+    work.error[1, 1] = np.sqrt(chord)

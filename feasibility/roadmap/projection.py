@@ -1,0 +1,198 @@
+"""Newton onto the fibre: the least step that mends tool point and cone, inside the limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feasibility.compiled import kernel
+from feasibility.roadmap.problem import CONE, LIMIT, NEXT, SINGULAR, look_at, place
+from robots import jacobians
+
+COMFORT = 0.7  # [1] share of the cone that a step keeps to where it can
+LARGEST_STEP = 0.35  # [rad] or [m], largest change of one joint in one Newton step
+POINT, POINT_AND_CONE = np.int64(3), np.int64(4)  # rows of a step
+LANDING_SLACK = 1e-6  # [1] share of the cone that a landing keeps free
+LANDING_STEPS = np.int64(60)
+
+
+@kernel
+def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
+    """Solve the m x m symmetric a y = b in place; False when a is not positive definite."""
+    for i in range(m):
+        for j in range(i + 1):
+            total = a[i, j]
+            for k in range(j):
+                total -= a[i, k] * a[j, k]
+            if i == j:
+                if not total > 0.0:
+                    return False
+                a[i, i] = np.sqrt(total)
+            else:
+                a[i, j] = total / a[j, j]
+    for i in range(m):
+        for k in range(i):
+            b[i] -= a[i, k] * b[k]
+        b[i] /= a[i, i]
+    for i in range(m - 1, -1, -1):
+        for k in range(i + 1, m):
+            b[i] -= a[k, i] * b[k]
+        b[i] /= a[i, i]
+    return True
+
+
+@kernel
+def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
+    """The step nearest to `work.wish` with rows @ step = rhs (first m rows), inside the limits.
+
+    Joints that would pass a limit are held at it, the furthest first, and the others take over.
+    Returns False when too few joints are left.
+    """
+    n = q.shape[0]
+    a = np.empty((4, 4))
+    y = np.empty(4)
+    for j in range(n):
+        work.held[j] = False
+        work.step[j] = 0.0
+    for _ in range(n + 1):
+        trace = 0.0
+        for i in range(m):
+            y[i] = work.rhs[i]
+            for j in range(n):
+                y[i] -= work.rows[i, j] * (work.step[j] if work.held[j] else work.wish[j])
+            for k in range(i + 1):
+                total = 0.0
+                for j in range(n):
+                    if not work.held[j]:
+                        total += work.rows[i, j] * work.rows[k, j]
+                a[i, k] = total
+            trace += a[i, i]
+        if not trace > 1e-14:
+            return False
+        for i in range(m):
+            a[i, i] += 1e-9 * trace  # damping: at a singularity the step stays finite
+        if not cholesky_solve(a, y, m):
+            return False
+        worst, furthest = -1, 1e-14
+        for j in range(n):
+            if work.held[j]:
+                continue
+            s = work.wish[j]
+            for i in range(m):
+                s += work.rows[i, j] * y[i]
+            work.step[j] = s
+            over = max(q[j] + s - problem.upper[j], problem.lower[j] - q[j] - s)
+            if over > furthest:
+                worst, furthest = j, over
+        if worst < 0:
+            return True
+        work.blame[1] = worst
+        limit = problem.upper[worst] if work.step[worst] > 0.0 else problem.lower[worst]
+        work.step[worst] = limit - q[worst]
+        work.held[worst] = True
+    return False
+
+
+@kernel
+def linearise(problem, work, slot, chord_goal):  # type: ignore[no-untyped-def]
+    """Linearise at a slot: three position rows, and a cone row; returns its direction's norm.
+
+    The cone row is the derivative of c = |a - b|, which is well scaled for narrow cones too.
+    """
+    jacobians(
+        problem.chain,
+        work.origins[slot],
+        work.axes[slot],
+        work.point[slot],
+        work.axis[slot],
+        work.point_rows,
+        work.axis_rows,
+    )
+    n = work.step.shape[0]
+    chord = work.error[slot, 1]
+    for k in range(3):
+        work.rhs[k] = work.target[0, k] - work.point[slot, k]
+        for j in range(n):
+            work.rows[k, j] = work.point_rows[k, j]
+    work.rhs[3] = chord_goal - chord
+    norm = 0.0
+    if chord > 1e-12:
+        for j in range(n):
+            total = 0.0
+            for k in range(3):
+                total += (work.axis[slot, k] - work.target[1, k]) * work.axis_rows[k, j]
+            work.rows[3, j] = total / chord
+            norm += work.rows[3, j] ** 2
+    else:
+        for j in range(n):
+            work.rows[3, j] = 0.0
+    return np.sqrt(norm)
+
+
+@kernel
+def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-def]
+    """Newton from q (in place) onto the fibre over `work.target`; slot 1 holds the result.
+
+    The first step starts at what slot 1 holds for q, heads for `work.wish`, and keeps well inside
+    the cone; `before` is |a - b| at the start of the step, from where it comes in gradually (inf
+    where that does not matter). Later steps are the least ones that mend the errors. Returns True
+    when the tool point is at its target to `problem.near`, and the axis inside the cone.
+    """
+    n = q.shape[0]
+    inner = work.room[1]
+    hard = inner * (1.0 - slack)
+    last = np.inf
+    for it in range(most):
+        if it > 0 and work.error[1, 0] <= problem.near and work.error[1, 1] <= inner:
+            return True
+        chord = work.error[1, 1]
+        goal = hard
+        if it == 0:
+            # Come in from the rim by a part of what the target's motion costs anyway.
+            inwards = max(0.5 * (chord - before), 150.0 * slack * before)
+            goal = min(hard, max(COMFORT * problem.rim, before - inwards))
+        norm = linearise(problem, work, NEXT, goal)
+        usable = norm > 1e-9
+        work.blame[1] = -1
+        cone = chord > goal and usable
+        done = least_step(problem, work, q, POINT_AND_CONE if cone else POINT)
+        if done and not cone and usable and chord > 0.3 * goal:
+            # Would the step leave the cone? Then do it again along the rim.
+            predicted = 0.0
+            for k in range(3):
+                change = work.axis[1, k] - work.target[1, k]
+                for j in range(n):
+                    change += work.axis_rows[k, j] * work.step[j]
+                predicted += change * change
+            if np.sqrt(predicted) > goal:
+                cone = True
+                done = least_step(problem, work, q, POINT_AND_CONE)
+        if not done and cone and goal < hard:
+            work.rhs[3] = hard - chord
+            done = least_step(problem, work, q, POINT_AND_CONE)
+        if not done:
+            work.blame[0] = LIMIT if work.blame[1] >= 0 else (CONE if cone else SINGULAR)
+            return False
+        largest = 0.0
+        for j in range(n):
+            largest = max(largest, abs(work.step[j]))
+        shrink = 1.0 if largest <= LARGEST_STEP else LARGEST_STEP / largest
+        for j in range(n):
+            q[j] = min(max(q[j] + shrink * work.step[j], problem.lower[j]), problem.upper[j])
+            work.wish[j] = 0.0
+        place(problem, work, NEXT, q)
+        error = work.error[1, 0] / problem.scale + max(work.error[1, 1] - inner, 0.0)
+        work.blame[0] = LIMIT if work.blame[1] >= 0 else (CONE if cone else SINGULAR)
+        if not error < np.inf or (it > 2 and error > 2.0 * last and most < 20):
+            return False
+        last = error
+    return work.error[1, 0] <= problem.near and work.error[1, 1] <= inner
+
+
+@kernel
+def land(problem, work, cell, q, most):  # type: ignore[no-untyped-def]
+    """Newton from a guess q (in place) onto the fibre over a cell's centre; True when it lands."""
+    look_at(problem, work, problem.points[cell], problem.approaches[cell])
+    place(problem, work, NEXT, q)
+    for j in range(q.shape[0]):
+        work.wish[j] = 0.0
+    return correct(problem, work, q, LANDING_SLACK, np.inf, most)

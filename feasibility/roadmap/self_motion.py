@@ -1,0 +1,187 @@
+"""The fibre over one cell: the configurations that work there, and motions among them.
+
+Over one target the tool point stands still, the axis stays inside the cone, and what is left free
+(roll, tilt, redundancy) moves. A motion that `connect` returns is certified as it is made, see
+`feasibility.segment`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.compiled import kernel
+from feasibility.roadmap.problem import HERE, NEXT, Problem, Work, accept, copy_slot, look_at, place
+from feasibility.roadmap.projection import LANDING_STEPS, correct, land, linearise
+from feasibility.roadmap.segment_bound import segment_holds
+
+RIM_SLACK = 1e-3  # [1] share of the cone kept free by a full step; it shrinks with the step
+NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
+SETTLE_STEPS = np.int64(40)  # of `settle`
+
+
+@kernel
+def effects(problem, work, slot, out):  # type: ignore[no-untyped-def]
+    """How much a radian (or metre) of each joint moves the tool: lever over scale, plus sine.
+
+    Joint differences weighted so measure what a motion does to the tool: the free roll of a wrist,
+    or the swing of two joints about one common axis at a singularity, costs next to nothing.
+    """
+    for j in range(out.shape[0]):
+        if problem.chain.prismatic[j]:
+            out[j] = 1.0 / problem.scale
+            continue
+        zx, zy, zz = work.axes[slot, j, 0], work.axes[slot, j, 1], work.axes[slot, j, 2]
+        x = work.point[slot, 0] - work.origins[slot, j, 0]
+        y = work.point[slot, 1] - work.origins[slot, j, 1]
+        z = work.point[slot, 2] - work.origins[slot, j, 2]
+        r = (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2
+        x, y, z = work.axis[slot, 0], work.axis[slot, 1], work.axis[slot, 2]
+        s = (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2
+        out[j] = np.sqrt(r) / problem.scale + np.sqrt(s)
+
+
+@kernel
+def wish_for_room(problem, work, q, size):  # type: ignore[no-untyped-def]
+    """Set `work.wish` to lead away from limits and from the rim of the cone (slot 1's rows)."""
+    n = q.shape[0]
+    for j in range(n):
+        half = 0.5 * (problem.upper[j] - problem.lower[j])
+        work.wish[j] = 0.0
+        if half < np.inf and half > 0.0:
+            x = (q[j] - problem.lower[j]) / half - 1.0
+            x2 = x * x
+            work.wish[j] = -size * x * x2 * x2
+    share = work.error[1, 1] / problem.rim
+    norm = 0.0
+    for j in range(n):
+        norm += work.rows[3, j] ** 2
+    if norm > 1e-12 and share < np.inf:
+        push = size * min(share, 1.0) ** 5 / np.sqrt(norm)
+        for j in range(n):
+            work.wish[j] -= push * work.rows[3, j]
+
+
+@kernel
+def connect(problem, work, target, approach, q, goal, ways, first, most):  # type: ignore[no-untyped-def]
+    """Self-motion over one target from q (in place) towards the configuration `goal`.
+
+    Each step heads for the goal and is put back onto the fibre. It gives up when the way lags:
+    a step that does not bring the goal nearer by a good part of its length means that the fibre
+    bends away, and other waypoints (other nodes) have to be tried. What was gone until then
+    stands, and is certified.
+
+    Returns:
+        (rows, reached): number of waypoints written, -2 when `ways` is full; and whether the last
+        one is `goal`.
+    """
+    n = q.shape[0]
+    look_at(problem, work, target, approach)
+    place(problem, work, HERE, q)
+    size, written = 0.3, 0
+    left = 0.0
+    for j in range(n):
+        left += (goal[j] - q[j]) ** 2
+    left = np.sqrt(left)
+    allowed = 1.5 * left + 0.1
+    for _ in range(most):
+        if left <= size:
+            for j in range(n):
+                work.trial[j] = goal[j]
+            place(problem, work, NEXT, work.trial)
+            position, cone = segment_holds(problem, work, q, work.trial)
+            if position <= 1.0 and cone <= 1.0:
+                if first + written >= ways.shape[0]:
+                    return -2, False
+                for j in range(n):
+                    q[j] = goal[j]
+                    ways[first + written, j] = q[j]
+                return written + 1, True
+            size = 0.5 * left
+        copy_slot(work)
+        for j in range(n):
+            work.trial[j] = q[j]
+            work.wish[j] = (goal[j] - q[j]) * min(1.0, size / max(left, 1e-12))
+        position, cone = np.inf, np.inf
+        remaining, moved = np.inf, 0.0
+        slack = 0.25 * RIM_SLACK * min(1.0, size / 0.1)
+        if correct(problem, work, work.trial, slack, np.inf, NEWTON_STEPS):
+            position, cone = segment_holds(problem, work, q, work.trial)
+            remaining = 0.0
+            for j in range(n):
+                remaining += (goal[j] - work.trial[j]) ** 2
+                moved += (work.trial[j] - q[j]) ** 2
+            remaining = np.sqrt(remaining)
+            moved = np.sqrt(moved)
+        if position <= 1.0 and cone <= 1.0:
+            allowed -= moved
+            if left - remaining < 0.05 * size or allowed < remaining:
+                return written, False
+            if first + written >= ways.shape[0]:
+                return -2, False
+            for j in range(n):
+                q[j] = work.trial[j]
+                ways[first + written, j] = q[j]
+            written += 1
+            left = remaining
+            accept(work)
+            size = min(0.5, 1.6 * size)
+        else:
+            size *= 0.5
+            if size < 1e-3:
+                return written, False
+    return written, False
+
+
+@kernel
+def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped-def]
+    """Self-motion over one target that makes room: away from limits and the rim (q in place)."""
+    n = q.shape[0]
+    look_at(problem, work, target, approach)
+    place(problem, work, HERE, q)
+    size = 0.3
+    for _ in range(most):
+        copy_slot(work)
+        linearise(problem, work, NEXT, problem.rim)
+        wish_for_room(problem, work, q, size)
+        for j in range(n):
+            work.trial[j] = q[j]
+        good = correct(problem, work, work.trial, RIM_SLACK, np.inf, NEWTON_STEPS)
+        if good:
+            position, cone = segment_holds(problem, work, q, work.trial)
+            good = position <= 1.0 and cone <= 1.0
+        if good:
+            moved = 0.0
+            for j in range(n):
+                moved = max(moved, abs(work.trial[j] - q[j]))
+                q[j] = work.trial[j]
+            accept(work)
+            if moved < 0.02 * size:
+                return
+        else:
+            size *= 0.5
+            if size < 0.02:
+                return
+
+
+def roomy(
+    problem: Problem, work: Work, cell: int, guesses: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Put guesses (in place) onto the fibre over a cell, and say how much room each has.
+
+    Returns:
+        (k,) the share of its half range, or of the cone, that the tightest constraint leaves free:
+        1 in the middle of everything, 0 at a limit or at the rim, -1 where Newton failed.
+    """
+    half = 0.5 * (problem.upper - problem.lower)
+    ranged = (half > 0.0) & (half < np.inf)
+    room = np.full(len(guesses), -1.0)
+    for g, q in enumerate(guesses):
+        if not land(problem, work, cell, q, LANDING_STEPS):
+            continue
+        settle(problem, work, problem.points[cell], problem.approaches[cell], q, SETTLE_STEPS)
+        off_middle = np.abs((q - problem.lower)[ranged] / half[ranged] - 1.0)
+        room[g] = min(
+            max(0.0, 1.0 - work.error[0, 1] / problem.rim), (1.0 - off_middle).min(initial=np.inf)
+        )
+    return room

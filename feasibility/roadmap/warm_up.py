@@ -1,0 +1,74 @@
+"""The kernels of the complete search, loaded ahead of the work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from feasibility.notices import compiling_notice
+
+
+class Gate(Protocol):
+    """A lock that processes share, such as `multiprocessing.Lock()`."""
+
+    def acquire(self, block: bool = True) -> bool:
+        """Take it; without `block`, only if nobody holds it."""
+
+    def release(self) -> None:
+        """Give it back."""
+
+
+def warm_up_in_turn(gate: Gate, say: Callable[[], None]) -> None:
+    """`warm_up` in one of several new processes: one of them compiles, the others load the result.
+
+    Args:
+        gate: what they share.
+        say: called in the process that compiles, if that takes long.
+    """
+    first = gate.acquire(False)
+    if not first:
+        gate.acquire()  # the first one is through
+        gate.release()
+    try:
+        with compiling_notice(say=say):
+            warm_up()
+    finally:
+        if first:
+            gate.release()
+
+
+def warm_up() -> None:
+    """Load (or compile) the kernels of the complete search, by a search over two small cells.
+
+    What it does is thrown away; afterwards timings tell of the search, not of the compiler.
+    """
+    global _warm
+    if _warm:
+        return
+    from feasibility.certification import replay
+    from feasibility.roadmap.branch_and_bound import root_box
+    from feasibility.roadmap.covering_walk import covering_walk
+    from feasibility.roadmap.diagnosis import diagnose
+    from feasibility.roadmap.exploration import Explorer
+    from feasibility.roadmap.problem import problem_of
+    from feasibility.roadmap.search import close, explore
+    from feasibility.task import Task
+    from robots import load_robot
+    from surfaces.patches import plane
+
+    robot = load_robot("puma560")
+    cells = plane(width=(0.7, 0.72), length=(0.1, 0.12), side="outside").cells(1, 2)
+    task = Task(standoff=0.01, cone_deg=60)
+    explorer = Explorer(robot, cells, problem_of(robot, cells, task), 0)
+    explore(explorer)
+    close(explorer)
+    explorer.stir(0)
+    explorer.rule(0, root_box(explorer.problem), 1)
+    diagnose(explorer, 0)
+    beyond = plane(width=(5.0, 5.02), length=(0.1, 0.12), side="outside").cells(1, 2)
+    diagnose(Explorer(robot, beyond, problem_of(robot, beyond, task), 0), 0)
+    replay(robot, cells, task, covering_walk(explorer.roadmap, explorer.best), explorer.covered)
+    _warm = True
+
+
+_warm = False

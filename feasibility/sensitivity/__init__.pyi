@@ -1,0 +1,9 @@
+from .explain import Dropped as Dropped
+from .explain import Explanation as Explanation
+from .explain import explain as explain
+from .parameters import LEAST_CONE_DEG as LEAST_CONE_DEG
+from .parameters import Kind as Kind
+from .parameters import Quantity as Quantity
+from .thresholds import Finding as Finding
+from .thresholds import Threshold as Threshold
+from .thresholds import last_true as last_true

@@ -1,0 +1,341 @@
+"""Questions about one case that cost less than a verdict, asked again and again by `explain`.
+
+- `follow`: is every cell's fibre still there, when configurations from a case nearby are put back
+  onto it? (A few evaluations a cell; a hint, not an answer.)
+- `rule`: is one cell proved uncoverable, or what covers it?
+- `attempt`: a search that starts from known configurations and stops at a number of evaluations.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification import replay
+from feasibility.roadmap import (
+    HERE,
+    Explorer,
+    OutOfTime,
+    Problem,
+    Ruling,
+    covering_walk,
+    evenly,
+    explore,
+    place,
+    problem_of,
+    roomy,
+    root_box,
+    rule,
+    work_for,
+    wound,
+)
+from feasibility.sensitivity.limited_search import Rationed, Trial, certifiable, configurations
+from feasibility.sensitivity.parameters import Kind, Quantity, Setup
+from feasibility.sensitivity.warm_start import NO_CELL, follow_all, land_guesses
+from feasibility.verdict import Answer, Evidence
+
+PLANTS = 2  # missed cells that an attempt starts from, besides the first
+SAME = 0.05  # [1], postures nearer than that are taken for one, see `Prober._posture`
+MOST_SUSPECTS = 12  # cells that are taken for hard
+AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
+LANDINGS = 16  # random configurations that are put over a cell that no known one covers
+LANDING_STEPS = np.int64(20)  # Newton steps of each
+LEAST_BOXES = 120  # for one cell, however dear proofs have turned out to be
+
+
+class Prober:
+    """Asks about one case and those nearby, and counts what that costs."""
+
+    def __init__(
+        self, setup: Setup, seed: int, deadline: float, tick: Callable[[], None] | None = None
+    ) -> None:
+        """Prepare the case as it stands; `tick` is called before each piece of work."""
+        self.setup = setup
+        self.seed = seed
+        self.deadline = deadline
+        self.problem = problem_of(*setup)
+        self._latest = ("", 0), self.problem
+        beyond = replace(setup.task, standoff=setup.task.standoff + 1.0)
+        self.outwards = beyond.targets(setup.cells).points - self.problem.points
+        """(N, 3) how the target points move with the standoff."""
+        self.work = work_for(setup.robot.n)
+        self.spent_before = 0
+        self.tick = tick or (lambda: None)
+        self.reach = setup.robot.reach
+        self.suspects: list[int] = []
+        """Cells that were hard to cover so far, the latest first."""
+        degree = np.diff(setup.cells.neighbours.indptr)
+        inner = degree >= np.median(degree)
+        self._spread = np.concatenate(
+            [evenly(np.flatnonzero(~inner)), evenly(np.flatnonzero(inner))]
+        )
+        self.allowance = 0.5
+        """Share of the boxes asked for that a proof gets: less for each that failed lately."""
+
+    @property
+    def spent(self) -> int:
+        """Evaluations of the arm so far; a box of a proof counts as one."""
+        return self.spent_before + int(self.work.counts[0])
+
+    def problem_at(self, quantity: Quantity, k: int) -> Problem:
+        """The problem with a quantity k steps from where it stands, without making it anew."""
+        if quantity.kind in (Kind.CONE, Kind.STANDOFF):
+            if self._latest[0] != (quantity.name, k):
+                self._latest = (quantity.name, k), problem_of(*quantity.applied(self.setup, k))
+            return self._latest[1]
+        problem = self.centres_at(quantity, k)
+        if quantity.kind is Kind.SHIFT:
+            targets = self.problem.targets.copy()
+            targets[:, 0, :3] += quantity.value(k) * np.array(quantity.axis)  # the constant ones
+            # Arrays that may be written to are of another type, for which kernels compile anew.
+            targets.flags.writeable = self.problem.targets.flags.writeable
+            return problem._replace(targets=targets)
+        return problem
+
+    def centres_at(self, quantity: Quantity, k: int) -> Problem:
+        """The same over the cells' centres, cheaper: what lies between them may be as it was."""
+        value = quantity.value(k) if k else quantity.given
+        if quantity.kind is Kind.CONE:
+            return self._coned(value) or self.problem_at(quantity, k)
+        if quantity.kind is Kind.STANDOFF:
+            grown = (value - quantity.given) * self.outwards
+            return self.problem._replace(points=self.problem.points + grown)
+        if quantity.kind is Kind.SHIFT:
+            shift = value * np.array(quantity.axis)
+            return self.problem._replace(points=self.problem.points + shift)
+        ends = [self.problem.lower.copy(), self.problem.upper.copy()]
+        ends[quantity.kind is Kind.UPPER][quantity.joint] = value
+        return self.problem._replace(lower=ends[0], upper=ends[1])
+
+    def _coned(self, cone: float) -> Problem | None:
+        """The problem with another cone (rad), as it is over the cells' centres, nearly."""
+        rim, former = float(2.0 * np.sin(0.5 * cone)), self.problem
+        if not (cone < np.pi and former.rim < np.inf and former.rim > 0.0):
+            return None
+        lost = (former.rim - former.inner_rim) * min(1.0, rim / former.rim)
+        return former._replace(rim=rim, inner_rim=rim - lost)
+
+    def order(self) -> NDArray[np.int64]:
+        """(N,) all cells, the hard ones first, then those at the edge of the surface."""
+        hard = np.array(self.suspects, dtype=np.int64)
+        rest = self._spread[~np.isin(self._spread, hard)]
+        return np.concatenate([hard, rest])
+
+    def suspect(self, cell: int) -> None:
+        """Look at this cell first from now on."""
+        if cell in self.suspects:
+            self.suspects.remove(cell)
+        self.suspects.insert(0, cell)
+        del self.suspects[MOST_SUSPECTS:]
+
+    def follow(self, problem: Problem, q: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
+        """Put configurations of a case nearby onto the fibres of this one.
+
+        Args:
+            problem: see `problem_at`.
+            q: (N, n) a configuration over each cell, in the case nearby.
+
+        Returns:
+            The first cell where that failed, or `NO_CELL`; and the configurations (N, n), which
+            are over their cells as far as the failure.
+        """
+        self.tick()
+        found = q.copy()
+        order = self.order()
+        landed = int(follow_all(problem, self.work, order, found))
+        if landed == len(order):
+            return NO_CELL, found
+        self.suspect(int(order[landed]))
+        return int(order[landed]), found
+
+    def rule(
+        self, problem: Problem, cell: int, boxes: int
+    ) -> tuple[Ruling, NDArray[np.float64] | None]:
+        """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
+
+        Returns:
+            The ruling; and, unless it is PROVED or OPEN, a configuration (n,) that Newton put onto
+            the cell's fibre, None where it could not.
+        """
+        self.tick()
+        if self.beyond_reach(problem)[cell]:
+            self.suspect(cell)
+            return Ruling.PROVED, None
+        boxes = max(int(self.allowance * boxes), min(boxes, LEAST_BOXES))
+        ruling, q = rule(problem, self.work, cell, root_box(problem), boxes)
+        if ruling is Ruling.OPEN:
+            self.allowance *= 0.5  # the arm's proofs are dear; one that succeeds takes this back
+            return ruling, None
+        if ruling is Ruling.PROVED:
+            self.allowance = 1.0
+            self.suspect(cell)
+            return ruling, None
+        if not np.isfinite(q).all():
+            return ruling, None
+        row = np.full((len(problem.points), len(q)), np.nan)
+        row[cell] = wound(problem, q)
+        landed = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
+        return ruling, row[cell] if landed else None
+
+    def beyond_reach(self, problem: Problem) -> NDArray[np.bool_]:
+        """(N,) cells that are further away than the arm reaches.
+
+        Turning joints reach alike in any limits; a slide that is longer than in the case as it
+        stands is not ruled out here.
+        """
+        slides = self.setup.robot.prismatic
+        longer = (problem.lower < self.problem.lower) | (problem.upper > self.problem.upper)
+        if (slides & longer).any():
+            return np.zeros(len(problem.points), dtype=bool)
+        away = problem.points - self.setup.robot.model.jointPlacements[1].translation
+        return np.linalg.norm(away, axis=1) > self.reach + problem.tolerance
+
+    def attempt(
+        self,
+        problem: Problem,
+        seeds: NDArray[np.float64],
+        most: float,
+        deep: bool,
+        needed: NDArray[np.bool_] | None = None,
+        hard: int = NO_CELL,
+    ) -> Trial:
+        """Search for a covering motion, from known configurations first.
+
+        Args:
+            problem: see `problem_at`.
+            seeds: (N, n) configurations to start from, one for each cell; NaN where there is none.
+            most: evaluations of the arm after which the search is stopped.
+            deep: go on with the whole search where the seeds do not lead to a covering motion.
+            needed: (N,) cells that are to be covered; all by default.
+            hard: a cell that random configurations are put over before the whole search begins.
+
+        Returns:
+            What it came to: feasible with a motion that is still to be `confirmed`; infeasible
+            where the whole search ended in time; undecided otherwise.
+        """
+        self.tick()
+        robot, cells, _ = self.setup
+        robot = robot.with_limits(np.column_stack([problem.lower, problem.upper]))
+        needed = np.ones(len(cells), dtype=bool) if needed is None else needed
+        explorer = Rationed(
+            robot, cells, problem, self.seed, self.deadline, lambda *_: self.tick(), most=most
+        )
+        ended = False
+        try:
+            self._plant(explorer, seeds, deep)
+            if hard != NO_CELL and not explorer.complete:
+                self._land(explorer, hard)
+            if deep and not explorer.complete:
+                explore(explorer)
+                ended = True
+        except OutOfTime:
+            pass
+        finally:
+            self.spent_before += int(explorer.work.counts[0])
+        q = configurations(explorer)
+        if needed.any() and explorer.covered[needed].all():
+            walk = covering_walk(explorer.roadmap, explorer.best)
+            detail = f"one motion of {len(walk.q)} waypoints"
+            return Trial(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
+        proved = [k for k, ruling in explorer.rulings.items() if ruling is Ruling.PROVED]
+        if proved:
+            self.suspect(proved[0])
+            detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
+            return Trial(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
+        best = f"the best motion covers {int(explorer.covered.sum())} of {len(cells)} cells"
+        if ended and certifiable(problem):
+            detail = f"the search ended without a covering motion; {best}"
+            return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
+        detail = f"not found with {int(explorer.work.counts[0])} evaluations of the arm; {best}"
+        if time.monotonic() > self.deadline:
+            detail = "unknown, because the time limit ran out"
+        return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+
+    def confirmed(
+        self, setup: Setup, trial: Trial, needed: NDArray[np.bool_] | None = None
+    ) -> Trial:
+        """A trial whose motion the replay has seen: feasible still, or undecided if it refuses."""
+        if trial.walk is None or trial.angle is not None:
+            return trial
+        self.tick()
+        robot, cells, task = setup
+        needed = np.ones(len(cells), dtype=bool) if needed is None else needed
+        replayed = replay(robot, cells, task, trial.walk, needed)
+        if replayed.accepted:
+            angle = replayed.certificate.max_angle
+            return replace(trial, detail=f"{trial.detail}, replayed", angle=angle)
+        detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
+        return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, trial.q, None)
+
+    def others(self, guesses: int, most: int) -> list[Trial]:
+        """Covering motions of the case as it stands, from postures far from each other.
+
+        Args:
+            guesses: random configurations that are put over a cell in the middle.
+            most: searches.
+        """
+        robot, cells, _ = self.setup
+        explorer = Explorer(robot, cells, self.problem, self.seed + 1)
+        tried = explorer.guesses(guesses)
+        room = roomy(self.problem, self.work, cells.middle, tried)
+        order = np.argsort(-room, kind="stable")
+        trials = []
+        tried = tried[order[room[order] >= 0.0]]
+        for k in apart(np.array([self._posture(q) for q in tried]), most):
+            seeds = np.full((len(cells), robot.n), np.nan)
+            seeds[cells.middle] = tried[k]
+            trials.append(self.attempt(self.problem, seeds, np.inf, deep=False))
+        return [trial for trial in trials if trial.found]
+
+    def _posture(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(7 n,) numbers that differ where postures do: where the joints are, most of all.
+
+        Joint values alone would tell little: turning wrists by half turns changes much of them.
+        """
+        place(self.problem, self.work, HERE, q)
+        origins, axes = self.work.origins[0] / self.problem.scale, self.work.axes[0]
+        return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
+
+    def _plant(self, explorer: Rationed, seeds: NDArray[np.float64], deep: bool) -> None:
+        """Plant seeds until one component covers every cell, hard cells first."""
+        known = np.asarray(np.isfinite(seeds).all(axis=1))
+        first = [cell for cell in self.suspects if known[cell]][:1]
+        for cell in first or np.flatnonzero(known)[:1].tolist():
+            explorer.plant(cell, np.clip(seeds[[cell]], explorer.low, explorer.high))
+        if not deep:
+            explorer.most = min(explorer.most, AGAIN * float(explorer.work.counts[0]))
+        for _ in range(PLANTS):
+            missed = np.flatnonzero(known & ~explorer.covered)
+            if explorer.complete or not len(missed):
+                return
+            cell = int(missed[len(missed) // 2])
+            known[cell] = False
+            explorer.plant(cell, seeds[[cell]])
+
+    def _land(self, explorer: Rationed, cell: int) -> None:
+        """Plant what random configurations lead to over one cell, the hardest.
+
+        Where they lead to nothing, little hope is left: half of the ration will do.
+        """
+        guesses = explorer.guesses(LANDINGS)
+        landed = np.zeros(len(guesses), dtype=bool)
+        land_guesses(explorer.problem, explorer.work, cell, guesses, LANDING_STEPS, landed)
+        if landed.any():
+            explorer.plant(cell, guesses[landed])
+        elif explorer.roadmap.first_node[cell] < 0:
+            explorer.most = 0.5 * (explorer.most + float(explorer.work.counts[0]))
+
+
+def apart(features: NDArray[np.float64], most: int) -> list[int]:
+    """Rows of (k, m) features, each as far as can be from those chosen before it; up to `most`."""
+    chosen = [0] if len(features) else []
+    while chosen and len(chosen) < min(most, len(features)):
+        away = np.linalg.norm(features[:, None] - features[chosen], axis=2).min(axis=1)
+        if away.max() < SAME:
+            break
+        chosen.append(int(away.argmax()))
+    return chosen

@@ -1,0 +1,17 @@
+from .combinations import case_of as case_of
+from .file import Study as Study
+from .file import load_study as load_study
+from .outcome import arm_of as arm_of
+from .outcome import bits_of as bits_of
+from .outcome import cells_of as cells_of
+from .outcome import cut_of as cut_of
+from .robot_comparison import Arm as Arm
+from .robot_comparison import Comparison as Comparison
+from .robot_comparison import compare as compare
+from .run import Row as Row
+from .run import StudyTask as StudyTask
+from .run import run_tasks as run_tasks
+from .store import Store as Store
+from .workers import Workers as Workers
+from .workers import WorkersError as WorkersError
+from .workers import open_workers as open_workers

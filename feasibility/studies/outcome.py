@@ -1,0 +1,220 @@
+"""What a study keeps of one verdict: plain numbers and words, worked out where the task runs."""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.cases import Case, parse_toml, read_robot, read_surface, toml_document
+from feasibility.roadmap import cause_counts
+
+if TYPE_CHECKING:
+    from feasibility.verdict import Verdict
+    from robots import Robot
+    from surfaces import Cells
+    from surfaces.meshes.cells import MeshCells
+
+ROBOTS_KEPT = 32  # arms that one worker keeps
+MESHES_KEPT = 4
+HOME = {"position": (0.0, 0.0, 0.0), "rpy_deg": (0.0, 0.0, 0.0)}
+
+Tables = dict[str, Any]
+Outcome = dict[str, Any]
+
+
+def evaluate(tables: Tables) -> Outcome:
+    """Decide one case.
+
+    The outcome depends on the tables alone, as long as the search has no time limit.
+
+    Args:
+        tables: a case, as `Case.to_tables` gives it.
+
+    Returns:
+        See `outcome_of`.
+
+    Raises:
+        CaseError: the case cannot be used.
+    """
+    from feasibility.checking import check
+
+    case = Case.from_toml(toml_document(tables))
+    verdict = check(arm_of(case), cut_of(case), case.task, case.search)
+    return outcome_of(verdict)
+
+
+def arm_of(case: Case) -> Robot:
+    """The arm of a case, loaded once.
+
+    Raises:
+        RobotError: it cannot be loaded as asked.
+    """
+    return _load(toml_document({"robot": case.robot.table()}))
+
+
+@lru_cache(maxsize=ROBOTS_KEPT)
+def _load(table: str) -> Robot:
+    """The arm of a [robot] table, written as a document."""
+    part = read_robot(parse_toml(table)["robot"], [])
+    if part is None:
+        raise ValueError("the table of a robot that was read before cannot be read again")
+    return part.build()
+
+
+def cut_of(case: Case) -> Cells:
+    """The cells of a case; a mesh is read and cut once, and then placed.
+
+    Raises:
+        BuildError: there is no such surface, or it cannot be cut so.
+    """
+    from surfaces import rotation_from_rpy
+    from surfaces.meshes.cells import MeshCells
+
+    if case.surface.kind != "mesh":
+        return case.surface.cut()
+    table = {key: value for key, value in case.surface.table().items() if value is not None}
+    file = os.stat(table["file"])
+    home = _cut(toml_document({"surface": table | HOME}), file.st_mtime_ns, file.st_size)
+    placed = replace(
+        home.surface,
+        rotation=rotation_from_rpy(*np.radians(case.surface.rpy_deg)),
+        position=np.array(case.surface.position),
+    )
+    return MeshCells.of(placed, home.labels)
+
+
+@lru_cache(maxsize=MESHES_KEPT)
+def _cut(table: str, changed: int, size: int) -> MeshCells:
+    """The cells of the mesh of a [surface] table, written as a document."""
+    part = read_surface(parse_toml(table)["surface"], [])
+    if part is None:
+        raise ValueError("the table of a surface that was read before cannot be read again")
+    return cast("MeshCells", part.cut())
+
+
+def outcome_of(verdict: Verdict) -> Outcome:
+    """A verdict as JSON values; no timing, so that the same case always has the same outcome.
+
+    Returns:
+        verdict, evidence, message: as in `Verdict`; method, seed.
+        cells, covered, share: how many, how many the best motion covers, and the share of the area
+            (0..1) that it covers.
+        edges, pairs: neighbouring cells that a motion joins, and all of them.
+        causes: missed cells by cause, the most frequent first; `examined` says how many of them
+            were looked at, the others counting as the nearest of these.
+        components: the sets of cells that single motions cover, none within another, the best
+            first, as hexadecimal bits (see `cells_of`).
+        margins: what the covering motion leaves (see `margins_of`), None unless feasible.
+        certificate: what the replay measured, None unless feasible.
+        fk: evaluations of the arm.
+    """
+    areas = np.asarray(verdict.cells.areas)
+    whole = float(areas.sum())
+    causes, examined = cause_counts(verdict)
+    return {
+        "verdict": str(verdict.answer),
+        "evidence": str(verdict.evidence),
+        "message": verdict.message,
+        "method": verdict.method,
+        "seed": int(verdict.seed),
+        "cells": len(verdict.cells),
+        "covered": verdict.n_covered,
+        "share": float(areas[verdict.covered].sum()) / whole if whole > 0.0 else 1.0,
+        "edges": int(verdict.n_edges),
+        "pairs": len(verdict.cells.pairs),
+        "causes": causes,
+        "examined": examined,
+        "components": [bits_of(cells) for cells in _largest(verdict)],
+        "margins": margins_of(verdict),
+        "certificate": _certificate(verdict),
+        "fk": int(verdict.statistics.get("fk", 0)),
+    }
+
+
+def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
+    """What the covering motion keeps from every bound; None where no motion is certified.
+
+    Returns:
+        limit_deg, limit_m: least distance of a turning (a sliding) joint from its limits, None
+            where no such joint has one.
+        cone_deg: by how much the tool axis stays inside the cone.
+        reach_m: by how much the furthest target is nearer than the arm's reach; None without one.
+    """
+    certificate, robot, task = verdict.certificate, verdict.robot, verdict.task
+    if certificate is None or not verdict.feasible or len(verdict.cells) == 0:
+        return None
+    turning = sliding = math.inf
+    if verdict.witness is not None:
+        q = verdict.witness.q
+        least = np.minimum(q - robot.lower, robot.upper - q).min(axis=0, initial=np.inf)
+        turning = math.degrees(float(least[~robot.prismatic].min(initial=np.inf)))
+        sliding = float(least[robot.prismatic].min(initial=np.inf))
+    points = task.targets(verdict.cells).points
+    first = robot.model.jointPlacements[1].translation
+    away = float(np.linalg.norm(points - first, axis=1).max())
+    return {
+        "limit_deg": finite(turning),
+        "limit_m": finite(sliding),
+        "cone_deg": task.cone_deg - math.degrees(float(certificate.max_angle)),
+        "reach_m": finite(robot.reach - away),
+    }
+
+
+def finite(value: float) -> float | None:
+    """JSON has neither inf nor NaN."""
+    return float(value) if math.isfinite(value) else None
+
+
+def _certificate(verdict: Verdict) -> dict[str, Any] | None:
+    """What the replay measured."""
+    certificate = verdict.certificate
+    if certificate is None:
+        return None
+    return {
+        "waypoints": int(certificate.waypoints),
+        "max_position_error_m": finite(certificate.max_position_error),
+        "max_angle_deg": finite(math.degrees(certificate.max_angle)),
+    }
+
+
+def _largest(verdict: Verdict) -> list[NDArray[np.bool_]]:
+    """Components (N,) that lie in no other one, in their order."""
+    kept: list[NDArray[np.bool_]] = []
+    for cells in sorted(verdict.components, key=len, reverse=True):
+        cover = np.zeros(len(verdict.cells), dtype=bool)
+        cover[cells] = True
+        if len(cells) and not any((cover <= other).all() for other in kept):
+            kept.append(cover)
+    return kept
+
+
+def bits_of(cover: NDArray[np.bool_]) -> str:
+    """Cells (N,) as hexadecimal bits, the first cell first.
+
+    Example:
+        >>> bits_of(np.array([True, False, False, True, True]))
+        '98'
+    """
+    return np.packbits(cover).tobytes().hex()
+
+
+def cells_of(bits: str, n: int) -> NDArray[np.bool_]:
+    """(n,) the cells that `bits_of` wrote.
+
+    Example:
+        >>> cells_of("98", 5).tolist()
+        [True, False, False, True, True]
+
+    Raises:
+        ValueError: they are no bits of n cells.
+    """
+    data = np.frombuffer(bytes.fromhex(bits), dtype=np.uint8)
+    if len(data) != (n + 7) // 8:
+        raise ValueError(f"{len(data)} bytes do not hold the bits of {n} cells")
+    return np.unpackbits(data, count=n).astype(bool)

@@ -1,0 +1,254 @@
+"""Arms compared: the same surface and task, one arm after the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from feasibility.cases import Case, CaseError, Fault, as_read, toml_document
+from feasibility.search import Progress
+from feasibility.sensitivity import LEAST_CONE_DEG
+from feasibility.studies.outcome import arm_of, cut_of, finite, outcome_of
+from feasibility.studies.run import StudyTask, run_tasks
+
+if TYPE_CHECKING:
+    from feasibility.studies.store import Store
+    from feasibility.studies.workers import Workers
+    from feasibility.task import Task
+    from robots import Robot
+    from surfaces import Cells
+
+MOST_DIVIDED = 400  # cells of a surface that is divided: a division takes several verdicts
+CONE_STEP_DEG = 0.5  # resolution of the critical cone
+
+Tables = dict[str, Any]
+
+UNKNOWN: Tables = {
+    "share": 0.0,
+    "covered": 0,
+    "cells": 0,
+    "cause": None,
+    "patches": None,
+    "patches_share": None,
+    "critical_cone_deg": None,
+    "margins": None,
+}  # of an arm whose task failed
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """What one arm can do about the surface."""
+
+    robot: str
+    joints: int
+    reach_m: float | None
+    """Upper bound on the distance of the tool from the first joint; None where there is none."""
+    verdict: str
+    """'feasible', 'infeasible' or 'undecided'."""
+    evidence: str
+    message: str
+    share: float
+    """Of the area, 0..1, that the best single motion covers."""
+    covered: int
+    """Cells of it."""
+    cells: int
+    cause: str | None
+    """The most frequent cause of missed cells; None without any."""
+    patches: int | None
+    """Continuous motions that together cover all that can be covered; None where not asked for."""
+    patches_share: float | None
+    """Of the area, 0..1, that these cover together."""
+    critical_cone_deg: float | None
+    """The smallest cone with a covering motion, to `CONE_STEP_DEG`; narrower ones than
+    `LEAST_CONE_DEG` are not looked at. None where there is none, or it was not asked for."""
+    margins: dict[str, float | None] | None
+    """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m."""
+    seconds: float
+    """Time that the work took."""
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Arms in the order in which they were named."""
+
+    case: str
+    arms: tuple[Arm, ...]
+    divided: bool
+    """Were patches counted?"""
+    critical: bool
+    """Were critical cones looked for?"""
+
+    @property
+    def ranked(self) -> tuple[Arm, ...]:
+        """The best first: feasible ones by their margin to the limits, the others by share."""
+        return tuple(sorted(self.arms, key=_merit))
+
+
+def _merit(arm: Arm) -> tuple[bool, float, float]:
+    """Smaller is better; the order of equal ones stays."""
+    margin = (arm.margins or {}).get("limit_deg")
+    room = 360.0 if margin is None else margin
+    return arm.verdict != "feasible", -arm.share, -room if arm.margins else 0.0
+
+
+def compare(
+    case: Case,
+    robots: Sequence[str],
+    workers: Workers,
+    *,
+    divide: bool = True,
+    critical: bool = False,
+    store: Store | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Ask the same of several arms, each mounted where the case's arm is.
+
+    Args:
+        case: surface, task and search; its own arm keeps its limits and tool if it is among the
+            robots.
+        robots: names of the library.
+        workers: where to, see `feasibility.study_workers.open_workers`.
+        divide: count the patches that an arm needs where one motion will not do, on surfaces of
+            up to `MOST_DIVIDED` cells.
+        critical: look for the smallest cone that each arm can do with; some ten verdicts each.
+        store: where finished arms are kept.
+        progress: called as progress(done, total, text); what it raises ends the work.
+
+    Raises:
+        CaseError: an arm cannot be loaded, or is named twice; all of them together.
+
+    Example:
+        >>> from feasibility.cases import load_case
+        >>> from feasibility.studies import open_workers
+        >>> with open_workers(0) as workers:
+        ...     found = compare(load_case("paper/4a"), ["puma560", "ur5"], workers, divide=False)
+        >>> [(arm.robot, arm.verdict) for arm in found.ranked]
+        [('puma560', 'feasible'), ('ur5', 'infeasible')]
+    """
+    tasks = []
+    for tables in _tables_of(case, robots):
+        asked = {"divide": divide, "critical": critical}
+        parameters = {"robot": tables["robot"]["name"]}
+        tasks.append(StudyTask({**tables, "compare": asked}, parameters, assess))
+    rows = run_tasks(tasks, workers, store, progress)
+    arms = []
+    for task, row in zip(tasks, rows, strict=True):
+        robot = arm_of(_case_of(task.tables))
+        known = {"robot": robot.name, "joints": robot.n, "reach_m": finite(robot.reach)}
+        arms.append(Arm(**{**UNKNOWN, **known, **row.result}, seconds=row.seconds))
+    return Comparison(case.name, tuple(arms), divide, critical)
+
+
+def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
+    """The case with each of the arms, checked.
+
+    Raises:
+        CaseError: see `compare`.
+    """
+    base = {title: as_read(table) for title, table in case.to_tables().items()}
+    if case.search.method != "complete":
+        base["search"] = {"seed": case.search.seed}
+    faults, made = [], []
+    if not robots:
+        faults.append(Fault("--robots", "is empty; expected names such as ur5,panda,puma560"))
+    for k, name in enumerate(robots):
+        place = f"--robots[{k}]"
+        if name in robots[:k]:
+            faults.append(Fault(place, f"{name!r} is named twice"))
+            continue
+        own = base["robot"].get("name") == name
+        tables = base if own else {**base, "robot": {"name": name}}
+        try:
+            case_here = Case.from_toml(toml_document(tables))
+            arm_of(case_here)
+        except CaseError as error:
+            faults += [Fault(f"{place}: {key}", text) for key, text in error.faults]
+        except ValueError as error:  # RobotError
+            faults.append(Fault(place, str(error)))
+        else:
+            made.append({**tables, "robot": {**tables["robot"], "name": name}})
+    if faults:
+        raise CaseError(case.name, faults)
+    return made
+
+
+def _case_of(tables: Tables) -> Case:
+    """The case of a task."""
+    return Case.from_toml(toml_document({k: v for k, v in tables.items() if k != "compare"}))
+
+
+def assess(tables: Tables) -> dict[str, Any]:
+    """In a worker: all that is said about one arm, but for the time that it took.
+
+    Args:
+        tables: of a case, and `compare`: what is asked for.
+    """
+    from feasibility.checking import check
+
+    asked = tables["compare"]
+    case = _case_of(tables)
+    robot, cells = arm_of(case), cut_of(case)
+    verdict = check(robot, cells, case.task, case.search)
+    outcome = outcome_of(verdict)
+    patches, patches_share = (1, 1.0) if verdict.feasible else (None, None)
+    if asked["divide"] and not verdict.feasible and 0 < len(cells) <= MOST_DIVIDED:
+        patches, patches_share = _patches(robot, cells, case)
+    cone = None
+    if asked["critical"]:
+        cone = critical_cone(robot, cells, case, verdict.feasible)
+    kept = ("verdict", "evidence", "message", "share", "covered", "cells", "margins")
+    return {
+        "robot": robot.name,
+        "joints": robot.n,
+        "reach_m": finite(robot.reach),
+        **{key: outcome[key] for key in kept},
+        "cause": next(iter(outcome["causes"]), None),
+        "patches": patches if asked["divide"] else None,
+        "patches_share": patches_share if asked["divide"] else None,
+        "critical_cone_deg": cone,
+    }
+
+
+def _patches(robot: Robot, cells: Cells, case: Case) -> tuple[int, float]:
+    """How many motions there have to be, and the share of the area that they cover."""
+    from feasibility.division import divide
+
+    division = divide(robot, cells, case.task, case.search)
+    accepted = [patch for patch in division.patches if patch.accepted]
+    whole = float(cells.areas.sum())
+    return len(accepted), sum(patch.area for patch in accepted) / whole if whole > 0.0 else 1.0
+
+
+def critical_cone(robot: Robot, cells: Cells, case: Case, feasible: bool) -> float | None:
+    """The smallest cone, deg, with which a covering motion is found; None where none is.
+
+    A wider cone allows all that a narrower one does, so halving finds it. What a search cannot
+    decide counts as not found.
+
+    Args:
+        robot: the arm.
+        cells: of the surface.
+        case: its task and search.
+        feasible: is the case, with its own cone?
+    """
+    from feasibility.checking import check
+    from feasibility.sensitivity import last_true
+
+    def holds(step: int) -> bool:
+        task: Task = replace(case.task, cone_deg=step * CONE_STEP_DEG)
+        return check(robot, cells, task, case.search).feasible
+
+    # Steps below the first one looked at count as failed; the case's own cone may lie between two.
+    below = round(LEAST_CONE_DEG / CONE_STEP_DEG) - 1
+    if feasible:
+        good = math.ceil(case.task.cone_deg / CONE_STEP_DEG)
+        if good <= below + 1:
+            return case.task.cone_deg
+        return min(last_true(holds, good, below) * CONE_STEP_DEG, case.task.cone_deg)
+    widest = round(180.0 / CONE_STEP_DEG)
+    failed = max(below, math.floor(case.task.cone_deg / CONE_STEP_DEG))
+    if failed >= widest or not holds(widest):
+        return None
+    return last_true(holds, widest, failed) * CONE_STEP_DEG

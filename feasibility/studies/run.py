@@ -1,0 +1,192 @@
+"""A study: many cases decided, kept as they are, and told apart by what they are."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+from feasibility.search import Progress
+from feasibility.studies.outcome import evaluate
+from feasibility.studies.scheduling import Answer, Tables, Work, deal
+from feasibility.studies.store import Record, Status, Store
+from feasibility.studies.workers import Workers
+from feasibility.version import version
+
+KEEP_S = 0.5  # [s] for which finished tasks may wait to be written together
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StudyTask:
+    """One task of a study.
+
+    Example:
+        >>> from feasibility.cases import load_case
+        >>> tables = load_case("paper/4a").to_tables()
+        >>> StudyTask(tables, {}).key == StudyTask(dict(tables), {"note": "same"}).key
+        True
+    """
+
+    tables: Tables
+    """What the work is told: JSON values; for verdicts a case, as `Case.to_tables` gives it."""
+    parameters: Mapping[str, Any]
+    """What varies in the study, for its table: JSON values."""
+    work: Work = evaluate
+    """What is done with the tables, in a worker: a function of a module, returning JSON values."""
+    key: str = field(init=False)
+    """The same for the same work on the same tables, files and version of the program."""
+
+    def __post_init__(self) -> None:
+        """Work out the key."""
+        says = {
+            "work": f"{self.work.__module__}.{self.work.__qualname__}",
+            "version": version(),
+            "tables": self.tables,
+            "files": [digest(*file) for file in _files_of(self.tables)],
+        }
+        text = json.dumps(says, sort_keys=True, allow_nan=False, separators=(",", ":"))
+        object.__setattr__(self, "key", hashlib.sha256(text.encode()).hexdigest())
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Row:
+    """What came of one task."""
+
+    parameters: Mapping[str, Any]
+    status: Status
+    result: Mapping[str, Any]
+    """What the work returned; where it failed, an undecided verdict whose message says why."""
+    seconds: float
+    """Time that the work took."""
+
+
+def run_tasks(
+    tasks: Sequence[StudyTask],
+    workers: Workers,
+    store: Store | None = None,
+    progress: Progress | None = None,
+) -> tuple[Row, ...]:
+    """Do all tasks that the store does not hold yet.
+
+    Whatever ends the run, what was finished half a second before is in the store; run again to
+    continue. Tasks with the same key are done once, those that failed are tried again.
+
+    Args:
+        tasks: in the order of the table.
+        workers: where to, see `feasibility.study_workers.open_workers`.
+        store: where finished tasks are kept.
+        progress: called as progress(done, total, text) several times a second; what it raises
+            ends the run.
+
+    Returns:
+        One row for each task, in the same order.
+
+    Raises:
+        StoreError: the store cannot be read or written.
+        WorkersError: the workers were lost for good.
+
+    Example:
+        >>> from feasibility.cases import load_case
+        >>> from feasibility.studies import open_workers
+        >>> tables = load_case("paper/4a").to_tables()
+        >>> with open_workers(0) as workers:
+        ...     (row,) = run_tasks([StudyTask(tables, {})], workers)
+        >>> row.result["verdict"], row.result["covered"]
+        ('feasible', 90)
+    """
+    kept = {} if store is None else store.find(task.key for task in tasks)
+    found = {key: record for key, record in kept.items() if record.status == "done"}
+    missing = list({task.key: task for task in tasks if task.key not in found}.values())
+    keeper = _Keeper(missing, store, found, progress, total=len(found) + len(missing))
+    try:
+        for work in dict.fromkeys(task.work for task in missing):
+            part = [k for k, task in enumerate(missing) if task.work is work]
+            keeper.begin(part)
+            deal(work, [missing[k].tables for k in part], workers, keeper.receive)
+    finally:
+        keeper.flush()
+    rows = [(task, found[task.key]) for task in tasks]
+    return tuple(Row(task.parameters, r.status, r.result, r.seconds) for task, r in rows)
+
+
+class _Keeper:
+    """Takes answers in, and writes them some times a second."""
+
+    def __init__(
+        self,
+        tasks: Sequence[StudyTask],
+        store: Store | None,
+        found: dict[str, Record],
+        progress: Progress | None,
+        total: int,
+    ) -> None:
+        """Answers to `tasks` go to the store and into `found`."""
+        self.tasks, self.store, self.found = tasks, store, found
+        self.progress, self.total = progress, total
+        self.waiting: list[Record] = []
+        self.written = 0.0
+        self.part: Sequence[int] = ()
+
+    def begin(self, part: Sequence[int]) -> None:
+        """The next answers are to these tasks."""
+        self.part = part
+
+    def receive(self, answers: list[Answer]) -> None:
+        """Take in what has come."""
+        for answer in answers:
+            record = _record(self.tasks[self.part[answer.index]], answer)
+            self.waiting.append(record)
+            self.found[record.key] = record
+        now = time.monotonic()
+        if self.waiting and now - self.written > KEEP_S:
+            self.flush()
+        if self.progress is not None:
+            self.progress(len(self.found), self.total, "")
+
+    def flush(self) -> None:
+        """Write what has not been written."""
+        waiting, self.waiting = self.waiting, []
+        self.written = time.monotonic()
+        if self.store is not None and waiting:
+            self.store.keep(waiting)
+
+
+def _record(task: StudyTask, answer: Answer) -> Record:
+    """An answer as the store keeps it."""
+    if answer.result is not None:
+        return Record(task.key, task.parameters, "done", answer.result, answer.seconds)
+    result = {"verdict": "undecided", "evidence": "budget", "message": answer.failure}
+    return Record(task.key, task.parameters, "failed", result, answer.seconds)
+
+
+def _files_of(tables: Mapping[str, Any]) -> list[tuple[str, float, int]]:
+    """The files that a case names, with time and size, by which a change is noticed."""
+    robot, surface = (tables.get(title) for title in ("robot", "surface"))
+    parts = [robot, surface]
+    if isinstance(surface, Mapping) and isinstance(surface.get("pieces"), Sequence):
+        parts += surface["pieces"]
+    found = []
+    for part in parts:
+        name = part.get("urdf", part.get("file")) if isinstance(part, Mapping) else None
+        if isinstance(name, str):
+            try:
+                status = os.stat(name)
+            except (OSError, ValueError):
+                continue  # the task will say so
+            found.append((name, status.st_mtime, status.st_size))
+    return found
+
+
+@lru_cache(maxsize=256)
+def digest(path: str, changed: float, size: int) -> str:
+    """What a file holds, in short; asked again when its time or size has changed."""
+    try:
+        with open(path, "rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError:
+        return ""  # the task will say so

@@ -1,0 +1,228 @@
+"""Where the tasks of a study run: this process, processes of this machine, or a Dask cluster.
+
+All of them are a `concurrent.futures.Executor` with what is needed around it: how wide it is, how
+the loss of a worker shows, and how it is made ready again.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
+from typing import Any, Protocol
+
+from feasibility.notices import compiling_notice, notify
+from feasibility.roadmap import Gate, warm_up, warm_up_in_turn
+
+ATTEMPTS = 3  # to start worker processes anew
+LOST = "the connection to the workers was lost; what was finished is kept, run again to continue"
+
+
+class WorkersError(ValueError):
+    """Workers that cannot be had, or were lost for good; what would do."""
+
+
+class Workers(Protocol):
+    """Where tasks run."""
+
+    losses: tuple[type[BaseException], ...]
+    """What a future raises when a worker died on it."""
+    patience: int
+    """How often a task may lose the worker that it has for itself before it is given up."""
+    shared_fate: bool
+    """Does the death of one worker end all that is in flight?"""
+
+    @property
+    def width(self) -> int:
+        """How many tasks run at the same time."""
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Run something; arguments and result are pickled on their way."""
+
+    def renew(self) -> None:
+        """Make ready again after a loss."""
+
+    def close(self, at_once: bool) -> None:
+        """End the workers: after what they are doing, or at once."""
+
+
+@contextmanager
+def open_workers(
+    count: int | None = None, address: str | None = None, *, warm: bool = True
+) -> Iterator[Workers]:
+    """Workers for `feasibility.study.run_tasks`, until the block ends.
+
+    Args:
+        count: processes on this machine; None for one on each processor, 0 for none: then tasks
+            run in this process.
+        address: of a Dask scheduler, such as "tcp://127.0.0.1:8786", instead of processes.
+        warm: load the kernels of the search before the first task. Where they have to be compiled,
+            one process does it while the others wait, and a line on stderr says so.
+
+    Raises:
+        WorkersError: there is no such scheduler, both are given, or the count is negative.
+
+    Example:
+        >>> with open_workers(0) as workers:
+        ...     workers.submit(max, 3, 5).result()
+        5
+    """
+    if address is not None and count is not None:
+        raise WorkersError("give a number of worker processes or the address of Dask, not both")
+    if count is not None and count < 0:
+        raise WorkersError(f"the number of workers must be >= 0, got {count}")
+    workers: Workers
+    if address is not None:
+        from feasibility.studies.dask_workers import DaskWorkers
+
+        workers = DaskWorkers(address, warm)
+    elif count == 0:
+        workers = Here(warm)
+    else:
+        workers = Processes(processors() if count is None else count, warm)
+    try:
+        yield workers
+    except BaseException:
+        workers.close(at_once=True)
+        raise
+    workers.close(at_once=False)
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+class Here:
+    """This process itself: one task after the other."""
+
+    losses: tuple[type[BaseException], ...] = ()
+    patience = 1
+    shared_fate = False
+    width = 1
+
+    def __init__(self, warm: bool) -> None:
+        """Nothing is done yet; see `open_workers`."""
+        self._warm = warm
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Run it now."""
+        if self._warm:
+            with compiling_notice():
+                warm_up()
+            self._warm = False
+        future: Future[Any] = Future()
+        try:
+            future.set_result(work(*arguments))
+        except Exception as error:  # noqa: BLE001 - it is the future's, as in every executor
+            future.set_exception(error)
+        return future
+
+    def renew(self) -> None:
+        """Nothing can be lost."""
+
+    def close(self, at_once: bool) -> None:
+        """Nothing is open."""
+
+
+class Processes:
+    """Processes of this machine that have the kernels loaded.
+
+    They are started afresh (spawn): a forked one would share locks of Pinocchio and numba. A pipe
+    is their leash: when this process dies, however it dies, its end closes and they end too.
+    """
+
+    losses: tuple[type[BaseException], ...] = (BrokenExecutor,)
+    patience = 3
+    shared_fate = True
+
+    def __init__(self, count: int, warm: bool) -> None:
+        """Start `count` processes, as they are needed; see `open_workers`."""
+        self.width, self._warm = count, warm
+        self._start()
+
+    def _start(self) -> None:
+        """Make the pool."""
+        from concurrent.futures import ProcessPoolExecutor
+        from multiprocessing import get_context
+
+        context = get_context("spawn")
+        self._end, self._leash = context.Pipe(duplex=False)
+        heard, self._word = context.Pipe(duplex=False)
+        self._ear = threading.Thread(target=_pass_on, args=[heard], daemon=True)
+        self._ear.start()
+        gate = context.Lock() if self._warm else None
+        self._pool: Executor = ProcessPoolExecutor(
+            self.width,
+            mp_context=context,
+            initializer=_begin,
+            initargs=(self._end, self._word, gate),
+        )
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Run it in one of the processes."""
+        # A process that is started here must never see a Ctrl-C, which a terminal sends to all:
+        # it takes over what is blocked.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return self._pool.submit(work, *arguments)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def renew(self) -> None:
+        """Start new processes, and wait for one of them.
+
+        Raises:
+            WorkersError: they die before they do anything.
+        """
+        for _ in range(ATTEMPTS):
+            self.close(at_once=True)
+            self._start()
+            try:
+                self.submit(os.getpid).result()
+                return
+            except BrokenExecutor:
+                continue
+        raise WorkersError(
+            f"the worker processes died while starting, {ATTEMPTS} times; what was finished is "
+            "kept: see that there is enough memory, or use fewer workers"
+        )
+
+    def close(self, at_once: bool) -> None:
+        """End the processes."""
+        if at_once:
+            self._leash.close()
+        self._pool.shutdown(wait=True, cancel_futures=True)
+        self._leash.close()
+        self._end.close()
+        self._word.close()
+        self._ear.join()
+
+
+def _pass_on(heard: Connection) -> None:
+    """Say that a worker compiles, when it sends word; until nobody is left who could."""
+    with heard:
+        try:
+            heard.recv_bytes()
+        except (EOFError, OSError):
+            return
+    notify()
+
+
+def _begin(leash: Connection, word: Connection, gate: Gate | None) -> None:
+    """In a new worker: watch the leash; load the kernels, one worker first, if there is a gate."""
+
+    def watch() -> None:
+        leash.poll(None)  # nothing is ever sent: it returns when the other end is closed
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+    if gate is not None:
+        warm_up_in_turn(gate, lambda: word.send_bytes(b"!"))
+    word.close()

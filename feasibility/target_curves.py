@@ -1,0 +1,220 @@
+"""The task applied to courses: where tool point and axis have to be between cell centres."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.task import Task
+from surfaces import Cells
+from surfaces.meshes import MeshSurface
+
+TELLING = 0.03  # [1] a course whose normal strays no further knows how the surface bends
+ASIDE = 1.1  # [1] the normal may turn that much faster between the places looked at
+FEW, MANY = 3, 32  # places on a course over a mesh; and on one over a crease, or off its facets by
+OFF = 0.05  # [1] of the tolerance
+
+
+class TargetCourses(NamedTuple):
+    """Target point f + h n and approach direction -+n along the M courses of some cells."""
+
+    first: NDArray[np.int64]
+    """(M + 1,) where each course's pieces begin, and the end of the last."""
+    cubics: NDArray[np.float64]
+    """(P, 4, 6) coefficients of 1, s, s^2, s^3 of point (m) and direction; s in 0..1."""
+    bends: NDArray[np.float64]
+    """(P, 2) largest second derivatives of both by t in 0..1; inf where the offset folds."""
+    turning: NDArray[np.float64]
+    """(P,) 1/m, how fast the direction turns for each metre on the target surface, at most."""
+    strays: NDArray[np.float64]
+    """(M, 2) how far target point (m) and direction may be from the surface's own, at most."""
+    standing: float
+    """1/m, the largest `turning` next to the cells' centres."""
+    folded: NDArray[np.bool_]
+    """(M,) courses where the offset surface folds, see `folded_courses`."""
+
+
+def folded_courses(cells: Cells, height: float) -> NDArray[np.bool_]:
+    """(M,) courses from or to a cell from which some course runs into a fold of the offset surface.
+
+    At a signed height (m) beyond a radius of curvature the offset surface runs backwards, but in
+    the direction of that curvature only; courses across it do not show it, their neighbours do.
+    """
+    folded = cells.courses.folds(height)
+    cell = np.zeros(len(cells), dtype=bool)
+    # One over a crease, or one that strays so far, tells nothing of its neighbours.
+    telling = ~cells.courses.creased & (cells.courses.strays[:, 1] <= TELLING)
+    cell[cells.pairs[folded & telling]] = True
+    return np.asarray(folded | cell[cells.pairs].any(axis=1))
+
+
+def _see_facets(
+    cells: Cells, standoff: float, tolerance: float, strays: NDArray[np.float64]
+) -> None:
+    """Bring the strays (M, 2) of courses over a mesh up to what its triangles say."""
+    some = np.arange(len(strays))
+    for count in (FEW, MANY):
+        t = (np.arange(count) + 0.5) / count
+        places = np.repeat(some, count), np.tile(t, len(some))
+        found = beside_facets(cells, standoff, tolerance, *places, everywhere=False)
+        off = found.off.reshape(-1, count).max(axis=1)
+        leans = found.leans.reshape(-1, count).max(axis=1)
+        strays[some] = np.maximum(strays[some], np.column_stack([off, leans]))
+        some = some[(off > OFF * tolerance) | (leans > 0.0) | cells.courses.creased[some]]
+
+
+class BesideFacets(NamedTuple):
+    """What the triangles of a mesh themselves say of k places on courses."""
+
+    off: NDArray[np.float64]
+    """(k,) m, by how much the target's distance from them is not the standoff."""
+    leans: NDArray[np.float64]
+    """(k,) |n - m| of the course's normal n and the direction m from the mesh to the target; on
+    the strips along creases only, elsewhere normals are interpolated."""
+    away: NDArray[np.float64]
+    """(k,) m, the target's distance from them."""
+
+
+def beside_facets(
+    cells: Cells,
+    standoff: float,
+    tolerance: float,
+    courses: NDArray[np.int64],
+    t: NDArray[np.float64],
+    everywhere: bool,
+) -> BesideFacets:
+    """Compare targets with the triangles of a mesh, without any interpolation.
+
+    On the strip along a crease, and where normals are interpolated, the targets are nearer to the
+    mesh than the standoff. So they are where something stands out of it. Nearer to a crease than
+    the tolerance leaves over the standoff, the normal is any of those that meet there.
+
+    Args:
+        cells: of a mesh.
+        standoff: m.
+        tolerance: m, of the tool point.
+        courses: (k,) which courses.
+        t: (k,) places on them.
+        everywhere: look at the whole mesh, which takes long at large standoffs; otherwise at the
+            cells of the course and at those that touch both.
+    """
+    surface = cells.surface
+    if not isinstance(surface, MeshSurface):
+        raise TypeError("the cells are not of a mesh")
+
+    def nearest(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        if everywhere:
+            return surface.nearest(points)
+        faces, weights = surface.faces_beneath(cells, cells.pairs[courses], points[:, None])
+        return faces[:, 0], weights[:, 0]
+
+    foot, normal = cells.courses.at(courses, t)
+    target = foot + surface.side_sign * standoff * normal
+    away, direction = surface.beside(target, *nearest(target))
+    leans = np.zeros(len(t))
+    off = np.abs(standoff - away) if standoff > 0.0 else leans
+    if surface.creased:
+        strip = surface.from_crease(*nearest(foot))
+        some = np.isfinite(strip) & (strip >= tolerance - standoff)
+        leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
+    return BesideFacets(off, leans, away)
+
+
+# Search and replay ask for the same; cells are values, told apart by identity.
+@lru_cache(maxsize=4)
+def target_courses(cells: Cells, standoff: float, tolerance: float) -> TargetCourses:
+    """Offset the courses of `cells` to the tool's side by `standoff` (m).
+
+    Args:
+        cells: the cells.
+        standoff: m.
+        tolerance: m, of the tool point.
+    """
+    courses, sign = cells.courses, cells.surface.side_sign
+    height = sign * standoff
+    folded = folded_courses(cells, height)
+    cubics = np.empty_like(courses.cubics)
+    cubics[..., :3] = courses.cubics[..., :3] + height * courses.cubics[..., 3:]
+    cubics[..., 3:] = -sign * courses.cubics[..., 3:]
+    bends = courses.bends.copy()
+    bends[:, 0] += standoff * bends[:, 1]
+    bends[np.repeat(folded, np.diff(courses.first))] = np.inf
+    # To the side of a course the normal may turn faster than along it.
+    sharpness = cells.surface.sharpness(cells, height)
+    if standoff > 0.0 and isinstance(cells.surface, MeshSurface):
+        # Over an edge it turns as over a ball of the standoff.
+        edge = np.where(cells.surface.creased_cells(cells), 1.0 / max(standoff, tolerance), 0.0)
+        sharpness = np.maximum(sharpness, edge)
+    across = sharpness[cells.pairs].max(axis=1)
+    turning = np.maximum(courses.turning(height), np.repeat(across, np.diff(courses.first)))
+    turning *= ASIDE
+    ends = np.concatenate([courses.first[:-1][~folded], courses.first[1:][~folded] - 1])
+    standing = turning[ends].max(initial=0.0)
+    if len(cells.pairs) == 0:  # a single cell: the normal turns beside its centre too
+        standing = ASIDE * sharpness[np.isfinite(sharpness)].max(initial=0.0)
+    strays = courses.strays.copy()
+    strays[:, 0] += standoff * strays[:, 1]
+    if cells.surface.grain > 0.0:
+        _see_facets(cells, standoff, tolerance, strays)
+    for array in (cubics, bends, turning, strays, folded):
+        array.flags.writeable = False
+    return TargetCourses(
+        first=courses.first,
+        cubics=cubics,
+        bends=bends,
+        turning=turning,
+        strays=strays,
+        standing=float(standing),
+        folded=folded,
+    )
+
+
+def closed_courses(cells: Cells, task: Task) -> str:
+    """Why no motion can be certified between some neighbouring cells; empty where it can."""
+    tolerance = task.leeway
+    ways = target_courses(cells, task.standoff, tolerance)
+    some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
+    courses = cells.courses
+    smooth = ~courses.creased & (courses.strays[:, 1] <= TELLING)
+    folds = ways.folded & smooth
+    rim = task.rim
+    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim) | ways.folded
+    parted = _parted(cells, ~rough)
+    if folds.any():
+        if cells.surface.grain > 0.0:  # facets do not tell the two apart
+            return (
+                "The offset surface folds where it is hollow, or the mesh is too coarse where it "
+                f"bends, {some.format(int(folds.sum()))}: the standoff is too large for the "
+                f"radius of curvature, so no motion can be certified there{parted}; use a smaller "
+                "standoff, a mesh that is finer along its bends, or a part of it that ends there."
+            )
+        return (
+            f"The offset surface folds {some.format(int(folds.sum()))}: the standoff reaches "
+            "the surface's radius of curvature on its hollow side, so no motion can be certified "
+            f"there{parted}; use a smaller standoff."
+        )
+    if rough.any():
+        return (
+            f"The surface is creased, or rougher than the task allows, "
+            f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
+            f"of a mesh it can, but not into a hollow one, or past a corner){parted}; use smaller "
+            "cells, a finer or smoother mesh, cut it along its creases, or allow a wider cone or a "
+            "larger tolerance."
+        )
+    return ""
+
+
+def _parted(cells: Cells, usable: NDArray[np.bool_]) -> str:
+    """Whether the ways (M,) that can be used leave the cells in several parts, whatever the arm."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    n = len(cells)
+    links = [coo_array((np.ones(len(k)), k.T), (n, n)) for k in (cells.pairs, cells.pairs[usable])]
+    whole, parts = (connected_components(link, directed=False)[0] for link in links)
+    if parts == whole:
+        return ""
+    return f", which leaves {parts} parts of the surface that no arm's motion joins"

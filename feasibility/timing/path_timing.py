@@ -1,0 +1,155 @@
+"""Time along a path: as fast as joints and tool may, from rest to rest.
+
+The path's straight lines are blended into a smooth curve (`blend`); toppra finds the largest speed
+along it that velocities, accelerations and the tool's speed allow (`timed_curve`), so that all
+limits hold along the curve.
+
+A controller sees its samples only, and puts quintics or cubics through them (`interpolation`). The
+fastest way along a curve jumps from one acceleration to another, and these swing past both. So the
+joints that would be over a limit then are given less, the way along the curve is sought again, and
+the little that is left is mended by running slower. The samples at last are replayed like any
+witness: as a motion of straight lines, of quintics and of cubics.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility.certification import replay
+from feasibility.paths import CoveragePath, PathError
+from feasibility.timing.controller_interpolation import (
+    KINDS,
+    PLACES,
+    accelerations_used,
+    motion_between,
+    past_limits,
+    used,
+)
+from feasibility.timing.smoothing import Curve, blended
+from feasibility.timing.speed_limits import MotionLimits, motion_limits, number
+from feasibility.timing.timed_curve import samples, timed_curve
+from feasibility.timing.trajectory import Trajectory
+from feasibility.verdict import Walk
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+DEFAULT_SPEED = 0.1  # [m/s] of the tool point
+DEFAULT_PERIOD = 0.02  # [s] between samples
+SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be asked for
+FINER = 4  # times that the period may be halved
+AT_LIMIT = 1e-6  # [rad] or [m] that interpolation may add where a path runs along a joint's limit
+ROUNDS = 3  # ways along a curve that are sought, each with less for joints that were over
+PARTS = (1.0, 0.95, 0.91, 0.86)  # [1] of a period: where samples lie between jumps is chance
+SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing down as a whole
+SLOWINGS = 8  # times that the last of them is slowed down a little; and then as much as it needs
+SMALL = 1.004  # [1] times that this is slower
+RESERVE = 1e-3  # [1] share of all limits that is left free
+
+
+def trajectory(
+    path: CoveragePath,
+    speed: float = DEFAULT_SPEED,
+    *,
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+    period: float = DEFAULT_PERIOD,
+) -> Trajectory:
+    """Run a path as fast as its limits allow.
+
+    Args:
+        path: the path.
+        speed: m/s, largest speed of the tool point.
+        velocity: rad/s or m/s, of all joints or (n,) of each; the URDF's limits by default.
+        acceleration: rad/s^2 or m/s^2, of all joints or (n,) of each; by default what takes a joint
+            to its largest velocity in half a second.
+        period: s between samples; a sample more stands where a cell's centre is passed. It is
+            halved where the motion between samples would leave the tolerance.
+
+    Returns:
+        The samples. They keep to the limits, and the independent replay accepts them, as straight
+        lines and as the quintics and cubics that controllers make of them.
+
+    Raises:
+        PathError: a number is not as it should be, or no such motion was found.
+
+    Example:
+        >>> from feasibility import Task, check
+        >>> from feasibility.paths import coverage_path
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> plate = plane((0.4, 0.6), (-0.1, 0.1), position=(0, 0, 0.3), side="outside")
+        >>> verdict = check(load_robot("ur5"), plate.cells(2, 3), Task(standoff=0.02, cone_deg=30))
+        >>> run = trajectory(coverage_path(verdict), speed=0.1)
+        >>> round(float(run.tool_speed.max()), 2), run.duration > run.tool_way / 0.1
+        (0.1, True)
+    """
+    robot, cells, task = path.robot, path.cells, path.task
+    limits = motion_limits(robot, speed, velocity, acceleration)
+    if not SHORTEST <= number(period) <= LONGEST:
+        raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
+    if len(np.unique(path.walk.q, axis=0)) == 1:
+        return _standing(robot, path.walk)
+    curve, refusal = blended(robot, cells, task, path.walk), ""
+    for _ in range(FINER + 1):
+        run = within_limits(robot, curve, limits, period)
+        refusal = _refusal(path, run)
+        if not refusal:
+            return run
+        period *= 0.5
+    raise PathError(f"the independent replay refuses the timed motion: {refusal}")
+
+
+def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: float) -> Trajectory:
+    """Samples of a curve that keep to the limits however they are interpolated.
+
+    Raises:
+        PathError: no such way to run it was found.
+    """
+    less, share = 1.0 - RESERVE, np.ones(robot.n)
+    for _ in range(ROUNDS):
+        given = MotionLimits(
+            less * limits.velocity, less * share * limits.acceleration, less * limits.tool_speed
+        )
+        timed = timed_curve(robot, curve, given)
+        runs = [samples(robot, timed, part * period) for part in PARTS]
+        over = np.max([accelerations_used(run, limits) for run in runs], axis=0)
+        if over.max() <= SLIGHTLY:
+            break
+        share /= np.maximum(over, 1.0)
+    slower = 1.0
+    for attempt in range(2 * SLOWINGS):
+        run = samples(robot, timed.slowed(slower), period)
+        too_fast = used(robot, run, limits).too_fast
+        if too_fast <= 1.0:
+            return run
+        # Other samples are over by another little: at first small steps, which may do.
+        slower *= min(too_fast, SMALL if attempt < SLOWINGS else too_fast) + RESERVE
+    raise PathError(
+        "no timing was found that keeps to the limits between samples too; a shorter period helps"
+    )
+
+
+def _refusal(path: CoveragePath, run: Trajectory) -> str:
+    """Why the samples will not do, as straight lines or interpolated; empty where they will."""
+    robot, cells, task = path.robot, path.cells, path.task
+    past = past_limits(robot, run)
+    if past > AT_LIMIT:
+        return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
+    walks = [run.walk, *(motion_between(run, kind, PLACES) for kind in KINDS)]
+    for walk in walks:
+        held = Walk(q=np.clip(walk.q, robot.lower, robot.upper), cell=walk.cell)
+        replayed = replay(robot, cells, task, held, path.needed)
+        if not replayed.accepted:
+            return replayed.refusal
+    return ""
+
+
+def _standing(robot: Robot, walk: Walk) -> Trajectory:
+    """The trajectory of a motion that stands still: one sample."""
+    q, nothing = walk.q[:1], np.zeros((1, robot.n))
+    return Trajectory(
+        joint_names=robot.joint_names, time=np.zeros(1), q=q, dq=nothing, ddq=nothing,
+        tool_speed=np.zeros(1), cell=walk.cell[:1],
+    )  # fmt: skip

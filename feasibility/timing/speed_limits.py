@@ -1,0 +1,194 @@
+"""How fast a curve may be run at each place, and what the joints may do: limits and their bounds.
+
+On a piece of a cubic spline q'(s) is a parabola, so its Bernstein coefficients bound it: the middle
+one is q'(0) + q''(0) h / 2 for a piece of length h. And with |p''(s)| <= D on the piece, which the
+lever arms give (as in `feasibility.segment`, and sum_j r_j |q_j''| for the bent curve), the tool's
+|p'(s)| is at most its larger end plus D h / 2. So the bounds hold on whole pieces, not only where
+they are looked at.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import BSpline
+
+from feasibility.certification import placements
+from feasibility.paths import PathError
+from feasibility.timing.joint_velocities import joint_velocities
+from robots import Kinematics, Robot
+
+Array = NDArray[np.float64]
+
+ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, where nothing is said
+LOOSE = 0.02  # [1] share by which the bound on the tool's speed may be too careful
+FEWEST, FINEST = 2, 12  # places of the grid on one piece
+MOST = 1e6  # [rad/s], [m/s] or their acceleration; more is no limit, and refused
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MotionLimits:
+    """What a timed motion keeps to."""
+
+    velocity: Array
+    """(n,) rad/s or m/s, of each joint."""
+    acceleration: Array
+    """(n,) rad/s^2 or m/s^2, of each joint."""
+    tool_speed: float
+    """m/s, of the tool point."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the arrays."""
+        for name in ("velocity", "acceleration"):
+            array = np.array(getattr(self, name), dtype=float)
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+
+
+def motion_limits(
+    robot: Robot,
+    tool_speed: float,
+    velocity: ArrayLike | None = None,
+    acceleration: ArrayLike | None = None,
+) -> MotionLimits:
+    """Check limits, and fill in what is not given.
+
+    Args:
+        robot: the arm.
+        tool_speed: m/s, largest speed of the tool point.
+        velocity: rad/s or m/s, one for all joints or (n,); the URDF's by default.
+        acceleration: rad/s^2 or m/s^2, one for all joints or (n,); by default each joint gets to
+            its largest velocity in half a second.
+
+    Raises:
+        PathError: a number is not positive and finite, or the URDF gives a joint no velocity.
+
+    Example:
+        >>> from robots import load_robot
+        >>> limits = motion_limits(load_robot("puma560"), tool_speed=0.1)
+        >>> limits.velocity.tolist(), limits.acceleration.tolist()
+        ([3.0, 3.0, 3.0, 3.0, 3.0, 3.0], [6.0, 6.0, 6.0, 6.0, 6.0, 6.0])
+    """
+    faults = []
+    speed = number(tool_speed)
+    if not 0.0 < speed <= MOST:
+        faults.append(
+            f"the tool speed must be a positive number of metres per second, got {tool_speed!r}"
+        )
+    fastest, fault = _per_joint(robot, "velocity", "rad/s or m/s", velocity)
+    if velocity is None:
+        fastest = joint_velocities(robot)
+        bad = ~((fastest > 0.0) & (fastest <= MOST))
+        names = [name for name, none in zip(robot.joint_names, bad, strict=True) if none]
+        fault = (
+            f"robot {robot.name!r} has no velocity limit for {', '.join(names)}; give velocity "
+            "(rad/s or m/s), one number for all joints or one for each"
+            if names
+            else ""
+        )
+    quickest, second = _per_joint(robot, "acceleration", "rad/s^2 or m/s^2", acceleration)
+    if acceleration is None:
+        quickest = fastest / ACCELERATION_TIME
+    faults += [text for text in (fault, second if acceleration is not None else "") if text]
+    if faults:
+        raise PathError("; ".join(faults))
+    return MotionLimits(fastest, quickest, speed)
+
+
+def number(value: object) -> float:
+    """A float, nan where it is none."""
+    try:
+        return float(value) if not isinstance(value, bool) else math.nan  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def _per_joint(robot: Robot, name: str, unit: str, value: ArrayLike | None) -> tuple[Array, str]:
+    """(n,) one number for each joint, and what is wrong with them."""
+    nothing = np.full(robot.n, math.nan)
+    if value is None:
+        return nothing, ""
+    form = f"{name} must be one positive number ({unit}), or {robot.n} for the joints"
+    try:
+        numbers = np.array(value, dtype=float)
+        numbers = np.broadcast_to(numbers, (robot.n,))
+    except (TypeError, ValueError):
+        return nothing, f"{form}, got {value!r}"
+    if not ((numbers > 0.0) & (numbers <= MOST)).all():
+        return nothing, f"{form}, got {value!r}"
+    return numbers, ""
+
+
+def fine_grid(robot: Robot, spline: BSpline, pieces: int) -> Array:
+    """Places 0 .. pieces of a curve, all whole numbers among them, at which to bound its speed.
+
+    Between the whole numbers there are so many that the tool's speed is bounded to `LOOSE`.
+    """
+    knots = np.arange(pieces + 1.0)
+    tool, _, swing = _slopes(robot, spline, knots)
+    slack = 0.5 * swing / np.maximum(np.maximum(tool[:-1], tool[1:]), 1e-300)
+    count = np.clip(np.ceil(slack / LOOSE), FEWEST, FINEST).astype(np.int64)
+    inner = [k + np.arange(m) / m for k, m in zip(knots[:-1], count, strict=True)]
+    return np.append(np.concatenate(inner), knots[-1])
+
+
+def squared_speeds(robot: Robot, spline: BSpline, grid: Array, limits: MotionLimits) -> Array:
+    """(m,) upper bounds on (ds/dt)^2 at the m places of a grid, so that all pieces keep to limits.
+
+    The grid has all knots of the spline among its places. Between two of them (ds/dt)^2 runs
+    straight, so what both ends keep to the whole piece keeps to.
+    """
+    h = np.diff(grid)
+    tool, fastest, swing = _slopes(robot, spline, grid)
+    tool_most = np.maximum(tool[:-1], tool[1:]) + 0.5 * h * swing
+    with np.errstate(divide="ignore"):
+        piece = np.minimum((limits.velocity / fastest).min(axis=1), limits.tool_speed / tool_most)
+    piece = np.minimum(piece, MOST / h) ** 2
+    return np.minimum(np.append(piece, np.inf), np.concatenate([[np.inf], piece]))
+
+
+def _slopes(robot: Robot, spline: BSpline, grid: Array) -> tuple[Array, Array, Array]:
+    """|p'| (m,) at the places of a grid; on its pieces the most of |q'| (m - 1, n) and |p''|."""
+    h = np.diff(grid)[:, None]
+    q, slope, bend = (spline.derivative(k)(grid) for k in range(3))
+    middle = slope[:-1] + 0.5 * h * bend[:-1]
+    fastest = np.maximum(np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])), np.abs(middle))
+    bent = np.maximum(np.abs(bend[:-1]), np.abs(bend[1:]))
+    swing = _swing(robot, placements(robot, q).levers, fastest * h, bent * h**2)
+    return tool_slopes(robot, q, slope), fastest, swing / h[:, 0] ** 2
+
+
+def _swing(robot: Robot, levers: Array, change: Array, bent: Array) -> Array:
+    """(m - 1,) m, bounds on the tool point's second derivative along pieces of unit length.
+
+    As in `certificate.second_derivatives`, and for joints whose own second derivatives are at most
+    `bent` too: each adds that times its lever arm.
+
+    Args:
+        robot: the arm.
+        levers: (m, n) lever arms at the ends of the pieces; 1 for a sliding joint.
+        change: (m - 1, n) bounds on the joints' first derivatives.
+        bent: (m - 1, n) bounds on their second derivatives.
+    """
+    total, behind = np.zeros(len(change)), np.zeros(len(change))
+    turns = np.where(robot.prismatic, 0.0, change)
+    before = np.cumsum(turns, axis=1) - turns
+    ends = np.maximum(levers[:-1], levers[1:])
+    for j in range(robot.n - 1, -1, -1):
+        d = change[:, j]
+        if robot.prismatic[j]:
+            total += 2.0 * d * before[:, j] + bent[:, j]
+            behind += d
+            continue
+        lever = ends[:, j] + 0.5 * behind
+        total += lever * (d * (d + 2.0 * before[:, j]) + bent[:, j])
+        behind += lever * d
+    return total
+
+
+def tool_slopes(robot: Robot, q: Array, slope: Array) -> Array:
+    """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n)."""
+    return np.linalg.norm(Kinematics(robot).tool_velocities(q, slope), axis=1)

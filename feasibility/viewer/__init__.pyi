@@ -1,0 +1,11 @@
+from .paper_figures import plot_causes as plot_causes
+from .paper_figures import plot_graph as plot_graph
+from .paper_figures import plot_transition as plot_transition
+from .path_and_division import view_division as view_division
+from .path_and_division import view_path as view_path
+from .placement_figures import plot_map as plot_map
+from .placements import view_placements as view_placements
+from .placements import view_study as view_study
+from .viewer import View as View
+from .viewer import show as show
+from .viewer import view as view

@@ -1,0 +1,155 @@
+"""Pictures of work to be done: a path that paints the surface, and the patches of a division.
+
+from feasibility.job_view import view_path
+view_path(path, trajectory).save_html("path.html")
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.verdict import CauseKind
+from feasibility.viewer import robot as robot_visuals
+from feasibility.viewer import threejs
+from feasibility.viewer.cell_meshes import cell_size
+from feasibility.viewer.html_page import Entry
+from feasibility.viewer.playback import LONGEST, Motion, paced
+from feasibility.viewer.robot_meshes import tubes
+from feasibility.viewer.scene import TRAIL, Layer, cells_layers, missed_layer, patch_layers
+from feasibility.viewer.threejs import Colour
+from feasibility.viewer.viewer import View, compose
+from robots import Kinematics, Robot
+
+if TYPE_CHECKING:
+    from feasibility.division import Division
+    from feasibility.paths import CoveragePath
+    from feasibility.timing import Trajectory
+
+RECONFIGURED: Colour = (0.80, 0.05, 0.05)
+STROKES = 160  # pieces of the trail that appear one after the other
+DENSE = 24  # points drawn of one move between patches
+FEW = 2  # joints of a move that the legend names
+FRAMES = 3_000  # samples of a trajectory that are drawn, at most
+
+
+def view_path(
+    path: CoveragePath, trajectory: Trajectory | None = None, case: str | None = None
+) -> View:
+    """The arm along a path, and the trail that it has painted growing behind it.
+
+    Args:
+        path: what is driven.
+        trajectory: its timing; played as fast as it is, or in a minute if it takes longer. Without
+            one the tool travels evenly.
+        case: name of the case, for the title.
+    """
+    robot, cells, figures = path.robot, path.cells, path.figures
+    if trajectory is None:
+        motion = paced(robot, path.walk.q, False, "coverage path")
+        speed = "not timed"
+    else:
+        motion = _timed(robot, trajectory)
+        speed = f"{trajectory.duration:.1f} s"
+    strokes, tracks = _strokes(motion, 0.06 * cell_size(cells))
+    title = f"{case}: " if case else ""
+    again = f", {figures.revisited:.2g} m of it again" if figures.revisited > 0.0 else ""
+    text = (
+        f"{robot.name}: {int(path.needed.sum())} cells in order {path.order}, "
+        f"{figures.length:.2f} m{again}, {speed}"
+    )
+    return compose(
+        robot, cells, f"{title}coverage path", text, [*cells_layers(cells), strokes], motion,
+        resting=path.walk.q[0], tracks=tracks,
+    )  # fmt: skip
+
+
+def view_division(division: Division, case: str | None = None) -> View:
+    """The patches of the plan with the fewest motions, and the moves between them in red."""
+    robot, cells, plan = division.robot, division.cells, division.fewest
+    names = [
+        f"patch {k + 1} ({len(patch.cells)} cell{'' if len(patch.cells) == 1 else 's'})"
+        for k, patch in enumerate(plan.patches)
+    ]
+    parts = [*cells_layers(cells), *patch_layers(cells, plan.patch_of(len(cells)), names)]
+    parts += _left_out(division)
+    walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
+    motion = None
+    if walks:
+        legs = [walks[0]]
+        for walk in walks[1:]:
+            share = np.linspace(0.0, 1.0, DENSE)[1:-1, None]
+            legs += [legs[-1][-1] + share * (walk[0] - legs[-1][-1]), walk]
+        motion = paced(robot, np.concatenate(legs), False, "all patches")
+        for k, move in enumerate(plan.moves):
+            parts.append(
+                _move(robot, move.start, move.end, f"{k + 1} to {k + 2}", cell_size(cells))
+            )
+    number = len(plan.patches)
+    title = f"{case}: " if case else ""
+    text = f"{robot.name}: {division.n_covered} of {len(cells)} cells; " + "; ".join(
+        f"move {k + 1} to {k + 2}: {move.described(FEW)}" for k, move in enumerate(plan.moves)
+    )
+    return compose(
+        robot, cells, f"{title}{number} patch{'' if number == 1 else 'es'}", text.rstrip("; "),
+        parts, motion, resting=walks[0][0] if walks else robot_visuals.home(robot),
+    )  # fmt: skip
+
+
+def _timed(robot: Robot, trajectory: Trajectory) -> Motion:
+    """A trajectory as what a view plays."""
+    kept = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), FRAMES)).astype(int))
+    q, time = trajectory.q[kept], trajectory.time[kept] - trajectory.time[0]
+    if time[-1] > LONGEST:
+        time = time * (LONGEST / time[-1])
+    kinematics = Kinematics(robot)
+    points = np.array([kinematics.tool(row)[0] for row in q])
+    return Motion(q, time, points, False, "coverage path")
+
+
+def _strokes(motion: Motion, radius: float) -> tuple[Layer, list[dict[str, Any]]]:
+    """The tool's trail in pieces that appear when the tool has passed, and their appearing."""
+    root = "/motion/painted trail"
+    end = float(motion.seconds[-1])
+    edges = np.linspace(0.0, end, STROKES + 1)
+    commands, tracks = [], []
+    for k, (start, stop) in enumerate(pairwise(edges)):
+        inside = (motion.seconds > start) & (motion.seconds < stop)
+        times = np.concatenate([[start], motion.seconds[inside], [stop]])
+        line = np.column_stack([np.interp(times, motion.seconds, row) for row in motion.points.T])
+        vertices, faces = tubes([line], radius)
+        if len(faces) == 0:
+            continue
+        path = f"{root}/{k:03d}"
+        commands.append(threejs.mesh(path, vertices, faces, TRAIL, lit=False))
+        tracks.append(threejs.appearing(path, stop, end))
+    return Layer(tuple(commands), Entry("painted trail", TRAIL, root), len(commands)), tracks
+
+
+def _move(
+    robot: Robot, start: NDArray[np.float64], end: NDArray[np.float64], name: str, size: float
+) -> Layer:
+    """The tool's way in a move between patches."""
+    kinematics = Kinematics(robot)
+    share = np.linspace(0.0, 1.0, 4 * DENSE)[:, None]
+    line = np.array([kinematics.tool(q)[0] for q in start + share * (end - start)])
+    path = f"/motion/move from patch {name}"
+    vertices, faces = tubes([line], 0.05 * size)
+    commands = (threejs.mesh(path, vertices, faces, RECONFIGURED, lit=False),)
+    return Layer(commands, Entry(f"move from patch {name}", RECONFIGURED, path), 1)
+
+
+def _left_out(division: Division) -> list[Layer]:
+    """Cells in no patch, by cause."""
+    kinds: dict[CauseKind | None, list[int]] = {}
+    for cause in division.left_out:
+        kinds.setdefault(cause.kind, []).append(cause.cell)
+    if len(division.unsettled):
+        kinds[None] = division.unsettled.tolist()
+    return [
+        missed_layer(division.cells, kind, np.array(cells, dtype=np.int64))
+        for kind, cells in kinds.items()
+    ]

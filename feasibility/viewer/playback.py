@@ -1,0 +1,153 @@
+"""The motion that a view plays: the witness, or one path of the search tree, in even time."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.verdict import Verdict
+from feasibility.viewer import threejs
+from feasibility.viewer.robot import joint_paths, joint_placements
+from robots import Kinematics, Robot
+
+KEY_FRAMES = 400
+SHORTEST, LONGEST = 6.0, 60.0  # [s]
+JOINED = 1e-6  # [rad] or [m]: largest gap between the end of one motion and the start of the next
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Motion:
+    """Straight lines in joint space, to be played at an even pace."""
+
+    walk: NDArray[np.float64]
+    """(m, n) waypoints, rad or m."""
+    seconds: NDArray[np.float64]
+    """(m,) when each waypoint is passed, from 0."""
+    points: NDArray[np.float64]
+    """(m, 3) m, the tool point at each waypoint."""
+    there_and_back: bool
+    """Played to the end and back again, rather than once more from the start."""
+    label: str
+
+    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Configurations (k, n) at the given times (k,) s."""
+        return np.column_stack([np.interp(times, self.seconds, row) for row in self.walk.T])
+
+
+def motion_of(verdict: Verdict) -> Motion | None:
+    """What the verdict's view plays; None where the arm stands still.
+
+    The witness where there is one, else the path of the search tree along which the tool travels
+    furthest.
+
+    Raises:
+        ValueError: two motions of a tree path do not join, so the verdict contradicts itself.
+    """
+    if verdict.witness is not None and len(verdict.witness.q) > 1:
+        return paced(verdict.robot, verdict.witness.q, False, "covering motion")
+    cells = longest_path(verdict.tree, verdict.cells.centres)
+    if len(cells) < 2:
+        return None
+    return paced(verdict.robot, walk_along(verdict.graph, cells), True, "one path of the tree")
+
+
+def longest_path(tree: nx.DiGraph | None, centres: NDArray[np.float64]) -> list[int]:
+    """Cells from the root of the search tree to the leaf furthest along it; empty without a tree.
+
+    The length of a step is the distance between the centres (N, 3) of its two cells.
+    """
+    if tree is None or tree.number_of_nodes() == 0:
+        return []
+    best: list[int] = []
+    longest = -1.0
+    for root in sorted(node for node, degree in tree.in_degree() if degree == 0):
+        length = {root: 0.0}
+        before: dict[int, int] = {}
+        for parent, child in nx.bfs_edges(tree, root):
+            length[child] = length[parent] + float(np.linalg.norm(centres[child] - centres[parent]))
+            before[child] = parent
+        leaf = max(length, key=lambda node: (length[node], -node))
+        if length[leaf] > longest:
+            longest = length[leaf]
+            best = [leaf]
+            while best[-1] in before:
+                best.append(before[best[-1]])
+    return best[::-1]
+
+
+def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
+    """The motions of successive edges, each turned the way it is gone, as one walk (m, n).
+
+    Raises:
+        ValueError: an edge has no motion, or a motion starts where the one before it did not end.
+    """
+    rows: list[NDArray[np.float64]] = []
+    for a, b in itertools.pairwise(cells):
+        motion = np.asarray(graph.edges[a, b]["motion"], dtype=float)
+        motion = motion if a < b else motion[::-1]
+        if rows:
+            gap = float(np.abs(rows[-1][-1] - motion[0]).max())
+            if not gap <= JOINED:
+                raise ValueError(
+                    f"the motion from cell {a} to cell {b} starts {gap:.3g} rad or m away from "
+                    "where the one before it ends; the tree of this verdict is no continuous motion"
+                )
+            motion = motion[1:]
+        rows.append(motion)
+    return np.concatenate(rows)
+
+
+def paced(robot: Robot, walk: NDArray[np.float64], there_and_back: bool, label: str) -> Motion:
+    """Time a walk (m, n) so that the tool travels evenly.
+
+    Where the tool stands still and only joints move, their motion counts: 1 rad as a twentieth of
+    the arm's reach, so that nothing jumps.
+    """
+    kinematics = Kinematics(robot)
+    points = np.array([kinematics.tool(q)[0] for q in walk])
+    reach = robot.reach if np.isfinite(robot.reach) else 1.0
+    lever = np.where(robot.prismatic, 1.0, reach / 20.0)  # [m] or [m/rad]
+    travel = np.hypot(
+        np.linalg.norm(np.diff(points, axis=0), axis=1),
+        np.abs(np.diff(walk, axis=0) * lever).max(axis=1),
+    )
+    travelled = np.concatenate([[0.0], np.cumsum(travel)])
+    duration = float(np.clip(travelled[-1] / (0.3 * reach), SHORTEST, LONGEST))
+    scale = duration / travelled[-1] if travelled[-1] > 0.0 else 0.0
+    return Motion(np.asarray(walk), travelled * scale, points, there_and_back, label)
+
+
+def key_times(motion: Motion) -> NDArray[np.float64]:
+    """Even times (k,) s of the key frames, at most `KEY_FRAMES` of them."""
+    return np.linspace(0.0, float(motion.seconds[-1]), min(KEY_FRAMES, 4 * len(motion.walk)))
+
+
+def animate(
+    robot: Robot, motion: Motion, *, play: bool, tracks: Sequence[dict[str, Any]] = ()
+) -> threejs.Command:
+    """The animation of a motion: one track for each joint's group, and what else moves with it."""
+    times = key_times(motion)
+    placements = joint_placements(robot, motion.at(times))
+    tracks = list(tracks)
+    for joint, path in enumerate(joint_paths(robot)[1:]):
+        if robot.prismatic[joint]:
+            tracks.append(threejs.track(path, "position", times, placements[:, joint, :3, 3]))
+        else:
+            turns = quaternions(placements[:, joint, :3, :3])
+            tracks.append(threejs.track(path, "quaternion", times, turns))
+    return threejs.animation(tracks, play=play, there_and_back=motion.there_and_back)
+
+
+def quaternions(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Unit quaternions (k, 4) as x, y, z, w of rotations (k, 3, 3), without jumps of sign."""
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_matrix(rotations).as_quat()
+    flips = np.concatenate([[1.0], np.where((turns[1:] * turns[:-1]).sum(axis=1) < 0, -1.0, 1.0)])
+    return turns * np.cumprod(flips)[:, None]

@@ -1,0 +1,218 @@
+"""The arm as it is drawn: its visuals in a tree of joints, and how that tree moves.
+
+Each joint is a group inside the group of the joint before it, as in the arm itself. The page then
+turns every joint about its own axis between two key frames, and the links keep their shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility.viewer import threejs
+from feasibility.viewer.robot_meshes import GREY, Mesh, MeshError, moved, read_mesh, shaded, thinned
+from robots import Kinematics, Robot, RobotError
+from robots.urdf import Box, Capsule, Cylinder, MeshFile, Sphere, Visual
+
+ROOT = "/robot"
+TRIANGLES = 60_000  # of a whole robot; more are thinned
+SKELETON: threejs.Colour = (0.55, 0.58, 0.62)
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """What the page needs to draw one robot."""
+
+    commands: tuple[threejs.Command, ...]
+    lowest: float
+    """m, smallest z of what does not move, at most 0."""
+    notes: tuple[str, ...]
+    """What could not be drawn as the URDF says, one sentence each."""
+
+
+def joint_paths(robot: Robot) -> tuple[str, ...]:
+    """The n + 1 groups of the scene tree: what is fixed to the root, then each joint's."""
+    paths = [ROOT]
+    for name in robot.joint_names:
+        paths.append(f"{paths[-1]}/joint {threejs.safe_name(name)}")
+    return tuple(paths)
+
+
+def home(robot: Robot) -> NDArray[np.float64]:
+    """(n,) where an arm without work stands: at zero, or at the limit next to it."""
+    return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
+
+
+def joint_placements(robot: Robot, walk: ArrayLike) -> NDArray[np.float64]:
+    """Each joint's frame in the frame of the joint before it, by Pinocchio.
+
+    Args:
+        robot: the arm.
+        walk: (k, n) configurations.
+
+    Returns:
+        (k, n, 4, 4) homogeneous matrices.
+    """
+    kinematics = Kinematics(robot)
+    data = robot.model.createData()
+    rows = np.asarray(walk, dtype=float).reshape(-1, robot.n)
+    placements = np.empty((len(rows), robot.n, 4, 4))
+    for row, q in enumerate(rows):
+        pin.forwardKinematics(robot.model, data, kinematics.configuration(q))
+        for joint in range(robot.n):
+            placements[row, joint] = data.liMi[joint + 1].homogeneous
+    return placements
+
+
+def pose(robot: Robot, q: ArrayLike) -> list[threejs.Command]:
+    """Commands that put the drawn arm into configuration q (n,)."""
+    placements = joint_placements(robot, q)[0]
+    paths = joint_paths(robot)[1:]
+    return [threejs.transform(path, place) for path, place in zip(paths, placements, strict=True)]
+
+
+def draw(robot: Robot) -> Drawing:
+    """Every visual of the URDF, on locked joints and off the chain too.
+
+    Where a mesh cannot be had, a link that is left without a shape is drawn as a capsule; so is
+    every link of a robot whose URDF cannot be read or has no visuals.
+    """
+    visuals, notes = _visuals(robot)
+    parts: dict[tuple[int, str], list[Mesh]] = {}
+    for visual in visuals:
+        frame = robot.model.frames[robot.model.getFrameId(visual.link, pin.FrameType.BODY)]
+        try:
+            meshes = _meshes(visual)
+        except MeshError as error:
+            notes.append(f"not drawn: a shape of link {visual.link}: {error}")
+            continue
+        place = frame.placement.homogeneous @ visual.origin
+        key = (int(frame.parentJoint), visual.link)
+        parts.setdefault(key, []).extend(moved(mesh, place) for mesh in meshes)
+    if notes or not parts:
+        for joint in set(range(robot.n + 1)) - {joint for joint, _ in parts}:
+            parts[joint, "capsule"] = [_capsule(robot, joint)]
+    return _drawing(robot, parts, notes)
+
+
+def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list[str]) -> Drawing:
+    """Thin, shade and name the parts of all links."""
+    owners, meshes = [], []
+    for key, group in parts.items():
+        for mesh in _joined(group):
+            owners.append(key)
+            meshes.append(mesh)
+    paths = joint_paths(robot)
+    commands, lowest = [], 0.0
+    for number, ((joint, link), mesh) in enumerate(
+        zip(owners, thinned(meshes, TRIANGLES), strict=True)
+    ):
+        if len(mesh.faces) == 0:
+            continue
+        mesh, normals = shaded(mesh)
+        if joint == 0:
+            lowest = min(lowest, float(mesh.vertices[:, 2].min()))
+        path = f"{paths[joint]}/link {threejs.safe_name(link)}/part {number}"
+        commands.append(
+            threejs.mesh(
+                path,
+                mesh.vertices,
+                mesh.faces,
+                mesh.colour,
+                normals=normals,
+                opacity=mesh.opacity,
+            )
+        )
+    return Drawing(tuple(commands), lowest, tuple(notes))
+
+
+def _visuals(robot: Robot) -> tuple[list[Visual], list[str]]:
+    """The checked visuals of the robot's URDF, and what is wrong with the others."""
+    if robot.urdf is None:
+        return [], []
+    from robots.urdf import check_urdf
+
+    try:
+        checked = check_urdf(robot.urdf, package_dirs=robot.package_dirs)
+    except (RobotError, OSError) as error:
+        return [], [f"not drawn: {robot.urdf} cannot be read: {error}"]
+    bodies = {frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY}
+    notes = [warning for warning in checked.warnings if warning.startswith("not drawn")]
+    return [visual for visual in checked.visuals if visual.link in bodies], notes
+
+
+def _meshes(visual: Visual) -> list[Mesh]:
+    """The triangles of one visual, in the visual's own frame.
+
+    Raises:
+        MeshError: its file cannot be read.
+    """
+    import trimesh
+
+    colour, opacity = None, 1.0
+    if visual.rgba is not None:
+        red, green, blue, opacity = visual.rgba
+        colour = (red, green, blue)
+    match visual.geometry:
+        case MeshFile(path, scale):
+            return read_mesh(Path(path), np.asarray(scale), colour)
+        case Box(size):
+            body = trimesh.creation.box(size)
+        case Cylinder(radius, length):
+            body = trimesh.creation.cylinder(radius=radius, height=length, sections=48)
+        case Capsule(radius, length):
+            body = trimesh.creation.capsule(radius=radius, height=length, count=(24, 24))
+            # trimesh has one half ball at the origin; URDF has the middle there.
+            body.apply_translation(-body.bounds.mean(axis=0))
+        case Sphere(radius):
+            body = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    return [_mesh(body, colour or GREY, opacity)]
+
+
+def _mesh(body: Any, colour: threejs.Colour, opacity: float = 1.0) -> Mesh:
+    """A trimesh as a `Mesh`."""
+    vertices = np.asarray(body.vertices, dtype=float)
+    return Mesh(vertices, np.asarray(body.faces, dtype=np.int64), colour, opacity)
+
+
+def _joined(meshes: list[Mesh]) -> list[Mesh]:
+    """One mesh for each colour."""
+    groups: dict[tuple[threejs.Colour, float], list[Mesh]] = {}
+    for mesh in meshes:
+        groups.setdefault((mesh.colour, mesh.opacity), []).append(mesh)
+    joined = []
+    for (colour, opacity), group in groups.items():
+        starts = np.cumsum([0] + [len(mesh.vertices) for mesh in group[:-1]])
+        joined.append(
+            Mesh(
+                np.concatenate([mesh.vertices for mesh in group]),
+                np.concatenate(
+                    [mesh.faces + start for mesh, start in zip(group, starts, strict=True)]
+                ),
+                colour,
+                opacity,
+            )
+        )
+    return joined
+
+
+def _capsule(robot: Robot, joint: int) -> Mesh:
+    """A link without a picture: a ball on its joint, a rod to the next joint or to the tool."""
+    import trimesh
+
+    model = robot.model
+    if joint < robot.n:
+        end = model.jointPlacements[joint + 1].translation
+    else:
+        end = model.frames[robot.tool_frame_id].placement.translation
+    radius = 0.03 * min(robot.reach, 10.0)
+    body = trimesh.creation.icosphere(subdivisions=3, radius=1.3 * radius)
+    if np.linalg.norm(end) > 1e-6:
+        rod = np.array([np.zeros(3), end])
+        body += trimesh.creation.cylinder(radius=radius, segment=rod, sections=32)
+    return _mesh(body, SKELETON)

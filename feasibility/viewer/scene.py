@@ -1,0 +1,253 @@
+"""What is drawn of a verdict: surface, cells, graph G, causes, other components, and the legend.
+
+Everything here is plain drawing commands with plain names, so that meshcat's own scene tree can
+show and hide each part; `feasibility.page` and `feasibility.meshcat_server` say where it appears.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.verdict import CauseKind, Verdict
+from feasibility.viewer import threejs
+from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, marks, patch
+from feasibility.viewer.html_page import Entry
+from feasibility.viewer.playback import Motion
+from feasibility.viewer.robot_meshes import tubes
+from feasibility.viewer.threejs import Colour, Command
+from surfaces import Cells
+
+SURFACE: Colour = (0.62, 0.71, 0.80)
+OUTLINES: Colour = (0.30, 0.35, 0.41)
+CENTRES: Colour = (0.25, 0.30, 0.36)
+EDGES: Colour = (0.05, 0.25, 0.85)
+START: Colour = (0.0, 0.62, 0.25)
+MISSED: Colour = (0.84, 0.12, 0.12)
+TRAIL: Colour = (0.95, 0.55, 0.05)
+CAUSES: dict[CauseKind, Colour] = {  # told apart by colour-blind eyes too (Okabe and Ito)
+    CauseKind.OUT_OF_REACH: (0.50, 0.05, 0.22),
+    CauseKind.JOINT_LIMITS: (0.90, 0.60, 0.00),
+    CauseKind.ORIENTATION: (0.80, 0.47, 0.65),
+    CauseKind.COLLISION: (0.20, 0.20, 0.20),
+    CauseKind.DISCONNECTED: (0.94, 0.86, 0.20),
+}
+COMPONENTS: tuple[Colour, ...] = (
+    (0.34, 0.71, 0.91),
+    (0.00, 0.62, 0.45),
+    (0.80, 0.47, 0.65),
+    (0.90, 0.60, 0.00),
+)
+PATCHES: tuple[Colour, ...] = (
+    (0.00, 0.45, 0.70),
+    (0.90, 0.60, 0.00),
+    (0.00, 0.62, 0.45),
+    (0.80, 0.47, 0.65),
+    (0.34, 0.71, 0.91),
+    (0.84, 0.37, 0.00),
+    (0.94, 0.86, 0.20),
+    (0.45, 0.35, 0.65),
+)
+TRAIL_POINTS = 2_000
+LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
+
+
+@dataclass(frozen=True, slots=True)
+class Layer:
+    """One part of the picture."""
+
+    commands: tuple[Command, ...]
+    entry: Entry
+    count: int
+    """Cells or edges in it."""
+
+
+def layers(verdict: Verdict) -> list[Layer]:
+    """Every part of the picture but the arm, in the order of the legend."""
+    if len(verdict.cells) == 0:
+        return []
+    return [
+        *cells_layers(verdict.cells),
+        *_graph(verdict),
+        *_start(verdict),
+        *_missed(verdict),
+        *_components(verdict),
+    ]
+
+
+def cells_layers(cells: Cells) -> list[Layer]:
+    """The surface, the borders of its cells, and their centres."""
+    return [_surface(cells), *_cell_marks(cells)]
+
+
+def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) -> list[Layer]:
+    """Cells filled with one colour for each label.
+
+    Args:
+        cells: the cells.
+        labels: (N,) which of `names` each cell belongs to; -1 for none.
+        names: one for each colour.
+    """
+    parts = []
+    for k, name in enumerate(names):
+        which = np.flatnonzero(labels == k)
+        if len(which) == 0:
+            continue
+        colour = PATCHES[k % len(PATCHES)]
+        path = f"/patches/{threejs.safe_name(name)}"
+        vertices, faces, _ = patch(cells, which, inset=0.06)
+        command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+        parts.append(Layer((command,), Entry(name, colour, path), len(which)))
+    return parts
+
+
+def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
+    """The edges of G, in the order of `graph.edges`: lines (E, k, 3) m at the standoff.
+
+    Each runs over the surface from target to target. It says that a motion joins the two cells; the
+    motion itself may take another way (the greedy search stops as soon as it has entered a cell).
+    """
+    cells = verdict.cells
+    pairs = np.array(list(verdict.graph.edges), dtype=np.int64).reshape(-1, 2)
+    keys = cells.pairs[:, 0] * len(cells) + cells.pairs[:, 1]
+    course = np.searchsorted(keys, pairs.min(axis=1) * len(cells) + pairs.max(axis=1))
+    t = np.linspace(0.0, 1.0, _edge_points(cells))
+    backwards = (pairs[:, 0] > pairs[:, 1])[:, None]
+    places = np.where(backwards, 1.0 - t, t)
+    foot, normal = cells.courses.at(np.repeat(course, len(t)), places.reshape(-1))
+    height = cells.surface.side_sign * verdict.task.standoff
+    return (foot + height * normal).reshape(len(pairs), len(t), 3)
+
+
+def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64]]:
+    """Flat indices of the cells that are not covered, by cause; None where no cause is known."""
+    kinds = {cause.cell: cause.kind for cause in verdict.causes}
+    missed = np.flatnonzero(~verdict.covered)
+    found: dict[CauseKind | None, NDArray[np.int64]] = {}
+    for kind in (*CauseKind, None):
+        cells = np.array([cell for cell in missed if kinds.get(int(cell)) == kind], dtype=np.int64)
+        if len(cells):
+            found[kind] = cells
+    return found
+
+
+def _surface(cells: Cells) -> Layer:
+    """The surface, shaded and half transparent."""
+    path = "/surface/patch"
+    commands: tuple[Command, ...] = ()
+    if len(cells):
+        vertices, faces, normals = patch(cells, np.arange(len(cells)))
+        commands = (threejs.mesh(path, vertices, faces, SURFACE, normals=normals, opacity=0.45),)
+    return Layer(commands, Entry("surface", SURFACE, path), len(cells))
+
+
+def _cell_marks(cells: Cells) -> Iterator[Layer]:
+    """Outlines of the cells, and a mark at each centre."""
+    if len(cells) == 0:
+        return
+    path = "/surface/cell outlines"
+    lines = threejs.segments(path, borders(cells).reshape(-1, 3), OUTLINES)
+    words = counted(len(cells))
+    if len(cells.shape) > 1:
+        words += f" ({' x '.join(str(part) for part in cells.shape)})"
+    yield Layer((lines,), Entry(words, OUTLINES, path), len(cells))
+    if len(cells) <= FULL_DETAIL:
+        path = "/surface/cell centres"
+        vertices, faces = marks(cells.centres, 0.035 * cell_size(cells))
+        dots = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
+        yield Layer((dots,), Entry("cell centres", CENTRES, path), len(cells))
+
+
+def _graph(verdict: Verdict) -> Iterator[Layer]:
+    """Graph G: one line for each edge."""
+    lines = edge_lines(verdict)
+    if len(lines) == 0:
+        return
+    path = f"/graph/edges of G ({len(lines)})"
+    if len(verdict.cells) <= FULL_DETAIL:
+        vertices, faces = tubes(list(lines), 0.022 * cell_size(verdict.cells))
+        command = threejs.mesh(path, vertices, faces, EDGES, lit=False)
+    else:
+        ends = np.stack([lines[:, :-1], lines[:, 1:]], axis=2)
+        command = threejs.segments(path, ends.reshape(-1, 3), EDGES)
+    pairs = len(verdict.cells.pairs)
+    label = f"{len(lines)} edges of G (of {pairs} pairs)"
+    yield Layer((command,), Entry(label, EDGES, path), len(lines))
+
+
+def _start(verdict: Verdict) -> Iterator[Layer]:
+    """A ball at the target of the cell where the search starts."""
+    if verdict.start is None:
+        return
+    import trimesh
+
+    path = f"/graph/start, cell {verdict.start}"
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1 * cell_size(verdict.cells))
+    centre = verdict.task.targets(verdict.cells).points[verdict.start]
+    command = threejs.mesh(path, ball.vertices + centre, ball.faces, START)
+    yield Layer((command,), Entry("start cell", START, path), 1)
+
+
+def _missed(verdict: Verdict) -> Iterator[Layer]:
+    """Cells that are not covered, in the colour of their cause."""
+    for kind, cells in missed_by_cause(verdict).items():
+        yield missed_layer(verdict.cells, kind, cells)
+
+
+def missed_layer(cells: Cells, kind: CauseKind | None, which: NDArray[np.int64]) -> Layer:
+    """Some cells in the colour of the cause for which they are missed; None where it is unknown."""
+    colour = MISSED if kind is None else CAUSES[kind]
+    words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
+    path = f"/cells/{words} ({len(which)})"
+    vertices, faces, _ = patch(cells, which, inset=0.06)
+    command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+    return Layer((command,), Entry(f"{words} ({len(which)})", colour, path), len(which))
+
+
+def _components(verdict: Verdict) -> Iterator[Layer]:
+    """The cells of each connected component, hidden until they are asked for."""
+    if len(verdict.components) < 2:
+        return
+    for number, cells in enumerate(verdict.components[:LISTED_COMPONENTS], start=1):
+        colour = COMPONENTS[(number - 1) % len(COMPONENTS)]
+        words = f"component {number} ({counted(len(cells))})"
+        path = f"/components/{words}"
+        vertices, faces, _ = patch(verdict.cells, np.asarray(cells), inset=0.15)
+        commands = (
+            threejs.mesh(path, vertices, faces, colour, opacity=0.9, lit=False),
+            threejs.set_property(path, "visible", False),
+        )
+        yield Layer(commands, Entry(words, colour, path, shown=False), len(cells))
+
+
+def trail(cells: Cells, motion: Motion) -> Layer:
+    """Where the tool goes in the motion that is played.
+
+    A covering motion runs along most edges of G, so it is hidden until it is asked for.
+    """
+    path = f"/motion/tool path, {motion.label}"
+    shown = motion.there_and_back
+    even = np.linspace(0.0, motion.seconds[-1], TRAIL_POINTS)
+    line = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
+    size = cell_size(cells)
+    vertices, faces = tubes([line], 0.035 * size)
+    commands = (
+        threejs.mesh(path, vertices, faces, TRAIL, lit=False),
+        threejs.set_property(path, "visible", shown),
+    )
+    return Layer(commands, Entry(f"tool path: {motion.label}", TRAIL, path, shown), 1)
+
+
+def _edge_points(cells: Cells) -> int:
+    """On the way from cell to cell: the more cells, the shorter and straighter their edges."""
+    if len(cells) > FULL_DETAIL:
+        return 2
+    return 9 if len(cells) <= 400 else 5
+
+
+def counted(number: int) -> str:
+    """'1 cell', '2 cells'."""
+    return f"{number} cell{'' if number == 1 else 's'}"

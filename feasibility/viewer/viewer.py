@@ -1,0 +1,289 @@
+"""The picture of a verdict: the arm at work over the surface, in a file, a notebook or a window.
+
+    from feasibility.viewer import show
+    show(verdict)
+
+The viewer stands at the edge: only other views and the commands import it.
+"""
+
+from __future__ import annotations
+
+import html
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility.verdict import Verdict
+from feasibility.viewer import robot as robot_visuals
+from feasibility.viewer import threejs
+from feasibility.viewer.html_page import Camera, Entry, Legend, page
+from feasibility.viewer.live_server import LiveView
+from feasibility.viewer.playback import Motion, animate, motion_of
+from feasibility.viewer.scene import Layer, layers, trail
+from feasibility.viewer.threejs import Command
+from robots import Robot
+from surfaces import Cells
+
+ARM: threejs.Colour = (0.35, 0.37, 0.40)
+FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class View:
+    """A verdict drawn: save it, serve it, or let a notebook show it."""
+
+    robot: Robot
+    commands: tuple[Command, ...]
+    """Of meshcat's page, in order."""
+    legend: Legend
+    camera: Camera
+    motion: Motion | None
+    """What the arm plays."""
+    notes: tuple[str, ...]
+    """What could not be drawn as the URDF says."""
+
+    def html(self, socket: str | None = None) -> str:
+        """One self-contained page; it fetches nothing and needs no server.
+
+        Args:
+            socket: path of a WebSocket that the page shall listen to, for `show`.
+        """
+        return page(
+            self.commands,
+            self.legend,
+            self.camera,
+            animated=self.motion is not None,
+            socket=socket,
+        )
+
+    def save_html(self, path: str | os.PathLike[str]) -> Path:
+        """Write the page to a file and return its path."""
+        file = Path(path)
+        file.write_text(self.html(), encoding="utf-8")
+        return file
+
+    def show(self, open_browser: bool = True) -> LiveView:
+        """Serve the page on 127.0.0.1 until the result is closed or this program ends."""
+        live = LiveView(self.html)
+        if open_browser:
+            live.open()
+        return live
+
+    def pose(self, q: ArrayLike) -> list[Command]:
+        """Commands that put the arm into configuration q (n,): `live.send(view.pose(q))`."""
+        return robot_visuals.pose(self.robot, q)
+
+    def _repr_html_(self) -> str:
+        """The page inside a notebook's output; it stays there when the notebook is saved."""
+        inner = html.escape(self.html(), quote=True)
+        style = "width: 100%; height: 560px; border: 0"
+        return f'<iframe srcdoc="{inner}" style="{style}" loading="lazy"></iframe>'
+
+    def __repr__(self) -> str:
+        """One line, for consoles."""
+        return f"View({self.legend.title!r}: {self.legend.text})"
+
+
+def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: float = 0.0) -> View:
+    """Draw a verdict.
+
+    Args:
+        verdict: of either method.
+        case: name of the case, for the title.
+        play: start the motion when the page opens; else the reader starts it.
+        at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
+
+    Raises:
+        ValueError: the verdict's own motions do not join.
+    """
+    motion = motion_of(verdict)
+    parts = layers(verdict)
+    if motion is not None:
+        parts.append(trail(verdict.cells, motion))
+    return compose(
+        verdict.robot,
+        verdict.cells,
+        _title(verdict, case),
+        _text(verdict),
+        parts,
+        motion,
+        resting=_resting(verdict),
+        play=play,
+        at=at,
+    )
+
+
+def compose(
+    robot: Robot,
+    cells: Cells,
+    title: str,
+    text: str,
+    parts: Sequence[Layer],
+    motion: Motion | None,
+    *,
+    resting: NDArray[np.float64],
+    tracks: Sequence[dict[str, Any]] = (),
+    play: bool = True,
+    at: float = 0.0,
+) -> View:
+    """Put arm, ground and parts into one picture.
+
+    Args:
+        robot: the arm.
+        cells: what it works on; the camera frames both.
+        title: of the legend.
+        text: below it.
+        parts: what is drawn, in the order of the legend.
+        motion: what the arm plays, or None.
+        resting: (n,) where it stands otherwise.
+        tracks: what else moves with it, see `threejs.track`.
+        play: start the motion when the page opens.
+        at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
+    """
+    drawing = robot_visuals.draw(robot)
+    commands = _stage(robot, cells, drawing.lowest) + list(drawing.commands)
+    entries = [Entry(robot.name, ARM, robot_visuals.ROOT)]
+    for part in parts:
+        commands += part.commands
+        entries.append(part.entry)
+    q = resting
+    if motion is not None:
+        commands.append(animate(robot, motion, play=play, tracks=tracks))
+        q = motion.at(np.array([at * motion.seconds[-1]]))[0]
+    commands += robot_visuals.pose(robot, q)
+    return View(
+        robot=robot,
+        commands=tuple(commands),
+        legend=Legend(title, " · ".join([text, *drawing.notes]), tuple(entries)),
+        camera=_camera(robot, cells, q, drawing.lowest),
+        motion=motion,
+        notes=drawing.notes,
+    )
+
+
+def show(
+    verdict: Verdict, case: str | None = None, *, block: bool | None = None
+) -> View | LiveView:
+    """Show a verdict: in the notebook's output, else in a browser window.
+
+    Args:
+        verdict: of either method.
+        case: name of the case, for the title.
+        block: wait until interrupted; by default only a script waits, since the window's page is
+            served by this program and ends with it.
+
+    Returns:
+        In a notebook the view, which the notebook displays; else what serves the window.
+    """
+    drawn = view(verdict, case)
+    if _in_notebook():
+        return drawn
+    live = drawn.show()
+    if block is None:
+        block = not hasattr(sys, "ps1")
+    if block:
+        try:
+            live.wait()
+        except KeyboardInterrupt:
+            live.close()
+    return live
+
+
+def _in_notebook() -> bool:
+    """True where a Jupyter kernel runs this."""
+    ipython = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython is not None else None
+    return getattr(shell, "kernel", None) is not None
+
+
+def _title(verdict: Verdict, case: str | None) -> str:
+    """What is asked, and the answer."""
+    name = f"{case}: " if case else ""
+    return f"{name}{verdict.answer} ({verdict.evidence})"
+
+
+def _text(verdict: Verdict) -> str:
+    """Arm, surface, and how much is covered."""
+    return (
+        f"{verdict.robot.name}: {verdict.n_covered} of {len(verdict.cells)} cells in one "
+        f"continuous motion ({verdict.method} search)"
+    )
+
+
+def _resting(verdict: Verdict) -> NDArray[np.float64]:
+    """A configuration for an arm that does not move: over the start cell if it can be had."""
+    known = [q for _, q in sorted(verdict.graph.nodes(data="q")) if q is not None]
+    if verdict.start is not None and verdict.start in verdict.graph:
+        known = [verdict.graph.nodes[verdict.start].get("q"), *known]
+    for q in known:
+        if q is not None:
+            return np.asarray(q, dtype=float)
+    return robot_visuals.home(verdict.robot)
+
+
+def _stage(robot: Robot, cells: Cells, floor: float) -> list[Command]:
+    """Background, a ground grid at the height of the lowest thing, and the root frame's axes."""
+    box = _points(cells)
+    size = max(robot.reach if np.isfinite(robot.reach) else 1.0, 0.2)
+    spacing = _round_below(size / 5.0)
+    extent = np.abs(box[:, :2]).max(initial=size)
+    half = spacing * np.ceil(extent / spacing)
+    lines = np.arange(-half, half + spacing / 2.0, spacing)
+    z = min(floor, float(box[:, 2].min(initial=0.0)))
+    ends = [[(x, -half, z), (x, half, z), (-half, x, z), (half, x, z)] for x in lines]
+    axis = 0.25 * size
+    frame = [(0, 0, 0), (axis, 0, 0), (0, 0, 0), (0, axis, 0), (0, 0, 0), (0, 0, axis)]
+    colours = np.repeat([(0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9)], 2, axis=0)
+    return [
+        threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
+        threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
+        threejs.set_property("/Grid", "visible", False),
+        threejs.set_property("/Axes", "visible", False),
+        threejs.segments("/ground", np.reshape(ends, (-1, 3)), (0.78, 0.80, 0.83)),
+        threejs.segments("/root frame", np.array(frame), (0, 0, 0), colours=colours),
+    ]
+
+
+def _round_below(value: float) -> float:
+    """The largest of 1, 2.5 and 5 times a power of ten that is at most `value`."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step * power for step in (1.0, 2.5, 5.0) if step * power <= value))
+
+
+def _points(cells: Cells) -> NDArray[np.float64]:
+    """Points (k, 3) m of the surface and the arm's base."""
+    base = np.zeros((1, 3))
+    if len(cells) == 0:
+        return base
+    corners = cells.borders(1).reshape(-1, 3)
+    return np.concatenate([base, cells.centres, corners])
+
+
+def _camera(robot: Robot, cells: Cells, q: NDArray[np.float64], floor: float) -> Camera:
+    """Look at arm and surface from the tool's side, a little from above."""
+    placements = robot_visuals.joint_placements(robot, q)[0]
+    place = np.eye(4)
+    joints = []
+    for step in placements:
+        place = place @ step
+        joints.append(place[:3, 3].copy())
+    points = np.concatenate([_points(cells), joints, [[0.0, 0.0, floor]]])
+    target = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    radius = max(float(np.linalg.norm(points - target, axis=1).max()), 0.1)
+    toward = np.zeros(3)
+    if len(cells):
+        toward = cells.surface.side_sign * cells.normals.mean(axis=0)
+    heading = np.arctan2(toward[1], toward[0]) if np.hypot(*toward[:2]) > 0.1 else -np.pi / 3.0
+    heading += np.radians(25.0)
+    height = np.radians(24.0)
+    direction = np.array(
+        [np.cos(heading) * np.cos(height), np.sin(heading) * np.cos(height), np.sin(height)]
+    )
+    eye = target + radius / np.sin(FRAMED) * direction
+    return Camera(tuple(target.tolist()), tuple(eye.tolist()))

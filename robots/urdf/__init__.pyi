@@ -1,0 +1,14 @@
+from .attributes import BadValue as BadValue
+from .attributes import numbers as numbers
+from .checked_urdf import CheckedUrdf as CheckedUrdf
+from .checked_urdf import JointInfo as JointInfo
+from .checked_urdf import check_urdf as check_urdf
+from .visuals import Box as Box
+from .visuals import Capsule as Capsule
+from .visuals import Cylinder as Cylinder
+from .visuals import MeshFile as MeshFile
+from .visuals import Sphere as Sphere
+from .visuals import Visual as Visual
+from .xml import UrdfError as UrdfError
+from .xml import parse_xml as parse_xml
+from .xml import read_bytes as read_bytes

@@ -1,0 +1,204 @@
+"""The gate that every URDF passes before a native parser sees it.
+
+Native URDF readers accept axes of length zero, limits that lock a joint, NaN and mesh names that
+climb out of their folder, and a long enough chain crashes the process. Here each of these is either
+one clear error or a correct robot. The native parser is then given a text of our own that holds the
+links and joints and nothing else of the file.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.sax.saxutils import quoteattr
+
+from robots.urdf.attributes import MAX_LENGTH, Faults
+from robots.urdf.joints import JointInfo, Mimic
+from robots.urdf.tree import MAX_LINKS, read_links, read_tree, refuse_other_formats
+from robots.urdf.visuals import (
+    Box,
+    Capsule,
+    Cylinder,
+    Geometry,
+    MeshFile,
+    MeshFolders,
+    Sphere,
+    Visual,
+    read_visuals,
+)
+from robots.urdf.xml import Node, UrdfError, parse_xml, read_bytes, shown
+
+__all__ = [
+    "MAX_LINKS", "Box", "Capsule", "CheckedUrdf", "Cylinder", "Geometry", "JointInfo", "MeshFile",
+    "Mimic", "Sphere", "UrdfError", "Visual", "check_urdf", "check_urdf_text",
+]  # fmt: skip
+
+
+MAX_WARNINGS = 100
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CheckedUrdf:
+    """A tree of links and joints that is safe to use, and what there is to draw."""
+
+    path: str
+    """Where it came from, for messages."""
+    name: str
+    text: str
+    """The same tree as URDF, written anew, for a native parser.
+
+    Only names, joint kinds, origins, axes and limits; mimic joints are free in it, and a joint
+    without usable limits (`JointInfo.fault`) has very wide ones, so that it is not locked.
+    """
+    root: str
+    """The link that no joint moves."""
+    links: tuple[str, ...]
+    """From the root outwards, parents before children."""
+    joints: tuple[JointInfo, ...]
+    """From the root outwards, in the order of `links[1:]`: joint i moves link i + 1."""
+    leaves: tuple[str, ...]
+    """Links without a child."""
+    visuals: tuple[Visual, ...]
+    warnings: tuple[str, ...]
+    """What is odd in the file and leaves the robot correct."""
+    package_dirs: tuple[str, ...]
+
+    def path_to(self, link: str) -> tuple[JointInfo, ...]:
+        """The joints from the root to `link`, base to tip.
+
+        Raises:
+            UrdfError: there is no such link.
+        """
+        if link not in self.links:
+            raise UrdfError(
+                self.path,
+                (f"has no link {shown(link)}; its leaves are: {', '.join(self.leaves[:20])}",),
+            )
+        above = {joint.child: joint for joint in self.joints}
+        path: list[JointInfo] = []
+        while link != self.root:
+            path.append(above[link])
+            link = above[link].parent
+        return tuple(reversed(path))
+
+    def __repr__(self) -> str:
+        """One line that says which robot this is."""
+        moving = sum(joint.moves for joint in self.joints)
+        return f"CheckedUrdf({self.name!r}, {len(self.links)} links, {moving} moving joints)"
+
+
+def check_urdf(
+    path: str | os.PathLike[str], package_dirs: Sequence[str | os.PathLike[str]] = ()
+) -> CheckedUrdf:
+    """Read and check a URDF file.
+
+    Args:
+        path: the file.
+        package_dirs: folders that hold the packages of `package://` mesh names.
+
+    Raises:
+        UrdfError: with every fault that was found, each with its line and what would do.
+    """
+    name = os.fsdecode(path)
+    root = parse_xml(read_bytes(name), name)
+    return _check(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
+
+
+def check_urdf_text(
+    text: str,
+    name: str = "URDF text",
+    base_dir: str | os.PathLike[str] | None = None,
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+) -> CheckedUrdf:
+    """Check a URDF that is a string.
+
+    Args:
+        text: the URDF.
+        name: what to call it in messages.
+        base_dir: folder of relative mesh names; without it they are not looked for.
+        package_dirs: as in `check_urdf`.
+
+    Raises:
+        UrdfError: as `check_urdf`.
+
+    Example:
+        >>> two_links = '''<robot name="slider"> <link name="rail"/> <link name="cart"/>
+        ...   <joint name="slide" type="prismatic"> <parent link="rail"/> <child link="cart"/>
+        ...     <limit lower="0" upper="0.5"/> </joint> </robot>'''
+        >>> check_urdf_text(two_links)
+        CheckedUrdf('slider', 2 links, 1 moving joints)
+        >>> check_urdf_text(two_links.replace('"0.5"', '"-0.5"')).joints[0].fault.split("; ")[0]
+        "line 2: joint 'slide' has limits [0, -0.5]: lower lies above upper"
+    """
+    try:
+        data = text.encode()
+    except UnicodeEncodeError as error:
+        raise UrdfError(name, (f"is no text: {error.reason} at {error.start}",)) from None
+    root = parse_xml(data, name, encoding="utf-8")
+    return _check(root, name, os.fsdecode(base_dir) if base_dir is not None else None, package_dirs)
+
+
+def _check(
+    robot: Node, path: str, base_dir: str | None, package_dirs: Sequence[str | os.PathLike[str]]
+) -> CheckedUrdf:
+    refuse_other_formats(robot, path)
+    faults = Faults()
+    folders = tuple(os.path.abspath(os.fsdecode(folder)) for folder in package_dirs)
+    faults.errors += [
+        f"package_dirs: {shown(folder, 200)} is not a folder"
+        for folder in folders
+        if not os.path.isdir(folder)
+    ]
+    links = read_links(robot, faults)
+    joints = read_tree(robot, links, faults)
+    if faults.errors:
+        raise UrdfError(path, tuple(faults.errors))
+    visuals = read_visuals(robot, MeshFolders(base_dir, folders), faults)
+    parents = {joint.parent for joint in joints}
+    root = next(iter(set(links) - {joint.child for joint in joints}))
+    names = (root, *(joint.child for joint in joints))
+    title = robot.attributes.get("name") or os.path.splitext(os.path.basename(path))[0] or "robot"
+    return CheckedUrdf(
+        path=path,
+        name=title,
+        text=_written(title, names, joints),
+        root=root,
+        links=names,
+        joints=joints,
+        leaves=tuple(name for name in names if name not in parents),
+        visuals=visuals,
+        warnings=_capped(faults.warnings),
+        package_dirs=folders,
+    )
+
+
+def _capped(warnings: list[str]) -> tuple[str, ...]:
+    more = len(warnings) - MAX_WARNINGS
+    return (*warnings[:MAX_WARNINGS], *([f"... and {more:,} more"] if more > 0 else []))
+
+
+def _written(title: str, links: tuple[str, ...], joints: tuple[JointInfo, ...]) -> str:
+    """Write the tree as URDF; repr keeps every digit of a number."""
+    lines = [f"<robot name={quoteattr(title)}>"]
+    lines += [f"  <link name={quoteattr(link)}/>" for link in links]
+    for joint in joints:
+        xyz, rpy, axis = (
+            " ".join(map(repr, values)) for values in (joint.xyz, joint.rpy, joint.axis)
+        )
+        lines += [
+            f'  <joint name={quoteattr(joint.name)} type="{joint.kind}">',
+            f"    <parent link={quoteattr(joint.parent)}/>",
+            f"    <child link={quoteattr(joint.child)}/>",
+            f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
+        ]
+        if joint.moves:
+            lines.append(f'    <axis xyz="{axis}"/>')
+        if joint.kind in ("revolute", "prismatic"):
+            lower = -MAX_LENGTH if joint.lower is None else joint.lower
+            upper = MAX_LENGTH if joint.upper is None else joint.upper
+            lines.append(
+                f'    <limit lower="{lower!r}" upper="{upper!r}" effort="0" velocity="0"/>'
+            )
+        lines.append("  </joint>")
+    return "\n".join([*lines, "</robot>", ""])

@@ -1,0 +1,163 @@
+"""Borders of cells made of faces: outlines, and who shares how much border with whom."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from surfaces.adjacency import Neighbours
+from surfaces.meshes.cells.dual_graph import sum_by
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Outlines:
+    """The closed border lines of cells, counter-clockwise seen from outside, holes clockwise."""
+
+    points: NDArray[np.float64]
+    """(K, 3) m, the corners of all loops, one loop after the other."""
+    vertices: NDArray[np.int64]
+    """(K,) which vertex of the mesh each is."""
+    starts: NDArray[np.int64]
+    """(L + 1,) where each loop begins, and the end of the last."""
+    cells: NDArray[np.int64]
+    """(L,) the cell of each loop, in rising order; a cell has several if it has holes, and none
+    if it is a whole closed surface."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the arrays."""
+        for field in fields(self):
+            array = np.array(getattr(self, field.name))
+            array.flags.writeable = False
+            object.__setattr__(self, field.name, array)
+
+    def of(self, cell: int) -> list[NDArray[np.float64]]:
+        """The loops of a cell as closed polylines (n + 1, 3) m: the last point is the first."""
+        first, last = np.searchsorted(self.cells, [cell, cell + 1])
+        bounds = zip(self.starts[first:last], self.starts[first + 1 : last + 1], strict=True)
+        return [np.concatenate([self.points[a:b], self.points[a : a + 1]]) for a, b in bounds]
+
+
+class SharedBorders(NamedTuple):
+    """Pairs of cells that share a border. Cells that touch in single points share none."""
+
+    pairs: NDArray[np.int64]
+    """(M, 2) i < j, sorted."""
+    lengths: NDArray[np.float64]
+    """(M,) m."""
+    midpoints: NDArray[np.float64]
+    """(M, 3) m, the place on each border that is nearest to its mean."""
+
+
+def outlines(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    partner: NDArray[np.int64],
+    labels: NDArray[np.int64],
+) -> Outlines:
+    """The border lines of all cells.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3) vertex indices.
+        partner: (F, 3) see `face_graph.edge_partners`.
+        labels: (F,) cell of each face.
+    """
+    other = np.where(partner >= 0, labels[partner // 3], -1)
+    border = other != labels[:, None]
+    order = np.argsort(labels, kind="stable")
+    chain, starts, cells = _loops(faces, partner, labels, border, order, int(border.sum()))
+    return Outlines(vertices[chain], chain, starts, cells)
+
+
+@njit(cache=True, error_model="numpy")
+def _loops(faces, partner, labels, border, order, total):  # type: ignore[no-untyped-def]
+    """Follow each border edge to the next one of the same cell, turning about their vertex."""
+    chain = np.empty(total, dtype=np.int64)
+    starts = np.empty(total + 1, dtype=np.int64)
+    cells = np.empty(total, dtype=np.int64)
+    seen = np.zeros(border.shape, dtype=np.bool_)
+    size, loops = 0, 0
+    for position in range(order.shape[0]):
+        for k in range(3):
+            face, edge = order[position], k
+            if not border[face, edge] or seen[face, edge]:
+                continue
+            starts[loops], cells[loops] = size, labels[face]
+            loops += 1
+            while not seen[face, edge]:
+                seen[face, edge] = True
+                chain[size] = faces[face, edge]
+                size += 1
+                edge = (edge + 1) % 3
+                while not border[face, edge]:
+                    across = partner[face, edge]
+                    face, edge = across // 3, (across % 3 + 1) % 3
+    starts[loops] = size
+    return chain, starts[: loops + 1], cells[:loops]
+
+
+def shared_borders(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    partner: NDArray[np.int64],
+    labels: NDArray[np.int64],
+) -> SharedBorders:
+    """Which cells share a border, how long it is, and where its middle lies.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3) vertex indices.
+        partner: (F, 3) see `face_graph.edge_partners`.
+        labels: (F,) cell of each face.
+    """
+    count = int(labels.max()) + 1
+    other = np.where(partner >= 0, labels[partner // 3], -1)
+    face, k = np.nonzero(other > labels[:, None])
+    keys, pair = np.unique(labels[face] * count + other[face, k], return_inverse=True)
+    start, end = vertices[faces[face, k]], vertices[faces[face, (k + 1) % 3]]
+    length = np.linalg.norm(end - start, axis=1)
+    total = sum_by(pair, length, len(keys))
+    mean = sum_by(pair, length[:, None] * (start + end) / 2.0, len(keys)) / total[:, None]
+    along = np.einsum("ij,ij->i", mean[pair] - start, end - start) / length**2
+    nearest = start + np.clip(along, 0.0, 1.0)[:, None] * (end - start)
+    # Rounded, so that of two places equally near the first is taken, however the mesh is turned.
+    off = np.linalg.norm(nearest - mean[pair], axis=1) / total[pair]
+    order = np.lexsort((np.arange(len(pair)), np.round(off, 6), pair))
+    first = order[np.unique(pair[order], return_index=True)[1]]
+    return SharedBorders(np.column_stack(np.divmod(keys, count)), total, nearest[first])
+
+
+def clockwise_neighbours(
+    borders: SharedBorders, centres: NDArray[np.float64], normals: NDArray[np.float64]
+) -> Neighbours:
+    """Each cell's neighbours, clockwise seen from its normal's tip, the lowest index first.
+
+    Args:
+        borders: of N cells.
+        centres: (N, 3) m.
+        normals: (N, 3) unit normals at the centres.
+    """
+    count = len(centres)
+    owner = np.concatenate([borders.pairs[:, 0], borders.pairs[:, 1]])
+    other = np.concatenate([borders.pairs[:, 1], borders.pairs[:, 0]])
+    middle = np.concatenate([borders.midpoints, borders.midpoints])
+    # Angles from the direction of the lowest neighbour, which so comes first.
+    order = np.lexsort((other, owner))
+    owner, other, middle = owner[order], other[order], middle[order]
+    indptr = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(np.bincount(owner, minlength=count), out=indptr[1:])
+    away = middle - centres[owner]
+    first = away[indptr[:-1][owner]]
+    normal = normals[owner]
+    ahead = np.einsum("ij,ij->i", first, away) - (
+        np.einsum("ij,ij->i", first, normal) * np.einsum("ij,ij->i", away, normal)
+    )
+    right = np.einsum("ij,ij->i", normal, np.cross(away, first))
+    angle = np.arctan2(right, ahead) % (2.0 * np.pi)
+    angle[indptr[:-1][owner] == np.arange(len(owner))] = -1.0
+    order = np.lexsort((other, angle, owner))
+    return Neighbours(indptr, other[order])

@@ -1,0 +1,237 @@
+"""Cut a triangle mesh into E-cells: connected groups of faces, compact and of even area.
+
+Lloyd's iteration: faces go to the nearest seed, seeds to the middle of their cells (a centroidal
+Voronoi tessellation on the faces; Du, Faber and Gunzburger 1999). A head start for each seed, more
+for a cell that is too small, evens the areas out. Nothing is random, and a turned, moved or scaled
+mesh gets the same cells.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.meshes.cells.dual_graph import FaceGraph, face_graph, sum_by
+from surfaces.meshes.cells.subdivision import MOST_FACES, Subdivision, subdivide
+from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps
+from surfaces.surface import SurfaceError
+
+FACES_PER_CELL = 80
+MOST_CELLS = 20_000
+_RIM = 0.6  # cells: how far outside the border counts as a seed
+_MOVING = 10  # rounds in which seeds move
+_MOST_MOVING = 40  # as long as areas are more uneven than
+_UNEVEN = 0.12  # this, std / mean
+_EVENING = 6  # rounds after that, at most, in which head starts alone even out the areas
+_EVEN = 0.03  # std / mean of the areas that is good enough
+_GAIN = 0.5  # share of a missing area that one round makes up for
+_JAGGED = 1.4  # borders run along edges, about this much longer than straight
+_PIN = 1e-3  # keeps the head starts of a separate piece from drifting
+_MOST_OFFSET = 3.0  # head starts, in lengths of a cell
+_MOST_STEP = 0.2  # between neighbours in one round
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class CellCut:
+    """A mesh fine enough for its cells, and the cell of each face."""
+
+    mesh: Subdivision
+    """The finer mesh, the old face of each new one, and `spread` for fields on vertices."""
+    labels: NDArray[np.int64]
+    """(G,) cell of each face of `mesh`, each of 0..count-1 at least once."""
+    count: int
+    """Number of cells."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the labels."""
+        labels = self.labels.copy()
+        labels.flags.writeable = False
+        object.__setattr__(self, "labels", labels)
+
+
+def cells_for(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    count: int | None = None,
+    size: float | None = None,
+) -> CellCut:
+    """Cut a mesh into cells, after splitting its coarse triangles.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3) vertex indices of a clean mesh.
+        count: how many cells; or
+        size: m, the side of a square that has a cell's area.
+
+    Raises:
+        SurfaceError: not exactly one of `count` and `size` is given, it is not a number that makes
+            1 to 20,000 cells, or there are fewer cells than separate pieces.
+
+    Example:
+        >>> square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
+        >>> cut = cells_for(square, np.array([[0, 1, 2], [0, 2, 3]]), size=0.25)
+        >>> cut.count, len(cut.labels)
+        (16, 2048)
+    """
+    corners = np.asarray(vertices, dtype=float)[np.asarray(faces, dtype=np.int64)]
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    total = float(np.linalg.norm(cross, axis=1).sum() / 2.0)
+    number = _number_of_cells(total, count, size)
+    mesh = subdivide(vertices, faces, total / number / FACES_PER_CELL)
+    return CellCut(mesh, cluster_faces(mesh.vertices, mesh.faces, number), number)
+
+
+def cluster_faces(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], count: int
+) -> NDArray[np.int64]:
+    """Labels (F,) of `count` connected cells of even area; separate pieces share by area.
+
+    The faces should be much smaller than the cells; `cells_for` sees to it.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3) vertex indices of a clean mesh.
+        count: number of cells, at least one for each separate piece and at most one for each face.
+
+    Raises:
+        SurfaceError: `count` is no such number, or there are more than 4,000,000 faces.
+    """
+    faces = np.asarray(faces, dtype=np.int64)
+    count = _whole(count)
+    if len(faces) > MOST_FACES:
+        raise SurfaceError(f"{len(faces):,} faces are too many; thin the mesh to {MOST_FACES:,}")
+    if not 1 <= count <= len(faces):
+        raise SurfaceError(
+            f"{count} cells cannot be made of {len(faces)} faces; each needs one at least. "
+            "Subdivide the mesh, or ask for fewer cells"
+        )
+    graph = face_graph(np.asarray(vertices, dtype=float), faces)
+    quota = _shares(graph, count)
+    # From here on, lengths are in cells: the side of a square of a cell's mean area is 1.
+    unit = math.sqrt(graph.area.sum() / count)
+    step, edge = graph.step / unit, graph.edge / unit
+    centre, area = graph.centre / unit, graph.area / unit**2
+    piece_area = np.bincount(graph.piece, weights=area)
+    target = np.repeat(piece_area / quota, quota)
+    seeds = far_seeds(graph.across, whole_steps(step), graph.piece, quota, units(_RIM))
+    labels = _lloyd(graph, step, edge, centre, area, target, seeds)
+    smooth(graph.across, whole_steps(edge), area, target, labels)
+    return labels
+
+
+def _lloyd(
+    graph: FaceGraph,
+    step: NDArray[np.float64],
+    edge: NDArray[np.float64],
+    centre: NDArray[np.float64],
+    area: NDArray[np.float64],
+    target: NDArray[np.float64],
+    seeds: NDArray[np.int64],
+) -> NDArray[np.int64]:
+    """The most even labels of some rounds, all lengths in cells; `seeds` (N,) is changed."""
+    labels = np.empty(len(area), dtype=np.int64)
+    best, least = labels, math.inf
+    anchors, offsets = centre[seeds], np.zeros(len(seeds))
+    moving, evened = True, 0
+    for done in range(1, _MOST_MOVING + _EVENING + 1):
+        flood(graph.across, step, centre, seeds, anchors, offsets, labels)
+        areas = sum_by(labels, area, len(seeds))
+        uneven = float((areas / target).std())
+        moving = moving and (done < _MOVING or (uneven > _UNEVEN and done < _MOST_MOVING))
+        if moving:
+            recentre(centre, graph.normal, area, labels, seeds, anchors)
+            # A border moves half as far as a head start, and around a cell it is about 4 long.
+            offsets += _GAIN * (target - areas) / np.sqrt(target) / 2.0
+        else:
+            evened += 1
+            if uneven < least:
+                best, least = labels.copy(), uneven
+            if uneven <= _EVEN or evened > _EVENING:
+                break
+            offsets += _head_starts(graph.across, edge, labels, target - areas)
+        offsets = np.clip(offsets - offsets.mean(), -_MOST_OFFSET, _MOST_OFFSET)
+    return best
+
+
+def _head_starts(
+    across: NDArray[np.int64],
+    edge: NDArray[np.float64],
+    labels: NDArray[np.int64],
+    missing: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """(N,) head starts that would give each cell the area it misses: one step of Newton's method.
+
+    A border of length s moves by half the difference of its two head starts h, so a cell gains
+    the sum of s (h - h') / 2 over its neighbours: a Laplace equation on the graph of cells.
+    """
+    from scipy.sparse import coo_array, diags_array
+    from scipy.sparse.linalg import spsolve
+
+    face, k = np.nonzero((across >= 0) & (labels[across] != labels[:, None]))
+    count = len(missing)
+    ends = (labels[face], labels[across[face, k]])
+    border = coo_array((edge[face, k] / _JAGGED / 2.0, ends), shape=(count, count)).tocsr()
+    laplace = diags_array(border.sum(axis=1) + _PIN) - border
+    change = np.atleast_1d(spsolve(laplace.tocsc(), missing))
+    steepest = np.max(abs(change[ends[0]] - change[ends[1]]), initial=0.0)
+    return change * min(_GAIN, _MOST_STEP / max(steepest, _MOST_STEP))
+
+
+def _shares(graph: FaceGraph, count: int) -> NDArray[np.int64]:
+    """(P,) cells of each piece: by area, at least one each and at most one for each face.
+
+    Raises:
+        SurfaceError: there are more pieces than cells.
+    """
+    area, faces = np.bincount(graph.piece, weights=graph.area), np.bincount(graph.piece)
+    if len(area) > count:
+        raise SurfaceError(
+            f"{count} cells are too few for {len(area)} separate pieces; each needs one at least. "
+            "Ask for more cells, or drop the small pieces"
+        )
+    ideal = area / area.sum() * count
+    quota = np.clip(np.floor(ideal).astype(np.int64), 1, faces)
+    while quota.sum() != count:  # one by one, where it helps or hurts least
+        if quota.sum() < count:
+            quota[np.argmax(np.where(quota < faces, ideal / (quota + 1.0), -1.0))] += 1
+        else:
+            quota[np.argmin(np.where(quota > 1, ideal / quota, np.inf))] -= 1
+    return quota
+
+
+def _number_of_cells(total: float, count: int | None, size: float | None) -> int:
+    """How many cells a mesh of `total` m^2 gets.
+
+    Raises:
+        SurfaceError: see `cells_for`.
+    """
+    side = math.sqrt(total)
+    hint = f"for this part of {total:.3g} m^2, size = {side / 14:.2g} (m) makes about 200 cells"
+    if (count is None) == (size is None):
+        raise SurfaceError(f"give either count or size of the cells; {hint}")
+    if size is not None:
+        if isinstance(size, bool) or not (math.isfinite(size) and size > 0.0):
+            raise SurfaceError(f"size must be a finite number > 0 (metres), got {size!r}; {hint}")
+        ideal = total / size**2
+        count = max(round(ideal), 1) if ideal < 1e9 else 10**9
+    number = _whole(count)
+    if not 1 <= number <= MOST_CELLS:
+        what = f"count = {number}" if size is None else f"size = {size:g} m, so {number:,} cells"
+        raise SurfaceError(f"a mesh can have 1 to {MOST_CELLS:,} cells, got {what}; {hint}")
+    return number
+
+
+def _whole(value: Any) -> int:
+    """A whole number, or a clear error."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or isinstance(value, bool):
+        raise SurfaceError(f"count must be a whole number >= 1, got {value!r}")
+    return number

@@ -1,0 +1,189 @@
+"""MeshCells: connected groups of the triangles of a mesh, of even area."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.adjacency import Neighbours
+from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.surface import SurfaceError
+
+if TYPE_CHECKING:
+    from surfaces.meshes.cells.properties import Figures
+    from surfaces.meshes.mesh_surface import MeshSurface
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshCells(Cells):
+    """N cells of a mesh; a cell is the faces with its label."""
+
+    surface: MeshSurface
+    labels: Ints
+    """(F,) cell of each face of `surface.mesh`."""
+
+    @staticmethod
+    def cut(surface: MeshSurface, count: int | None, size: float | None) -> MeshCells:
+        """See `MeshSurface.cells`."""
+        from surfaces.meshes.cells.clustering import cells_for
+
+        cut = cells_for(surface.mesh.vertices, surface.mesh.faces, count, size)
+        fine = surface.finer(cut.mesh.vertices, cut.mesh.faces, cut.mesh.original)
+        return MeshCells.of(fine, cut.labels)
+
+    @staticmethod
+    def of(surface: MeshSurface, labels: ArrayLike) -> MeshCells:
+        """Cells from given groups of faces.
+
+        Args:
+            surface: the mesh.
+            labels: (F,) cell of each face, every one of 0..N-1 at least once, each connected.
+
+        Raises:
+            SurfaceError: the labels are no such groups.
+        """
+        numbers = np.asarray(labels)
+        if numbers.shape != (len(surface.mesh.faces),) or numbers.dtype.kind not in "iu":
+            raise SurfaceError(
+                f"labels must be {len(surface.mesh.faces)} whole numbers, one for each face, got "
+                f"shape {numbers.shape} of {numbers.dtype}"
+            )
+        if numbers.min() < 0:
+            raise SurfaceError(f"labels must number cells from 0 on, got {numbers.min()}")
+        numbers = numbers.astype(np.int64)
+        figures = _figures(surface, numbers)
+        made = MeshCells(
+            surface=surface,
+            centres=figures.centres @ surface.rotation.T + surface.position,
+            normals=figures.normals @ surface.rotation.T,
+            areas=figures.areas,
+            shape=(len(figures.areas),),
+            labels=numbers,
+        )
+        made.__dict__["figures"] = figures
+        return made
+
+    @cached_property
+    def figures(self) -> Figures:
+        """What is known of each cell: flatness, borders, outlines; in the surface's own frame."""
+        return _figures(self.surface, self.labels)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about the mesh and its cells; one sentence each."""
+        from surfaces.meshes.cells.properties import coarse
+
+        words = coarse(self.figures)
+        return (*self.surface.notes, *([words] if words else []))
+
+    @property
+    def neighbours(self) -> Neighbours:
+        """(indptr, indices): the cells that share a border with each, clockwise from outside."""
+        return self.figures.neighbours
+
+    @property
+    def border_lengths(self) -> Array:
+        """(M,) m, length of the border that each of `pairs` shares."""
+        return self.figures.borders.lengths
+
+    @cached_property
+    def members(self) -> tuple[Ints, Ints]:
+        """Faces cell by cell (F,), and where each cell's begin (N + 1,)."""
+        order = np.argsort(self.labels, kind="stable")
+        return order, np.searchsorted(self.labels[order], np.arange(len(self) + 1))
+
+    def crossings(self, pairs: Ints) -> Array:
+        """(m, 3) m, a place in the middle of the border that two cells share."""
+        keys = self.pairs[:, 0] * len(self) + self.pairs[:, 1]
+        row = np.searchsorted(keys, pairs.min(axis=1) * len(self) + pairs.max(axis=1))
+        local = self.figures.borders.midpoints[row]
+        return local @ self.surface.rotation.T + self.surface.position
+
+    def locate(self, points: ArrayLike) -> Ints:
+        """See `Cells.locate`."""
+        return self.labels[self.surface.faces_below(points)]
+
+    def borders(self, samples: int = 8) -> Array:
+        """See `Cells.borders`: the edges between faces of different cells, and the mesh's own."""
+        edges = self.surface.mesh.edges
+        apart = self.labels[edges.faces[:, 0]] != self.labels[edges.faces[:, 1]]
+        ends = np.concatenate([edges.vertices[apart], edges.border_vertices])
+        local = self.surface.mesh.vertices[ends]
+        return local @ self.surface.rotation.T + self.surface.position
+
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
+        """See `Cells.triangles`."""
+        members, indptr = self.members
+        parts = [members[indptr[k] : indptr[k + 1]] for k in which]
+        faces = np.concatenate([np.empty(0, dtype=np.int64), *parts])
+        surface = self.surface
+        corners = surface.mesh.vertices[surface.mesh.faces[faces]] @ surface.rotation.T
+        corners = corners + surface.position
+        centre = self.centres[self.labels[faces]][:, None]
+        corners = corners + inset * (centre - corners)
+        return Triangles(
+            vertices=corners.reshape(-1, 3),
+            faces=np.arange(3 * len(faces)).reshape(-1, 3),
+            normals=(surface.corner_normals[faces] @ surface.rotation.T).reshape(-1, 3),
+        )
+
+    def unrolled(self) -> Unrolled:
+        """See `Cells.unrolled`: seen along the mean normal, from the outside."""
+        mean = (self.areas[:, None] * self.normals).sum(axis=0)
+        _, _, axes = np.linalg.svd(self.centres - self.centres.mean(axis=0))
+        up = mean if np.linalg.norm(mean) > 0.1 * self.areas.sum() else axes[-1]
+        up = up / np.linalg.norm(up)
+        right = axes[0] - (axes[0] @ up) * up
+        if np.linalg.norm(right) < 1e-6:
+            right = axes[1] - (axes[1] @ up) * up
+        right = right / np.linalg.norm(right)
+        flat = np.column_stack([right, -np.cross(up, right)])  # y runs down
+        middle = self.centres.mean(axis=0)
+        rotation, position = self.surface.rotation, self.surface.position
+        none = np.empty((0, 3))  # of a cell that is a whole closed surface
+        loops = [
+            max(self.figures.outlines.of(k), key=_length, default=none) for k in range(len(self))
+        ]
+        return Unrolled(
+            centres=(self.centres - middle) @ flat,
+            outlines=tuple((loop @ rotation.T + position - middle) @ flat for loop in loops),
+            labels=("along (m)", "across (m)"),
+            turns=(np.inf, np.inf),
+        )
+
+    def unravel(self, k: int) -> tuple[int]:
+        """The cell's number.
+
+        Raises:
+            IndexError: there is no such cell.
+        """
+        if not 0 <= k < len(self):
+            raise IndexError(f"no cell {k} among {len(self)}")
+        return (int(k),)
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"Cells({len(self)} of {self.surface!r})"
+
+
+def _length(line: Array) -> float:
+    """m, of a polyline (k, 3)."""
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _figures(surface: MeshSurface, labels: Ints) -> Figures:
+    """The figures of labelled faces."""
+    from surfaces.meshes.cells.properties import figures
+
+    mesh = surface.mesh
+    normals = np.empty_like(mesh.vertices)
+    normals[mesh.faces.ravel()] = surface.rim_normals.reshape(-1, 3)
+    made = figures(mesh.vertices, mesh.faces, normals, labels)
+    return replace(made, normals=surface.normals_at(made.faces, made.weights) @ surface.rotation)

@@ -1,0 +1,188 @@
+"""What is to be known of each cell of a mesh: centre, normal, area, flatness, neighbours."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.adjacency import Neighbours
+from surfaces.meshes.cells.borders import (
+    Outlines,
+    SharedBorders,
+    clockwise_neighbours,
+    outlines,
+    shared_borders,
+)
+from surfaces.meshes.cells.centres import centre_places
+from surfaces.meshes.cells.dual_graph import edge_partners, sum_by
+from surfaces.surface import SurfaceError
+
+MOST_TURN_DEG = 30.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Figures:
+    """The figures of N cells of a mesh."""
+
+    centres: NDArray[np.float64]
+    """(N, 3) m, on the faces."""
+    normals: NDArray[np.float64]
+    """(N, 3) unit normals at the centres, interpolated between the vertices."""
+    areas: NDArray[np.float64]
+    """(N,) m^2."""
+    faces: NDArray[np.int64]
+    """(N,) the face each centre lies on."""
+    weights: NDArray[np.float64]
+    """(N, 3) the centres' barycentric coordinates there."""
+    mean_normals: NDArray[np.float64]
+    """(N, 3) unit, area-weighted; the centre's normal where the mean is zero (a closed cell)."""
+    flatness: NDArray[np.float64]
+    """(N,) rad, the largest angle between a face's normal and the mean normal."""
+    crease: NDArray[np.float64]
+    """(N,) rad, the largest angle between two faces of the cell that share an edge."""
+    sagitta: NDArray[np.float64]
+    """(N,) m, the largest distance of a vertex from the plane through the centre, across the
+    mean normal."""
+    borders: SharedBorders
+    """Neighbouring pairs, and the border they share."""
+    neighbours: Neighbours
+    """Each cell's neighbours, clockwise seen from the normal's tip, the lowest index first."""
+    outlines: Outlines
+    """The cells' border lines."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the arrays."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                copy = value.copy()
+                copy.flags.writeable = False
+                object.__setattr__(self, field.name, copy)
+            elif isinstance(value, (SharedBorders, Neighbours)):
+                for array in value:
+                    array.flags.writeable = False
+
+
+def figures(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int64],
+    vertex_normals: NDArray[np.float64],
+    labels: NDArray[np.int64],
+) -> Figures:
+    """The figures of cells.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3) vertex indices of a clean mesh.
+        vertex_normals: (V, 3) of any length; of a mesh that was made finer, those that
+            `Subdivision.spread` carried over.
+        labels: (F,) cell of each face; every one of 0..N-1 is used.
+
+    Raises:
+        SurfaceError: a label is not used.
+    """
+    used = np.bincount(labels)
+    if (used == 0).any():
+        raise SurfaceError(f"cell {int(np.argmin(used))} has no face; number cells from 0 on")
+    count = len(used)
+    partner = edge_partners(faces, len(vertices))
+    other = np.where(partner >= 0, labels[partner // 3], -1)
+    corners = vertices[faces]
+    double = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    face_areas = np.linalg.norm(double, axis=1) / 2.0
+    face_normals = _unit(double)
+    border = other != labels[:, None]
+    places = centre_places(vertices, faces, labels, face_areas, border)
+    normals = np.einsum("nk,nkc->nc", places.weights, vertex_normals[faces[places.faces]])
+    normals = _unit(normals, instead=face_normals[places.faces])
+    areas = sum_by(labels, face_areas, count)
+    mean = _unit(sum_by(labels, double, count), instead=normals, least=1e-12 * areas)
+    flatness, crease, sagitta = np.zeros(count), np.zeros(count), np.zeros(count)
+    np.maximum.at(flatness, labels, _angle(face_normals, mean[labels]))
+    face, k = np.nonzero(~border)
+    bend = _angle(face_normals[face], face_normals[partner[face, k] // 3])
+    np.maximum.at(crease, labels[face], bend)
+    height = corners - places.points[labels][:, None]
+    off_plane = abs(np.einsum("fkc,fc->fk", height, mean[labels])).max(axis=1)
+    np.maximum.at(sagitta, labels, off_plane)
+    borders = shared_borders(vertices, faces, partner, labels)
+    return Figures(
+        centres=places.points,
+        normals=normals,
+        areas=areas,
+        faces=places.faces,
+        weights=places.weights,
+        mean_normals=mean,
+        flatness=flatness,
+        crease=crease,
+        sagitta=sagitta,
+        borders=borders,
+        neighbours=clockwise_neighbours(borders, places.points, normals),
+        outlines=outlines(vertices, faces, partner, labels),
+    )
+
+
+def coarse(figures: Figures) -> str:
+    """Say which share of the cells is too large for the curvature, and what would do; or "".
+
+    A cell is too large where a normal in it leans more than `MOST_TURN_DEG` from its mean. Smaller
+    cells mend that, unless the surface has a crease.
+    """
+    most = math.radians(MOST_TURN_DEG)
+    count = len(figures.areas)
+    creased = figures.crease > most
+    curved = (figures.flatness > most) & ~creased
+    parts = []
+    if curved.any():
+        worst = float(figures.flatness[curved].max())
+        # The lean grows with a cell's width; a tenth is added for cells that lie worse.
+        ratio = 1.1 * worst / most
+        size = math.sqrt(float(figures.areas.mean()))
+        parts.append(
+            f"{_share(curved)} too large for the curvature: the normal leans up to "
+            f"{math.degrees(worst):.0f} degrees from the cell's mean, more than "
+            f"{MOST_TURN_DEG:g}; about {_round_up(count * ratio**2):,} cells "
+            f"(cell_size = {size / ratio:.2g} m) would do"
+        )
+    if creased.any():
+        parts.append(
+            f"{_share(creased)} folded over a crease of up to "
+            f"{math.degrees(float(figures.crease.max())):.0f} degrees, which no smaller cell "
+            "removes: their one centre speaks for both sides; cut the surface there for cells that "
+            "end at it"
+        )
+    return "; ".join(parts)
+
+
+def _share(which: NDArray[np.bool_]) -> str:
+    """'12 of 200 cells (6 %) are'."""
+    number = int(which.sum())
+    percent = 100.0 * number / len(which)
+    figure = f"{percent:.0f}" if percent >= 9.5 else f"{percent:.2g}"
+    return f"{number} of {len(which)} cells ({figure} %) {'is' if number == 1 else 'are'}"
+
+
+def _round_up(number: float) -> int:
+    """Up to two significant digits."""
+    step = 10.0 ** max(math.floor(math.log10(number)) - 1, 0)
+    return int(math.ceil(number / step) * step)
+
+
+def _unit(
+    vectors: NDArray[np.float64],
+    instead: NDArray[np.float64] | None = None,
+    least: NDArray[np.float64] | float = 0.0,
+) -> NDArray[np.float64]:
+    """Rows of length 1; those no longer than `least` are taken from `instead`, or zero."""
+    length = np.linalg.norm(vectors, axis=1)
+    short = (length <= least)[:, None]
+    unit = vectors / np.where(short, 1.0, length[:, None])
+    return np.where(short, 0.0 if instead is None else instead, unit)
+
+
+def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(K,) rad between unit vectors, exact for small angles too (Kahan)."""
+    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))

@@ -1,0 +1,82 @@
+"""OBJ: vertices and polygons as text. Materials and textures that it names are never opened."""
+
+from __future__ import annotations
+
+from array import array
+from typing import BinaryIO
+
+import numpy as np
+
+from surfaces.meshes.files.raw_mesh import (
+    MOST_SIDES,
+    RawMesh,
+    no_triangles,
+    refuse_large,
+    triangulated,
+)
+from surfaces.meshes.files.text import Lines, shown
+
+_FREEFORM = {b"cstype", b"deg", b"surf", b"curv", b"curv2", b"parm", b"trim", b"hole", b"end"}
+_IGNORED = {
+    *(b"vt", b"vn", b"vp", b"g", b"s", b"l", b"p", b"usemtl", b"mtllib", b"lod", b"usemap"),
+    *(b"maplib", b"bevel", b"c_interp", b"d_interp", b"shadow_obj", b"trace_obj", b"mg"),
+}  # fmt: skip
+
+
+def read_obj(stream: BinaryIO, size: int) -> RawMesh:
+    """Read an OBJ; its objects and groups are joined.
+
+    Raises:
+        SurfaceError: not an OBJ, damaged, too large, or of curved patches.
+    """
+    lines = Lines(stream, b"#")
+    numbers, corners, sides, triangles = array("d"), array("q"), array("q"), 0
+    objects: set[bytes] = set()
+    name = b""
+    for words in lines:
+        word = words[0]
+        if words[-1].endswith(b"\\"):
+            raise lines.error("goes on in the next line (\\); export the mesh as triangles")
+        if word == b"v":
+            if len(words) < 4:
+                raise lines.error("should be 'v x y z'")
+            numbers.extend(lines.floats(words[1:4]))
+            refuse_large(0, len(numbers) // 3)
+        elif word in (b"f", b"fo"):
+            if not 4 <= len(words) <= 1 + MOST_SIDES:
+                raise lines.error(
+                    f"should be a face of 3 .. {MOST_SIDES} corners, got {len(words) - 1}"
+                )
+            corners.extend(_corners(lines, words[1:], len(numbers) // 3))
+            sides.append(len(words) - 1)
+            triangles += len(words) - 3
+            refuse_large(triangles)
+            objects.add(name)
+        elif word == b"o":
+            name = b" ".join(words[1:])
+        elif word in _FREEFORM:
+            raise lines.error(f"starts a curved patch ({shown(word)}); export it as triangles")
+        elif word not in _IGNORED:
+            raise lines.error(f"starts with {shown(word)}, which no OBJ line does")
+    if not sides:
+        raise no_triangles()
+    vertices = np.array(numbers).reshape(-1, 3)
+    mesh = triangulated(vertices, np.array(corners, np.int64), np.array(sides, np.int64))
+    several = (f"{len(objects)} objects of the file were joined",) * (len(objects) > 1)
+    return RawMesh(mesh.vertices, mesh.faces, several + mesh.notes)
+
+
+def _corners(lines: Lines, words: list[bytes], so_far: int) -> list[int]:
+    """Indices from 0 out of 'v', 'v/vt', 'v//vn' or 'v/vt/vn'.
+
+    A file counts from 1, or backwards from the vertex read last as -1.
+    """
+    indices = []
+    for word in words:
+        index = lines.whole(word.split(b"/", 1)[0])
+        if index == 0 or index < -so_far:
+            raise lines.error(
+                f"names vertex {index}; an OBJ counts from 1, or from -1 back to -{so_far} here"
+            )
+        indices.append(index - 1 if index > 0 else so_far + index)
+    return indices

@@ -1,0 +1,123 @@
+"""What a mesh file holds before it is checked, and how much of it is taken."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from surfaces.meshes.triangle_mesh import Floats, Ints
+from surfaces.surface import SurfaceError
+
+MOST_FACES = 2_000_000
+MOST_VERTICES = 3 * MOST_FACES
+MOST_SIDES = 64  # of a polygon
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RawMesh:
+    """Triangles as a file has them; indices may be out of range and numbers not finite."""
+
+    vertices: Floats
+    """(V, 3) in the file's unit."""
+    faces: Ints
+    """(F, 3)"""
+    notes: tuple[str, ...] = ()
+
+
+def refuse_large(faces: int, vertices: int = 0) -> None:
+    """Refuse counts above what is taken.
+
+    Raises:
+        SurfaceError: more than `MOST_FACES` faces, or thrice as many vertices.
+    """
+    for count, most, what in (
+        (faces, MOST_FACES, "faces"),
+        (vertices, MOST_VERTICES, "vertices"),
+    ):
+        if count > most:
+            raise SurfaceError(
+                f"has {count:,} {what}, more than the {most:,} that are taken; thin it first, "
+                "for instance with MeshLab's Quadric Edge Collapse Decimation or Blender's "
+                "Decimate: a cell of the surface needs about a hundred faces, not thousands"
+            )
+
+
+def no_triangles() -> SurfaceError:
+    """The error for a file that is well formed, but empty."""
+    return SurfaceError(
+        "holds no faces (points and lines alone are no surface); export it as triangles"
+    )
+
+
+def triangulated(vertices: Floats, corners: Ints, sides: Ints) -> RawMesh:
+    """Cut polygons into triangles.
+
+    Each becomes a fan about one of its corners, the first from which all triangles face the same
+    way as the polygon; a convex polygon has one at once.
+
+    Args:
+        vertices: (V, 3).
+        corners: the polygons' vertices, one polygon after the other.
+        sides: (N,) how many corners each polygon has.
+
+    Raises:
+        SurfaceError: a polygon with fewer than 3 corners or too many, or one without such a fan.
+    """
+    if not len(sides):
+        raise no_triangles()
+    for bad, why in ((sides < 3, "fewer than 3"), (sides > MOST_SIDES, f"over {MOST_SIDES}")):
+        if bad.any():
+            first = int(bad.argmax())
+            raise SurfaceError(
+                f"face {first} (counted from 0) has {sides[first]} corners, {why}; "
+                "export the mesh as triangles"
+            )
+    refuse_large(int((sides - 2).sum()))
+    begins = np.cumsum(sides) - sides
+    places = np.cumsum(sides - 2) - (sides - 2)
+    faces = np.empty((int((sides - 2).sum()), 3), np.int64)
+    for count in np.unique(sides).tolist():
+        chosen = np.flatnonzero(sides == count)
+        polygons = corners[begins[chosen, None] + np.arange(count)]
+        if count > 3:
+            polygons = _turned_to_fan(vertices, polygons, chosen)
+        for k in range(count - 2):
+            faces[places[chosen] + k] = polygons[:, [0, k + 1, k + 2]]
+    cut = int((sides > 3).sum())
+    several = f"{cut} faces with more than three corners were" if cut > 1 else "1 face was"
+    return RawMesh(vertices, faces, (f"{several} cut into triangles",) * bool(cut))
+
+
+def _turned_to_fan(vertices: Floats, polygons: Ints, names: Ints) -> Ints:
+    """Turn each polygon (n, k) so that the fan about its first corner covers it."""
+    inside = ((polygons >= 0) & (polygons < len(vertices))).all(axis=1)  # others fail later
+    result = polygons.copy()
+    open_ones = np.flatnonzero(inside)
+    for turn in range(polygons.shape[1]):
+        rolled = np.roll(polygons[open_ones], -turn, axis=1)
+        spokes = vertices[rolled[:, 1:]] - vertices[rolled[:, :1]]
+        with np.errstate(all="ignore"):  # numbers that are not finite are refused later
+            normals = np.cross(spokes[:, :-1], spokes[:, 1:])
+            whole = normals.sum(axis=1)  # the same whichever corner it is taken about
+            along = np.einsum("nkc,nc->nk", normals, whole)
+            backwards = (along < -1e-9 * np.einsum("nc,nc->n", whole, whole)[:, None]).any(axis=1)
+        result[open_ones] = rolled
+        open_ones = open_ones[backwards]
+        if not len(open_ones):
+            return result
+    raise SurfaceError(
+        f"{len(open_ones)} faces with {polygons.shape[1]} corners are not convex, the first is "
+        f"face {names[open_ones[0]]} (counted from 0); export the mesh as triangles"
+    )
+
+
+def joined(parts: Sequence[RawMesh]) -> RawMesh:
+    """Several meshes as one."""
+    offsets = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    return RawMesh(
+        np.concatenate([part.vertices for part in parts]),
+        np.concatenate([part.faces + start for part, start in zip(parts, offsets, strict=False)]),
+        tuple(dict.fromkeys(note for part in parts for note in part.notes)),
+    )

@@ -1,0 +1,181 @@
+"""Meshes from untrusted files: STL, OBJ, PLY, OFF and GLB, each read by its own strict reader.
+
+Every count is checked against the size of the file and a cap before memory is taken for it, every
+number and index before it is used, and only the one file is opened, whatever it names.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from surfaces.arguments import real
+from surfaces.meshes.files.glb import read_glb
+from surfaces.meshes.files.obj import read_obj
+from surfaces.meshes.files.off import read_off
+from surfaces.meshes.files.ply import read_ply
+from surfaces.meshes.files.raw_mesh import RawMesh
+from surfaces.meshes.files.stl import read_stl
+from surfaces.meshes.repair import clean
+from surfaces.meshes.triangle_mesh import TriangleMesh
+from surfaces.surface import SurfaceError
+
+LARGEST_FILE = 512 << 20  # bytes
+# [m] Parts outside are taken only where the scale was given: no arm reaches around them.
+LARGEST_PART, SMALLEST_PART = 20.0, 1e-3
+WIDE_PART = 5.0  # [m]: worth a note
+
+_READERS: dict[str, Callable[[BinaryIO, int], RawMesh]] = {
+    ".stl": read_stl,
+    ".obj": read_obj,
+    ".ply": read_ply,
+    ".off": read_off,
+    ".glb": read_glb,
+}
+FORMATS = "STL, OBJ, PLY, OFF or GLB"
+# How files begin that are something else than their name says.
+_STARTS = {
+    b"PK\x03\x04": "a zip archive; unpack it first",
+    b"PK\x05\x06": "an empty zip archive",
+    b"\x1f\x8b": "packed with gzip; unpack it first",
+    b"BZh": "packed with bzip2; unpack it first",
+    b"\xfd7zXZ": "packed with xz; unpack it first",
+    b"7z\xbc\xaf": "a 7z archive; unpack it first",
+    b"\x28\xb5\x2f\xfd": "packed with zstd; unpack it first",
+    b"Rar!": "a rar archive; unpack it first",
+    b"ISO-10303-21": "a STEP file (CAD); export it as STL",
+    b"version https://git-lfs": "only a Git LFS pointer to the mesh; fetch it with 'git lfs pull'",
+    b"<": "XML or a web page, not a mesh",
+    b"{": "JSON (glTF as text?); export it as one .glb",
+    b"%PDF": "a PDF",
+}
+# With what follows the word, for a binary STL may begin with any text.
+_OWN_STARTS = {
+    b"glTF\2\0\0\0": ".glb",
+    **dict.fromkeys((b"ply\n", b"ply\r"), ".ply"),
+    **dict.fromkeys((b"OFF\n", b"OFF\r"), ".off"),
+}
+
+
+def read_mesh(
+    path: str | os.PathLike[str], scale: float | None = None, *, drop_crumbs: bool = False
+) -> TriangleMesh:
+    """Read a mesh file and clean it; see `surfaces.mesh_repair.clean` for what is repaired.
+
+    Args:
+        path: a file of one of the formats, at most 512 MB and 2,000,000 faces.
+        scale: metres per unit of the file, such as 0.001 for millimetres. Without it the unit is
+            taken as the metre, and a part above 20 m or below 1 mm is refused: that is nearly
+            always a wrong unit, and an arm would only be told that it cannot reach. Any given
+            scale, 1.0 too, is believed.
+        drop_crumbs: drop separate pieces of less than a thousandth of the area.
+
+    Raises:
+        SurfaceError: no such file, not a mesh, damaged, too large, or not a surface; with the
+            file's name, the place and what would do.
+    """
+    name = repr(Path(os.fsdecode(path)).name[:100])
+    unit = metres_per_unit(scale, name)
+    try:
+        raw = _read(path)
+        with np.errstate(over="ignore"):  # infinite coordinates are refused next
+            vertices = raw.vertices * unit
+        mesh = clean(vertices, raw.faces, drop_crumbs=drop_crumbs, history=raw.notes)
+        if scale is not None:
+            return mesh
+        return _with_likely_unit(mesh)
+    except SurfaceError as error:
+        raise SurfaceError(f"{name}: {error}") from error
+
+
+def metres_per_unit(scale: float | None, name: str) -> float:
+    """The scale as a number, 1 where none is given; `name` says of what.
+
+    Raises:
+        SurfaceError: it is no number, or not within 1e-9 .. 1e9.
+    """
+    if scale is None:
+        return 1.0
+    unit = real(scale)
+    if not 1e-9 <= unit <= 1e9:
+        raise SurfaceError(
+            f"scale must be a number > 0 (metres per unit of {name}), within 1e-9 .. 1e9, "
+            f"got {scale!r}"
+        )
+    return unit
+
+
+def _read(path: str | os.PathLike[str]) -> RawMesh:
+    """Open a regular file, look at how it begins, and read it."""
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_CLOEXEC", 0))
+    except FileNotFoundError as error:
+        raise SurfaceError(f"there is no such file; expected a mesh as {FORMATS}") from error
+    except (OSError, ValueError) as error:  # ValueError: a NUL byte in the name
+        why = getattr(error, "strerror", None) or str(error)
+        raise SurfaceError(f"cannot be opened: {why.lower()}") from error
+    status = os.fstat(handle)
+    if not stat.S_ISREG(status.st_mode):
+        os.close(handle)
+        raise SurfaceError(f"is not a regular file; expected a mesh as {FORMATS}")
+    with open(handle, "rb") as stream:
+        if status.st_size > LARGEST_FILE:
+            raise SurfaceError(
+                f"has {status.st_size:,} bytes, more than the {LARGEST_FILE:,} that are read; "
+                "thin the mesh, or save it as binary STL"
+            )
+        suffix = Path(os.fsdecode(path)).suffix.lower()
+        try:
+            _check_start(stream.read(80), suffix)
+            stream.seek(0)
+            return _READERS[suffix](stream, status.st_size)
+        except OSError as error:
+            raise SurfaceError(f"cannot be read: {error.strerror}") from error
+
+
+def _check_start(head: bytes, suffix: str) -> None:
+    """The file's name and its first bytes must agree."""
+    if not head:
+        raise SurfaceError(f"is empty; expected a mesh as {FORMATS}")
+    text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
+    for start, what in _STARTS.items():
+        if head.startswith(start) or (start[0] < 0x7F and text.startswith(start)):
+            if start in (b"<", b"{") and b"\0" in head:
+                continue  # the free text at the head of a binary STL
+            raise SurfaceError(f"is {what}")
+    if suffix not in _READERS:
+        raise SurfaceError(
+            f"{'ends in ' + repr(suffix[:20]) if suffix else 'has no extension'}, where a mesh as "
+            f"{FORMATS} is expected; export the surface in one of these"
+        )
+    for start, own in _OWN_STARTS.items():
+        if head.startswith(start) and suffix != own:
+            raise SurfaceError(f"is {own[1:].upper()} by its first bytes; name it {own}")
+
+
+def _with_likely_unit(mesh: TriangleMesh) -> TriangleMesh:
+    """Refuse a part of unlikely size, and note one that is wider than most arms reach."""
+    wide = float(mesh.extent.max())
+    if wide > LARGEST_PART:
+        raise SurfaceError(
+            f"the part is {wide:.4g} m wide; if the file is in millimetres give scale = 0.001 "
+            f"({wide * 0.001:.3g} m), if in inches scale = 0.0254 ({wide * 0.0254:.3g} m), and if "
+            "it is that wide scale = 1.0"
+        )
+    if wide < SMALLEST_PART:
+        raise SurfaceError(
+            f"the part is {wide:.3g} m wide; if it was scaled from millimetres to metres twice "
+            f"give scale = 1000 ({wide * 1000:.3g} m), and if it is that small scale = 1.0"
+        )
+    if wide <= WIDE_PART:
+        return mesh
+    note = (
+        f"the part is {wide:.4g} m wide, wider than most arms reach; if its unit is not the metre, "
+        "give scale"
+    )
+    return TriangleMesh(mesh.vertices, mesh.faces, (*mesh.history, note))

@@ -1,0 +1,373 @@
+"""MeshSurface: a triangle mesh as a surface with a pose, a side and a continuous normal."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.arguments import Checks
+from surfaces.meshes.normals import WIDTH, blended, carried, corner_normals, sectors, unit
+from surfaces.meshes.triangle_mesh import TriangleMesh
+from surfaces.surface import Foot, Side, Surface, points_of, sharpest_turn
+
+if TYPE_CHECKING:
+    from surfaces.cells import Cells
+    from surfaces.meshes.cells import MeshCells
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_ORIGIN = (0.0, 0.0, 0.0)
+JUMP = 3.0  # times as far as the line goes: then nearest places jump
+ON = 1e-9  # [1] of the mean edge: so near to a face is on it
+FIRST_CANDIDATES = 8  # faces looked at for each point before it is known that they are enough
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshSurface(Surface):
+    """Triangles with normals interpolated between their corners; outward is where faces look."""
+
+    kind: ClassVar[str] = "mesh"
+
+    mesh: TriangleMesh
+    """In the surface's own frame."""
+    corner_normals: Array
+    """(F, 3, 3) unit normal at each corner of each face, in the own frame."""
+    rim_normals: Array
+    """(F, 3, 3) the same on creases, where both sides have one: the normal turns to it over a strip
+    along the crease, `WIDTH` of a face wide."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the arrays."""
+        super().__post_init__()
+        for name in ("corner_normals", "rim_normals"):
+            normals = np.array(getattr(self, name), dtype=float)
+            normals.flags.writeable = False
+            object.__setattr__(self, name, normals)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was repaired in the mesh, and what to know about it."""
+        return self.mesh.notes
+
+    @cached_property
+    def grain(self) -> float:
+        """m, the mean length of the edges."""
+        edges = self.mesh.edges
+        lengths = np.concatenate([edges.lengths, edges.border_lengths])
+        return float(lengths.mean())
+
+    def closest(self, points: ArrayLike) -> Foot:
+        """The points of the mesh nearest to `points` (..., 3) m; see `Foot`.
+
+        `height` is the whole distance, positive where the point lies on the outer side of the
+        surface; the mesh ends at its border, so every foot is inside.
+        """
+        points = points_of(points)
+        flat = (points.reshape(-1, 3) - self.position) @ self.rotation
+        face, weights = self._nearest(flat)
+        corners = self.mesh.vertices[self.mesh.faces[face]]
+        off = flat - np.einsum("kc,kci->ki", weights, corners)
+        normals = self.normals_at(face, weights)
+        outer = np.einsum("ki,ki->k", off, normals @ self.rotation) >= 0.0
+        distance = np.linalg.norm(off, axis=1)
+        shape = points.shape[:-1]
+        nowhere = np.full(shape, np.nan)
+        return Foot(
+            u=nowhere,
+            v=nowhere,
+            height=np.where(outer, distance, -distance).reshape(shape),
+            normal=normals.reshape(*shape, 3),
+            inside=np.ones(shape, dtype=bool),
+        )
+
+    def nearest(self, points: Array) -> tuple[Ints, Array]:
+        """Faces (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m."""
+        return self._nearest((points - self.position) @ self.rotation)
+
+    def beside(self, points: Array, face: Ints, weights: Array) -> tuple[Array, Array]:
+        """Distances (k,) m of points (k, 3) m from places of faces, and outward directions (k, 3).
+
+        These are unit vectors along the lines from the places to the points, without any
+        interpolation: over an edge the direction to the edge; on a face the face's own normal.
+        """
+        local = (points - self.position) @ self.rotation
+        off = local - np.einsum("kc,kci->ki", weights, self._balls[0][face])
+        distance = np.linalg.norm(off, axis=1)
+        # Not by the face's own normal: beyond a sharp edge a point may lie under its plane.
+        mean = self.normals_at(face, weights) @ self.rotation
+        outer = np.where(np.einsum("ki,ki->k", off, mean) >= 0.0, 1.0, -1.0)
+        on = distance <= ON * self.grain
+        direction = off * (outer / np.where(on, 1.0, distance))[:, None]
+        flat = self.mesh.face_normals[face]
+        return distance, np.where(on[:, None], flat, direction) @ self.rotation.T
+
+    @property
+    def creased(self) -> bool:
+        """Are there strips along creases, where the normal turns?"""
+        return bool(self._rims.any())
+
+    def from_crease(self, face: Ints, weights: Array) -> Array:
+        """(k,) m, how far off a crease places of faces are, at most.
+
+        Only on the strips where the normal turns; inf elsewhere.
+        """
+        away = np.full(len(face), np.inf)
+        some = np.flatnonzero(self.rim_share(face, weights) > 0.0)
+        corners, rims = self._balls[0][face[some]], self._rims[face[some]]
+        parts = weights[some] * rims
+        near = np.einsum("kc,kci->ki", parts / parts.sum(axis=1, keepdims=True), corners)
+        off = np.linalg.norm(np.einsum("kc,kci->ki", weights[some], corners) - near, axis=1)
+        # A face with three corners on creases may have none of its edges on one.
+        away[some] = np.where(rims.all(axis=1), 2.0 * self._balls[2][face[some]], off)
+        return away
+
+    def creased_cells(self, cells: Cells) -> NDArray[np.bool_]:
+        """(N,) which of the cells have such a strip."""
+        from surfaces.meshes.cells import MeshCells
+
+        if not isinstance(cells, MeshCells):
+            raise TypeError("the cells are not of a mesh")
+        creased = np.zeros(len(cells), dtype=bool)
+        creased[cells.labels[self._rims.any(axis=1)]] = True
+        return creased
+
+    def faces_below(self, points: ArrayLike) -> Ints:
+        """(k,) the face nearest to each of `points` (k, 3) m."""
+        return self.nearest(points_of(points))[0]
+
+    def normals_at(self, face: Ints, weights: Array) -> Array:
+        """(..., 3) unit normals in the root frame at places of faces, by their weights."""
+        own = self.corner_normals[face]
+        turned = own + self.rim_share(face, weights)[..., None, None] * (
+            self.rim_normals[face] - own
+        )
+        return unit(np.einsum("...c,...ci->...i", weights, turned)) @ self.rotation.T
+
+    def rim_share(self, face: Ints, weights: Array) -> Array:
+        """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it."""
+        along = (weights * self._rims[face]).sum(axis=-1)  # 1 on the crease
+        return np.asarray(np.clip(1.0 - (1.0 - along) / WIDTH, 0.0, 1.0))
+
+    def trace(self, cells: Cells, pairs: Ints, t: Array) -> tuple[Array, Array]:
+        """See `Surface.trace`: the nearest places of straight lines on the faces of both cells.
+
+        Where these jump, because the surface is strongly bent or creased between the centres, the
+        line is led over the middle of the border that the cells share.
+        """
+        from surfaces.meshes.cells import MeshCells
+
+        if not isinstance(cells, MeshCells):
+            raise TypeError("the cells are not of a mesh")
+        start, end = cells.centres[pairs[:, 0]], cells.centres[pairs[:, 1]]
+        points, normals = self.beneath(
+            cells, pairs, _bent_lines(start, 0.5 * (start + end), end, t)
+        )
+        steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
+        even = np.linalg.norm(end - start, axis=1)[:, None] * np.diff(t)
+        jumps = (steps > JUMP * even).any(axis=1)
+        over = pairs[jumps]
+        bent = _bent_lines(start[jumps], cells.crossings(over), end[jumps], t)
+        points[jumps], normals[jumps] = self.beneath(cells, over, bent)
+        return points, normals
+
+    def beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Array, Array]:
+        """See `Surface.beneath`: on the two cells and those that touch both."""
+        faces, weights = self.faces_beneath(cells, pairs, points)
+        found = np.einsum("mkc,mkci->mki", weights, self._balls[0][faces])
+        return found @ self.rotation.T + self.position, self.normals_at(faces, weights)
+
+    def faces_beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Ints, Array]:
+        """The same as faces (m, k) and weights (m, k, 3)."""
+        from surfaces.meshes.cells import MeshCells
+        from surfaces.meshes.closest_point import put_on_cells
+
+        if not isinstance(cells, MeshCells):
+            raise TypeError("the cells are not of a mesh")
+        local = np.ascontiguousarray((points - self.position) @ self.rotation)
+        faces = np.empty(points.shape[:2], dtype=np.int64)
+        weights = np.empty((*points.shape[:2], 3))
+        members, indptr = cells.members
+        pairs = np.ascontiguousarray(pairs)
+        near_indptr, near = cells.neighbours
+        put_on_cells(*self._balls, members, indptr, near, near_indptr, pairs, local, faces, weights)
+        return faces, weights
+
+    def sharpness(self, cells: Cells, height: float = 0.0) -> Array:
+        """See `Surface.sharpness`: of the face of each cell where the normal turns fastest."""
+        from surfaces.meshes.cells import MeshCells
+
+        if not isinstance(cells, MeshCells):
+            raise TypeError("the cells are not of a mesh")
+        sides, turns = self._sides
+        face = sharpest_turn(sides + height * turns, turns)
+        sharpest = np.zeros(len(cells))
+        np.maximum.at(sharpest, cells.labels, face)
+        return sharpest
+
+    def cells(self, count: int | None = None, size: float | None = None) -> MeshCells:
+        """Cut the mesh into connected cells of even area.
+
+        Args:
+            count: how many cells; or
+            size: m, the side of a square that has a cell's area.
+
+        Returns:
+            The cells. Their `surface` is this one, its triangles split until they are small enough
+            for the cells, and its normals blended at creases.
+
+        Raises:
+            SurfaceError: not exactly one of the two is given, or it makes no sense.
+        """
+        from surfaces.meshes.cells import MeshCells
+
+        return MeshCells.cut(self, count, size)
+
+    def finer(self, vertices: Array, faces: Ints, parent: Ints) -> MeshSurface:
+        """The same surface in smaller triangles, with a continuous normal.
+
+        Args:
+            vertices: (W, 3) m, in the own frame.
+            faces: (G, 3).
+            parent: (G,) the present face that each is part of.
+        """
+        normals = carried(self.mesh, self.corner_normals, vertices, faces, parent)
+        mesh = TriangleMesh(vertices, faces, self.mesh.history)
+        own = blended(vertices, faces, normals, sectors(mesh))
+        rim = blended(vertices, faces, normals, faces)
+        return MeshSurface(self.rotation, self.position, self.side, mesh, own, rim)
+
+    @cached_property
+    def _rims(self) -> NDArray[np.bool_]:
+        """(F, 3) corners that lie on a crease."""
+        return np.asarray((self.corner_normals != self.rim_normals).any(axis=2))
+
+    @cached_property
+    def _sides(self) -> tuple[Array, Array]:
+        """Two sides of each face (F, 2, 3) m, and what the normal turns by along them, own frame.
+
+        On the strip along a crease it turns as over a face that is so much smaller; half way from
+        one unit normal to the other, their mean is shorter, and turns faster.
+        """
+        corners = self._balls[0]
+        halves = 0.5 * np.linalg.norm(self.corner_normals + self.rim_normals, axis=2).min(axis=1)
+        strip = WIDTH / (1.0 + WIDTH) * halves
+        size = np.where(self._rims.any(axis=1), strip, 1.0)[:, None, None]
+        turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]
+        return size * (corners[:, 1:] - corners[:, :1]), turns
+
+    @cached_property
+    def _balls(self) -> tuple[Array, Array, Array]:
+        """Corners (F, 3, 3), middles (F, 3) and radii (F,) of the faces, m, in the own frame."""
+        corners = self.mesh.vertices[self.mesh.faces]
+        middles = corners.mean(axis=1)
+        radii = np.linalg.norm(corners - middles[:, None], axis=2).max(axis=1)
+        return np.ascontiguousarray(corners), middles, radii
+
+    @cached_property
+    def _tree(self) -> Any:
+        """The middles of the faces, to be asked for neighbours."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self._balls[1])
+
+    def _nearest(self, points: Array) -> tuple[Ints, Array]:
+        """Nearest face (k,) and weights (k, 3) of its nearest point, of points in the own frame."""
+        from surfaces.meshes.closest_point import nearest_of_each
+
+        faces = np.full(len(points), -1, dtype=np.int64)
+        weights = np.full((len(points), 3), np.nan)
+        left, wanted = np.flatnonzero(np.isfinite(points).all(axis=1)), FIRST_CANDIDATES
+        corners, middles, radii = self._balls
+        while len(left):
+            wanted = min(wanted, len(middles))
+            away, some = self._tree.query(points[left], k=wanted)
+            away, some = away.reshape(len(left), wanted), some.reshape(len(left), wanted)
+            found, at = np.empty(len(left), dtype=np.int64), np.empty((len(left), 3))
+            indptr = np.arange(len(left) + 1) * wanted
+            nearest_of_each(
+                corners, middles, radii, some.astype(np.int64).ravel(), indptr, points[left],
+                found, at,
+            )  # fmt: skip
+            faces[left], weights[left] = found, at
+            spot = np.einsum("kc,kci->ki", at, corners[found])
+            # A face that was not looked at is at least this far off.
+            least = away[:, -1] - radii.max()
+            sure = np.linalg.norm(points[left] - spot, axis=1) <= least
+            left = left[~sure] if wanted < len(middles) else left[:0]
+            wanted *= 2
+        return faces, weights
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"mesh({self.mesh!r}, side={self.side!r}, position={self.position.tolist()})"
+
+
+def _bent_lines(start: Array, middle: Array, end: Array, t: Array) -> Array:
+    """(m, k, 3) points at t (k,) of m lines that bend in the middle, at even speed."""
+    first = np.linalg.norm(middle - start, axis=1)
+    second = np.linalg.norm(end - middle, axis=1)
+    share = (first / np.maximum(first + second, 1e-300))[:, None]
+    before = np.clip(t / np.maximum(share, 1e-300), 0.0, 1.0)[..., None]
+    after = np.clip((t - share) / np.maximum(1.0 - share, 1e-300), 0.0, 1.0)[..., None]
+    start, middle, end = start[:, None], middle[:, None], end[:, None]
+    return np.asarray(start + before * (middle - start) + after * (end - middle))
+
+
+def mesh(
+    source: str | os.PathLike[str] | TriangleMesh | Any,
+    scale: float | None = None,
+    side: Side = "outside",
+    position: ArrayLike = _ORIGIN,
+    rpy_deg: ArrayLike = _ORIGIN,
+) -> MeshSurface:
+    """A surface from a mesh file, or from triangles in hand.
+
+    Args:
+        source: path of an STL, OBJ, PLY, OFF or GLB file; or a `TriangleMesh`; or anything with
+            `vertices` and `faces`, such as a `trimesh.Trimesh`. The files and the last kind are
+            checked and repaired, see `surfaces.mesh_repair.clean`.
+        scale: metres per unit of the source; see `surfaces.mesh_file.read_mesh`.
+        side: 'outside' for a tool on the side that the faces look to, 'inside' for the other.
+        position: (3,) m, origin of the mesh's frame in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the mesh's frame.
+
+    Raises:
+        SurfaceError: the numbers make no pose or scale, or the mesh is no surface; with the reason.
+
+    Example:
+        >>> square = mesh(TriangleMesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]],
+        ...                            [[0, 1, 2], [0, 2, 3]]))
+        >>> len(square.cells(count=9))
+        9
+    """
+    check = Checks("mesh")
+    pose = {
+        "side": check.side(side),
+        "position": check.vector("position", position, "metres"),
+        "rotation": check.rotation("rpy_deg", rpy_deg),
+    }
+    check.done()
+    triangles = _triangles(source, scale)
+    normals = corner_normals(triangles)
+    return MeshSurface(mesh=triangles, corner_normals=normals, rim_normals=normals, **pose)  # type: ignore[arg-type]
+
+
+def _triangles(source: Any, scale: float | None) -> TriangleMesh:
+    """The clean triangles of a source."""
+    from surfaces.meshes.files import metres_per_unit, read_mesh
+    from surfaces.meshes.repair import clean
+
+    if not (hasattr(source, "vertices") and hasattr(source, "faces")):
+        return read_mesh(source, scale)
+    unit = metres_per_unit(scale, "the mesh")
+    if not isinstance(source, TriangleMesh):
+        return clean(unit * np.asarray(source.vertices), source.faces)
+    if scale is None:
+        return source
+    return TriangleMesh(unit * source.vertices, source.faces, source.history)

@@ -1,0 +1,253 @@
+"""From any arrays to a clean mesh: what is safe is repaired and said, the rest is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from surfaces.meshes.repair.caps import flipped, thin
+from surfaces.meshes.repair.orientation import one_fan_each, oriented, place
+from surfaces.meshes.repair.weld import weld_distance, welded
+from surfaces.meshes.triangle_mesh import (
+    Floats,
+    Ints,
+    TriangleMesh,
+    doubled_areas,
+    half_edge_ends,
+    half_edges,
+    piece_numbers,
+)
+from surfaces.surface import SurfaceError
+
+CRUMB = 1e-3  # of the mesh's area: a separate piece below it is a crumb
+FARTHEST = 1e6  # mesh diagonals from the origin; beyond it, coordinates have no digits to spare
+
+
+def clean(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    *,
+    drop_crumbs: bool = False,
+    history: Sequence[str] = (),
+) -> TriangleMesh:
+    """Check the triangles of a surface, repair what is safe, and say in `notes` what was done.
+
+    Repaired: vertices closer than a few ten-millionths of the mesh's diagonal become one;
+    vertices without a face, faces without area and repeated faces go; faces that disagree with
+    their neighbours about the outer side are turned over, so that the larger area of each piece
+    stays as it is; a vertex at which several fans of faces touch is split. None of it moves the
+    surface by more than a millionth of the diagonal. Separate pieces and holes stay, and are noted.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3) whole numbers, counterclockwise seen from outside.
+        drop_crumbs: drop separate pieces of less than a thousandth of the area.
+        history: what was done to the mesh before.
+
+    Raises:
+        SurfaceError: numbers that are not finite, indices out of range, more than two faces on an
+            edge, a piece with only one side, or nothing left.
+
+    Example:
+        >>> mesh = clean([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], [[0, 1, 2]])
+        >>> mesh
+        TriangleMesh(1 faces, 0.5 m^2, 1 x 1 x 0 m)
+        >>> mesh.notes
+        ('1 vertex that no face uses was dropped',)
+    """
+    points, corners = _checked(vertices, faces)
+    notes = list(history)
+    points, corners = _compact(points, corners, notes)
+    distance = weld_distance(points)
+    corners = _weld(points, corners, distance, notes)
+    corners = _drop_repeated(points, corners, notes)
+    corners = _drop_crowded(points, corners, distance, notes)
+    _refuse_crowded(points, corners)
+    corners, turned = oriented(points, corners)
+    if turned:
+        notes.append(
+            f"{_count(turned, 'face')} turned over, to face the same way as the larger part of "
+            f"{'its' if turned == 1 else 'their'} piece"
+        )
+    corners, flips, dropped = flipped(points, corners, distance)
+    if flips:
+        notes.append(
+            f"{_count(flips, 'face')} without area (thinner than {distance:.2g} m) mended by "
+            "flipping the long edge"
+        )
+    if dropped:
+        notes.append(f"{_count(dropped, 'face')} thinner than {distance:.2g} m dropped")
+    _refuse_empty(corners, notes)
+    if drop_crumbs:
+        corners = _drop_crumbs(points, corners, notes)
+    points, corners, split = one_fan_each(points, corners)
+    if split:
+        notes.append(f"{_count(split, 'vertex', 'vertices')} added where pieces touch in a point")
+    points, corners = _compact(points, corners, [])
+    return TriangleMesh(points, corners, tuple(notes))
+
+
+def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
+    """The arrays, if they are a mesh at all; every fault is named."""
+    try:
+        points, numbers = np.array(vertices, dtype=float), np.array(faces)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise SurfaceError(f"vertices and faces must be arrays of numbers: {error}") from error
+    faults = []
+    if points.ndim != 2 or points.shape[1] != 3:
+        faults.append(f"vertices must have shape (V, 3) (metres), got {points.shape}")
+    if numbers.ndim != 2 or numbers.shape[1] != 3 or not len(numbers):
+        faults.append(f"faces must have shape (F, 3), at least one face, got {numbers.shape}")
+    elif numbers.dtype.kind not in "iu":
+        faults.append(f"faces must be whole numbers (indices of vertices), got {numbers.dtype}")
+    if faults:
+        raise SurfaceError("; ".join(faults))
+    outside = ((numbers < 0) | (numbers >= len(points))).any(axis=1)
+    if outside.any():
+        first = int(outside.argmax())
+        raise SurfaceError(
+            f"{_count(int(outside.sum()), 'face')} of {len(numbers)} name vertices that do not "
+            f"exist; face {first} (counted from 0) has {numbers[first].tolist()}, and the vertices "
+            f"are 0 .. {len(points) - 1}; the file is damaged or cut short, export it again"
+        )
+    corners = numbers.astype(np.int64)
+    used = np.zeros(len(points), bool)
+    used[corners] = True
+    bad = used & ~np.isfinite(points).all(axis=1)
+    if bad.any():
+        first = int(bad.argmax())
+        raise SurfaceError(
+            f"{_count(int(bad.sum()), 'vertex', 'vertices')} of {len(points)} that faces use "
+            f"{'is' if bad.sum() == 1 else 'are'} not finite, the first is vertex {first} (counted "
+            f"from 0) at {points[first].tolist()}; remove or mend it where the mesh comes from"
+        )
+    _refuse_lost_digits(points[used])
+    return points, corners
+
+
+def _refuse_lost_digits(points: Floats) -> None:
+    """A mesh that is huge, a point, or far away has no digits for areas and normals."""
+    farthest = float(np.abs(points).max())
+    if farthest > 1e9:
+        raise SurfaceError(
+            f"a vertex lies {farthest:.3g} m from the origin; coordinates must be within 1e9 m"
+        )
+    diagonal = float(np.linalg.norm(np.ptp(points, axis=0)))
+    if diagonal < 1e-9:
+        raise SurfaceError(
+            f"the mesh is {diagonal:.3g} m across, which is no surface; give scale if its unit is "
+            "not the metre"
+        )
+    if farthest > FARTHEST * diagonal:
+        raise SurfaceError(
+            f"the mesh is {diagonal:.3g} m across, but lies {farthest:.3g} m from its origin, too "
+            f"far for exact normals (at most {FARTHEST:g} times its size); move it to its origin"
+        )
+
+
+def _compact(points: Floats, corners: Ints, notes: list[str]) -> tuple[Floats, Ints]:
+    """Leave out vertices that no face uses; the others keep their order."""
+    used = np.zeros(len(points), bool)
+    used[corners] = True
+    unused = len(points) - int(used.sum())
+    if unused:
+        notes.append(
+            f"{_count(unused, 'vertex', 'vertices')} that no face uses "
+            f"{'was' if unused == 1 else 'were'} dropped"
+        )
+    return points[used], (np.cumsum(used) - 1)[corners]
+
+
+def _weld(points: Floats, corners: Ints, distance: float, notes: list[str]) -> Ints:
+    """Join vertices that mean one point, and drop the faces that this leaves without corners."""
+    stands = welded(points, distance)
+    moved = (points[stands] != points).any(axis=1)
+    joined = int((stands != np.arange(len(points))).sum())
+    if joined:
+        near = f", {moved.sum()} of them not equal but within {distance:.2g} m" * bool(moved.any())
+        notes.append(
+            f"{_count(joined, 'vertex', 'vertices')} that repeated others "
+            f"{'was' if joined == 1 else 'were'} joined to them{near}"
+        )
+    corners = stands[corners]
+    collapsed = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
+    if collapsed.any():
+        notes.append(
+            f"{_count(int(collapsed.sum()), 'face')} with two corners in one place dropped"
+        )
+    _refuse_empty(corners[~collapsed], notes)
+    return corners[~collapsed]
+
+
+def _drop_repeated(points: Floats, corners: Ints, notes: list[str]) -> Ints:
+    """Of faces with the same three corners, whichever way they turn, the first stays."""
+    ordered = np.sort(corners, axis=1)
+    ranks = np.lexsort(ordered.T[::-1])
+    repeated = np.zeros(len(corners), bool)
+    repeated[ranks[1:]] = (ordered[ranks[1:]] == ordered[ranks[:-1]]).all(axis=1)
+    if repeated.any():
+        area = 0.5 * np.linalg.norm(doubled_areas(points, corners[repeated]), axis=1).sum()
+        notes.append(
+            f"{_count(int(repeated.sum()), 'face')} ({area:.4g} m^2) that repeated others dropped"
+        )
+    return corners[~repeated]
+
+
+def _drop_crowded(points: Floats, corners: Ints, distance: float, notes: list[str]) -> Ints:
+    """Drop faces without area from edges that have more than two faces."""
+    halves = half_edges(corners)
+    crowded = np.zeros(len(corners), bool)
+    crowded[halves.order[np.repeat(halves.counts, halves.counts) > 2] // 3] = True
+    crowded &= thin(points, corners, distance)
+    if crowded.any():
+        notes.append(
+            f"{_count(int(crowded.sum()), 'face')} thinner than {distance:.2g} m dropped from "
+            "edges with more than two faces"
+        )
+    _refuse_empty(corners[~crowded], notes)
+    return corners[~crowded]
+
+
+def _refuse_crowded(points: Floats, corners: Ints) -> None:
+    """More than two faces on an edge leave open on which side of which face the tool works."""
+    halves = half_edges(corners)
+    crowded = halves.counts > 2
+    if crowded.any():
+        first = int(crowded.argmax())
+        a, b = points[half_edge_ends(corners, halves.order[halves.starts[first]])]
+        raise SurfaceError(
+            f"{_count(int(crowded.sum()), 'edge')} with more than two faces; the first runs from "
+            f"{place(a)} to {place(b)} and has {halves.counts[first]}; keep only the skin that is "
+            "to be covered: remove inner walls and doubled parts, and export it again"
+        )
+
+
+def _drop_crumbs(points: Floats, corners: Ints, notes: list[str]) -> Ints:
+    """Drop separate pieces of less than a thousandth of the area."""
+    areas = 0.5 * np.linalg.norm(doubled_areas(points, corners), axis=1)
+    pieces = piece_numbers(half_edges(corners).of_count(2) // 3, areas)
+    sizes = np.bincount(pieces, areas)
+    crumbs = sizes < CRUMB * sizes.sum()
+    crumbs[0] = False  # the largest piece stays, however many there are
+    if not crumbs.any():
+        return corners
+    notes.append(
+        f"{_count(int(crumbs.sum()), 'crumb')} (separate pieces below {CRUMB:g} of the area) of "
+        f"together {sizes[crumbs].sum():.4g} m^2 dropped"
+    )
+    return corners[~crumbs[pieces]]
+
+
+def _refuse_empty(corners: Ints, notes: list[str]) -> None:
+    """Nothing is left."""
+    if not len(corners):
+        raise SurfaceError(
+            "no face with an area is left; " + "; ".join(notes) + "; export the surface again"
+        )
+
+
+def _count(count: int, one: str, several: str | None = None) -> str:
+    """A number with its noun."""
+    return f"{count} {one if count == 1 else several or one + 's'}"

@@ -1,0 +1,245 @@
+"""TriangleMesh: triangles that form a clean surface, with their edges and normals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.surface import SurfaceError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Edges:
+    """The edges of E pairs of faces, and the B edges on the border."""
+
+    faces: Ints
+    """(E, 2) the two faces that share an edge, the lower index first."""
+    vertices: Ints
+    """(E, 2) the ends of that edge, in the order in which the first face runs along it."""
+    lengths: Floats
+    """(E,) m."""
+    border_faces: Ints
+    """(B,) the only face at each border edge."""
+    border_vertices: Ints
+    """(B, 2) the ends of each border edge, in the order in which its face runs along it."""
+    border_lengths: Floats
+    """(B,) m."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TriangleMesh:
+    """A surface of triangles that `surfaces.mesh_repair.clean` has checked.
+
+    No edge has more than two faces, faces that share an edge agree about the outer side, every
+    vertex is used, by one fan of faces, and no face is without area. A face is seen from outside
+    where its corners run counterclockwise.
+
+    Raises:
+        SurfaceError: the arrays break one of the rules that this class can hold: shapes, indices,
+            finite vertices, faces with an area, at most two faces on an edge, one outer side.
+    """
+
+    vertices: Floats
+    """(V, 3) m."""
+    faces: Ints
+    """(F, 3) indices of vertices."""
+    history: tuple[str, ...] = ()
+    """What was repaired or cut since the mesh was read, in order."""
+    face_normals: Floats = field(init=False, repr=False)
+    """(F, 3) outward unit normals."""
+    face_areas: Floats = field(init=False, repr=False)
+    """(F,) m^2."""
+    vertex_normals: Floats = field(init=False, repr=False)
+    """(V, 3) unit: the mean of the faces' normals, each weighted by its angle at the vertex.
+
+    Angles and not areas, so that the normal belongs to the surface and not to how it is cut into
+    triangles: splitting a face through its corner changes nothing.
+    """
+    edges: Edges = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Copy, derive and write-protect the arrays."""
+        vertices = np.array(self.vertices, dtype=float)
+        faces = np.array(self.faces, dtype=np.int64)
+        _check_arrays(vertices, faces)
+        doubled = doubled_areas(vertices, faces)
+        lengths = np.linalg.norm(doubled, axis=1)
+        if not lengths.all():
+            raise SurfaceError(f"face {int(lengths.argmin())} has no area; clean the mesh first")
+        normals = doubled / lengths[:, None]
+        self._set("vertices", vertices)
+        self._set("faces", faces)
+        self._set("face_normals", normals)
+        self._set("face_areas", 0.5 * lengths)
+        self._set("vertex_normals", _vertex_normals(vertices, faces, normals))
+        object.__setattr__(self, "edges", _edges(vertices, faces))
+
+    def _set(self, name: str, array: NDArray[np.generic]) -> None:
+        """Store an array for reading only."""
+        array.flags.writeable = False
+        object.__setattr__(self, name, array)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle as a call of the constructor, which protects the arrays again."""
+        return (type(self), (self.vertices, self.faces, self.history))
+
+    def __repr__(self) -> str:
+        """One line: how many faces, their area and extent."""
+        x, y, z = self.extent
+        return (
+            f"TriangleMesh({len(self.faces)} faces, {self.area:.6g} m^2, "
+            f"{x:.4g} x {y:.4g} x {z:.4g} m)"
+        )
+
+    @property
+    def area(self) -> float:
+        """m^2."""
+        return float(self.face_areas.sum())
+
+    @property
+    def extent(self) -> Floats:
+        """(3,) m, the sides of the box around the mesh, along x, y and z."""
+        return np.ptp(self.vertices, axis=0)
+
+    @property
+    def pieces(self) -> Ints:
+        """(F,) number of the connected piece of each face; 0 is the piece of largest area."""
+        return piece_numbers(self.edges.faces, self.face_areas)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was repaired or cut, and what to know about the surface as it stands."""
+        from surfaces.meshes.repair import remarks
+
+        return (*self.history, *remarks(self))
+
+
+def doubled_areas(vertices: Floats, faces: Ints) -> Floats:
+    """(F, 3) m^2: the normals of the faces, as long as twice their areas."""
+    corners = vertices[faces]
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class HalfEdges:
+    """The three directed edges of every face, sorted so that those of one edge are neighbours.
+
+    Half-edge 3 f + k runs from corner k of face f to the next corner.
+    """
+
+    order: Ints
+    """(3 F,) the half-edges, sorted by their ends, and by face within one edge."""
+    starts: Ints
+    """(N,) where in `order` each edge begins."""
+    counts: Ints
+    """(N,) how many faces each edge has."""
+
+    def of_count(self, count: int) -> Ints:
+        """(M, count) the half-edges of the edges that have so many faces."""
+        chosen = self.starts[self.counts == count]
+        return self.order[chosen[:, None] + np.arange(count)]
+
+
+def half_edges(faces: Ints) -> HalfEdges:
+    """Sort the half-edges of (F, 3) faces by edge."""
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    key = np.minimum(tails, heads) * (int(faces.max(initial=0)) + 1) + np.maximum(tails, heads)
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    first = np.concatenate([[True], key[1:] != key[:-1]]) if len(key) else np.empty(0, bool)
+    starts = np.flatnonzero(first)
+    return HalfEdges(order, starts, np.diff(np.append(starts, len(key))))
+
+
+def half_edge_ends(faces: Ints, halves: Ints) -> Ints:
+    """(..., 2) the vertices from which and to which half-edges run."""
+    face, corner = np.divmod(halves, 3)
+    return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=-1)
+
+
+def components(pairs: Ints, count: int) -> Ints:
+    """(count,) number of the connected component of each of `count` things joined by pairs."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    joined = coo_array((np.ones(len(pairs), bool), pairs.T.reshape(2, -1)), shape=(count, count))
+    return connected_components(joined, directed=False)[1].astype(np.int64)
+
+
+def piece_numbers(pairs: Ints, areas: Floats) -> Ints:
+    """(F,) number of the piece of each face, from pairs that share an edge; the largest is 0."""
+    labels = components(pairs, len(areas))
+    rank = np.empty(labels.max(initial=-1) + 1, np.int64)
+    rank[np.argsort(-np.bincount(labels, areas), kind="stable")] = np.arange(len(rank))
+    return rank[labels]
+
+
+def _check_arrays(vertices: Floats, faces: Ints) -> None:
+    """Refuse arrays that are not a mesh at all."""
+    for name, array in (("vertices", vertices), ("faces", faces)):
+        if array.ndim != 2 or array.shape[1] != 3:
+            raise SurfaceError(f"{name} must have shape (n, 3), got {array.shape}")
+    if not len(faces):
+        raise SurfaceError("the mesh has no faces")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise SurfaceError(f"faces must name vertices 0 .. {len(vertices) - 1}")
+    if not np.isfinite(vertices).all():
+        raise SurfaceError("vertices must be finite numbers (metres)")
+
+
+def _edges(vertices: Floats, faces: Ints) -> Edges:
+    """Who touches whom."""
+    halves = half_edges(faces)
+    if halves.counts.max() > 2:
+        raise SurfaceError("an edge has more than two faces; clean the mesh first")
+    inner, border = halves.of_count(2), halves.of_count(1)[:, 0]
+    ends = half_edge_ends(faces, inner[:, 0])
+    if (ends == half_edge_ends(faces, inner[:, 1])).all(axis=1).any():
+        raise SurfaceError("faces disagree about the outer side; clean the mesh first")
+    border_ends = half_edge_ends(faces, border)
+    arrays: list[ArrayLike] = [
+        inner // 3,
+        ends,
+        np.linalg.norm(np.diff(vertices[ends], axis=1)[:, 0], axis=1),
+        border // 3,
+        border_ends,
+        np.linalg.norm(np.diff(vertices[border_ends], axis=1)[:, 0], axis=1),
+    ]
+    edges = Edges(*map(np.asarray, arrays))
+    for item in fields(edges):
+        getattr(edges, item.name).flags.writeable = False
+    return edges
+
+
+def corner_angles(vertices: Floats, faces: Ints) -> Floats:
+    """(F, 3) rad, of each face at its corners."""
+    corners = vertices[faces]
+    ahead = np.roll(corners, -1, axis=1) - corners
+    behind = np.roll(corners, 1, axis=1) - corners
+    cross = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    return np.arctan2(cross, np.einsum("fki,fki->fk", ahead, behind))
+
+
+def _vertex_normals(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
+    """Unit normals at the vertices, each face weighted by its angle there."""
+    angles = corner_angles(vertices, faces)
+    sums = np.column_stack(
+        [
+            np.bincount(faces.ravel(), (angles * normals[:, axis, None]).ravel(), len(vertices))
+            for axis in range(3)
+        ]
+    )
+    lengths = np.linalg.norm(sums, axis=1)
+    # Faces folded flat onto each other cancel; then one of them speaks for the vertex.
+    folded = lengths < 1e-9
+    if folded.any():
+        some_face = np.zeros(len(vertices), np.int64)
+        some_face[faces.ravel()] = np.repeat(np.arange(len(faces)), 3)
+        sums[folded] = normals[some_face[folded]]
+        lengths[folded] = 1.0
+    return sums / lengths[:, None]

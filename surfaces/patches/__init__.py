@@ -1,0 +1,5 @@
+"""Smooth parametric patches g(u, v), one kind a file, cut into grids of E-cells."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,0 +1,16 @@
+from .closed_form import ClosedFormPatch as ClosedFormPatch
+from .closed_form_kernels import cell_at as cell_at
+from .closed_form_kernels import foot as foot
+from .cone import cone as cone
+from .cylinder import cylinder as cylinder
+from .ellipsoid import ellipsoid as ellipsoid
+from .grid_cells import GridCells as GridCells
+from .grid_cells import charted_grid as charted_grid
+from .hyperboloid import hyperboloid as hyperboloid
+from .nurbs import bspline as bspline
+from .nurbs import read_net as read_net
+from .patch import Patch as Patch
+from .plane import plane as plane
+from .revolution import revolution as revolution
+from .sphere import sphere as sphere
+from .torus import torus as torus

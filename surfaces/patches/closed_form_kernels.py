@@ -1,0 +1,253 @@
+"""The surface as compiled loops see it: the foot of a point, and the cell it falls in.
+
+One implementation serves `ClosedFormPatch.closest` and the search kernels alike. A new kind of surface
+adds a code, a `_..._foot` function in its own frame, and a branch in `foot`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+PLANE, SPHERE, CYLINDER, HYPERBOLOID = 0, 1, 2, 3
+EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lies on it
+_TURN = 2.0 * math.pi
+
+
+class Chart(NamedTuple):
+    """A patch of a surface, cut into cells; a plain tuple, as numba likes it.
+
+    It holds no arrays: numba counts references to an array whenever it is read out of a tuple,
+    and that took longer than the geometry.
+
+    Built by `ClosedFormPatch.chart` and `GridCells.chart`.
+    """
+
+    code: int
+    """Which kind of surface: PLANE, SPHERE, ..."""
+    shape: tuple[float, ...]
+    """(2) m, lengths of the surface: radius; waist and flare; 0 where it has fewer."""
+    rotation: tuple[float, ...]
+    """(9) own frame in the root frame, row by row."""
+    position: tuple[float, ...]
+    """m, origin of the own frame in the root frame."""
+    side_sign: float
+    """-1.0 inside, +1.0 outside."""
+    low: tuple[float, float]
+    """rad or m, where the ranges of u and v begin."""
+    high: tuple[float, float]
+    """rad or m, where they end."""
+    closed: tuple[bool, bool]
+    """True where the range is a full turn."""
+    cells: tuple[int, int]
+    """Number of cells along u and v."""
+
+
+@njit(cache=True, error_model="numpy")
+def wrap(angle, low, high):  # type: ignore[no-untyped-def]
+    """The value angle + 2 pi k (rad) that lies in low..high, or failing that, nearest to it."""
+    a = low + (angle - low) % _TURN
+    if a > high and a - high > low - (a - _TURN):
+        a -= _TURN
+    return a
+
+
+@njit(cache=True, error_model="numpy")
+def _sphere_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+    """Foot on the sphere about the origin: u, v, height, normal, in its own frame."""
+    rho = math.hypot(x, y)
+    distance = math.hypot(rho, z)
+    if distance == 0.0:  # every point is equally near: take the patch's first corner
+        u, v = low[0], low[1]
+        s = math.sin(u)
+        return u, v, -radius, s * math.cos(v), s * math.sin(v), math.cos(u)
+    u = math.atan2(rho, z)
+    v = wrap(math.atan2(y, x), low[1], high[1])
+    if rho <= EDGE * distance:  # a pole is one point for every azimuth: take one of the patch
+        v = min(max(v, low[1]), high[1])
+    return u, v, distance - radius, x / distance, y / distance, z / distance
+
+
+@njit(cache=True, error_model="numpy")
+def _cylinder_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+    """Foot on the cylinder about z: u, v, height, normal, in its own frame."""
+    rho = math.hypot(x, y)
+    if rho == 0.0:
+        u = low[0]
+        return u, z, -radius, math.cos(u), math.sin(u), 0.0
+    return wrap(math.atan2(y, x), low[0], high[0]), z, rho - radius, x / rho, y / rho, 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def hyperbola_foot(waist, slope, rho, z):  # type: ignore[no-untyped-def]
+    """Abscissa t of the point of r(t) = sqrt(waist^2 + slope^2 t^2) nearest to (z, rho).
+
+    It is a root of f(t) = (1 + s^2) t - s^2 rho t / r(t) - z. For z >= 0, f is convex on t >= 0
+    with f(0) <= 0, so it has one root there where it rises, and the nearest point is that one.
+    Newton from a bound on its right falls onto it monotonically, and stops when rounding ends
+    the fall.
+    """
+    target = abs(z)
+    square = slope * slope
+    t = (target + slope * rho) / (1.0 + square)
+    for _ in range(200):
+        r = math.sqrt(waist * waist + square * t * t)
+        pull = square * rho / r
+        value = (1.0 + square - pull) * t - target
+        rise = 1.0 + square - pull * (waist / r) ** 2
+        if not (value > 0.0 and rise > 0.0):
+            break
+        following = max(t - value / rise, 0.0)
+        if following >= t:
+            break
+        t = following
+    return math.copysign(t, z)
+
+
+@njit(cache=True, error_model="numpy")
+def _hyperboloid_foot(waist, flare, x, y, z, low, high):  # type: ignore[no-untyped-def]
+    """Foot on the hyperboloid of one sheet about z: u, v, height, normal, in its own frame."""
+    rho = math.hypot(x, y)
+    slope = waist / flare
+    t = hyperbola_foot(waist, slope, rho, z)
+    r = math.sqrt(waist * waist + slope * slope * t * t)
+    rise = slope * slope * t / r
+    length = math.sqrt(1.0 + rise * rise)
+    height = ((rho - r) - rise * (z - t)) / length
+    if rho == 0.0:
+        u = low[0]
+        cosine, sine = math.cos(u), math.sin(u)
+    else:
+        u = wrap(math.atan2(y, x), low[0], high[0])
+        cosine, sine = x / rho, y / rho
+    return u, t, height, cosine / length, sine / length, -rise / length
+
+
+@njit(cache=True, error_model="numpy")
+def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
+    """The point of the surface nearest to (x, y, z), all in the root frame.
+
+    Args:
+        chart: a `Chart`.
+        x: m, as y and z.
+        y: m.
+        z: m.
+
+    Returns:
+        (u, v, height, nx, ny, nz): parameters (rad or m; an angle is wrapped into the patch's
+        range, or stays outside it if no turn brings it in), signed height along the outward
+        normal (m), and that unit normal.
+    """
+    r, shape, low, high = chart.rotation, chart.shape, chart.low, chart.high
+    dx = x - chart.position[0]
+    dy = y - chart.position[1]
+    dz = z - chart.position[2]
+    a = r[0] * dx + r[3] * dy + r[6] * dz
+    b = r[1] * dx + r[4] * dy + r[7] * dz
+    c = r[2] * dx + r[5] * dy + r[8] * dz
+    if chart.code == SPHERE:
+        u, v, height, na, nb, nc = _sphere_foot(shape[0], a, b, c, low, high)
+    elif chart.code == CYLINDER:
+        u, v, height, na, nb, nc = _cylinder_foot(shape[0], a, b, c, low, high)
+    elif chart.code == HYPERBOLOID:
+        u, v, height, na, nb, nc = _hyperboloid_foot(shape[0], shape[1], a, b, c, low, high)
+    elif chart.code == PLANE:
+        u, v, height, na, nb, nc = a, b, c, 0.0, 0.0, 1.0
+    else:
+        u, v, height, na, nb, nc = math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
+    return (
+        u,
+        v,
+        height,
+        r[0] * na + r[1] * nb + r[2] * nc,
+        r[3] * na + r[4] * nb + r[5] * nc,
+        r[6] * na + r[7] * nb + r[8] * nc,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def spot(chart, u, v):  # type: ignore[no-untyped-def]
+    """The point of the surface at parameters u, v (rad or m), and the normal there.
+
+    Returns:
+        (x, y, z, nx, ny, nz): the point (m) and the outward unit normal, in the root frame.
+    """
+    r, shape, position = chart.rotation, chart.shape, chart.position
+    if chart.code == SPHERE:
+        s = math.sin(u)
+        na, nb, nc = s * math.cos(v), s * math.sin(v), math.cos(u)
+        a, b, c = shape[0] * na, shape[0] * nb, shape[0] * nc
+    elif chart.code == CYLINDER:
+        na, nb, nc = math.cos(u), math.sin(u), 0.0
+        a, b, c = shape[0] * na, shape[0] * nb, v
+    elif chart.code == HYPERBOLOID:
+        slope = shape[0] / shape[1]
+        radius = math.sqrt(shape[0] * shape[0] + slope * slope * v * v)
+        rise = slope * slope * v / radius
+        length = math.sqrt(1.0 + rise * rise)
+        na, nb, nc = math.cos(u) / length, math.sin(u) / length, -rise / length
+        a, b, c = radius * math.cos(u), radius * math.sin(u), v
+    elif chart.code == PLANE:
+        na, nb, nc = 0.0, 0.0, 1.0
+        a, b, c = u, v, 0.0
+    else:
+        na, nb, nc = math.nan, math.nan, math.nan
+        a, b, c = math.nan, math.nan, math.nan
+    return (
+        position[0] + r[0] * a + r[1] * b + r[2] * c,
+        position[1] + r[3] * a + r[4] * b + r[5] * c,
+        position[2] + r[6] * a + r[7] * b + r[8] * c,
+        r[0] * na + r[1] * nb + r[2] * nc,
+        r[3] * na + r[4] * nb + r[5] * nc,
+        r[6] * na + r[7] * nb + r[8] * nc,
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def on_patch(chart, u, v):  # type: ignore[no-untyped-def]
+    """True where u and v (rad or m, wrapped as `foot` returns them) lie in the patch's ranges."""
+    u0, u1, v0, v1 = chart.low[0], chart.high[0], chart.low[1], chart.high[1]
+    return u0 - EDGE <= u <= u1 + EDGE and v0 - EDGE <= v <= v1 + EDGE
+
+
+@njit(cache=True, error_model="numpy")
+def cell_at(chart, u, v):  # type: ignore[no-untyped-def]
+    """Flat row-major index of the cell at u, v (rad or m), or -1 outside the patch.
+
+    A closed parameter may be off by any number of turns. A border belongs to the cell of higher
+    index, the outermost border to the last cell.
+    """
+    u0, u1, v0, v1 = chart.low[0], chart.high[0], chart.low[1], chart.high[1]
+    u_closed, v_closed = chart.closed[0], chart.closed[1]
+    rows, columns = chart.cells[0], chart.cells[1]
+    if u_closed:
+        u = wrap(u, u0, u1)
+    if v_closed:
+        v = wrap(v, v0, v1)
+    on = u0 - EDGE <= u <= u1 + EDGE and v0 - EDGE <= v <= v1 + EDGE
+    if rows == 0 or columns == 0 or not on:
+        return -1
+    i = math.floor((u - u0) / (u1 - u0) * rows)
+    j = math.floor((v - v0) / (v1 - v0) * columns)
+    return min(max(i, 0), rows - 1) * columns + min(max(j, 0), columns - 1)
+
+
+@njit(cache=True, error_model="numpy")
+def feet(chart, points):  # type: ignore[no-untyped-def]
+    """`foot` of many points (k, 3): values (k, 6) in the order of `foot`, and `on_patch` (k,)."""
+    count = points.shape[0]
+    values = np.empty((count, 6))
+    inside = np.empty(count, dtype=np.bool_)
+    for k in range(count):
+        u, v, height, nx, ny, nz = foot(chart, points[k, 0], points[k, 1], points[k, 2])
+        values[k, 0] = u
+        values[k, 1] = v
+        values[k, 2] = height
+        values[k, 3] = nx
+        values[k, 4] = ny
+        values[k, 5] = nz
+        inside[k] = on_patch(chart, u, v)
+    return values, inside

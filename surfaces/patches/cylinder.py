@@ -1,0 +1,90 @@
+"""cylinder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.arguments import Checks
+from surfaces.patches.closed_form import ClosedFormPatch
+from surfaces.patches.normal_bounds import CurvatureSlices
+from surfaces.surface import Side
+
+Array = NDArray[np.float64]
+Pair = Sequence[float]
+
+_ORIGIN = (0.0, 0.0, 0.0)
+_SLICES = 512  # over which the hyperboloid's curvatures are bounded
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Cylinder(ClosedFormPatch):
+    """u is the angle about z, v the height along z."""
+
+    kind: ClassVar[str] = "cylinder"
+    units: ClassVar[tuple[str, str]] = ("rad", "m")
+    code: ClassVar[int] = 2
+    u_angle: ClassVar[bool] = True
+    v_angle: ClassVar[bool] = False
+    radius: float
+    """m."""
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """The radius."""
+        return (self.radius,)
+
+    def local_point(self, u: Array, v: Array) -> Array:
+        """(R cos u, R sin u, v)."""
+        return np.stack([self.radius * np.cos(u), self.radius * np.sin(u), v], axis=-1)
+
+    def local_normal(self, u: Array, v: Array) -> Array:
+        """Away from the axis."""
+        return np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=-1)
+
+    def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
+        """R (u1 - u0) (v1 - v0)."""
+        u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
+        return np.asarray(self.radius * (u1 - u0) * (v1 - v0))
+
+    def curvature_slices(self, margin: float) -> CurvatureSlices:
+        """Straight along z, 1/R around it."""
+        return CurvatureSlices.constant(0.0, 1.0 / self.radius)
+
+
+def cylinder(
+    radius: float,
+    angle_deg: Pair,
+    height: Pair,
+    side: Side = "inside",
+    position: Pair = _ORIGIN,
+    rpy_deg: Pair = _ORIGIN,
+) -> Cylinder:
+    """A patch of a cylinder about the z axis of its own frame.
+
+    Args:
+        radius: m.
+        angle_deg: (low, high) angle about z, at most a full turn apart.
+        height: (low, high) along z, m.
+        side: 'inside' or 'outside', where the tool works.
+        position: (3,) m, origin of the surface's frame in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+
+    Raises:
+        SurfaceError: one or more of the numbers do not describe a patch; all are named.
+    """
+    check = Checks("cylinder")
+    made = Cylinder(
+        u_range=check.angles("angle_deg", angle_deg),
+        v_range=check.interval("height", height),
+        radius=check.positive("radius", radius),
+        side=check.side(side),
+        position=check.vector("position", position, "metres"),
+        rotation=check.rotation("rpy_deg", rpy_deg),
+    )
+    check.done()
+    return made

@@ -1,0 +1,248 @@
+"""A patch cut into a grid of parameter cells."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.adjacency import Neighbours, grid_neighbours
+from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.patches.closed_form import ClosedFormPatch
+from surfaces.patches.patch import Patch
+from surfaces.surface import SurfaceError
+
+if TYPE_CHECKING:
+    from surfaces.patches.closed_form_kernels import Chart
+
+
+CHARTED = "a sphere, cylinder, hyperboloid or plane"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GridCells(Cells):
+    """N = nu x nv cells of one patch, numbered row by row: cell (i, j) is i * nv + j.
+
+    A cell's centre lies at its mid parameters. A grid without cells (0 x nv) is allowed.
+    """
+
+    surface: Patch
+    shape: tuple[int, int]
+    u: NDArray[np.float64]
+    """(N,) first parameter of each centre, rad or m."""
+    v: NDArray[np.float64]
+    """(N,) second parameter of each centre, rad or m."""
+
+    @staticmethod
+    def cut(surface: Patch, nu: int, nv: int) -> GridCells:
+        """Cut `surface` into nu x nv cells of equal parameter steps; see `Patch.cells`.
+
+        Raises:
+            SurfaceError: nu or nv is not a whole number >= 0.
+        """
+        nu, nv = _count("nu", nu), _count("nv", nv)
+        u_edges = np.linspace(*surface.u_range, nu + 1)
+        v_edges = np.linspace(*surface.v_range, nv + 1)
+        areas = surface.area(u_edges[:-1, None], u_edges[1:, None], v_edges[:-1], v_edges[1:])
+        u = np.repeat((u_edges[:-1] + u_edges[1:]) / 2.0, nv)
+        v = np.tile((v_edges[:-1] + v_edges[1:]) / 2.0, nu)
+        return GridCells(
+            surface=surface,
+            centres=surface.point(u, v),
+            normals=surface.normal(u, v),
+            areas=np.broadcast_to(areas, (nu, nv)).reshape(-1),
+            shape=(nu, nv),
+            u=u,
+            v=v,
+        )
+
+    @cached_property
+    def neighbours(self) -> Neighbours:
+        """(indptr, indices): each cell's neighbours, clockwise from the upper left one."""
+        closed = (self.surface.u_closed, self.surface.v_closed)
+        found = grid_neighbours(*self.shape, closed=closed, poles=self.surface.poles)
+        for array in found:
+            array.flags.writeable = False
+        return found
+
+    @property
+    def middle(self) -> int:
+        """The cell in the middle row and column."""
+        return self.index(self.shape[0] // 2, self.shape[1] // 2)
+
+    @property
+    def charted(self) -> ClosedFormPatch:
+        """The patch, for the greedy search.
+
+        Raises:
+            SurfaceError: the patch is of a kind that its compiled loops do not know.
+        """
+        if not isinstance(self.surface, ClosedFormPatch):
+            raise _uncharted(self.surface.kind)
+        return self.surface
+
+    @cached_property
+    def chart(self) -> Chart:
+        """What compiled loops of the greedy search need of these cells; see `charted`."""
+        return self.charted.chart(*self.shape)
+
+    def index(self, i: int, j: int) -> int:
+        """Flat index of the cell in row i (u) and column j (v).
+
+        Raises:
+            IndexError: there is no such cell.
+        """
+        if not (0 <= i < self.shape[0] and 0 <= j < self.shape[1]):
+            raise IndexError(f"no cell ({i}, {j}) in a grid of {self.shape[0]} x {self.shape[1]}")
+        return int(i * self.shape[1] + j)
+
+    def unravel(self, k: int) -> tuple[int, int]:
+        """Row (u) and column (v) of the cell with flat index k.
+
+        Raises:
+            IndexError: there is no such cell.
+        """
+        if not 0 <= k < len(self):
+            raise IndexError(f"no cell {k} in a grid of {self.shape[0]} x {self.shape[1]}")
+        i, j = divmod(int(k), self.shape[1])
+        return i, j
+
+    def outlines(self, samples: int = 8) -> NDArray[np.float64]:
+        """Borders of the cells as closed polylines (N, 4 * samples + 1, 3) m, in the root frame.
+
+        Args:
+            samples: straight pieces along each of a cell's four sides, >= 1. Every `samples`-th
+                point is a corner; the order is (u, v) = (low, low), (low, high), (high, high),
+                (high, low).
+
+        Raises:
+            SurfaceError: `samples` is not a whole number >= 1.
+        """
+        if _count("samples", samples) == 0:
+            raise SurfaceError("samples must be a whole number >= 1, got 0")
+        t = np.arange(samples) / samples
+        zero, one = np.zeros(samples), np.ones(samples)
+        du = np.concatenate([zero, t, one, 1.0 - t, [0.0]]) - 0.5
+        dv = np.concatenate([t, one, 1.0 - t, zero, [0.0]]) - 0.5
+        width_u, width_v = self._widths
+        return self.surface.point(
+            self.u[:, None] + du * width_u,
+            self.v[:, None] + dv * width_v,
+        )
+
+    def borders(self, samples: int = 8) -> NDArray[np.float64]:
+        """See `Cells.borders`."""
+        lines = self.outlines(samples)
+        return np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 3)
+
+    def locate(self, points: ArrayLike) -> NDArray[np.int64]:
+        """See `Cells.locate`."""
+        foot = self.surface.closest(points)
+        return np.where(foot.inside, self.at(foot.u, foot.v), -1)
+
+    def at(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.int64]:
+        """The cells at some parameters; -1 where these are NaN, or where there are no cells.
+
+        Parameters beyond the ranges count as the nearest ones within.
+        """
+        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
+        row = _bin(u, self.surface.u_range, self.shape[0])
+        column = _bin(v, self.surface.v_range, self.shape[1])
+        return np.where((row >= 0) & (column >= 0), row * self.shape[1] + column, -1)
+
+    def triangles(
+        self, which: NDArray[np.int64], samples: int = 8, inset: float = 0.0
+    ) -> Triangles:
+        """See `Cells.triangles`."""
+        t = (np.linspace(0.0, 1.0, samples + 1) - 0.5) * (1.0 - inset)
+        du, dv = (part.reshape(-1) for part in np.meshgrid(t, t, indexing="ij"))
+        width_u, width_v = self._widths
+        u = self.u[which, None] + du * width_u
+        v = self.v[which, None] + dv * width_v
+        i, j = (part.reshape(-1) for part in np.meshgrid(*[np.arange(samples)] * 2, indexing="ij"))
+        corner = i * (samples + 1) + j
+        right, up = corner + 1, corner + samples + 1
+        one = np.concatenate(
+            [np.column_stack([corner, right, up + 1]), np.column_stack([corner, up + 1, up])]
+        )
+        starts = np.arange(len(which)) * (samples + 1) ** 2
+        faces = (starts[:, None, None] + one).reshape(-1, 3)
+        vertices = self.surface.point(u, v).reshape(-1, 3)
+        normals = self.surface.normal(u, v).reshape(-1, 3)
+        corners = vertices[faces]
+        looks = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        if (looks * normals[faces[:, 0]]).sum() < 0.0:  # counterclockwise seen from outside
+            faces = faces[:, ::-1]
+        return Triangles(vertices, faces, normals)
+
+    def unrolled(self) -> Unrolled:
+        """See `Cells.unrolled`: v to the right and u down, as cells are numbered."""
+        surface = self.surface
+        degrees = [np.degrees(1.0) if unit == "rad" else 1.0 for unit in surface.units]
+        words = [{"rad": " (degrees)", "m": " (m)"}.get(unit, "") for unit in surface.units]
+        half = 0.5 * np.array(self._widths)[::-1] * degrees[::-1]
+        corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]) * half
+        centres = np.column_stack([self.v * degrees[1], self.u * degrees[0]])
+        return Unrolled(
+            centres=centres,
+            outlines=tuple(centres[:, None] + corners),
+            labels=(f"v{words[1]}", f"u{words[0]}"),
+            turns=(
+                np.ptp(surface.v_range) * degrees[1] if surface.v_closed else np.inf,
+                np.ptp(surface.u_range) * degrees[0] if surface.u_closed else np.inf,
+            ),
+        )
+
+    @property
+    def _widths(self) -> tuple[float, float]:
+        """Width of a cell along u and v, rad or m."""
+        surface = self.surface
+        return (
+            (surface.u_range[1] - surface.u_range[0]) / max(self.shape[0], 1),
+            (surface.v_range[1] - surface.v_range[0]) / max(self.shape[1], 1),
+        )
+
+    def __repr__(self) -> str:
+        """One line: how many cells of what."""
+        return f"Cells({self.shape[0]} x {self.shape[1]} of {self.surface!r})"
+
+
+def charted_grid(cells: Cells) -> GridCells:
+    """The cells, for the greedy search.
+
+    Raises:
+        SurfaceError: they are no grid on a patch that its compiled loops know.
+    """
+    if not isinstance(cells, GridCells) or not isinstance(cells.surface, ClosedFormPatch):
+        raise _uncharted(cells.surface.kind)
+    return cells
+
+
+def _uncharted(kind: str) -> SurfaceError:
+    """What to say of a surface that the greedy search does not know."""
+    return SurfaceError(
+        f"the greedy search works on {CHARTED} only, not on a {kind}; use "
+        'search.method = "complete"'
+    )
+
+
+def _bin(values: NDArray[np.float64], limits: tuple[float, float], count: int) -> NDArray[np.int64]:
+    """Which of `count` equal parts of a range each value falls in; -1 for NaN, and of none."""
+    share = (values - limits[0]) / (limits[1] - limits[0])
+    part = np.clip(np.floor(share * count), 0, count - 1)
+    return np.where(np.isnan(part), -1, part).astype(np.int64)
+
+
+def _count(name: str, value: Any) -> int:
+    """A whole number >= 0, or a clear error."""
+    try:
+        count = operator.index(value)
+    except TypeError:
+        count = -1
+    if count < 0 or isinstance(value, bool):
+        raise SurfaceError(f"{name} must be a whole number >= 0, got {value!r}")
+    return count

@@ -1,0 +1,146 @@
+"""hyperboloid."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.arguments import Checks
+from surfaces.patches.closed_form import ClosedFormPatch
+from surfaces.patches.normal_bounds import CurvatureSlices
+from surfaces.surface import Side
+
+Array = NDArray[np.float64]
+Pair = Sequence[float]
+
+_ORIGIN = (0.0, 0.0, 0.0)
+_SLICES = 512  # over which the hyperboloid's curvatures are bounded
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Hyperboloid(ClosedFormPatch):
+    """One sheet, r(z) = waist sqrt(1 + (z / flare)^2): u is the angle about z, v = z.
+
+    With s = waist/flare, r^2 = waist^2 + s^2 z^2, r r' = s^2 z and
+    g = r sqrt(1 + r'^2) = sqrt(waist^2 + s^2 (1 + s^2) z^2): the area element is g du dz, the
+    curvatures are 1/g around the axis and -s^2 waist^2 / g^3 along the meridian.
+    """
+
+    kind: ClassVar[str] = "hyperboloid"
+    units: ClassVar[tuple[str, str]] = ("rad", "m")
+    code: ClassVar[int] = 3
+    u_angle: ClassVar[bool] = True
+    v_angle: ClassVar[bool] = False
+    waist: float
+    """m, radius at z = 0."""
+    flare: float
+    """m, height at which the radius is sqrt(2) waist."""
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """Waist and flare."""
+        return (self.waist, self.flare)
+
+    def _radius(self, z: Array) -> Array:
+        return np.hypot(self.waist, z * (self.waist / self.flare))
+
+    def local_point(self, u: Array, v: Array) -> Array:
+        """(r cos u, r sin u, z)."""
+        r = self._radius(v)
+        return np.stack([r * np.cos(u), r * np.sin(u), v], axis=-1)
+
+    def local_normal(self, u: Array, v: Array) -> Array:
+        """(cos u, sin u, -r') over its length: away from the axis."""
+        rise = (self.waist / self.flare) ** 2 * v / self._radius(v)
+        length = np.hypot(1.0, rise)
+        return np.stack([np.cos(u) / length, np.sin(u) / length, -rise / length], axis=-1)
+
+    def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
+        """(u1 - u0) times the integral of g, z (g + waist asinh(x) / x) / 2, x = b z / waist."""
+        u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
+        slope = self.waist / self.flare
+        b = slope * math.sqrt(1.0 + slope**2)
+
+        def integral(z: Array) -> Array:
+            x = b * z / self.waist
+            ratio = np.divide(np.arcsinh(x), x, out=np.ones_like(x), where=x != 0.0)
+            return z * self.waist * (np.hypot(1.0, x) + ratio) / 2.0
+
+        return np.asarray((u1 - u0) * (integral(v1) - integral(v0)))
+
+    def curvature_slices(self, margin: float) -> CurvatureSlices:
+        """Interval bounds on each of many slices of z: rigorous, not sampled.
+
+        d kappa_2 / ds = -b^2 z r / g^4 and d kappa_1 / ds = 3 s^2 waist^2 b^2 z r / g^6, where
+        b^2 = s^2 (1 + s^2); r and g grow with |z|. Outward normals from z and -z meet in the plane
+        z = 0 at height g / s^2, which is never beyond the meridian's centre of curvature; inward
+        normals meet on the axis, at the centre of curvature 1 / kappa_2.
+        """
+        square = (self.waist / self.flare) ** 2
+        growth = square * (1.0 + square)
+        # Equal steps of asinh(b z / waist): fine at the waist, where the curvatures change fastest.
+        scale = self.waist / math.sqrt(growth)
+        low, high = self.v_range[0] - margin, self.v_range[1] + margin
+        steps = np.linspace(math.asinh(low / scale), math.asinh(high / scale), _SLICES + 1)
+        edges = scale * np.sinh(steps)
+        edges[0], edges[-1] = low, high
+        a, b = np.abs(edges[:-1]), np.abs(edges[1:])
+        far = np.maximum(a, b)
+        near = np.where(edges[:-1] * edges[1:] <= 0.0, 0.0, np.minimum(a, b))
+        g_near = np.hypot(self.waist, math.sqrt(growth) * near)
+        g_far = np.hypot(self.waist, math.sqrt(growth) * far)
+        dent = square * self.waist**2
+        lever = growth * far * self._radius(far)
+        return CurvatureSlices(
+            meridian_low=-dent / g_near**3,
+            meridian_high=-dent / g_far**3,
+            parallel_low=1.0 / g_far,
+            parallel_high=1.0 / g_near,
+            meridian_slope=3.0 * dent * lever / g_near**6,
+            parallel_slope=lever / g_near**4,
+            reach=g_near / square,
+        )
+
+
+def hyperboloid(
+    waist: float,
+    flare: float,
+    angle_deg: Pair,
+    height: Pair,
+    side: Side = "inside",
+    position: Pair = _ORIGIN,
+    rpy_deg: Pair = _ORIGIN,
+) -> Hyperboloid:
+    """A patch of a hyperboloid of one sheet, r(z) = waist sqrt(1 + (z / flare)^2).
+
+    Args:
+        waist: m, radius at z = 0.
+        flare: m, height at which the radius is sqrt(2) waist.
+        angle_deg: (low, high) angle about z, at most a full turn apart.
+        height: (low, high) along z, m.
+        side: 'inside' or 'outside', where the tool works.
+        position: (3,) m, origin of the surface's frame in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+
+    Raises:
+        SurfaceError: one or more of the numbers do not describe a patch; all are named.
+    """
+    check = Checks("hyperboloid")
+    waist, flare = check.positive("waist", waist), check.positive("flare", flare)
+    check.ratio("waist / flare", waist / flare, "beyond that use a cylinder or a plane")
+    made = Hyperboloid(
+        u_range=check.angles("angle_deg", angle_deg),
+        v_range=check.interval("height", height),
+        waist=waist,
+        flare=flare,
+        side=check.side(side),
+        position=check.vector("position", position, "metres"),
+        rotation=check.rotation("rpy_deg", rpy_deg),
+    )
+    check.done()
+    return made

@@ -1,0 +1,86 @@
+"""plane."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.arguments import Checks
+from surfaces.patches.closed_form import ClosedFormPatch
+from surfaces.patches.normal_bounds import CurvatureSlices
+from surfaces.surface import Side
+
+Array = NDArray[np.float64]
+Pair = Sequence[float]
+
+_ORIGIN = (0.0, 0.0, 0.0)
+_SLICES = 512  # over which the hyperboloid's curvatures are bounded
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Plane(ClosedFormPatch):
+    """u and v are x and y of its own frame, the normal is +z."""
+
+    kind: ClassVar[str] = "plane"
+    units: ClassVar[tuple[str, str]] = ("m", "m")
+    code: ClassVar[int] = 0
+    u_angle: ClassVar[bool] = False
+    v_angle: ClassVar[bool] = False
+
+    @property
+    def lengths(self) -> tuple[float, ...]:
+        """Nothing."""
+        return ()
+
+    def local_point(self, u: Array, v: Array) -> Array:
+        """(u, v, 0)."""
+        return np.stack([u, v, np.zeros_like(u)], axis=-1)
+
+    def local_normal(self, u: Array, v: Array) -> Array:
+        """+z."""
+        zero = np.zeros_like(u)
+        return np.stack([zero, zero, np.ones_like(u)], axis=-1)
+
+    def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
+        """(u1 - u0) (v1 - v0)."""
+        u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
+        return np.asarray((u1 - u0) * (v1 - v0))
+
+    def curvature_slices(self, margin: float) -> CurvatureSlices:
+        """None."""
+        return CurvatureSlices.constant(0.0, 0.0)
+
+
+def plane(
+    width: Pair,
+    length: Pair,
+    side: Side = "inside",
+    position: Pair = _ORIGIN,
+    rpy_deg: Pair = _ORIGIN,
+) -> Plane:
+    """A rectangle in the xy plane of its own frame, its normal +z.
+
+    Args:
+        width: (low, high) along x, m.
+        length: (low, high) along y, m.
+        side: 'outside' for a tool on the +z side, 'inside' for one on the -z side.
+        position: (3,) m, origin of the surface's frame in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+
+    Raises:
+        SurfaceError: one or more of the numbers do not describe a patch; all are named.
+    """
+    check = Checks("plane")
+    made = Plane(
+        u_range=check.interval("width", width),
+        v_range=check.interval("length", length),
+        side=check.side(side),
+        position=check.vector("position", position, "metres"),
+        rotation=check.rotation("rpy_deg", rpy_deg),
+    )
+    check.done()
+    return made

@@ -1,0 +1,95 @@
+"""SmoothPatch: what the patches share that find feet by their own formulas or by search."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.patches.patch import Patch
+from surfaces.surface import Foot, points_of
+
+Array = NDArray[np.float64]
+
+EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lies on it
+
+
+class LocalFeet(NamedTuple):
+    """Feet of n points in the own frame of a patch, before the ranges are looked at."""
+
+    u: Array
+    """(n,) rad, m or as the knots count."""
+    v: Array
+    """(n,) likewise."""
+    height: Array
+    """(n,) m, along the outward normal."""
+    normal: Array
+    """(n, 3) outward unit normals."""
+    upright: NDArray[np.bool_]
+    """(n,) True where the point lies on the normal of its foot, to 1e-9 m."""
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class SmoothPatch(Patch):
+    """A patch that gives points, normals and feet in its own frame."""
+
+    @abstractmethod
+    def local_feet(self, points: Array) -> LocalFeet:
+        """Feet of finite points (n, 3) m, given in the own frame."""
+
+    def closest(self, points: ArrayLike) -> Foot:
+        """The feet of `points` (..., 3) m on the surface; see `Foot`.
+
+        Where a point has no foot with its normal through the point, because the nearest place is
+        on a border, `height` is the part of the distance along the normal there and `inside` is
+        False. A point that is not finite has a foot of NaN that is not inside.
+
+        Raises:
+            ValueError: `points` does not end in an axis of length 3.
+        """
+        points = points_of(points)
+        flat = points.reshape(-1, 3)
+        finite = np.isfinite(flat).all(axis=1)
+        values = np.full((len(flat), 6), np.nan)
+        inside = np.zeros(len(flat), dtype=bool)
+        if finite.any():
+            feet = self.local_feet((flat[finite] - self.position) @ self.rotation)
+            values[finite] = np.column_stack(
+                [feet.u, feet.v, feet.height, feet.normal @ self.rotation.T]
+            )
+            inside[finite] = feet.upright & self._on_patch(feet.u, feet.v)
+        shape = points.shape[:-1]
+        return Foot(
+            u=values[:, 0].reshape(shape),
+            v=values[:, 1].reshape(shape),
+            height=values[:, 2].reshape(shape),
+            normal=values[:, 3:].reshape(*shape, 3),
+            inside=inside.reshape(shape),
+        )
+
+    def _on_patch(self, u: Array, v: Array) -> NDArray[np.bool_]:
+        """True where the parameters lie in the patch's ranges."""
+        (u0, u1), (v0, v1) = self.u_range, self.v_range
+        within = (u >= u0 - EDGE) & (u <= u1 + EDGE) & (v >= v0 - EDGE) & (v <= v1 + EDGE)
+        return np.asarray(within)
+
+
+def wrapped(angle: Array, low: float, high: float) -> Array:
+    """The values angle + 2 pi k (rad) that lie in low..high, or failing that, nearest to it."""
+    turned = low + np.mod(angle - low, math.tau)
+    back = (turned > high) & (turned - high > low - (turned - math.tau))
+    return np.where(back, turned - math.tau, turned)
+
+
+def azimuth(x: Array, y: Array, lowest: float, highest: float, size: float) -> Array:
+    """Angle about z (rad) within a range; on the axis, where every angle is one, one inside it.
+
+    `size` (m) is the length beside which a distance from the axis of 1e-9 is none.
+    """
+    angle = wrapped(np.arctan2(y, x), lowest, highest)
+    on_axis = np.hypot(x, y) <= EDGE * size
+    return np.where(on_axis, np.clip(angle, lowest, highest), angle)

@@ -1,0 +1,5 @@
+"""Several patches joined along their seams into one surface."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

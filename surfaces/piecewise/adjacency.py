@@ -1,0 +1,169 @@
+"""Which cells of different pieces touch across the seams of a piecewise surface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.adjacency import grid_neighbours
+from surfaces.piecewise.seams import Side, contacts, sides_of
+
+if TYPE_CHECKING:
+    from surfaces.piecewise.piecewise_surface import Piecewise
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Counts = Sequence[tuple[int, int]]
+
+MARKS = 16  # on each cell's border side; cells that share fewer than one of them do not touch
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Joints:
+    """Pairs of cells that touch across a seam, on a stretch of their sides or at a corner."""
+
+    pairs: Ints
+    """(m, 2) i < j, each once, sorted."""
+    crossings: Array
+    """(m, 3) m, in the root frame: the middle of the border they share, or the corner."""
+    normals: Array
+    """(m, 2, 3) outward unit normals of the pieces of i and of j there."""
+
+    @property
+    def creases(self) -> Array:
+        """(m,) rad, the angle between both normals."""
+        apart = np.linalg.norm(self.normals[:, 0] - self.normals[:, 1], axis=1)
+        return 2.0 * np.arcsin(np.clip(0.5 * apart, 0.0, 1.0))
+
+    def of(self, pairs: Ints) -> Joints:
+        """The joints of some of the pairs (k, 2), i < j, in their order."""
+        row = np.searchsorted(_keys(self.pairs), _keys(pairs))
+        return Joints(self.pairs[row], self.crossings[row], self.normals[row])
+
+
+def joints_of(surface: Piecewise, counts: Counts) -> Joints:
+    """Find the joints between the cells of all pieces.
+
+    Two cells touch across a seam where their border sides share more than a thirtieth or so of the
+    shorter one; and, as in a grid, where they have only a corner in common but also a neighbour.
+
+    Args:
+        surface: the pieces, and which of them are joined.
+        counts: cells along u and v of each piece.
+    """
+    first = np.concatenate([[0], np.cumsum([nu * nv for nu, nv in counts])])
+    sides = [side for side in sides_of(surface.pieces, surface.gap) if min(counts[side.piece]) > 0]
+    pairs, places = _along_sides(surface, counts, first, sides)
+    more, corners = _at_corners(surface, counts, first, sides, pairs)
+    pairs, places = np.concatenate([pairs, more]), np.concatenate([places, corners])
+    order = np.argsort(_keys(pairs))
+    pairs, places = pairs[order], places[order]
+    return Joints(
+        pairs,
+        places @ surface.rotation.T + surface.position,
+        _normals(surface, first, pairs, places) @ surface.rotation.T,
+    )
+
+
+def _along_sides(
+    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Side]
+) -> tuple[Ints, Array]:
+    """Pairs that share a stretch of border, and the middle of it, in the frame of the whole."""
+    joined = {seam.pieces for seam in surface.seams}
+    parts = [counts[side.piece][1 - side.fixed] for side in sides]
+    marks = [(np.arange(MARKS * n) + 0.5) / (MARKS * n) for n in parts]
+    found: list[Ints] = []
+    spots: list[Array] = []
+    for contact in contacts(sides, marks, surface.gap):
+        one, other = sides[contact.side], sides[contact.other]
+        if (min(one.piece, other.piece), max(one.piece, other.piece)) not in joined:
+            continue
+        here = _cells_at(one, counts, contact.marks // MARKS)
+        n = parts[contact.other]
+        there = _cells_at(other, counts, np.minimum((contact.there * n).astype(np.int64), n - 1))
+        pair = np.column_stack([here + first[one.piece], there + first[other.piece]])
+        found.append(np.sort(pair, axis=1))
+        spots.append(one.point(marks[contact.side][contact.marks]))
+    if not found:
+        return np.empty((0, 2), dtype=np.int64), np.empty((0, 3))
+    pairs, group, count = np.unique(
+        np.concatenate(found), axis=0, return_inverse=True, return_counts=True
+    )
+    # The mark nearest to the mean of all: it lies on the border, however bent that is.
+    spot, group = np.concatenate(spots), group.reshape(-1)
+    mean = np.column_stack([np.bincount(group, spot[:, k]) for k in range(3)]) / count[:, None]
+    order = np.lexsort((np.linalg.norm(spot - mean[group], axis=1), group))
+    return pairs, spot[order[np.searchsorted(group[order], np.arange(len(pairs)))]]
+
+
+def _at_corners(
+    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Side], touching: Ints
+) -> tuple[Ints, Array]:
+    """Pairs that share a corner and a neighbour but no border, and the corners."""
+    from scipy.sparse import coo_array
+    from scipy.spatial import cKDTree
+
+    none = np.empty((0, 2), dtype=np.int64), np.empty((0, 3))
+    if len(touching) == 0:
+        return none
+    spots, cells, pieces = [], [], []
+    for side in sides:
+        n = counts[side.piece][1 - side.fixed]
+        corners = side.point(np.arange(n + 1) / n)
+        own = _cells_at(side, counts, np.arange(n)) + first[side.piece]
+        spots += [corners[:-1], corners[1:]]
+        cells += [own, own]
+        pieces.append(np.full(2 * n, side.piece))
+    spot, cell, piece = np.concatenate(spots), np.concatenate(cells), np.concatenate(pieces)
+    near = cKDTree(spot).query_pairs(surface.gap, output_type="ndarray")
+    near = near[piece[near[:, 0]] != piece[near[:, 1]]]
+    pairs = np.sort(cell[near], axis=1)
+    pairs, once = np.unique(pairs, axis=0, return_index=True)
+    spot = spot[near[once, 0]]
+    size = int(first[-1])
+    links = np.concatenate([*_own_pairs(surface, counts, first), touching])
+    ones = np.ones(len(links))
+    graph: Any = coo_array((ones, (links[:, 0], links[:, 1])), shape=(size, size)).tocsr()
+    graph = graph + graph.T
+    common = np.asarray(graph[pairs[:, 0]].multiply(graph[pairs[:, 1]]).sum(axis=1)).reshape(-1)
+    keep = (common > 0) & ~np.isin(_keys(pairs), _keys(touching))
+    return pairs[keep], spot[keep]
+
+
+def _own_pairs(surface: Piecewise, counts: Counts, first: Ints) -> list[Ints]:
+    """Pairs of neighbours within each piece."""
+    return [
+        grid_neighbours(*of, (patch.u_closed, patch.v_closed), patch.poles).pairs + start
+        for patch, of, start in zip(surface.pieces, counts, first, strict=False)
+    ]
+
+
+def _cells_at(side: Side, counts: Counts, along: Ints) -> Ints:
+    """Cells of a piece's grid at places counted along one of its borders."""
+    nu, nv = counts[side.piece]
+    if side.fixed == 0:
+        return (nu - 1 if side.upper else 0) * nv + along
+    return along * nv + (nv - 1 if side.upper else 0)
+
+
+def _normals(surface: Piecewise, first: Ints, pairs: Ints, places: Array) -> Array:
+    """(m, 2, 3) outward unit normals of the pieces of two cells at a place of their seam."""
+    pieces = np.searchsorted(first, pairs, side="right") - 1
+    normals = np.empty((*pairs.shape, 3))
+    for k, patch in enumerate(surface.pieces):
+        for end in (0, 1):
+            some = np.flatnonzero(pieces[:, end] == k)
+            if len(some):
+                foot = patch.closest(places[some])
+                u, v = np.clip(foot.u, *patch.u_range), np.clip(foot.v, *patch.v_range)
+                normals[some, end] = surface.signs[k] * patch.normal(u, v)
+    return normals
+
+
+def _keys(pairs: Ints) -> Ints:
+    """One number for each pair, in the order of the pairs."""
+    return np.asarray(pairs[:, 0] * np.int64(2**31) + pairs[:, 1])

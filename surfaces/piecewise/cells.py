@@ -1,0 +1,212 @@
+"""PieceCells: the pieces of a piecewise surface, each cut into a grid, numbered piece by piece."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.adjacency import Neighbours
+from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.patches import GridCells
+from surfaces.surface import SurfaceError
+
+if TYPE_CHECKING:
+    from surfaces.piecewise.adjacency import Joints
+    from surfaces.piecewise.piecewise_surface import Piecewise
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+LEFT = 0.2  # rad, so far clockwise from the left a list of neighbours begins, as in a grid
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PieceCells(Cells):
+    """N cells of several pieces; cell (piece, i, j) is cell (i, j) of that piece's grid."""
+
+    surface: Piecewise
+    counts: tuple[tuple[int, int], ...]
+    """Cells along u and v of each piece."""
+
+    @staticmethod
+    def cut(surface: Piecewise, counts: Any) -> PieceCells:
+        """See `Piecewise.cells`."""
+        checked = _counts(counts, len(surface.pieces))
+        grids = [piece.cells(*of) for piece, of in zip(surface.placed, checked, strict=True)]
+        signs = surface.signs
+        areas = np.concatenate([grid.areas for grid in grids])
+        return PieceCells(
+            surface=surface,
+            centres=np.concatenate([grid.centres for grid in grids]),
+            normals=np.concatenate([s * g.normals for s, g in zip(signs, grids, strict=True)]),
+            areas=areas,
+            shape=(len(areas),),
+            counts=checked,
+        )
+
+    @cached_property
+    def grids(self) -> tuple[GridCells, ...]:
+        """The cells of each piece alone, in the root frame."""
+        return tuple(
+            piece.cells(*of) for piece, of in zip(self.surface.placed, self.counts, strict=True)
+        )
+
+    @cached_property
+    def first(self) -> Ints:
+        """(pieces + 1,) where the cells of each piece begin, and the end of the last."""
+        return np.concatenate([[0], np.cumsum([nu * nv for nu, nv in self.counts])])
+
+    @cached_property
+    def piece(self) -> Ints:
+        """(N,) the piece of each cell."""
+        return np.repeat(np.arange(len(self.counts)), np.diff(self.first))
+
+    @cached_property
+    def joints(self) -> Joints:
+        """The pairs of cells that touch across seams."""
+        from surfaces.piecewise.adjacency import joints_of
+
+        return joints_of(self.surface, self.counts)
+
+    @cached_property
+    def neighbours(self) -> Neighbours:
+        """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
+        own = [grid.pairs + start for grid, start in zip(self.grids, self.first, strict=False)]
+        pairs = np.concatenate([*own, self.joints.pairs])
+        owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
+        right = np.concatenate([_rightward(grid) for grid in self.grids])
+        up = np.cross(self.normals, right)
+        way = self.centres[other] - self.centres[owner]
+        x, y = ((way * axes[owner]).sum(axis=1) for axes in (right, up))
+        clockwise = np.mod(np.arctan2(y, -x) - LEFT, 2.0 * np.pi)
+        order = np.lexsort((clockwise, owner))
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(self)))])
+        indices = other[order]
+        for array in (indptr, indices):
+            array.flags.writeable = False
+        return Neighbours(indptr, indices)
+
+    def around(self, a: int, b: int) -> tuple[int, ...]:
+        """Two pieces, and all others that have a seam with both; of one piece, itself alone."""
+        if a == b:
+            return (a,)
+        met = {seam.pieces for seam in self.surface.seams}
+        return tuple(
+            k
+            for k in range(len(self.counts))
+            if k in (a, b) or all((min(k, of), max(k, of)) in met for of in (a, b))
+        )
+
+    def index(self, piece: int, i: int, j: int) -> int:
+        """Flat index of the cell in row i and column j of a piece.
+
+        Raises:
+            IndexError: there is no such cell.
+        """
+        if not 0 <= piece < len(self.grids):
+            raise IndexError(f"no piece {piece} among {len(self.grids)}")
+        return int(self.first[piece]) + self.grids[piece].index(i, j)
+
+    def unravel(self, k: int) -> tuple[int, int, int]:
+        """Piece, row (u) and column (v) of the cell with flat index k.
+
+        Raises:
+            IndexError: there is no such cell.
+        """
+        if not 0 <= k < len(self):
+            raise IndexError(f"no cell {k} among {len(self)}")
+        piece = int(self.piece[k])
+        return (piece, *self.grids[piece].unravel(int(k - self.first[piece])))
+
+    def locate(self, points: ArrayLike) -> Ints:
+        """See `Cells.locate`."""
+        found = self.surface.nearest(points)
+        cells = np.full(len(found.piece), -1, dtype=np.int64)
+        for k, grid in enumerate(self.grids):
+            some = found.inside & (found.piece == k)
+            cells[some] = self.first[k] + grid.at(found.u[some], found.v[some])
+        return cells
+
+    def borders(self, samples: int = 8) -> Array:
+        """See `Cells.borders`."""
+        return np.concatenate([grid.borders(samples) for grid in self.grids])
+
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
+        """See `Cells.triangles`; cell by cell in the order asked for."""
+        which = np.asarray(which, dtype=np.int64)
+        corners, faces = (samples + 1) ** 2, 2 * samples**2  # of one cell
+        vertices, normals = np.empty((2, len(which), corners, 3))
+        triangles = np.empty((len(which), faces, 3), dtype=np.int64)
+        for k, grid in enumerate(self.grids):
+            some = np.flatnonzero(self.piece[which] == k)
+            part = grid.triangles(which[some] - self.first[k], samples, inset)
+            vertices[some] = part.vertices.reshape(-1, corners, 3)
+            normals[some] = self.surface.signs[k] * part.normals.reshape(-1, corners, 3)
+            shift = corners * (some - np.arange(len(some)))
+            triangles[some] = part.faces.reshape(-1, faces, 3) + shift[:, None, None]
+        return Triangles(vertices.reshape(-1, 3), triangles.reshape(-1, 3), normals.reshape(-1, 3))
+
+    def unrolled(self) -> Unrolled:
+        """See `Cells.unrolled`: seen along the mean normal, from the outside."""
+        mean = (self.areas[:, None] * self.normals).sum(axis=0)
+        middle = self.centres.mean(axis=0)
+        _, _, axes = np.linalg.svd(np.vstack([self.centres - middle, np.zeros((3, 3))]))
+        up = mean if np.linalg.norm(mean) > 0.1 * self.areas.sum() else axes[-1]
+        up = up / np.linalg.norm(up)
+        flatter = [axis - (axis @ up) * up for axis in axes[:2]]
+        right = next(axis for axis in flatter if np.linalg.norm(axis) > 1e-6)
+        right = right / np.linalg.norm(right)
+        flat = np.column_stack([right, -np.cross(up, right)])  # y runs down
+        return Unrolled(
+            centres=(self.centres - middle) @ flat,
+            outlines=tuple(
+                (line - middle) @ flat for grid in self.grids for line in grid.outlines()
+            ),
+            labels=("along (m)", "across (m)"),
+            turns=(np.inf, np.inf),
+        )
+
+    def __repr__(self) -> str:
+        """One line."""
+        grids = " + ".join(f"{nu} x {nv}" for nu, nv in self.counts)
+        return f"Cells({grids} of {self.surface!r})"
+
+
+def _rightward(grid: GridCells) -> Array:
+    """(N, 3) unit tangents at the centres along which v grows."""
+    low, high = grid.surface.v_range
+    step = 1e-5 * (high - low)
+    along = grid.surface.point(grid.u, grid.v + step) - grid.surface.point(grid.u, grid.v - step)
+    return np.asarray(along / np.linalg.norm(along, axis=1, keepdims=True))
+
+
+def _counts(counts: Any, pieces: int) -> tuple[tuple[int, int], ...]:
+    """One (nu, nv) for each piece."""
+    expected = (
+        f"counts must be a pair (nu, nv) of whole numbers >= 0 for all pieces, or a list of "
+        f"{pieces} such pairs, one for each piece"
+    )
+    if isinstance(counts, np.ndarray):
+        counts = counts.tolist()
+    if not isinstance(counts, Sequence) or isinstance(counts, (str, bytes)):
+        raise SurfaceError(f"{expected}; got {counts!r}")
+    alike = len(counts) == 2 and not any(isinstance(part, Sequence) for part in counts)
+    rows = [counts] * pieces if alike else counts
+    if len(rows) != pieces:
+        raise SurfaceError(f"{expected}; got {len(rows)} of them")
+    checked = []
+    for k, row in enumerate(rows):
+        try:
+            nu, nv = (operator.index(number) for number in row)
+        except (TypeError, ValueError):
+            nu = nv = -1
+        if min(nu, nv) < 0 or any(isinstance(number, bool) for number in row):
+            raise SurfaceError(f"{expected}; of pieces[{k}] got {row!r}")
+        checked.append((nu, nv))
+    return tuple(checked)

@@ -1,0 +1,123 @@
+"""The places of several patches nearest to points, borders included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.patches import Patch
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+TIE = 1e-9  # [m]: of two pieces so equally near, the one whose foot lies inside it counts
+BLOCK = 50_000  # points at once, to bound the memory
+PARALLEL = 1e-3  # [1], sine of an angle below which two normals are one
+
+
+class PieceFeet(NamedTuple):
+    """For each of k points its nearest place on some pieces."""
+
+    piece: Ints
+    """(k,)"""
+    u: Array
+    """(k,) within the piece's range."""
+    v: Array
+    """(k,)"""
+    places: Array
+    """(k, 3) m."""
+    normals: Array
+    """(k, 3) outward unit normals of the whole there."""
+    height: Array
+    """(k,) m, distance with the sign of the side; beside the surface, its part along the normal."""
+    inside: NDArray[np.bool_]
+    """(k,) whether the normal there leads to the point; at a seam, one between both normals."""
+
+
+def nearest_places(
+    patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
+) -> PieceFeet:
+    """The nearest places of all patches.
+
+    Where the foot on a patch lies beyond its border, the place on the border at the same parameters
+    counts. That is the nearest one as long as the point is near to the border.
+
+    Args:
+        patches: at least one.
+        signs: +1.0 where a patch's own normal is outward, -1.0 where it is turned over.
+        points: (k, 3) m; those that are not finite have places of NaN.
+        gap: m, how far apart the two borders of a seam may be.
+    """
+    count = len(points)
+    values = np.full((count, 9), np.nan)
+    piece, inside = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=bool)
+    finite = np.flatnonzero(np.isfinite(points).all(axis=1))
+    for first in range(0, len(finite) if patches else 0, BLOCK):
+        some = finite[first : first + BLOCK]
+        piece[some], values[some], inside[some] = _nearest(patches, signs, points[some], gap)
+    return PieceFeet(
+        piece, values[:, 0], values[:, 1], values[:, 2:5], values[:, 5:8], values[:, 8], inside
+    )
+
+
+class _Feet(NamedTuple):
+    """Nearest places on one patch."""
+
+    values: Array
+    """(k, 9) u, v, place, normal, height."""
+    distance: Array
+    """(k,) m."""
+    inside: NDArray[np.bool_]
+
+
+def _feet(patch: Patch, sign: float, points: Array) -> _Feet:
+    """Nearest places on one patch."""
+    foot = patch.closest(points)
+    u, v = np.clip(foot.u, *patch.u_range), np.clip(foot.v, *patch.v_range)
+    places, normals = patch.point(u, v), sign * patch.normal(u, v)
+    away = points - places
+    height = np.where(foot.inside, sign * foot.height, (away * normals).sum(axis=1))
+    distance = np.where(foot.inside, np.abs(foot.height), np.linalg.norm(away, axis=1))
+    return _Feet(np.column_stack([u, v, places, normals, height]), distance, foot.inside)
+
+
+def _nearest(
+    patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
+) -> tuple[Ints, Array, NDArray[np.bool_]]:
+    """Piece (k,), values (k, 9) as in `_Feet`, and whether they are inside, of finite points."""
+    found = [_feet(patch, sign, points) for patch, sign in zip(patches, signs, strict=True)]
+    distance = np.stack([feet.distance + np.where(feet.inside, 0.0, TIE) for feet in found])
+    values, within = (
+        np.stack([getattr(feet, name) for feet in found]) for name in ("values", "inside")
+    )
+    row = np.arange(len(points))
+    piece = np.argmin(distance, axis=0)
+    best, inside = values[piece, row], within[piece, row].copy()
+    if len(patches) > 1:
+        distance[piece, row] = np.inf
+        second = values[np.argmin(distance, axis=0), row]
+        over = ~inside & _over_seam(points, best, second, gap)
+        away = np.linalg.norm(points - best[:, 2:5], axis=1)
+        best[over, 8] = np.copysign(away, best[:, 8])[over]
+        inside |= over
+    return piece, best, inside
+
+
+def _over_seam(points: Array, one: Array, other: Array, gap: float) -> NDArray[np.bool_]:
+    """Points over a seam: both pieces are nearest there, and the point lies off neither end.
+
+    Over the outer side of a crease, or over the hair's breadth between two borders, no piece has
+    its foot inside.
+    """
+    together = np.linalg.norm(one[:, 2:5] - other[:, 2:5], axis=1) <= 2.0 * gap
+    away = points - one[:, 2:5]
+    along = np.cross(one[:, 5:8], other[:, 5:8])
+    sine = np.linalg.norm(along, axis=1)
+    off_end = np.abs((away * along).sum(axis=1)) / np.maximum(sine, PARALLEL)
+    middle = one[:, 5:8] + other[:, 5:8]
+    middle /= np.maximum(np.linalg.norm(middle, axis=1, keepdims=True), 1e-300)
+    beside = np.linalg.norm(away - (away * middle).sum(axis=1, keepdims=True) * middle, axis=1)
+    return together & (np.where(sine > PARALLEL, off_end, beside) <= 2.0 * gap)

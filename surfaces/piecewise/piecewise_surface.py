@@ -1,0 +1,285 @@
+"""Piecewise: several patches joined along their seams into one surface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.arguments import Checks
+from surfaces.patches import Patch
+from surfaces.piecewise.closest_point import PieceFeet, nearest_places
+from surfaces.piecewise.consistency import groups_of, on_each_other, turned_pieces
+from surfaces.piecewise.seams import Seam, sides_of, survey
+from surfaces.surface import Foot, Side, Surface, SurfaceError, points_of
+
+if TYPE_CHECKING:
+    from surfaces.cells import Cells
+    from surfaces.piecewise.cells import PieceCells
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_ORIGIN = (0.0, 0.0, 0.0)
+GAP = 1e-4  # m, how far apart two borders may be that are one seam
+SHARE = 1e-3  # [1], and the same as a share of the shortest border
+WIDEST = 0.02  # [1], what may be asked for, as a share of the shortest border
+CREASE = math.radians(2.0)  # seams that bend by more are told of
+MOST_PIECES = 200
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Piecewise(Surface):
+    """Patches joined along seams; outward is where the first piece of each joined group says."""
+
+    kind: ClassVar[str] = "piecewise"
+
+    pieces: tuple[Patch, ...]
+    """In the frame of the whole. Their own `side` says nothing."""
+    turned: tuple[bool, ...]
+    """Whether each piece's own normal is turned over."""
+    gap: float
+    """m, how far apart two borders may be that are one seam."""
+    seams: tuple[Seam, ...]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Pieces turned over, creases, and pieces that touch nothing."""
+        words = [
+            f"pieces[{k}] (a {self.pieces[k].kind}) is turned over, so that its outward side "
+            "continues that of the pieces it is joined to."
+            for k in np.flatnonzero(self.turned)
+        ]
+        creases: dict[tuple[int, int], float] = {}
+        for seam in self.seams:
+            creases[seam.pieces] = max(creases.get(seam.pieces, 0.0), seam.crease)
+        words += [
+            f"pieces[{a}] and pieces[{b}] meet at a crease of up to {math.degrees(angle):.3g} "
+            "degrees; motions across it cannot be certified where it is sharper than tolerance "
+            "and cone allow."
+            for (a, b), angle in creases.items()
+            if angle > CREASE
+        ]
+        groups = self.groups
+        if len(groups) > 1:
+            lists = "; ".join(", ".join(map(str, group)) for group in groups)
+            words.append(
+                f"The pieces make {len(groups)} surfaces that touch nowhere ({lists}), so no "
+                f"motion along the surface joins them. Borders count as joined within "
+                f"{1e3 * self.gap:.3g} mm; if they should be, move the pieces together, or widen "
+                "gap."
+            )
+        return tuple(words)
+
+    @property
+    def groups(self) -> tuple[tuple[int, ...], ...]:
+        """The pieces that hang together, each group in order."""
+        return groups_of(len(self.pieces), self.seams)
+
+    @cached_property
+    def placed(self) -> tuple[Patch, ...]:
+        """The pieces in the root frame."""
+        return tuple(piece.moved(self.rotation, self.position) for piece in self.pieces)
+
+    @cached_property
+    def signs(self) -> tuple[float, ...]:
+        """+1.0 where a piece's own normal is outward, -1.0 where it is turned over."""
+        return tuple(-1.0 if turned else 1.0 for turned in self.turned)
+
+    def nearest(self, points: ArrayLike, pieces: Sequence[int] | None = None) -> PieceFeet:
+        """The nearest places of some pieces (all if None) to points (k, 3) m, in the root frame."""
+        some = range(len(self.pieces)) if pieces is None else pieces
+        found = nearest_places(
+            [self.placed[k] for k in some], [self.signs[k] for k in some],
+            points_of(points).reshape(-1, 3), self.gap,
+        )  # fmt: skip
+        return found._replace(piece=np.asarray(some, dtype=np.int64)[found.piece])
+
+    def closest(self, points: ArrayLike) -> Foot:
+        """The feet of `points` (..., 3) m on the nearest piece; see `Foot`.
+
+        u and v are NaN: pieces count them each in its own way. Over the outer side of a crease the
+        foot lies on the seam, and `height` is the whole distance. Beyond a free border `height` is
+        the part of the distance along the normal there, and `inside` is False.
+        """
+        points = points_of(points)
+        found = self.nearest(points)
+        shape = points.shape[:-1]
+        nowhere = np.full(shape, np.nan)
+        return Foot(
+            u=nowhere,
+            v=nowhere,
+            height=found.height.reshape(shape),
+            normal=found.normals.reshape(*shape, 3),
+            inside=found.inside.reshape(shape),
+        )
+
+    def trace(self, cells: Cells, pairs: Ints, t: Array) -> tuple[Array, Array]:
+        """See `Surface.trace`: within a piece its own ways, across a seam see `piece_ways`."""
+        from surfaces.piecewise.curves import ways_across
+
+        cells = _own(cells)
+        points, normals = np.empty((2, len(pairs), len(t), 3))
+        of = cells.piece[pairs]
+        for a, b in np.unique(of, axis=0):
+            both = np.flatnonzero((of == (a, b)).all(axis=1))
+            if a == b:
+                grid = cells.grids[a]
+                found = grid.surface.trace(grid, pairs[both] - cells.first[a], t)
+                points[both], normals[both] = found[0], self.signs[a] * found[1]
+            else:
+                found = ways_across(self, cells, pairs[both], t, (int(a), int(b)))
+                points[both], normals[both] = found
+        return points, normals
+
+    def smoothed(self, cells: Cells, pairs: Ints) -> NDArray[np.bool_]:
+        """See `Surface.smoothed`: across creases."""
+        from surfaces.piecewise.curves import SMOOTH
+
+        cells = _own(cells)
+        creased = cells.piece[pairs[:, 0]] != cells.piece[pairs[:, 1]]
+        creased[creased] = cells.joints.of(pairs[creased]).creases > SMOOTH
+        return creased
+
+    def sharpness(self, cells: Cells, height: float = 0.0) -> Array:
+        """See `Surface.sharpness`."""
+        cells = _own(cells)
+        return np.concatenate([grid.surface.sharpness(grid, height) for grid in cells.grids])
+
+    def cells(self, counts: Any) -> PieceCells:
+        """Cut every piece into a grid of cells.
+
+        Args:
+            counts: (nu, nv) for all pieces alike, or a list of one (nu, nv) for each.
+
+        Raises:
+            SurfaceError: that is not what the counts are.
+        """
+        from surfaces.piecewise.cells import PieceCells
+
+        return PieceCells.cut(self, counts)
+
+    def beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Array, Array]:
+        """See `Surface.beneath`: on the pieces of both cells, and those that touch both."""
+        cells = _own(cells)
+        places, normals = np.empty_like(points), np.empty_like(points)
+        of = cells.piece[pairs]
+        for a, b in np.unique(of, axis=0):
+            both = np.flatnonzero((of == (a, b)).all(axis=1))
+            found = self.nearest(points[both], cells.around(int(a), int(b)))
+            places[both] = found.places.reshape(-1, *points.shape[1:])
+            normals[both] = found.normals.reshape(-1, *points.shape[1:])
+        return places, normals
+
+    def __repr__(self) -> str:
+        """One line."""
+        kinds = ", ".join(piece.kind for piece in self.pieces)
+        return f"piecewise({kinds}, side={self.side!r}, position={self.position.tolist()})"
+
+
+def piecewise(
+    pieces: Sequence[Patch],
+    side: Side = "inside",
+    position: Sequence[float] = _ORIGIN,
+    rpy_deg: Sequence[float] = _ORIGIN,
+    gap: float | None = None,
+) -> Piecewise:
+    """Several patches joined into one surface along the borders that they share.
+
+    Borders are found by geometry: wherever two of different pieces run along each other, on their
+    whole length or a part of it. The first piece of each joined group says where outward is; others
+    are turned over where they say otherwise, and `notes` tells which. Pieces that lie on each other
+    are refused; that they do not cut through each other is not checked.
+
+    Args:
+        pieces: patches of any kinds, placed in the frame of the whole. Their own `side` says
+            nothing.
+        side: 'outside' for a tool on the outward side, 'inside' for one on the other.
+        position: (3,) m, origin of the frame of the whole in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the frame of the whole.
+        gap: m, how far apart the borders of a seam may be; None for 0.1 mm, and at most a
+            thousandth of the shortest border.
+
+    Raises:
+        SurfaceError: one or more of the arguments are wrong, all are named; or pieces lie on each
+            other, or three share one seam; or no choice of outward sides is consistent, as on a
+            Moebius strip.
+
+    Example:
+        >>> from surfaces import sphere
+        >>> east, west = (sphere(1.0, (20, 90), ends) for ends in ((0, 180), (180, 360)))
+        >>> len(piecewise([east, west]).cells((4, 6)).pairs) == len(
+        ...     sphere(1.0, (20, 90), (0, 360)).cells(4, 12).pairs)
+        True
+    """
+    check = Checks("piecewise")
+    patches = _patches(pieces, check.faults)
+    width = _gap(gap, patches, check)
+    chosen, place = check.side(side), check.vector("position", position, "metres")
+    rotation = check.rotation("rpy_deg", rpy_deg)
+    check.done()
+    sheets = on_each_other(patches, width)
+    if sheets:
+        raise SurfaceError(
+            f"piecewise: pieces[{sheets[0]}] and pieces[{sheets[1]}] lie on each other, at least "
+            "in part; leave one of them out, or cut it back to the seam"
+        )
+    found = survey(patches, width)
+    if found.crowded:
+        names = ", ".join(f"pieces[{k}]" for k in found.crowded)
+        raise SurfaceError(
+            f"piecewise: {names} share one seam; a surface has two sides of a seam at most; leave "
+            "one of them out"
+        )
+    return Piecewise(
+        rotation,
+        place,
+        chosen,
+        patches,
+        turned_pieces(len(patches), found.seams),
+        width,
+        found.seams,
+    )
+
+
+def _patches(pieces: Any, faults: list[str]) -> tuple[Patch, ...]:
+    """The pieces; none after a fault."""
+    expected = f"pieces must be a list of 1 to {MOST_PIECES} patches, such as surfaces.plane makes"
+    if not isinstance(pieces, Sequence) or not 1 <= len(pieces) <= MOST_PIECES:
+        size = f"{len(pieces)} of them" if isinstance(pieces, Sequence) else type(pieces).__name__
+        faults.append(f"{expected}, got {size}")
+        return ()
+    wrong = [k for k, piece in enumerate(pieces) if not isinstance(piece, Patch)]
+    faults += [
+        f"pieces[{k}] must be a patch, such as surfaces.plane makes, got {type(pieces[k]).__name__}"
+        for k in wrong
+    ]
+    return () if wrong else tuple(pieces)
+
+
+def _gap(gap: Any, patches: tuple[Patch, ...], check: Checks) -> float:
+    """m, how far apart borders of a seam may be."""
+    shortest = min((side.length for side in sides_of(patches, 1e-7)), default=math.inf)
+    if gap is None:
+        return min(GAP, SHARE * shortest)
+    width = check.positive("gap", gap)
+    if patches and width > WIDEST * shortest:
+        check.faults.append(
+            f"gap must be at most a fiftieth of the shortest border, {WIDEST * shortest:.3g} m, "
+            f"got {gap!r}"
+        )
+    return width
+
+
+def _own(cells: Cells) -> PieceCells:
+    """Cells of a piecewise surface, and no others."""
+    from surfaces.piecewise.cells import PieceCells
+
+    if not isinstance(cells, PieceCells):
+        raise TypeError("the cells are not of a piecewise surface")
+    return cells

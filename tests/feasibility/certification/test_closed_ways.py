@@ -1,0 +1,52 @@
+"""What is said where no motion can go from cell to cell, whatever the arm."""
+
+from __future__ import annotations
+
+import re
+
+import networkx as nx
+import numpy as np
+import pytest
+
+from feasibility.target_curves import closed_courses, target_courses
+from feasibility.task import Task
+from surfaces.meshes import TriangleMesh, mesh
+from surfaces.patches import plane
+from surfaces.patches.sphere import sphere
+
+
+def zigzag(*turns_deg: float) -> TriangleMesh:
+    """Plates of 0.2 m side by side; the normal turns by an angle from each to the next."""
+    slopes = np.radians(np.cumsum([0.0, *turns_deg]))
+    x = np.concatenate([[0.0], np.cumsum(0.2 * np.cos(slopes))])
+    z = np.concatenate([[0.0], np.cumsum(-0.2 * np.sin(slopes))])
+    vertices = [[a, y, b] for a, b in zip(x, z, strict=True) for y in (0.0, 0.3)]
+    faces = [
+        f for k in range(0, 2 * len(slopes), 2) for f in ([k, k + 2, k + 3], [k, k + 3, k + 1])
+    ]
+    return TriangleMesh(np.array(vertices), faces)
+
+
+def told(text: str) -> int:
+    found = re.search(r"leaves (\d+) parts", text)
+    return 1 if found is None else int(found[1])
+
+
+@pytest.mark.parametrize("turns", [(-70,), (60, -70), (-70, -60), (-60, 50, -60), (50, 50)])
+def test_the_parts_that_closed_ways_leave_are_counted(turns: tuple[int, ...]) -> None:
+    """A motion goes round outer edges, not into hollow ones."""
+    cells, task = mesh(zigzag(*turns)).cells(60), Task(standoff=0.02, cone_deg=60)
+    text = closed_courses(cells, task)
+    ways = target_courses(cells, task.standoff, 1e-3)
+    usable = ~ways.folded & (ways.strays[:, 0] < 1e-3) & (ways.strays[:, 1] < 1.0)
+    graph = nx.Graph(cells.pairs[usable].tolist())
+    graph.add_nodes_from(range(len(cells)))
+    assert told(text) == nx.number_connected_components(graph)
+    assert told(text) >= 1 + sum(turn < 0 for turn in turns)
+    assert (told(text) == 1) == (min(turns) > 0)
+    assert ("no arm's motion joins" in text) == (told(text) > 1)
+
+
+def test_where_every_way_is_open_nothing_is_said() -> None:
+    for cells in (plane((0, 1), (0, 1)).cells(3, 4), sphere(0.5, (20, 80), (0, 90)).cells(4, 4)):
+        assert closed_courses(cells, Task(standoff=0.02, cone_deg=30)) == ""

@@ -1,0 +1,72 @@
+"""Motions over meshes that a hunt found to be nearer to the triangles than they may be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from dense_replay import tools
+from test_creases import PER_SEGMENT, nearest, roof
+
+from feasibility.checking import check
+from feasibility.target_curves import beside_facets
+from feasibility.task import Task
+from robots import load_robot
+from surfaces.meshes import mesh
+
+CASES = {
+    "sharp, near": (roof(120), Task(0.02, 45, 3e-4), 20),
+    "sharp, far": (roof(120), Task(0.05, 45, 3e-4), 20),
+    "right": (roof(90), Task(0.05, 45, 3e-4), 20),
+    "blunt": (roof(45), Task(0.02, 20, 3e-4), 12),
+    "smooth": (roof(25), Task(0.03, 30, 1e-3), 12),
+    "hollow": (roof(-20), Task(0.03, 30, 1e-3), 12),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) -> None:
+    """By the exact distance, and over a sharp edge by the direction to it too."""
+    part, task, count = CASES[name]
+    surface = mesh(part, position=(0.5, -0.15, 0.3))
+    verdict = check(load_robot("ur5"), surface.cells(count), task)
+    assert verdict.feasible
+    assert verdict.witness is not None
+    assert verdict.certificate is not None
+    walk, certificate = verdict.witness, verdict.certificate
+    share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
+    q = walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share
+    tips, axes = tools(verdict.robot, np.concatenate([q.reshape(-1, 6), walk.q[-1:]]))
+    foot = nearest(part.vertices[part.faces] + surface.position, tips)
+    away = np.linalg.norm(tips - foot, axis=1)
+    assert np.abs(away - task.standoff).max() <= certificate.max_position_error
+    if name not in ("smooth", "hollow"):  # where normals are interpolated
+        cosine = ((foot - tips) * axes).sum(axis=1) / away
+        assert np.arccos(np.clip(cosine, -1, 1)).max() <= certificate.max_angle + 1e-9
+
+
+@pytest.mark.parametrize("angle", [95, 120, 150, 170])
+def test_what_is_over_a_sharp_edge_is_outside(angle: int) -> None:
+    """It may lie under the plane of either face."""
+    surface = mesh(roof(angle)).cells(20).surface
+    turn = np.radians(np.linspace(-0.49, 0.49, 25) * angle)
+    over = np.column_stack([np.sin(turn), np.zeros(len(turn)), np.cos(turn)])
+    for y in np.linspace(0.01, 0.29, 8):
+        foot = surface.closest([0.0, y, 0.0] + 0.05 * over)
+        np.testing.assert_allclose(foot.height, 0.05, rtol=1e-12)
+        assert surface.closest([0.0, y, -0.01]).height < 0.0
+
+
+@pytest.mark.parametrize("angle", [25, 60, 120, 150])
+def test_the_cells_of_a_course_say_what_the_whole_mesh_says(angle: int) -> None:
+    """Where nothing else is near: the search asks the former, the replay the latter."""
+    cells = mesh(roof(angle)).cells(20)
+    t = (np.arange(32) + 0.5) / 32
+    places = np.repeat(np.arange(len(cells.pairs)), len(t)), np.tile(t, len(cells.pairs))
+    near, all_over = (
+        beside_facets(cells, 0.02, 3e-4, *places, everywhere=everywhere)
+        for everywhere in (False, True)
+    )
+    np.testing.assert_allclose(near.off, all_over.off, atol=1e-12)
+    np.testing.assert_allclose(near.leans, all_over.leans, atol=1e-9)
+    assert near.leans.max() < 0.1
+    assert (near.leans.max() > 0.0) == (angle > 30)

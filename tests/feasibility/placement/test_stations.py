@@ -1,0 +1,104 @@
+"""The fewest stations: hundreds of small tables against brute force, and from outcomes."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from feasibility.placement.stations import Stations, fewest_stations, stations_of
+from feasibility.studies import bits_of
+
+
+def random_table(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Up to 8 motions over up to 12 cells, and which of the cells are needed."""
+    rng = np.random.default_rng([11, seed])
+    shape = int(rng.integers(0, 9)), int(rng.integers(0, 13))
+    return rng.random(shape) < rng.uniform(0.1, 0.8), rng.random(shape[1]) < 0.8
+
+
+def fewest_by_brute_force(covers: np.ndarray, needed: np.ndarray) -> int:
+    """Size of the smallest choice of rows that has every needed cell that any row has."""
+    wanted = needed & covers.any(axis=0)
+    for count in range(len(covers) + 1):
+        for choice in combinations(range(len(covers)), count):
+            if (covers[list(choice)].any(axis=0) | ~wanted).all():
+                return count
+    raise AssertionError("all rows together have everything")
+
+
+def assert_stations(found: Stations, covers: np.ndarray, needed: np.ndarray) -> None:
+    """Each needed cell that can be covered is given to one station, which covers it."""
+    wanted = needed & covers.any(axis=0)
+    given = np.concatenate([s.cells for s in found.stations] or [np.zeros(0, dtype=np.int64)])
+    assert sorted(given.tolist()) == np.flatnonzero(wanted).tolist()
+    assert found.left_out.tolist() == np.flatnonzero(needed & ~wanted).tolist()
+    assert found.whole == (wanted == needed).all()
+    for station in found.stations:
+        assert len(station.cells)
+        assert station.covers[station.cells].all()
+    sizes = [len(station.cells) for station in found.stations]
+    assert sizes == sorted(sizes, reverse=True)
+
+
+@pytest.mark.parametrize("block", range(10))
+def test_random_tables_against_brute_force(block: int) -> None:
+    several = 0
+    for seed in range(40 * block, 40 * block + 40):
+        covers, needed = random_table(seed)
+        found = fewest_stations(covers, needed)
+        assert_stations(found, covers, needed)
+        assert all((covers[s.row] == s.covers).all() for s in found.stations)
+        assert found.optimal
+        assert len(found) == fewest_by_brute_force(covers, needed)
+        several += len(found) > 1
+    assert several > 5  # most tables are not trivial
+
+
+def test_outcomes_give_the_same_as_their_table() -> None:
+    """Components of several placements are rows of one table; a motion cannot change placement."""
+    for seed in range(100):
+        covers, needed = random_table(1000 + seed)
+        rng = np.random.default_rng(seed)
+        cuts = np.sort(rng.integers(0, len(covers) + 1, 3))
+        parts = np.split(np.arange(len(covers)), cuts)
+        n = covers.shape[1]
+        results = [
+            {"cells": n, "components": [bits_of(row) for row in covers[part]]} for part in parts
+        ]
+        found = stations_of(results, needed)
+        assert len(found) == fewest_by_brute_force(covers, needed)
+        assert_stations(found, covers, needed)
+        for station in found.stations:
+            assert (covers[parts[station.row][station.component]] == station.covers).all()
+
+
+def test_a_failed_task_covers_nothing() -> None:
+    whole = {"cells": 3, "components": [bits_of(np.ones(3, dtype=bool))]}
+    found = stations_of([{"verdict": "undecided"}, {"cells": 3, "components": []}, whole])
+    assert [(s.row, s.cells.tolist()) for s in found.stations] == [(2, [0, 1, 2])]
+    assert len(stations_of([])) == 0
+    assert stations_of([], [True, False]).left_out.tolist() == [0]
+
+
+def test_one_motion_that_covers_all_is_one_station() -> None:
+    covers = np.eye(50, dtype=bool)
+    covers[17] = True
+    found = fewest_stations(covers)
+    assert [s.row for s in found.stations] == [17]
+    assert found.optimal
+
+
+def test_bad_input() -> None:
+    with pytest.raises(ValueError, match=r"shape \(K, N\), got \(3,\)"):
+        fewest_stations([True, False, True])
+    with pytest.raises(ValueError, match=r"needed must have shape \(2,\)"):
+        fewest_stations([[True, False]], [True])
+    two, three = np.ones(2, dtype=bool), np.ones(3, dtype=bool)
+    mixed = [{"cells": len(c), "components": [bits_of(c)]} for c in (two, three)]
+    # Both fit into one byte, so only the counts tell them apart.
+    with pytest.raises(ValueError, match="2, 3 cells"):
+        stations_of(mixed)
+    with pytest.raises(ValueError, match="do not hold the bits of 9 cells"):
+        stations_of([{"cells": 9, "components": ["ff"]}])

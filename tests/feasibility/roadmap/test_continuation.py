@@ -1,0 +1,91 @@
+"""Tracks between neighbouring centres, and every motion that a search stores, replayed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from random_arms import QUESTIONS, finite_limits, question, tools
+
+from feasibility.certification import replay
+from feasibility.roadmap import (
+    Explorer,
+    close,
+    edge_motion,
+    explore,
+    problem_of,
+    roomy,
+    track,
+    work_for,
+)
+from feasibility.roadmap.graph import EDGES
+from feasibility.verdict import Walk
+
+
+def refusal(robot, cells, task, q, first, last):
+    """Why the replay refuses a motion from one cell's centre to another's; empty if it does not."""
+    marks = np.full(len(q), -1)
+    marks[0], marks[-1] = first, last
+    return replay(robot, cells, task, Walk(q, marks), np.zeros(len(cells), dtype=bool)).refusal
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_tracks_end_over_the_next_centre(name):
+    """From several configurations over every cell into every neighbour."""
+    robot, cells, task = question(name)
+    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    targets = task.targets(cells)
+    rng = np.random.default_rng(5)
+    ways = np.empty((500, robot.n))
+    arrived = 0
+    for cell in range(0, len(cells), 2):
+        guesses = rng.uniform(*finite_limits(robot), (6, robot.n))
+        starts = guesses[roomy(problem, work, cell, guesses) >= 0.0]
+        entries = slice(*cells.neighbours.indptr[cell : cell + 2])
+        links = cells.neighbours.links[entries]
+        for other, course in zip(cells.neighbours.of(cell), links, strict=True):
+            begin, end = (0.0, 1.0) if cell < other else (1.0, 0.0)
+            for start in starts[:2]:
+                q = start.copy()
+                rows = track(problem, work, course, begin, end, q, q, False, ways, 0)
+                if rows < 0:
+                    assert rows == -1
+                    assert work.blame[0] > 0
+                    continue
+                arrived += 1
+                motion = np.vstack([start[None], ways[:rows]])
+                assert (q == motion[-1]).all()
+                (point,), _ = tools(robot, q[None])
+                assert np.linalg.norm(point - targets.points[other]) <= problem.near + 1e-12
+                assert refusal(robot, cells, task, motion, cell, other) == ""
+    assert arrived > 20
+
+
+def test_a_track_does_not_start_off_its_target():
+    """A start that is not where it is said to be is no motion."""
+    robot, cells, task = question("ur5, plate")
+    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    ways = np.empty((500, robot.n))
+    q = np.zeros(robot.n)
+    assert track(problem, work, 0, 0.0, 1.0, q, q, False, ways, 0) == -1
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_every_motion_that_a_search_stores_holds(name, seed):
+    """Spread, stirred and closed: each edge runs from node to node, and the replay accepts it."""
+    robot, cells, task = question(name)
+    explorer = Explorer(robot, cells, problem_of(robot, cells, task), seed)
+    explore(explorer)
+    for cell in range(0, len(cells), 3):
+        explorer.plant(cell, explorer.guesses(3))
+        explorer.stir(cell)
+    close(explorer)
+    roadmap = explorer.roadmap
+    count = int(roadmap.counters[EDGES])
+    assert count >= len(cells) - 1
+    for e in range(count):
+        x, y = roadmap.ends[e]
+        motion = edge_motion(roadmap, e)
+        assert (motion[0] == roadmap.q[x]).all()
+        assert (motion[-1] == roadmap.q[y]).all()
+        assert refusal(robot, cells, task, motion, roadmap.cell[x], roadmap.cell[y]) == ""

@@ -1,0 +1,298 @@
+"""The bound between samples, against dense sampling by Pinocchio, on random arms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from arm_urdfs import joint
+from random_arms import (
+    between,
+    deviation,
+    planar_arm,
+    random_arm,
+    random_configuration,
+    random_surface,
+    robot_of,
+    tilted,
+    tools,
+    turn_onto,
+)
+
+from feasibility.roadmap import correct, look_at, place, problem_of, segment_holds, work_for
+from feasibility.roadmap.problem import aim, bend_between
+from feasibility.roadmap.segment_bound import peak, spread
+from feasibility.task import Task
+from surfaces.patches import GridCells, plane
+from surfaces.patches.cylinder import cylinder
+from surfaces.patches.sphere import sphere
+
+ROUNDING = 1e-12
+KINDS = ["sphere", "cylinder", "hyperboloid", "plane"]
+SPHERE = sphere(1.0, (20, 160), (-90, 90), side="outside")
+CYLINDER = cylinder(1.0, (-90, 90), (-1, 1), side="outside")
+
+
+def far_plane():
+    """A surface for those who only want to know how the tool moves."""
+    return plane((-1, 1), (-1, 1)).cells(1, 1)
+
+
+def random_segments(rng, arms, per_arm):
+    """(robot, q0, q1), with steps of 1e-4 to 3 rad in all joints or in a few."""
+    for _ in range(arms):
+        robot = random_arm(rng)
+        for _ in range(per_arm):
+            q0 = random_configuration(robot, rng)
+            step = rng.normal(size=robot.n) * 10.0 ** rng.uniform(-4.0, 0.5)
+            if rng.random() < 0.5:
+                step *= rng.random(robot.n) < 0.4
+            yield robot, q0, q0 + step
+
+
+def test_second_derivatives_bound_the_sag_of_every_segment():
+    """2,400 segments of 80 arms: the tool point and the axis stay as near their chords as D says.
+
+    The bound is not loose either: some segment uses all of it, and half of them 15 per cent.
+    """
+    rng = np.random.default_rng(1)
+    used, used_axis = [], []
+    previous = None
+    for robot, q0, q1 in random_segments(rng, 80, 30):
+        if robot is not previous:
+            problem, work = problem_of(robot, far_plane(), Task(0.0, 30)), work_for(robot.n)
+            previous = robot
+        place(problem, work, 0, q0)
+        place(problem, work, 1, q1)
+        bends = spread(problem, work, q0, q1)
+        s, q = between(q0, q1, 32)
+        for values, bend, ratios in zip(tools(robot, q), bends, (used, used_axis), strict=True):
+            chord = (1.0 - s[:, None]) * values[0] + s[:, None] * values[-1]
+            sag = np.linalg.norm(values - chord, axis=1)
+            allowed = 0.5 * bend * s * (1.0 - s)
+            assert (sag <= allowed * (1.0 + 1e-9) + ROUNDING).all(), (robot.urdf, q0, q1)
+            if bend > 1e-6:
+                ratios.append((sag[1:-1] / allowed[1:-1]).max())
+    for ratios in (used, used_axis):
+        assert max(ratios) > 0.99
+        assert np.median(ratios) > 0.15
+
+
+def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
+    """Folded, stretched, folded again: the lever of the first joint peaks halfway.
+
+    Ends: the second joint at -+bend, so that the tool is as near to the first axis at both.
+    """
+    robot = planar_arm(2, (-3.1, 3.1))
+    problem, work = problem_of(robot, far_plane(), Task(0.0, 30)), work_for(2)
+    worst = 0.0
+    for bend in np.linspace(0.05, 3.1, 60):
+        for turn in (0.01, 0.1, 1.0, 3.0):
+            for q0, q1 in (
+                (np.array([0.0, -bend]), np.array([turn, bend])),
+                (np.array([turn, -bend]), np.array([0.0, bend])),
+            ):
+                place(problem, work, 0, q0)
+                place(problem, work, 1, q1)
+                bound, _ = spread(problem, work, q0, q1)
+                s, q = between(q0, q1, 200)
+                points, _ = tools(robot, q)
+                chord = (1.0 - s[:, None]) * points[0] + s[:, None] * points[-1]
+                sag = np.linalg.norm(points - chord, axis=1)
+                assert (sag <= 0.5 * bound * s * (1.0 - s) + ROUNDING).all()
+                worst = max(worst, (2.0 * sag[1:-1] / (bound * s * (1.0 - s))[1:-1]).max())
+    assert worst > 0.7
+
+
+def test_peak_is_the_largest_value():
+    """Against 2,001 points of the parabola, for 2,000 random ones; exactly at its corner cases."""
+    rng = np.random.default_rng(2)
+    s = np.linspace(0.0, 1.0, 2001)
+    for _ in range(2000):
+        a, b = rng.uniform(0.0, 1.0, 2)
+        most = 10.0 ** rng.uniform(-3.0, 2.0)
+        sampled = ((1.0 - s) * a + s * b + 0.5 * most * s * (1.0 - s)).max()
+        assert sampled <= peak(a, b, most) * (1.0 + 1e-12)
+        assert peak(a, b, most) <= sampled + 0.5 * most * 2.6e-7
+    assert peak(0.3, 0.3, 0.0) == 0.3
+    assert peak(0.0, 0.5, 1.0) == 0.5
+    assert peak(0.2, 0.2, 8.0) == pytest.approx(1.2, rel=1e-15)
+    assert peak(0.1, 0.2, np.inf) == np.inf
+    for hole in range(3):
+        values = [0.1, 0.2, 0.3]
+        values[hole] = np.nan
+        assert np.isnan(peak(*values))
+
+
+def two_cells(surface, feet):
+    """Two neighbouring cells of a patch with their centres at given parameters (2, 2)."""
+    (u0, v0), (u1, v1) = feet
+    u, v = np.array([u0, u1]), np.array([v0, v1])
+    return GridCells(
+        surface, surface.point(u, v), surface.normal(u, v), np.ones(2), (1, 2), u=u, v=v
+    )
+
+
+def surface_segment(rng, robot, kind, task, share, strays, longest, onto):
+    """A segment that starts near a random target surface, axis at a share of the cone.
+
+    Its targets run along a course from the foot of one end to the foot of the other. Returns
+    problem, work, cells, q0, q1 (slots 0 and 1 hold both ends), or None where Newton does not
+    bring the second end onto the surface.
+    """
+    surface = random_surface(rng, kind)
+    u, v = (rng.uniform(*span) * 0.9 for span in (surface.u_range, surface.v_range))
+    sign = surface.side_sign
+    normal = surface.normal(u, v)
+    target = surface.point(u, v) + sign * task.standoff * normal
+    q0 = random_configuration(robot, rng)
+    (point,), (axis,) = tools(robot, q0[None])
+    approach = tilted(axis, share * min(task.cone, 3.1), rng)
+    turn = turn_onto(-sign * normal, approach, rng)
+    stray = rng.normal(size=3)
+    stray *= rng.choice(strays) * task.tolerance / np.linalg.norm(stray)
+    surface = surface.moved(turn, point + stray - turn @ target)
+    q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, longest)
+    (away,), _ = tools(robot, q1[None])
+    feet = surface.closest(np.array([surface.point(u, v), away]))
+    cells = two_cells(surface, np.column_stack([feet.u, feet.v]))
+    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    aim(problem, work, 0, 1.0)
+    place(problem, work, 1, q1)
+    bend_between(problem, work, 0, 0.0, 1.0)
+    if onto:
+        work.wish[:] = 0.0
+        if not correct(problem, work, q1, 1e-6, np.inf, 60):
+            return None
+        place(problem, work, 1, q1)
+    aim(problem, work, 0, 0.0)
+    place(problem, work, 0, q0)
+    return problem, work, cells, q0, q1
+
+
+def beside_the_course(robot, cells, task, q0, q1, samples):
+    """Distance from the moving target, and |a - b| there and at the tool point's own foot."""
+    s, q = between(q0, q1, samples)
+    points, axes = tools(robot, q)
+    foot, normal = cells.courses.at(np.zeros(len(s), dtype=np.int64), s)
+    sign = cells.surface.side_sign
+    distance = np.linalg.norm(points - foot - sign * task.standoff * normal, axis=1)
+    chord = np.linalg.norm(axes + sign * normal, axis=1)
+    return distance, chord, deviation(cells.surface, task.standoff, points, axes).chord
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_segment_that_is_said_to_hold_holds_everywhere(kind):
+    """700 segments at either side of 35 random surfaces in any pose, 40 samples each.
+
+    Whatever `segment_holds` lets pass stays within tolerance and cone at every sample, and within
+    the share that it states. It lets a fair part pass, and some use at least half of what it
+    allows the tool point beyond the errors of the ends.
+    """
+    rng = np.random.default_rng(KINDS.index(kind))
+    passed, tried, worst = 0, 0, 0.0
+    for _ in range(35):
+        robot = random_arm(rng)
+        for _ in range(20):
+            cone_deg = float(rng.choice([2.0, 20.0, 60.0, 120.0, 179.0, 180.0]))
+            task = Task(float(rng.choice([0.0, 0.05])), cone_deg, 10.0 ** rng.uniform(-4.5, -2.0))
+            made = surface_segment(
+                rng, robot, kind, task, rng.random(), (0.0, 0.02, 0.7), -0.3, rng.random() < 0.8
+            )
+            if made is None:
+                continue
+            problem, work, cells, q0, q1 = made
+            position, cone = segment_holds(problem, work, q0, q1)
+            tried += 1
+            if not (position <= 1.0 and cone <= 1.0):
+                continue
+            passed += 1
+            distance, chord, own = beside_the_course(robot, cells, task, q0, q1, 40)
+            assert distance.max() <= position * work.room[0] + ROUNDING
+            assert distance.max() <= task.tolerance
+            if task.cone_deg < 180.0:
+                assert chord.max() <= cone * work.room[1] + ROUNDING
+                ends = max(work.error[0, 0], work.error[1, 0])
+                if ends <= problem.near:  # as everywhere in a search
+                    angle = 2.0 * np.arcsin(np.minimum(0.5 * own, 1.0))
+                    assert angle.max() <= task.cone + 1e-9
+            grown = position * work.room[0] - max(distance[0], distance[-1])
+            if grown > 1e-7:
+                worst = max(worst, (distance.max() - max(distance[0], distance[-1])) / grown)
+    assert tried > 300
+    assert passed > 150
+    assert worst > 0.5
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_cone_holds_on_long_segments(kind):
+    """450 segments with a tolerance of 0.15 m, so that they may be long, and cones beyond 90 deg.
+
+    There a normal that bulges between the ends turns away from the axis, and the bound must know.
+    """
+    rng = np.random.default_rng(10 + KINDS.index(kind))
+    passed = 0
+    for _ in range(30):
+        robot = random_arm(rng)
+        for _ in range(15):
+            task = Task(0.01, float(rng.choice([45.0, 100.0, 150.0, 178.0])), 0.15)
+            problem, work, cells, q0, q1 = surface_segment(
+                rng, robot, kind, task, rng.uniform(0.5, 1.0), (0.0, 0.3), 0.1, False
+            )
+            position, cone = segment_holds(problem, work, q0, q1)
+            if not position <= 1.0:
+                continue
+            passed += 1
+            distance, chord, _ = beside_the_course(robot, cells, task, q0, q1, 20)
+            assert distance.max() <= position * work.room[0] + ROUNDING
+            assert chord.max() <= cone * work.room[1] + ROUNDING
+    assert passed > 150
+
+
+@pytest.mark.parametrize("surface", [SPHERE, CYLINDER], ids=lambda surface: surface.kind)
+@pytest.mark.parametrize("half", [0.01, 0.1, 0.3])
+def test_a_normal_that_bulges_away_from_a_fixed_axis(surface, half):
+    """A gantry with its tool turned away: 2 cos(half / 2) at the ends, 2 in the middle.
+
+    The bound covers the middle, and the growth from the ends to it is at least 0.2 of what the
+    bound allows for (the most that a bound by the ends' norms alone can do here is 0.43, and as
+    much again is for the tool point's own foot).
+    """
+    gantry = robot_of([joint(i, "prismatic", axis=np.eye(3)[i - 1]) for i in (1, 2, 3)], (1, 0, 0))
+    at = {"sphere": lambda a: (0.5 * np.pi, a), "cylinder": lambda a: (a, 0.0)}[surface.kind]
+    cells = two_cells(surface, (at(-half), at(half)))
+    # The approach direction is -x where the surface's outward normal is +x.
+    problem = problem_of(gantry, cells, Task(0.0, 179.0, 0.1))
+    work = work_for(3)
+    q0, q1 = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (-half, half))
+    for slot, q in enumerate((q0, q1)):
+        aim(problem, work, 0, float(slot))
+        place(problem, work, slot, q)
+    bend_between(problem, work, 0, 0.0, 1.0)
+    position, cone = segment_holds(problem, work, q0, q1)
+    assert position * 0.1 >= 1.0 - np.cos(half)
+    assert position * 0.1 <= 1.2 * (1.0 - np.cos(half))
+    end = 2.0 * np.cos(half / 2.0)
+    assert cone * work.room[1] >= 2.0 - ROUNDING
+    assert (2.0 - end) / (cone * work.room[1] - end) > 0.2
+
+
+def test_nothing_that_is_not_a_number_passes():
+    """NaN or infinity in a joint, or a surface that folds, never certifies a segment."""
+    robot = planar_arm(3)
+    problem, work = problem_of(robot, far_plane(), Task(0.0, 180, 1.0)), work_for(3)
+    q = np.array([0.1, 0.2, 0.3])
+    look_at(problem, work, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    place(problem, work, 0, q)
+    place(problem, work, 1, q)
+    position, cone = segment_holds(problem, work, q, q)
+    assert position <= 1.0
+    assert cone == 0.0
+    for bad in (np.nan, np.inf):
+        wrong = np.array([0.1, bad, 0.3])
+        place(problem, work, 1, wrong)
+        position, cone = segment_holds(problem, work, q, wrong)
+        assert not (position <= 1.0 and cone <= 1.0)
+    place(problem, work, 1, q)
+    work.bend[:] = np.inf
+    position, cone = segment_holds(problem, work, q, q + 1e-9)
+    assert not (position <= 1.0 and cone <= 1.0)

@@ -1,0 +1,112 @@
+"""Pictures of paths and divisions: what is drawn is what is done."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from feasibility.cases import load_case
+from feasibility.checking import check
+from feasibility.division import divide
+from feasibility.paths import coverage_path
+from feasibility.viewer import view_division, view_path
+from feasibility.viewer.path_and_division import STROKES
+from feasibility.viewer.playback import LONGEST
+from robots import Kinematics
+
+
+@cache
+def path():
+    """Over the paper's first case, row by row."""
+    return coverage_path(check(*load_case("paper/4a").build()), "rows")
+
+
+@cache
+def division():
+    """Of the paper's cylinder that joint 1 cannot sweep."""
+    case = load_case("paper/4d").build()
+    return divide(case.robot, case.cells, case.task)
+
+
+def tracks(view, name):
+    """The animation's tracks of one property: path -> keys."""
+    (animation,) = [c for c in view.commands if c["type"] == "set_animation"]
+    found = {}
+    for part in animation["animations"]:
+        for keys in part["clip"]["tracks"]:
+            if keys["name"] == name:
+                found[part["path"]] = keys
+    return found
+
+
+def numbers(packed):
+    """A typed array of the page, as numbers."""
+    return np.frombuffer(packed.data, dtype="<f4")
+
+
+def test_the_trail_appears_piece_by_piece_behind_the_tool():
+    """Each piece is drawn once, hidden until the tool has passed its end, in the order of time."""
+    view = view_path(path(), case="paper/4a")
+    appearing = tracks(view, ".visible")
+    drawn = [c["path"] for c in view.commands if "painted trail/" in c.get("path", "")]
+    assert sorted(appearing) == sorted(drawn)
+    assert 0.9 * STROKES <= len(drawn) <= STROKES
+    when = np.array([numbers(appearing[name]["times"])[1] for name in sorted(appearing)])
+    assert (np.diff(when) > 0.0).all()
+    assert when[-1] == pytest.approx(view.motion.seconds[-1], rel=1e-6)
+    assert all(keys["values"] == [False, True, True] for keys in appearing.values())
+    assert "rows" in view.legend.text
+    assert view.legend.title == "paper/4a: coverage path"
+
+
+def test_the_arm_plays_the_walk():
+    """Every waypoint, in even time."""
+    view = view_path(path())
+    np.testing.assert_array_equal(view.motion.walk, path().walk.q)
+    assert view.motion.seconds[-1] <= LONGEST
+
+
+def test_patches_and_what_is_left_out_are_coloured():
+    """60 cells of the one patch, 30 that joint 1 cannot reach; the page needs nothing else."""
+    view = view_division(division(), "paper/4d")
+    names = [entry.label for entry in view.legend.entries]
+    assert "patch 1 (60 cells)" in names
+    assert "not covered: joint limits (30)" in names
+    assert "http" not in view.html().split("</head>")[0].replace("http-equiv", "")
+
+
+def test_moves_between_patches_are_drawn_where_the_tool_goes():
+    """Made of two walks by hand: the arm goes straight from one to the other."""
+    from dataclasses import replace
+
+    from feasibility.division import Reconfiguration
+
+    one = division()
+    patch = one.fewest.patches[0]
+    half = len(patch.walk.q) // 2
+    from feasibility.verdict import Walk
+
+    parts = [
+        replace(patch, walk=Walk(patch.walk.q[:half], patch.walk.cell[:half])),
+        replace(patch, walk=Walk(patch.walk.q[::-1], patch.walk.cell[::-1])),
+    ]
+    robot = one.robot
+    move = Reconfiguration(
+        robot.joint_names, robot.prismatic, parts[0].walk.q[-1], parts[1].walk.q[0]
+    )
+    two = replace(one, fewest=replace(one.fewest, patches=tuple(parts), moves=(move,)))
+    view = view_division(two)
+    assert any("move from patch 1 to 2" in entry.label for entry in view.legend.entries)
+    assert "move 1 to 2" in view.legend.text
+    walk = view.motion.walk
+    np.testing.assert_array_equal(walk[:half], parts[0].walk.q)
+    np.testing.assert_array_equal(walk[-len(parts[1].walk.q) :], parts[1].walk.q)
+    between = walk[half - 1 : len(walk) - len(parts[1].walk.q) + 1]
+    share = np.linspace(0.0, 1.0, len(between))[:, None]
+    np.testing.assert_allclose(between, move.start + share * (move.end - move.start), atol=1e-12)
+    kinematics = Kinematics(robot)
+    np.testing.assert_allclose(
+        view.motion.points[half - 1], kinematics.tool(parts[0].walk.q[-1])[0], atol=1e-12
+    )

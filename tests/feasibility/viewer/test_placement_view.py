@@ -1,0 +1,498 @@
+"""Pictures of poses: each that was tried is drawn where it was, in the colour of its share."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from surface_files import cube, sheet, write_stl
+from test_viewer import Tags, numbers, objects, unpacked, vertices
+
+from feasibility.cases import Case
+from feasibility.checking import check
+from feasibility.placement import (
+    Placements,
+    Pose,
+    Region,
+    Stage,
+    StationPlan,
+    Trial,
+    moved_cells,
+    place,
+)
+from feasibility.placement.stations import stations_of
+from feasibility.placement.trial import Margins
+from feasibility.reports.placement import as_text
+from feasibility.search import Search
+from feasibility.studies import Row, bits_of, open_workers, run_tasks
+from feasibility.studies.file import read_study
+from feasibility.task import Task
+from feasibility.verdict import Answer, Evidence
+from feasibility.viewer import pose_layers, view_placements, view_study
+from feasibility.viewer.outline import MOST, outline
+from feasibility.viewer.placements import NEARER, same_frame
+from feasibility.viewer.pose_layers import (
+    COLOURS,
+    HIDDEN,
+    MOST_DRAWN,
+    Class,
+    Tried,
+    class_layers,
+    class_of_row,
+    class_of_share,
+    drawn_size,
+)
+from feasibility.viewer.threejs import hex_colour, pack
+from feasibility.viewer.viewer import FRAMED
+from robots import load_robot
+from surfaces.meshes import mesh
+from surfaces.patches import plane
+from surfaces.patches.cylinder import cylinder
+from surfaces.patches.sphere import sphere
+from surfaces.patches.torus import torus
+
+PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
+CELLS = PLATE.cells(3, 2)
+TASK = Task(standoff=0.02, cone_deg=30)
+HOSTILE = '<script>alert("x")</script>'
+
+# Colours as people see them who lack one kind of cone: Machado, Oliveira and Fernandes (2009).
+BLINDNESS = {
+    "none": np.eye(3),
+    "protan": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216],
+               [-0.003882, -0.048116, 1.051998]],
+    "deutan": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413],
+               [-0.011820, 0.042940, 0.968881]],
+    "tritan": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602],
+               [0.004733, 0.691367, 0.303900]],
+}  # fmt: skip
+
+
+@cache
+def ur5():
+    return load_robot("ur5")
+
+
+def poses(count, seed=0):
+    """Poses in front of the arm."""
+    rng = np.random.default_rng(seed)
+    low, high = [0.3, -0.4, 0.1, -40, -40, -90], [0.8, 0.4, 0.5, 40, 40, 90]
+    return [Pose.of_values(row) for row in rng.uniform(low, high, (count, 6)).round(6)]
+
+
+def covers(share):
+    """One component that covers so many of the six cells."""
+    return (np.arange(6) < round(6 * share))[None]
+
+
+def fabricated(*extra):
+    """A search without an answer whose trials fall into every class but 'feasible'."""
+    at = iter(poses(40))
+    margins = Margins(0.3, 0.2, 0.1)
+    trials = [
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, 1.0, margins, covers(1)) for _ in range(2)),
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, s, covers=covers(s)) for s in (5 / 6, 0.75)),
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, s, covers=covers(s)) for s in (2 / 3, 0.6, 0.5)),
+        *(Trial(next(at), Stage.SEARCH, 1.0, 1.0, 1 / 3, covers=covers(1 / 3)) for _ in range(4)),
+        *(Trial(next(at), Stage.CHECK, 1.0, 1.0, s, answer=Answer.INFEASIBLE)
+          for s in (1 / 6, 0.0, 0.0, 0.0, 0.0)),
+        *(Trial(next(at), Stage.PROBE, 1.0, 0.5) for _ in range(6)),
+        Trial(next(at), Stage.BOUND, 0.5),
+        *(Trial(next(at), Stage.FAILED, 0.0, message=HOSTILE) for _ in range(3)),
+        *extra,
+    ]  # fmt: skip
+    region = Region.around(Pose.of_surface(PLATE), {"x": (0.2, 0.9)})
+    return Placements(
+        ur5(), CELLS, TASK, region, Answer.INFEASIBLE, Evidence.EXHAUSTED, "", (), tuple(trials),
+        None, statistics={"bound": 11},
+    )  # fmt: skip
+
+
+EXPECTED = {
+    Class.WHOLE: 2, Class.MOST: 2, Class.HALF: 3, Class.SOME: 4, Class.LITTLE: 5,
+    Class.UNSEARCHED: 7, Class.FAILED: 3,
+}  # fmt: skip
+
+
+def colour_of(view, path):
+    """The colour that an object is drawn in."""
+    (command,) = (c for c in view.commands if c["type"] == "set_object" and c["path"] == path)
+    return command["object"]["materials"][0]["color"]
+
+
+def classes_of(view):
+    """Label -> entry of every class in the legend."""
+    return {e.label: e for e in view.legend.entries if e.path and e.path.startswith("/poses/")}
+
+
+def turned(points, pose):
+    """Points of the surface's frame at a pose, by scipy's fixed-axis angles."""
+    turn = Rotation.from_euler("xyz", pose.rpy_deg, degrees=True)
+    return turn.apply(np.reshape(points, (-1, 3))) + pose.position
+
+
+# -- classes ----------------------------------------------------------------------------------
+
+
+def test_every_class_is_in_the_legend_with_its_number_and_its_colour():
+    view = view_placements(fabricated())
+    entries = classes_of(view)
+    assert list(entries) == [f"{kind} ({number})" for kind, number in EXPECTED.items()]
+    hidden = {c["path"] for c in view.commands if c.get("property") == "visible" and not c["value"]}
+    for kind, entry in zip(EXPECTED, entries.values(), strict=True):
+        assert entry.colour == COLOURS[kind]
+        assert colour_of(view, entry.path) == hex_colour(COLOURS[kind])
+        assert entry.shown is (kind not in HIDDEN)
+        assert (entry.path in hidden) is (kind in HIDDEN)
+    assert "26 placements tried, 11 more discarded as out of reach" in view.legend.text
+    assert view.motion is None
+
+
+def test_every_outline_is_where_the_surface_was_tried():
+    """All ends of all lines of a class, against scipy's rotations; each drawn as small as told."""
+    asked = fabricated()
+    view = view_placements(asked)
+    assert "of their size" not in view.legend.text
+    tried = [Tried(t.pose, pose_layers.class_of_trial(t), None) for t in asked.trials]
+    assert drawn_size(tried) == 1.0
+    compare(view, tried, 1.0)
+    view = view_placements(replace(asked, trials=asked.trials * 8))
+    assert "drawn at 35 % of their size" in view.legend.text  # sqrt(16 / (8 * 16)) of it
+    compare(view, tried * 8, np.sqrt(1 / 8))
+
+
+def compare(view, tried, size):
+    """Each class of a view against the outline, turned and moved by scipy."""
+    lines = outline(CELLS)
+    middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2
+    small = middle + size * (lines - middle)
+    assert len(classes_of(view)) == len(EXPECTED)
+    for kind, entry in zip(EXPECTED, classes_of(view).values(), strict=True):
+        want = np.concatenate([turned(small, one.pose) for one in tried if one.kind is kind])
+        got = vertices(objects(view.commands)[entry.path])
+        np.testing.assert_allclose(got, want, atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("share", "kind"),
+    [(1.0, Class.WHOLE), (1 - 1e-12, Class.WHOLE), (0.999, Class.MOST), (0.75, Class.MOST),
+     (0.7499, Class.HALF), (0.5, Class.HALF), (0.4999, Class.SOME), (0.25, Class.SOME),
+     (0.2499, Class.LITTLE), (0.0, Class.LITTLE)],
+)  # fmt: skip
+def test_the_class_of_a_share(share, kind):
+    assert class_of_share(share) is kind
+
+
+def test_whole_shares_are_feasible_only_where_that_was_said():
+    """A row that failed has no share; one that ran out of time keeps the share it found."""
+    row = Row({}, "done", {"verdict": "feasible", "share": 1.0}, 0.1)
+    assert class_of_row(row) is Class.FEASIBLE
+    late = {"verdict": "undecided", "share": 1.0}
+    assert class_of_row(replace(row, result=late)) is Class.WHOLE
+    assert class_of_row(replace(row, result={**late, "share": 0.6})) is Class.HALF
+    died = {"verdict": "undecided", "evidence": "budget", "message": "its worker died"}
+    assert class_of_row(replace(row, status="failed", result=died)) is Class.FAILED
+
+
+@pytest.mark.parametrize("blindness", BLINDNESS)
+def test_colours_stay_apart_for_colour_blind_eyes(blindness):
+    """Every two classes by at least 18 in CIELAB, where 2 can just be told apart."""
+    seen = []
+    for colour in COLOURS.values():
+        value = np.array(colour)
+        linear = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
+        linear = np.clip(np.array(BLINDNESS[blindness]) @ linear, 0.0, 1.0)
+        xyz = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750],
+                        [0.0193339, 0.1191920, 0.9503041]]) @ linear  # fmt: skip
+        xyz /= [0.95047, 1.0, 1.08883]
+        f = np.where(xyz > 216 / 24389, np.cbrt(xyz), xyz * 841 / 108 + 4 / 29)
+        seen.append([116 * f[1] - 16, 500 * (f[0] - f[1]), 200 * (f[1] - f[2])])
+    for (a, one), (b, other) in itertools.combinations(zip(COLOURS, seen, strict=True), 2):
+        assert np.linalg.norm(np.subtract(one, other)) >= 18, (a, b)
+
+
+def test_of_many_poses_some_are_drawn_and_the_legend_says_so():
+    tried = [Tried(pose, Class.HALF, None) for pose in poses(450)]
+    lines = outline(CELLS)
+    (layer,) = class_layers(lines, tried)
+    assert layer.entry.label == f"50 to 75 % ({MOST_DRAWN} of 450 drawn)"
+    drawn = vertices(objects(layer.commands)[layer.entry.path]).reshape(MOST_DRAWN, -1, 3)
+    starts = np.array([turned(lines[0, 0], one.pose)[0] for one in tried])
+    which = [int(np.linalg.norm(starts - part[0], axis=1).argmin()) for part in drawn]
+    assert which[0] == 0
+    assert which[-1] == 449
+    assert set(np.diff(which)) == {2, 3}  # spread evenly: 449 / 199
+    assert drawn_size(tried) == pytest.approx(np.sqrt(16 / MOST_DRAWN))
+
+
+# -- outlines ---------------------------------------------------------------------------------
+
+
+def length(lines):
+    """Of all segments together, m."""
+    return float(np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum())
+
+
+@pytest.mark.parametrize(
+    ("cells", "expected"),
+    [
+        (CELLS, 2 * (0.3 + 0.2)),
+        (cylinder(0.3, angle_deg=(0, 360), height=(0.0, 0.5)).cells(24, 3), 4 * np.pi * 0.3),
+        (cylinder(0.3, angle_deg=(0, 90), height=(0.0, 0.5)).cells(12, 3), np.pi * 0.3 + 1.0),
+        (sphere(0.4, polar_deg=(0, 90), azimuth_deg=(0, 360)).cells(4, 24), 2 * np.pi * 0.4),
+        # Closed: three sections, each a full circle.
+        (sphere(0.4, polar_deg=(0, 180), azimuth_deg=(0, 360)).cells(12, 24), 6 * np.pi * 0.4),
+    ],
+)
+def test_an_outline_is_the_rim_or_three_sections(cells, expected):
+    """Its length against the formula; every end lies on the surface, the stroke's tip beside it."""
+    lines = outline(cells)
+    surface = cells.surface
+    world = lines @ surface.rotation.T + surface.position
+    heights = surface.closest(world.reshape(-1, 3)).height.reshape(-1, 2)
+    stroke = np.abs(heights[:, 1]) > 0.02
+    assert stroke.sum() <= 1
+    assert (np.sign(heights[stroke, 1]) == surface.side_sign).all()
+    assert np.abs(heights[~stroke]).max() < 0.02 * 0.4
+    assert length(lines[~stroke]) == pytest.approx(expected, rel=0.02)
+    assert len(lines) <= MOST + 1
+
+
+def test_an_outline_does_not_depend_on_where_the_surface_stands():
+    ring = torus(0.4, 0.1, (0, 270), (0, 180)).cells(9, 4)
+    for cells in (CELLS, ring):
+        for pose in poses(3):
+            there = outline(moved_cells(cells, pose))
+            np.testing.assert_allclose(there, outline(cells), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("triangles", "expected"), [(sheet(0.3, 0.2, 40), 2 * (0.3 + 0.2)), (cube(0.2), 3 * 4 * 0.2)]
+)
+def test_the_outline_of_a_mesh(tmp_path, triangles, expected):
+    """Of a sheet with many triangles its edges, thinned; of a whole cube three square sections."""
+    cells = mesh(write_stl(tmp_path / "part.stl", triangles)).cells(count=24)
+    lines = outline(cells)
+    flat = np.ptp(triangles.reshape(-1, 3), axis=0).min() == 0.0
+    assert length(lines[:-1] if flat else lines) == pytest.approx(expected, rel=0.05)
+    assert 4 < len(lines) <= MOST + 1
+
+
+# -- the best one -----------------------------------------------------------------------------
+
+
+def test_the_best_placement_plays_the_motion_that_check_finds():
+    region = Region.around(Pose.of_surface(PLATE), {"x": (0.3, 0.7), "yaw_deg": (0, 60)})
+    found = place(ur5(), CELLS, TASK, region, count=8, around=1, keep=2)
+    assert found.answer is Answer.FEASIBLE
+    view = view_placements(found, case="plate")
+    there = moved_cells(CELLS, found.best.pose)
+    verdict = check(ur5(), there, TASK, Search())
+    np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
+    heights = there.surface.closest(view.motion.points).height
+    assert np.abs(heights - TASK.standoff).max() < 2e-3
+    assert view.legend.title == "plate: placements, feasible (witness)"
+    entries = classes_of(view)
+    assert f"feasible ({len(found.found)})" in entries
+    counted = sum(int(re.search(r"\((\d+)\)", label)[1]) for label in entries)
+    assert counted == len(found.trials)
+    # Thick: every point of the tubes lies near the outline, drawn where one was found.
+    drawn = vertices(objects(view.commands)["/poses/feasible"]).reshape(len(found.found), -1, 3)
+    lines = outline(CELLS)
+    middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2
+    tried = [Tried(t.pose, pose_layers.class_of_trial(t), None) for t in found.trials]
+    ends = middle + drawn_size(tried) * (lines - middle)
+    for part, trial in zip(drawn, found.found, strict=True):
+        want = turned(ends, trial.pose)
+        near = np.linalg.norm(part[:, None] - want[None], axis=2).min(axis=1)
+        assert near.max() < 3e-3
+
+
+def test_what_the_best_one_covers_is_filled_where_none_is_feasible():
+    """The first trial covers all but one of the cells."""
+    whole = fabricated()
+    asked = replace(whole, trials=whole.trials[2:])
+    view = view_placements(asked)
+    labels = [entry.label for entry in view.legend.entries]
+    assert "covered there in one motion (5 cells)" in labels
+    assert "not covered there (1 cell)" in labels
+    drawn = vertices(objects(view.commands)["/best/not covered there"])
+    there = moved_cells(CELLS, asked.trials[0].pose)
+    np.testing.assert_allclose(
+        (drawn.min(axis=0) + drawn.max(axis=0)) / 2, there.centres[5], atol=1e-4
+    )
+    assert "the best covers 83.3 % of the area" in view.legend.text
+
+
+def test_a_region_out_of_reach_claims_no_share():
+    """Ruled out by proof: no outline but grey ones, and no word of 0 %."""
+    region = Region.around(Pose.of_surface(PLATE), {"x": (3.0, 3.4)})
+    view = view_placements(place(ur5(), CELLS, TASK, region))
+    assert [e.colour for e in classes_of(view).values()] == [COLOURS[Class.UNSEARCHED]]
+    assert "out of reach" in view.legend.text
+    assert "%" not in view.legend.text
+    assert "the best of them" not in [entry.label for entry in view.legend.entries]
+
+
+def test_where_the_time_ran_out_at_once_the_surface_alone_is_drawn():
+    """Nothing was tried, so nothing is said of reach, and no share."""
+    region = Region.around(Pose.of_surface(PLATE), {"x": (0.4, 0.6)})
+    late = place(ur5(), CELLS, TASK, region, time_limit=1e-9)
+    assert late.trials == ()
+    view = view_placements(late)
+    assert "no placement was tried" in view.legend.text
+    assert "reach" not in view.legend.text
+    assert classes_of(view) == {}
+    drawn = vertices(objects(view.commands)["/surface/patch"])
+    np.testing.assert_allclose(drawn.min(axis=0), [0.35, -0.1, 0.2], atol=2e-5)
+    np.testing.assert_allclose(drawn.max(axis=0), [0.65, 0.1, 0.2], atol=2e-5)
+    assert "%" not in as_text(late)
+    assert "no placement" in as_text(late)
+
+
+def test_stations_are_drawn_where_they_stand():
+    where = poses(2)
+    masks = np.array([[1, 1, 1, 1, 0, 0], [0, 0, 0, 1, 1, 1]], dtype=bool)
+    trials = tuple(
+        Trial(pose, Stage.SEARCH, 1.0, 1.0, 0.5, covers=mask[None])
+        for pose, mask in zip(where, masks, strict=True)
+    )
+    stations = stations_of([{"cells": 6, "components": [bits_of(mask)]} for mask in masks])
+    plan = StationPlan(stations, tuple(trials[s.row] for s in stations.stations), ("", ""))
+    asked = fabricated(*trials)
+    view = view_placements(asked, plan=plan)
+    assert "2 stations cover 6 of 6 cells" in view.legend.text
+    drawn = objects(view.commands)
+    for k, (station, trial) in enumerate(zip(stations.stations, plan.trials, strict=True)):
+        centres = moved_cells(CELLS, trial.pose).centres[station.cells]
+        points = vertices(drawn[f"/stations/station {k + 1}/cells"])
+        away = np.linalg.norm(points[:, None] - centres[None], axis=2).min(axis=1)
+        assert away.max() < 0.5 * np.hypot(0.1, 0.1) + 1e-6
+        rim = vertices(drawn[f"/stations/station {k + 1}/outline"])
+        np.testing.assert_allclose(rim, turned(outline(CELLS), trial.pose), atol=2e-5)
+    shown = {entry.label: entry.shown for entry in view.legend.entries}
+    assert shown["station 1 (4 cells)"]
+    assert shown["station 2 (2 cells)"]
+    assert not shown["the best of them"]
+
+
+def test_everything_shown_is_in_the_picture():
+    """Seen from the camera, every point is within the angle that the lens takes in."""
+    view = view_placements(replace(fabricated(), trials=fabricated().trials * 8))
+    eye, target = np.array(view.camera.eye), np.array(view.camera.target)
+    axis = (target - eye) / np.linalg.norm(target - eye)
+    widest = np.arcsin(np.sin(FRAMED) / NEARER)
+    assert widest < np.arctan(np.tan(np.radians(37.5)) / view.camera.zoom) + 0.02
+    drawn = objects(view.commands)
+    for entry in classes_of(view).values():
+        if entry.shown:
+            toward = vertices(drawn[entry.path]) - eye
+            angle = np.arccos(toward @ axis / np.linalg.norm(toward, axis=1))
+            assert angle.max() <= widest + 1e-6
+
+
+# -- studies ----------------------------------------------------------------------------------
+
+STUDY = """
+[base.robot]
+name = "ur5"
+[base.surface]
+kind = "plane"
+u = [-0.15, 0.15]
+v = [-0.1, 0.1]
+cells = [3, 2]
+side = "outside"
+[base.task]
+standoff = 0.02
+cone_deg = 30
+[vary]
+robots = ["ur5", "panda"]
+"surface.position" = { x = [0.45, 0.6, 2.0], y = 0, z = 0.2 }
+"surface.rpy_deg".yaw = [0, 45]
+"""
+
+
+@cache
+def decided():
+    study = read_study(STUDY)
+    with open_workers(0) as workers:
+        return study, run_tasks(study.tasks, workers)
+
+
+def test_a_study_is_drawn_for_the_arm_of_its_best_row():
+    """Against a count by hand of the rows of that arm."""
+    study, rows = decided()
+    view = view_study(study.tasks, rows, "s")
+    mine = [row for row in rows if row.parameters["robot"] == view.robot.name]
+    assert len(mine) == 6
+    assert "6 of 12 cases" in view.legend.text
+    feasible = [row for row in mine if row.result["verdict"] == "feasible"]
+    entries = classes_of(view)
+    assert f"feasible ({len(feasible)})" in entries
+    assert sum(int(re.search(r"\((\d+)\)", label)[1]) for label in entries) == 6
+    low = [r for r in mine if r.result["verdict"] != "feasible" and r.result["share"] < 0.25]
+    assert f"less than 25 % ({len(low)})" in entries
+    assert len(low) >= 2
+    best = max(feasible, key=lambda row: row.result["margins"]["limit_deg"])
+    where = {k: best.parameters[f"surface.{k}"] for k in ("position.x", "rpy_deg.yaw")}
+    case = Case.from_toml(
+        re.sub(r"\[base\.(\w+)\]", r"[\1]", STUDY.split("[vary]")[0]),
+        overrides=[f"robot.name={view.robot.name}", f"surface.rpy_deg=[0,0,{where['rpy_deg.yaw']}]",
+                   f"surface.position=[{where['position.x']}, 0, 0.2]"],
+    )  # fmt: skip
+    verdict = check(*case.build())
+    np.testing.assert_array_equal(view.motion.walk, verdict.witness.q)
+
+
+def test_a_study_needs_a_row_for_each_task():
+    study, rows = decided()
+    with pytest.raises(ValueError, match="got 11 for 12 tasks"):
+        view_study(study.tasks, rows[1:])
+    with pytest.raises(ValueError, match="got 0"):
+        view_study([], [])
+
+
+def test_only_the_pose_may_differ_within_a_picture():
+    study, _ = decided()
+    arms = [task.parameters["robot"] for task in study.tasks]
+    for row in (0, 11):
+        assert same_frame(study.tasks, row) == [k for k in range(12) if arms[k] == arms[row]]
+
+
+def test_a_study_that_failed_altogether_is_still_a_picture():
+    study, rows = decided()
+    died = {"verdict": "undecided", "evidence": "budget", "message": HOSTILE}
+    view = view_study(study.tasks, [replace(row, status="failed", result=died) for row in rows])
+    assert list(classes_of(view)) == ["could not be tried (6)"]
+    assert view.motion is None
+
+
+# -- the page ---------------------------------------------------------------------------------
+
+
+def test_the_page_holds_the_view_and_nothing_of_a_hostile_name(tmp_path):
+    """What the file unpacks to are the view's own commands; tags are those of any other view."""
+    asked = fabricated()
+    plain = Tags(view_placements(asked, case="plate").html())
+    view = view_placements(replace(asked, robot=replace(asked.robot, name=HOSTILE)), case=HOSTILE)
+    file = view.save_html(tmp_path / "view.html")
+    text = file.read_text(encoding="utf-8")
+    assert Tags(text).tags == plain.tags
+    assert HOSTILE not in text
+    assert "&lt;script&gt;alert" in text
+    framed, at = unpacked(text, "commands"), 0
+    for message in pack(view.commands):
+        size = int.from_bytes(framed[at : at + 4], "little")
+        assert framed[at + 4 : at + 4 + size] == message
+        at += 4 + size
+    assert at == len(framed)
+    outside = text.replace(text.split('id="program">')[1].split("<")[0], "")
+    assert not re.search(r"https?://", outside)
+    assert len(
+        numbers(objects(view.commands)["/poses/50 to 75 _"]["attributes"]["position"]["array"])
+    )

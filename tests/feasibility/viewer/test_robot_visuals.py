@@ -1,0 +1,192 @@
+"""The drawn arm: every link, in the right place, whatever its files are like."""
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import trimesh
+
+from feasibility.viewer.robot import TRIANGLES, draw, joint_paths, joint_placements
+from feasibility.viewer.robot_meshes import Mesh, MeshError, read_mesh, shaded, thinned, tubes
+from feasibility.viewer.threejs import safe_name
+from robots import Kinematics, load_robot
+from robots.urdf import check_urdf
+
+TWO_LINKS = (
+    '<robot name="two"><link name="base">{base}</link><link name="arm">{arm}</link>'
+    '<link name="tip"/>'
+    '<joint name="turn" type="revolute"><parent link="base"/><child link="arm"/>'
+    '<origin xyz="0 0 1"/><axis xyz="0 0 1"/>'
+    '<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>'
+    '<joint name="end" type="fixed"><parent link="arm"/><child link="tip"/>'
+    '<origin xyz="0.5 0 0"/></joint></robot>'
+)
+SHAPE = '<visual><origin xyz="0 0 0.1"/><geometry>{}</geometry></visual>'
+
+
+def drawn(robot):
+    """Path -> (vertices, number of faces) of every mesh of the drawing."""
+    found = {}
+    for command in draw(robot).commands:
+        data = command["object"]["geometries"][0]["data"]
+        where = np.frombuffer(data["attributes"]["position"]["array"].data, "<f4")
+        kind = "<u2" if data["index"]["type"] == "Uint16Array" else "<u4"
+        faces = np.frombuffer(data["index"]["array"].data, kind).reshape(-1, 3)
+        assert faces.max() < len(where) // 3
+        normals = np.frombuffer(data["attributes"]["normal"]["array"].data, "i1").reshape(-1, 3)
+        assert np.allclose(np.linalg.norm(normals / 127.0, axis=1), 1.0, atol=0.02)
+        found[command["path"]] = (where.reshape(-1, 3), len(faces))
+    return found
+
+
+def two_links(folder, base="", arm=""):
+    file = folder / "two.urdf"
+    file.write_text(TWO_LINKS.format(base=base, arm=arm))
+    return load_robot(str(file))
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5", "panda", "xarm7", "baxter_left"])
+def test_every_link_with_visuals_is_drawn_whole_and_within_its_own_shape(name):
+    robot = load_robot(name)
+    checked = check_urdf(robot.urdf, package_dirs=robot.package_dirs)
+    assert not [warning for warning in checked.warnings if warning.startswith("not drawn")]
+    parts = drawn(robot)
+    paths = joint_paths(robot)
+    for link in {visual.link for visual in checked.visuals}:
+        frame = robot.model.frames[robot.model.getFrameId(link, pin.FrameType.BODY)]
+        start = f"{paths[frame.parentJoint]}/link {safe_name(link)}/part "
+        points = np.concatenate([p for path, (p, _) in parts.items() if path.startswith(start)])
+        local = (points - frame.placement.translation) @ frame.placement.rotation
+        bounds = np.array([extent(visual) for visual in checked.visuals if visual.link == link])
+        low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+        assert np.allclose([local.min(axis=0), local.max(axis=0)], [low, high], atol=0.02), link
+    assert sum(count for _, count in parts.values()) <= TRIANGLES
+
+
+def extent(visual):
+    """Lowest and highest corner of a visual in its link's frame, read another way."""
+    shape = visual.geometry
+    if hasattr(shape, "path"):
+        body = trimesh.load(shape.path, force="mesh", process=False)
+        body.apply_scale(shape.scale)
+    elif hasattr(shape, "size"):
+        body = trimesh.creation.box(shape.size)
+    elif hasattr(shape, "length"):
+        body = trimesh.creation.cylinder(radius=shape.radius, height=shape.length, sections=96)
+    else:
+        body = trimesh.creation.icosphere(subdivisions=4, radius=shape.radius)
+    return body.apply_transform(visual.origin).bounds
+
+
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [
+        ('<box size="0.2 0.4 0.6"/>', (0.2, 0.4, 0.6)),
+        ('<cylinder radius="0.1" length="0.6"/>', (0.2, 0.2, 0.6)),
+        ('<capsule radius="0.1" length="0.4"/>', (0.2, 0.2, 0.6)),
+        ('<sphere radius="0.1"/>', (0.2, 0.2, 0.2)),
+    ],
+)
+def test_simple_shapes_have_their_size_and_their_middle(tmp_path, shape, size):
+    robot = two_links(tmp_path, arm=SHAPE.format(shape))
+    ((path, (points, _)),) = drawn(robot).items()
+    assert path == "/robot/joint turn/link arm/part 0"
+    assert np.allclose(np.ptp(points, axis=0), size, atol=2e-3)
+    assert np.allclose(points.min(axis=0) + points.max(axis=0), [0, 0, 0.2], atol=2e-3)
+
+
+def test_a_mesh_is_scaled_and_placed(tmp_path):
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
+    mesh = '<mesh filename="box.stl" scale="0.1 0.1 -0.1"/>'
+    ((points, faces),) = drawn(two_links(tmp_path, base=SHAPE.format(mesh))).values()
+    assert faces == 12
+    assert np.allclose(points.min(axis=0), [-0.05, -0.1, -0.05], atol=1e-4)
+    assert np.allclose(points.max(axis=0), [0.05, 0.1, 0.25], atol=1e-4)
+
+
+@pytest.mark.parametrize("content", [None, b"solid nothing", b"\0" * 84, b"\xff" * 200])
+def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, content):
+    if content is not None:
+        (tmp_path / "lost.stl").write_bytes(content)
+    robot = two_links(
+        tmp_path,
+        base=SHAPE.format('<box size="0.1 0.1 0.1"/>'),
+        arm=SHAPE.format('<mesh filename="lost.stl"/>'),
+    )
+    notes = draw(robot).notes
+    assert len(notes) == 1
+    assert "lost.stl" in notes[0]
+    parts = drawn(robot)
+    assert set(parts) == {"/robot/link base/part 0", "/robot/joint turn/link capsule/part 1"}
+    points, _ = parts["/robot/joint turn/link capsule/part 1"]
+    assert points[:, 0].min() < 0 < 0.49 < points[:, 0].max(), "from the joint to the tool"
+
+
+def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
+    bare = two_links(tmp_path)
+    assert len(drawn(bare)) == 2
+    (tmp_path / "two.urdf").unlink()
+    assert len(drawn(bare)) == 2
+    (note,) = draw(bare).notes
+    assert "two.urdf" in note
+
+
+def test_textures_and_materials_beside_a_mesh_are_not_opened(tmp_path, monkeypatch):
+    (tmp_path / "evil.obj").write_text(
+        "mtllib ../../etc/passwd\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n"
+    )
+    opened = []
+    real = open
+    monkeypatch.setattr("builtins.open", lambda *a, **k: opened.append(a[0]) or real(*a, **k))
+    (mesh,) = read_mesh(tmp_path / "evil.obj", np.ones(3), (1.0, 0.0, 0.0))
+    assert len(mesh.faces) == 1
+    assert not [name for name in opened if "passwd" in str(name)]
+    with pytest.raises(MeshError, match=r"none\.stl"):
+        read_mesh(tmp_path / "none.stl", np.ones(3), None)
+
+
+def test_joint_placements_compose_to_pinocchios_tool():
+    robot = load_robot("kinova")  # three continuous joints
+    rng = np.random.default_rng(1)
+    walk = rng.uniform(-3, 3, (20, robot.n))
+    tip = robot.model.frames[robot.model.getFrameId(robot.tool_frame)].placement.homogeneous
+    for q, steps in zip(walk, joint_placements(robot, walk), strict=True):
+        place = np.linalg.multi_dot([*steps, tip])
+        assert np.allclose(place[:3, 3], Kinematics(robot).tool(q)[0], atol=1e-12)
+
+
+def test_thinning_keeps_the_shape_and_the_budget():
+    ball = trimesh.creation.icosphere(subdivisions=6, radius=0.1)
+    mesh = Mesh(np.asarray(ball.vertices), np.asarray(ball.faces), (0.5, 0.5, 0.5))
+    (thin,) = thinned([mesh], 5_000)
+    assert 500 < len(thin.faces) <= 5_000
+    assert np.abs(np.linalg.norm(thin.vertices, axis=1) - 0.1).max() < 3e-3
+    volume = trimesh.Trimesh(thin.vertices, thin.faces, process=False).volume
+    assert volume == pytest.approx(ball.volume, rel=0.03)
+    (same,) = thinned([mesh], 10**6)
+    assert len(same.faces) == len(ball.faces)
+
+
+def test_edges_stay_sharp_and_round_parts_look_round():
+    box = trimesh.creation.box((1, 1, 1))
+    split, normals = shaded(Mesh(box.vertices, box.faces, (1, 1, 1)))
+    assert len(split.vertices) == 24
+    assert np.allclose(np.sort(np.abs(normals), axis=1), [0, 0, 1])
+    assert np.allclose(split.vertices[split.faces], box.vertices[box.faces])
+    ball = trimesh.creation.icosphere(subdivisions=3)
+    split, normals = shaded(Mesh(ball.vertices, ball.faces, (1, 1, 1)))
+    assert len(split.vertices) == len(ball.vertices)
+    assert (np.einsum("ij,ij->i", normals, split.vertices) > 0.999).all()
+
+
+def test_tubes_run_around_their_lines_at_their_radius():
+    t = np.linspace(0, 1, 40)[:, None]
+    arc = np.hstack([np.cos(t), np.sin(t), t])
+    straight = np.array([[0, 0, 0], [0, 0, 1.0], [0, 0, 1.0]])
+    point = np.zeros((3, 3))
+    vertices, faces = tubes([arc, straight, point], 0.01)
+    assert len(vertices) == 5 * (40 + 2)
+    assert len(faces) == 10 * (39 + 1)
+    assert np.allclose(np.linalg.norm(vertices[-10:, :2], axis=1), 0.01)
+    centre = np.repeat(arc, 5, axis=0)
+    assert np.allclose(np.linalg.norm(vertices[:200] - centre, axis=1), 0.01)
+    assert tubes([], 0.01)[1].shape == (0, 3)

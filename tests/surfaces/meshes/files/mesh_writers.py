@@ -1,0 +1,183 @@
+"""Small mesh files of every format, written from plain arrays; and what a clean mesh must be."""
+
+import json
+import struct
+from collections import defaultdict
+
+import numpy as np
+
+from surfaces.meshes import TriangleMesh
+
+
+def cube(size=0.2):
+    """8 vertices and 12 faces that look outwards."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * size
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    return corners, np.array([[q[0], *q[k : k + 2]] for q in quads for k in (1, 2)])
+
+
+def plate(nu, nv, width=0.3, height=0.2):
+    """A flat grid of nu x nv squares, each cut in two, that looks up."""
+    u, v = np.meshgrid(np.linspace(0, width, nu + 1), np.linspace(0, height, nv + 1), indexing="ij")
+    i, j = (grid.ravel() for grid in np.meshgrid(np.arange(nu), np.arange(nv), indexing="ij"))
+    a = i * (nv + 1) + j
+    b, c, d = a + nv + 1, a + nv + 2, a + 1
+    faces = np.stack([np.stack([a, b, c], 1), np.stack([a, c, d], 1)], 1).reshape(-1, 3)
+    return np.stack([u.ravel(), v.ravel(), 0 * u.ravel()], 1), faces
+
+
+def strip(twisted, count=24):
+    """A band around a circle, with half a twist (Moebius) or none."""
+    angle = 2 * np.pi * np.arange(count) / count
+    half = angle / 2 if twisted else 0 * angle
+    across = np.stack(
+        [np.cos(half) * np.cos(angle), np.cos(half) * np.sin(angle), np.sin(half)], axis=1
+    )
+    middle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    vertices = np.concatenate([middle - 0.2 * across, middle + 0.2 * across]) * 0.3
+    k = np.arange(count)
+    a, b = k, (k + 1) % count
+    c, d = a + count, b + count
+    if twisted:
+        b[-1], d[-1] = count, 0
+    return vertices, np.concatenate([np.stack([a, c, d], 1), np.stack([a, d, b], 1)])
+
+
+def stl(vertices, faces, count=None, normals=None, head=b"made by a test"):
+    rows = np.zeros(len(faces), [("n", "<f4", 3), ("v", "<f4", (3, 3)), ("a", "<u2")])
+    rows["v"] = np.asarray(vertices)[np.asarray(faces)] if len(faces) else 0
+    if normals is not None:
+        rows["n"] = normals
+    total = len(faces) if count is None else count
+    return head.ljust(80, b" ") + struct.pack("<I", total) + rows.tobytes()
+
+
+def text_stl(vertices, faces, name="part"):
+    lines = [f"solid {name}"]
+    for face in np.asarray(vertices)[np.asarray(faces)]:
+        lines += ["facet normal 0 0 0", "outer loop"]
+        lines += [f"vertex {x!r} {y!r} {z!r}" for x, y, z in face.tolist()]
+        lines += ["endloop", "endfacet"]
+    return "\n".join([*lines, f"endsolid {name}", ""]).encode()
+
+
+def off(vertices, polygons, head="OFF", counts=None):
+    first = counts or f"{len(vertices)} {len(polygons)} 0"
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
+    rows += [" ".join(map(str, [len(p), *p])) for p in polygons]
+    return "\n".join([head, "# a comment", first, *rows, ""]).encode()
+
+
+def obj(vertices, polygons, more=""):
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(vertices, float).tolist()]
+    rows += ["f " + " ".join(str(k + 1) for k in p) for p in polygons]
+    return (more + "\n".join([*rows, ""])).encode()
+
+
+def ply(vertices, polygons, order="<", header=None):
+    """Text where `order` is empty; with columns beside the ones that count."""
+    kind = {"": "ascii", "<": "binary_little_endian", ">": "binary_big_endian"}[order]
+    head = header or (
+        f"ply\nformat {kind} 1.0\ncomment made by a test\n"
+        f"element vertex {len(vertices)}\nproperty uchar red\nproperty double x\n"
+        f"property double y\nproperty double z\nelement face {len(polygons)}\n"
+        "property uchar flag\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    body = b""
+    for x, y, z in np.asarray(vertices, float).tolist():
+        body += (
+            f"9 {x!r} {y!r} {z!r}\n".encode()
+            if not order
+            else struct.pack(order + "B3d", 9, x, y, z)
+        )
+    for p in polygons:
+        if order:
+            body += struct.pack(f"{order}BB{len(p)}i", 7, len(p), *map(int, p))
+        else:
+            body += (" ".join(map(str, [7, len(p), *p])) + "\n").encode()
+    return head.encode() + body
+
+
+def scene(vertices, faces, **more):
+    """The glTF scene of one mesh in one node, and its bytes."""
+    points = np.asarray(vertices, "<f4").tobytes()
+    data = points + np.asarray(faces, "<u4").tobytes()
+    content = {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(vertices), "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5125, "count": np.size(faces), "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": len(points)},
+            {"buffer": 0, "byteOffset": len(points), "byteLength": len(data) - len(points)},
+        ],
+        "buffers": [{"byteLength": len(data)}],
+    }
+    return content | more, data
+
+
+def glb(content, data, version=2, extra=0):
+    text = content if isinstance(content, bytes) else json.dumps(content).encode()
+    text += b" " * (-len(text) % 4)
+    data += bytes(-len(data) % 4)
+    length = 28 + len(text) + len(data) + extra
+    head = struct.pack("<4sIIII", b"glTF", version, length, len(text), 0x4E4F534A)
+    return head + text + struct.pack("<II", len(data), 0x004E4942) + data
+
+
+def assert_clean(mesh):
+    """Everything that a `TriangleMesh` promises, by way of dictionaries."""
+    assert isinstance(mesh, TriangleMesh)
+    v, f = mesh.vertices, mesh.faces
+    assert len(f)
+    assert v.dtype == float
+    assert f.dtype == np.int64
+    assert np.isfinite(v).all()
+    assert sorted(set(f.ravel().tolist())) == list(range(len(v)))
+    directed, corners = defaultdict(list), defaultdict(list)
+    for k, (a, b, c) in enumerate(f.tolist()):
+        assert len({a, b, c}) == 3
+        for tail, head in ((a, b), (b, c), (c, a)):
+            directed[tail, head].append(k)
+        corners[a].append((b, c))
+        corners[b].append((c, a))
+        corners[c].append((a, b))
+    assert all(len(owners) == 1 for owners in directed.values())
+    shared = {(min(e), max(e)) for e in directed if e[::-1] in directed}
+    edges = mesh.edges
+    assert {(min(e), max(e)) for e in edges.vertices.tolist()} == shared
+    assert len(edges.vertices) == len(shared)
+    for (a, b), (x, y), length in zip(
+        edges.vertices.tolist(), edges.faces.tolist(), edges.lengths.tolist(), strict=True
+    ):
+        assert directed[a, b] == [x]
+        assert directed[b, a] == [y]
+        assert x < y
+        assert abs(length - np.linalg.norm(v[a] - v[b])) <= 1e-15 + 1e-12 * length
+    lonely = {e: owners[0] for e, owners in directed.items() if e[::-1] not in directed}
+    found = dict(
+        zip(map(tuple, edges.border_vertices.tolist()), edges.border_faces.tolist(), strict=True)
+    )
+    assert found == lonely
+    for spokes in corners.values():  # one fan: from spoke to spoke, all are met
+        following = dict(spokes)
+        starts = set(following) - set(following.values()) or {next(iter(following))}
+        assert len(starts) == 1
+        spoke, met = starts.pop(), 0
+        while spoke in following and met < len(spokes):
+            spoke, met = following[spoke], met + 1
+        assert met == len(spokes)
+    a, b, c = (v[f[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    size = np.linalg.norm(cross, axis=1)
+    assert (size > 0).all()
+    assert np.abs(mesh.face_normals - cross / size[:, None]).max() < 1e-12
+    assert np.abs(mesh.face_areas - size / 2).max() <= 1e-12 * size.max()
+    assert np.abs(np.linalg.norm(mesh.vertex_normals, axis=1) - 1).max() < 1e-12
+    for array in (v, f, mesh.face_normals, mesh.vertex_normals, mesh.face_areas, edges.faces):
+        assert not array.flags.writeable
