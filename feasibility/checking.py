@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from feasibility.search import Progress, Search
-from feasibility.target_curves import closed_courses
+from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence, Verdict, Walk, deferred
 from robots import Robot
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import networkx as nx
 
     from feasibility.certification import Replay
-    from feasibility.roadmap import Explorer
+    from feasibility.roadmap import Exploration
 
 
 NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
@@ -63,9 +63,9 @@ def check(
     _refuse_other_types(robot, cells, task, search)
     if search.method == "greedy":
         from feasibility.paper import greedy_check
-        from surfaces.patches import charted_grid
+        from surfaces.patches import closed_form_grid
 
-        return greedy_check(robot, charted_grid(cells), task, search, progress)
+        return greedy_check(robot, closed_form_grid(cells), task, search, progress)
     return _complete_check(robot, cells, task, search, progress)
 
 
@@ -90,7 +90,7 @@ def _refuse_other_types(*given: object) -> None:
 class _Attempt:
     """One search, and the replay of what it found."""
 
-    explorer: Explorer
+    exploration: Exploration
     in_time: bool
     walk: Walk | None
     replayed: Replay | None
@@ -119,28 +119,28 @@ def _complete_check(
 
     called = time.monotonic()
     with compiling_notice():
-        from feasibility.roadmap import Explorer, causes_of, problem_of
+        from feasibility.roadmap import Exploration, causes_of, problem_of
 
         warm_up()
-    cells.courses  # noqa: B018 - part of the cells, made once
+    cells.curves  # noqa: B018 - part of the cells, made once
     began = time.monotonic()
     deadline = np.inf if search.time_limit is None else began + search.time_limit
 
     def attempt(within: Task) -> _Attempt:
         start = time.monotonic()
         problem = problem_of(robot, cells, within)
-        explorer = Explorer(robot, cells, problem, search.seed, deadline, progress)
-        return _attempt(explorer, task, start)
+        exploration = Exploration(robot, cells, problem, search.seed, deadline, progress)
+        return _attempt(exploration, task, start)
 
     tried = [attempt(task)]
     if tried[0].narrowly_refused:
         # The replay measures what strays between its samples, and may find a little more.
         tried.append(attempt(_narrowed(task)))
     found = tried[-1] if tried[-1].accepted else tried[0]
-    explorer, walk, replayed = found.explorer, found.walk, found.replayed
-    answer, evidence, message = _answer(explorer, task, replayed, found.in_time)
+    exploration, walk, replayed = found.exploration, found.walk, found.replayed
+    answer, evidence, message = _answer(exploration, task, replayed, found.in_time)
     feasible = answer is Answer.FEASIBLE
-    explorer.deadline, explorer.progress = np.inf, None
+    exploration.deadline, exploration.progress = np.inf, None
     return Verdict(
         answer=answer,
         evidence=evidence,
@@ -150,10 +150,10 @@ def _complete_check(
         task=task,
         method="complete",
         seed=search.seed,
-        graph=deferred(lambda: graph_of(explorer)),
-        covered=explorer.covered,
-        causes=deferred(lambda: causes_of(explorer)),
-        components=tuple(np.flatnonzero(explorer.covers(root)) for root in explorer.roots()),
+        graph=deferred(lambda: graph_of(exploration)),
+        covered=exploration.covered,
+        causes=deferred(lambda: causes_of(exploration)),
+        components=tuple(np.flatnonzero(exploration.covers(root)) for root in exploration.roots()),
         start=int(walk.cell[0]) if walk is not None else None,
         witness=walk if feasible else None,
         certificate=replayed.certificate if feasible and replayed is not None else None,
@@ -163,58 +163,58 @@ def _complete_check(
             "certify_s": sum(one.certify_s for one in tried),
             "total_s": time.monotonic() - called,
         },
-        n_edges=explorer.n_edges,
+        n_edges=exploration.n_edges,
         statistics={
-            "fk": sum(int(one.explorer.work.counts[0]) for one in tried),
-            "nodes": int(explorer.roadmap.counters[0]),
-            "motions": int(explorer.roadmap.counters[1]),
-            "boxes": explorer.boxes,
-            "rounds": explorer.rounds,
+            "fk": sum(int(one.exploration.work.counts[0]) for one in tried),
+            "nodes": int(exploration.roadmap.counters[0]),
+            "motions": int(exploration.roadmap.counters[1]),
+            "boxes": exploration.boxes,
+            "rounds": exploration.rounds,
         },
     )
 
 
-def _attempt(explorer: Explorer, task: Task, began: float) -> _Attempt:
+def _attempt(exploration: Exploration, task: Task, began: float) -> _Attempt:
     """Search since `began` (s), and replay the motion found against a task."""
     from feasibility.certification import replay
     from feasibility.roadmap import OutOfTime, close, covering_walk, explore
 
     in_time = True
     try:
-        explore(explorer)
-        close(explorer)
+        explore(exploration)
+        close(exploration)
     except OutOfTime:
         in_time = False
     searched = time.monotonic()
     walk: Walk | None = None
     replayed: Replay | None = None
-    robot, cells = explorer.robot, explorer.cells
-    if explorer.complete and len(cells):
-        walk = covering_walk(explorer.roadmap, explorer.best)
+    robot, cells = exploration.robot, exploration.cells
+    if exploration.complete and len(cells):
+        walk = covering_walk(exploration.roadmap, exploration.best)
         # Every cell, whatever the search believes that it covers.
         replayed = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool))
     return _Attempt(
-        explorer, in_time, walk, replayed, searched - began, time.monotonic() - searched
+        exploration, in_time, walk, replayed, searched - began, time.monotonic() - searched
     )
 
 
 def _narrowed(task: Task) -> Task:
     """A task that leaves the replay some room."""
-    tolerance = task.leeway
+    tolerance = task.effective_tolerance
     return replace(task, tolerance=NARROWER * tolerance, cone_deg=NARROWER * task.cone_deg)
 
 
 def _answer(
-    explorer: Explorer, task: Task, replayed: Replay | None, in_time: bool
+    exploration: Exploration, task: Task, replayed: Replay | None, in_time: bool
 ) -> tuple[Answer, Evidence, str]:
     """Answer, evidence and the sentences that say what was done."""
     from feasibility.roadmap import Ruling
 
-    total = len(explorer.cells)
-    covered = int(explorer.covered.sum())
-    tolerance = task.leeway
+    total = len(exploration.cells)
+    covered = int(exploration.covered.sum())
+    tolerance = task.effective_tolerance
     within = f"within {1e3 * tolerance:g} mm and {task.cone_deg:g} deg"
-    proved = sum(ruling is Ruling.PROVED for ruling in explorer.rulings.values())
+    proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
     if total == 0:
         return Answer.FEASIBLE, Evidence.WITNESS, "There are no cells to cover."
     if replayed is not None and replayed.accepted:
@@ -236,7 +236,7 @@ def _answer(
             Answer.INFEASIBLE,
             Evidence.PROOF,
             f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {within} "
-            f"(reach bound and branch and bound, {explorer.boxes} boxes); the best single motion "
+            f"(reach bound and branch and bound, {exploration.boxes} boxes); the best single motion "
             f"covers {covered} of {total}.",
         )
     if not in_time:
@@ -246,17 +246,17 @@ def _answer(
             f"The time limit ran out; the best single motion so far covers {covered} of {total} "
             f"cells.",
         )
-    if not explorer.problem.rim > 0.0:
+    if not exploration.problem.cone_chord > 0.0:
         return (
             Answer.UNDECIDED,
             Evidence.BUDGET,
             "A cone of 0 degrees leaves a motion no room between samples, so none can be "
             "certified; allow a small angle.",
         )
-    closed = closed_courses(explorer.cells, task)
+    closed = blocked_curves(exploration.cells, task)
     if closed:
         return (Answer.UNDECIDED, Evidence.BUDGET, closed)
-    missed = int((~explorer.reached).sum())
+    missed = int((~exploration.reached).sum())
     what = (
         f"{missed} cell{'s were' if missed > 1 else ' was'} never reached, without a proof"
         if missed
@@ -266,12 +266,12 @@ def _answer(
         Answer.INFEASIBLE,
         Evidence.EXHAUSTED,
         f"The search ended without a covering motion {within}: {what}; the best covers {covered} "
-        f"of {total} cells ({explorer.roadmap.counters[0]} nodes, {explorer.rounds} rounds, seed "
-        f"{explorer.seed}).",
+        f"of {total} cells ({exploration.roadmap.counters[0]} nodes, {exploration.rounds} rounds, seed "
+        f"{exploration.seed}).",
     )
 
 
-def graph_of(explorer: Explorer) -> nx.Graph:
+def graph_of(exploration: Exploration) -> nx.Graph:
     """Graph G of the best component: every cell, and one motion for each pair that has any.
 
     Nodes carry `q` (n,), a configuration over the cell's centre, None for cells that the component
@@ -281,13 +281,13 @@ def graph_of(explorer: Explorer) -> nx.Graph:
 
     from feasibility.roadmap import NODES, edge_motion, pair_edges, root_of
 
-    roadmap, best = explorer.roadmap, explorer.best
+    roadmap, best = exploration.roadmap, exploration.best
     graph: nx.Graph = nx.Graph()
-    graph.add_nodes_from(range(len(explorer.cells)), q=None)
+    graph.add_nodes_from(range(len(exploration.cells)), q=None)
     for x in range(roadmap.counters[NODES] - 1, -1, -1):
         if root_of(roadmap, roadmap.component[x]) == best:
             graph.nodes[int(roadmap.cell[x])]["q"] = roadmap.q[x].copy()
-    for (i, j), e in pair_edges(explorer).items():
+    for (i, j), e in pair_edges(exploration).items():
         motion = edge_motion(roadmap, e)
         if roadmap.cell[roadmap.ends[e, 0]] != i:
             motion = motion[::-1]

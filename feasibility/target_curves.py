@@ -13,57 +13,57 @@ from surfaces import Cells
 from surfaces.meshes import MeshSurface
 
 TELLING = 0.03  # [1] a course whose normal strays no further knows how the surface bends
-ASIDE = 1.1  # [1] the normal may turn that much faster between the places looked at
+LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
 FEW, MANY = 3, 32  # places on a course over a mesh; and on one over a crease, or off its facets by
 OFF = 0.05  # [1] of the tolerance
 
 
-class TargetCourses(NamedTuple):
+class TargetCurves(NamedTuple):
     """Target point f + h n and approach direction -+n along the M courses of some cells."""
 
     first: NDArray[np.int64]
     """(M + 1,) where each course's pieces begin, and the end of the last."""
     cubics: NDArray[np.float64]
     """(P, 4, 6) coefficients of 1, s, s^2, s^3 of point (m) and direction; s in 0..1."""
-    bends: NDArray[np.float64]
+    derivative_bounds: NDArray[np.float64]
     """(P, 2) largest second derivatives of both by t in 0..1; inf where the offset folds."""
-    turning: NDArray[np.float64]
+    curvature: NDArray[np.float64]
     """(P,) 1/m, how fast the direction turns for each metre on the target surface, at most."""
-    strays: NDArray[np.float64]
+    deviations: NDArray[np.float64]
     """(M, 2) how far target point (m) and direction may be from the surface's own, at most."""
-    standing: float
-    """1/m, the largest `turning` next to the cells' centres."""
+    centre_curvature: float
+    """1/m, the largest `curvature` next to the cells' centres."""
     folded: NDArray[np.bool_]
-    """(M,) courses where the offset surface folds, see `folded_courses`."""
+    """(M,) courses where the offset surface folds, see `folded_curves`."""
 
 
-def folded_courses(cells: Cells, height: float) -> NDArray[np.bool_]:
+def folded_curves(cells: Cells, height: float) -> NDArray[np.bool_]:
     """(M,) courses from or to a cell from which some course runs into a fold of the offset surface.
 
     At a signed height (m) beyond a radius of curvature the offset surface runs backwards, but in
     the direction of that curvature only; courses across it do not show it, their neighbours do.
     """
-    folded = cells.courses.folds(height)
+    folded = cells.curves.folds(height)
     cell = np.zeros(len(cells), dtype=bool)
     # One over a crease, or one that strays so far, tells nothing of its neighbours.
-    telling = ~cells.courses.creased & (cells.courses.strays[:, 1] <= TELLING)
+    telling = ~cells.curves.creased & (cells.curves.deviations[:, 1] <= TELLING)
     cell[cells.pairs[folded & telling]] = True
     return np.asarray(folded | cell[cells.pairs].any(axis=1))
 
 
 def _see_facets(
-    cells: Cells, standoff: float, tolerance: float, strays: NDArray[np.float64]
+    cells: Cells, standoff: float, tolerance: float, deviations: NDArray[np.float64]
 ) -> None:
     """Bring the strays (M, 2) of courses over a mesh up to what its triangles say."""
-    some = np.arange(len(strays))
+    some = np.arange(len(deviations))
     for count in (FEW, MANY):
         t = (np.arange(count) + 0.5) / count
         places = np.repeat(some, count), np.tile(t, len(some))
         found = beside_facets(cells, standoff, tolerance, *places, everywhere=False)
         off = found.off.reshape(-1, count).max(axis=1)
         leans = found.leans.reshape(-1, count).max(axis=1)
-        strays[some] = np.maximum(strays[some], np.column_stack([off, leans]))
-        some = some[(off > OFF * tolerance) | (leans > 0.0) | cells.courses.creased[some]]
+        deviations[some] = np.maximum(deviations[some], np.column_stack([off, leans]))
+        some = some[(off > OFF * tolerance) | (leans > 0.0) | cells.curves.creased[some]]
 
 
 class BesideFacets(NamedTuple):
@@ -82,7 +82,7 @@ def beside_facets(
     cells: Cells,
     standoff: float,
     tolerance: float,
-    courses: NDArray[np.int64],
+    curves: NDArray[np.int64],
     t: NDArray[np.float64],
     everywhere: bool,
 ) -> BesideFacets:
@@ -108,16 +108,16 @@ def beside_facets(
     def nearest(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         if everywhere:
             return surface.nearest(points)
-        faces, weights = surface.faces_beneath(cells, cells.pairs[courses], points[:, None])
+        faces, weights = surface.faces_beneath(cells, cells.pairs[curves], points[:, None])
         return faces[:, 0], weights[:, 0]
 
-    foot, normal = cells.courses.at(courses, t)
-    target = foot + surface.side_sign * standoff * normal
+    point, normal = cells.curves.at(curves, t)
+    target = point + surface.side_sign * standoff * normal
     away, direction = surface.beside(target, *nearest(target))
     leans = np.zeros(len(t))
     off = np.abs(standoff - away) if standoff > 0.0 else leans
     if surface.creased:
-        strip = surface.from_crease(*nearest(foot))
+        strip = surface.from_crease(*nearest(point))
         some = np.isfinite(strip) & (strip >= tolerance - standoff)
         leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
     return BesideFacets(off, leans, away)
@@ -125,7 +125,7 @@ def beside_facets(
 
 # Search and replay ask for the same; cells are values, told apart by identity.
 @lru_cache(maxsize=4)
-def target_courses(cells: Cells, standoff: float, tolerance: float) -> TargetCourses:
+def target_curves(cells: Cells, standoff: float, tolerance: float) -> TargetCurves:
     """Offset the courses of `cells` to the tool's side by `standoff` (m).
 
     Args:
@@ -133,58 +133,60 @@ def target_courses(cells: Cells, standoff: float, tolerance: float) -> TargetCou
         standoff: m.
         tolerance: m, of the tool point.
     """
-    courses, sign = cells.courses, cells.surface.side_sign
+    curves, sign = cells.curves, cells.surface.side_sign
     height = sign * standoff
-    folded = folded_courses(cells, height)
-    cubics = np.empty_like(courses.cubics)
-    cubics[..., :3] = courses.cubics[..., :3] + height * courses.cubics[..., 3:]
-    cubics[..., 3:] = -sign * courses.cubics[..., 3:]
-    bends = courses.bends.copy()
-    bends[:, 0] += standoff * bends[:, 1]
-    bends[np.repeat(folded, np.diff(courses.first))] = np.inf
+    folded = folded_curves(cells, height)
+    cubics = np.empty_like(curves.cubics)
+    cubics[..., :3] = curves.cubics[..., :3] + height * curves.cubics[..., 3:]
+    cubics[..., 3:] = -sign * curves.cubics[..., 3:]
+    derivative_bounds = curves.derivative_bounds.copy()
+    derivative_bounds[:, 0] += standoff * derivative_bounds[:, 1]
+    derivative_bounds[np.repeat(folded, np.diff(curves.first))] = np.inf
     # To the side of a course the normal may turn faster than along it.
-    sharpness = cells.surface.sharpness(cells, height)
+    max_curvature = cells.surface.max_curvature(cells, height)
     if standoff > 0.0 and isinstance(cells.surface, MeshSurface):
         # Over an edge it turns as over a ball of the standoff.
         edge = np.where(cells.surface.creased_cells(cells), 1.0 / max(standoff, tolerance), 0.0)
-        sharpness = np.maximum(sharpness, edge)
-    across = sharpness[cells.pairs].max(axis=1)
-    turning = np.maximum(courses.turning(height), np.repeat(across, np.diff(courses.first)))
-    turning *= ASIDE
-    ends = np.concatenate([courses.first[:-1][~folded], courses.first[1:][~folded] - 1])
-    standing = turning[ends].max(initial=0.0)
+        max_curvature = np.maximum(max_curvature, edge)
+    across = max_curvature[cells.pairs].max(axis=1)
+    curvature = np.maximum(curves.curvature(height), np.repeat(across, np.diff(curves.first)))
+    curvature *= LATERAL
+    ends = np.concatenate([curves.first[:-1][~folded], curves.first[1:][~folded] - 1])
+    centre_curvature = curvature[ends].max(initial=0.0)
     if len(cells.pairs) == 0:  # a single cell: the normal turns beside its centre too
-        standing = ASIDE * sharpness[np.isfinite(sharpness)].max(initial=0.0)
-    strays = courses.strays.copy()
-    strays[:, 0] += standoff * strays[:, 1]
-    if cells.surface.grain > 0.0:
-        _see_facets(cells, standoff, tolerance, strays)
-    for array in (cubics, bends, turning, strays, folded):
+        centre_curvature = LATERAL * max_curvature[np.isfinite(max_curvature)].max(initial=0.0)
+    deviations = curves.deviations.copy()
+    deviations[:, 0] += standoff * deviations[:, 1]
+    if cells.surface.mean_edge_length > 0.0:
+        _see_facets(cells, standoff, tolerance, deviations)
+    for array in (cubics, derivative_bounds, curvature, deviations, folded):
         array.flags.writeable = False
-    return TargetCourses(
-        first=courses.first,
+    return TargetCurves(
+        first=curves.first,
         cubics=cubics,
-        bends=bends,
-        turning=turning,
-        strays=strays,
-        standing=float(standing),
+        derivative_bounds=derivative_bounds,
+        curvature=curvature,
+        deviations=deviations,
+        centre_curvature=float(centre_curvature),
         folded=folded,
     )
 
 
-def closed_courses(cells: Cells, task: Task) -> str:
+def blocked_curves(cells: Cells, task: Task) -> str:
     """Why no motion can be certified between some neighbouring cells; empty where it can."""
-    tolerance = task.leeway
-    ways = target_courses(cells, task.standoff, tolerance)
+    tolerance = task.effective_tolerance
+    ways = target_curves(cells, task.standoff, tolerance)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
-    courses = cells.courses
-    smooth = ~courses.creased & (courses.strays[:, 1] <= TELLING)
+    curves = cells.curves
+    smooth = ~curves.creased & (curves.deviations[:, 1] <= TELLING)
     folds = ways.folded & smooth
-    rim = task.rim
-    rough = (ways.strays[:, 0] >= tolerance) | (ways.strays[:, 1] >= rim) | ways.folded
+    cone_chord = task.cone_chord
+    rough = (
+        (ways.deviations[:, 0] >= tolerance) | (ways.deviations[:, 1] >= cone_chord) | ways.folded
+    )
     parted = _parted(cells, ~rough)
     if folds.any():
-        if cells.surface.grain > 0.0:  # facets do not tell the two apart
+        if cells.surface.mean_edge_length > 0.0:  # facets do not tell the two apart
             return (
                 "The offset surface folds where it is hollow, or the mesh is too coarse where it "
                 f"bends, {some.format(int(folds.sum()))}: the standoff is too large for the "

@@ -67,12 +67,12 @@ class Task:
         return math.radians(self.cone_deg)
 
     @property
-    def leeway(self) -> float:
+    def effective_tolerance(self) -> float:
         """The tolerance, m; where it is left to the method, that of the complete search."""
         return DEFAULT_TOLERANCE if self.tolerance is None else self.tolerance
 
     @property
-    def rim(self) -> float:
+    def cone_chord(self) -> float:
         """|a - b| of unit vectors a and b, `cone` apart, 0 .. 2; inf where any axis will do."""
         return math.inf if self.cone_deg >= 180.0 else 2.0 * math.sin(0.5 * self.cone)
 

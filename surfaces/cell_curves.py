@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 PIECES = (1, 4, 8, 16, 32, 64)  # numbers of cubics that a course may be made of
 CLOSE = 1e-6  # [1], share of its length that a course may stray, and [1] that its normal may
 FACETED = 5e-4  # [1], the same for the normal of a mesh
-FACETED_FOOT = 0.01  # [1], share of a mesh's edges that a course may stray from it
+FACETED_POINT = 0.01  # [1], share of a mesh's edges that a course may stray from it
 STANDS = 1e-3  # [1] a parallel curve that is so much shorter stands still
 PLACES = 3  # along a piece, where its slopes are looked at
 LEGS = 4  # of a course over a crease; it is at rest between them
@@ -43,39 +43,39 @@ BLOCK = 5_000  # courses fitted at once: what the processor's caches hold
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Courses:
+class CellCurves:
     """One curve for each of M neighbouring pairs (i, j) of cells, from centre i to centre j."""
 
     first: NDArray[np.int64]
     """(M + 1,) where each course's pieces begin, equal shares of t, and the end of the last."""
     cubics: Array
     """(P, 4, 6) coefficients of 1, s, s^2, s^3 of foot (m) and normal; s in 0..1 on the piece."""
-    bends: Array
+    derivative_bounds: Array
     """(P, 2) largest |f''| (m) and |n''| on each piece, for t in 0..1 on the whole course."""
-    strays: Array
+    deviations: Array
     """(M, 2) how far foot (m) and normal (1) may be from the surface's own, at most."""
     rests: NDArray[np.bool_]
     """(P,) pieces at an end of which the foot is at rest, see `surfaces.creased`."""
 
     def __post_init__(self) -> None:
         """Write-protect the arrays."""
-        for name in ("first", "cubics", "bends", "strays", "rests"):
+        for name in ("first", "cubics", "derivative_bounds", "deviations", "rests"):
             getattr(self, name).flags.writeable = False
 
     def __len__(self) -> int:
         """Number of courses."""
         return len(self.first) - 1
 
-    def at(self, courses: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    def at(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Foot (k, 3) m and normal (k, 3) at t (k,) of some courses (k,)."""
-        powers, cubics = self._local(courses, t)
+        powers, cubics = self._local(curves, t)
         values = np.einsum("kp,kpd->kd", powers, cubics)
         return values[:, :3], values[:, 3:]
 
-    def slopes(self, courses: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    def slopes(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Derivatives by t of foot (k, 3) m and normal (k, 3)."""
-        powers, cubics = self._local(courses, t)
-        count = np.diff(self.first)[courses]
+        powers, cubics = self._local(curves, t)
+        count = np.diff(self.first)[curves]
         by_s = np.column_stack([powers[:, 0], 2.0 * powers[:, 1], 3.0 * powers[:, 2]])
         values = np.einsum("kp,kpd->kd", by_s, cubics[:, 1:]) * count[:, None]
         return values[:, :3], values[:, 3:]
@@ -87,20 +87,20 @@ class Courses:
         folds: no tool can follow it.
         """
         folded = np.zeros(len(self.cubics), dtype=bool)
-        for foot, normal in self._slopes_along():
-            onward = ((foot + height * normal) * foot).sum(axis=1)
-            folded |= ~(onward > STANDS * (foot**2).sum(axis=1))
+        for point, normal in self._slopes_along():
+            onward = ((point + height * normal) * point).sum(axis=1)
+            folded |= ~(onward > STANDS * (point**2).sum(axis=1))
         return np.logical_or.reduceat(folded, self.first[:-1]) if len(self) else folded
 
-    def turning(self, height: float) -> Array:
+    def curvature(self, height: float) -> Array:
         """(P,) 1/m, how fast the normal turns for each metre that the target travels, at most.
 
         Args:
             height: signed height of the target over the surface, m.
         """
         fastest = np.zeros(len(self.cubics))
-        for foot, normal in self._slopes_along():
-            way = np.linalg.norm(foot + height * normal, axis=1)
+        for point, normal in self._slopes_along():
+            way = np.linalg.norm(point + height * normal, axis=1)
             turn = np.linalg.norm(normal, axis=1)
             none = np.where(turn > 0.0, np.inf, 0.0)  # it turns on the spot, or there is no way
             rate = np.divide(turn, way, out=none, where=way > 0.0)
@@ -126,59 +126,61 @@ class Courses:
             return np.zeros(len(self), dtype=bool)
         return np.logical_or.reduceat(self.rests, self.first[:-1])
 
-    def _local(self, courses: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    def _local(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Powers 1, s, s^2, s^3 (k, 4), and the cubics (k, 4, 6) that hold at t."""
-        count = np.diff(self.first)[courses]
+        count = np.diff(self.first)[curves]
         piece = np.clip(np.floor(t * count), 0, count - 1).astype(np.int64)
         s = t * count - piece
-        return np.vander(s, 4, increasing=True), self.cubics[self.first[courses] + piece]
+        return np.vander(s, 4, increasing=True), self.cubics[self.first[curves] + piece]
 
 
-def courses_of(cells: Cells) -> Courses:
+def curves_of(cells: Cells) -> CellCurves:
     """Fit a course to every neighbouring pair of cells; see the module."""
-    pairs, grain = cells.pairs, cells.surface.grain
+    pairs, mean_edge_length = cells.pairs, cells.surface.mean_edge_length
     length = np.linalg.norm(cells.centres[pairs[:, 0]] - cells.centres[pairs[:, 1]], axis=1)
-    close = np.full((len(pairs), 2), CLOSE if grain == 0.0 else FACETED)
-    close[:, 0] = np.maximum(CLOSE * length, FACETED_FOOT * grain)
-    strays = np.full((len(pairs), 2), np.inf)
+    close = np.full((len(pairs), 2), CLOSE if mean_edge_length == 0.0 else FACETED)
+    close[:, 0] = np.maximum(CLOSE * length, FACETED_POINT * mean_edge_length)
+    deviations = np.full((len(pairs), 2), np.inf)
     fitted: list[tuple[NDArray[np.int64], Array]] = []
     missing = np.arange(len(pairs))
     for count in PIECES:
         # A mesh has nothing to say between its facets: no more pieces than half the samples.
         samples = np.full(len(missing), count + 2)
-        if grain:
-            samples = np.maximum(samples, 2 * np.ceil(length[missing] / grain).astype(np.int64))
+        if mean_edge_length:
+            samples = np.maximum(
+                samples, 2 * np.ceil(length[missing] / mean_edge_length).astype(np.int64)
+            )
         for some, fit_to in _blocks(missing, samples):
-            cubics, stray = _fit(cells, pairs[some], count, fit_to)
-            final = (stray <= close[some]).all(axis=1) | (count == PIECES[-1])
-            if grain:
+            cubics, deviation = _fit(cells, pairs[some], count, fit_to)
+            final = (deviation <= close[some]).all(axis=1) | (count == PIECES[-1])
+            if mean_edge_length:
                 final |= 4 * count > fit_to
-            strays[some[final]] = stray[final]
+            deviations[some[final]] = deviation[final]
             fitted.append((some[final], cubics[final]))
-        missing = np.flatnonzero(np.isinf(strays).any(axis=1))
+        missing = np.flatnonzero(np.isinf(deviations).any(axis=1))
         if len(missing) == 0:
             break
     creased = np.zeros(len(pairs), dtype=bool)
-    if grain:
+    if mean_edge_length:
         from surfaces.meshes.cells import MeshCells, over_bends, over_creases
 
         if isinstance(cells, MeshCells):
-            rough = np.flatnonzero((strays > close).any(axis=1))
-            for some, cubics in over_creases(cells, rough, close, strays):
+            rough = np.flatnonzero((deviations > close).any(axis=1))
+            for some, cubics in over_creases(cells, rough, close, deviations):
                 fitted.append((some, cubics))
                 creased[some] = True
-            fitted += over_bends(cells, fitted, rough[~creased[rough]], close, strays)
-    return _joined(fitted, strays, creased)
+            fitted += over_bends(cells, fitted, rough[~creased[rough]], close, deviations)
+    return _joined(fitted, deviations, creased)
 
 
 def _blocks(
-    courses: NDArray[np.int64], samples: NDArray[np.int64]
+    curves: NDArray[np.int64], samples: NDArray[np.int64]
 ) -> Iterator[tuple[NDArray[np.int64], int]]:
     """Courses that are sampled alike, some at a time: the courses, and into how many parts."""
     # Few different numbers of samples: powers of two of a mesh's, all alike of a patch's.
     rounded = np.where(samples > 8, 2 ** np.ceil(np.log2(np.maximum(samples, 1))), samples)
     for parts in np.unique(rounded).astype(np.int64):
-        alike = courses[rounded == parts]
+        alike = curves[rounded == parts]
         for start in range(0, len(alike), BLOCK):
             yield alike[start : start + BLOCK], int(parts)
 
@@ -227,20 +229,20 @@ def fitted_to(
     smoothed = np.flatnonzero(cells.surface.smoothed(cells, pairs))
     if len(smoothed):
         # Least squares also cut corners along the facets, which takes nothing off the surface.
-        feet = off[:, smoothed, :3].swapaxes(0, 1)
-        places, normals = cells.surface.beneath(cells, pairs[smoothed], feet)
+        closest_points = off[:, smoothed, :3].swapaxes(0, 1)
+        places, normals = cells.surface.beneath(cells, pairs[smoothed], closest_points)
         values[:, smoothed] = np.concatenate([places, normals], axis=2).swapaxes(0, 1)
     off = off - values
-    stray = [np.sqrt((off[..., half] ** 2).sum(axis=2)).max(axis=0) for half in HALVES]
+    deviation = [np.sqrt((off[..., half] ** 2).sum(axis=2)).max(axis=0) for half in HALVES]
     # The surface's own normal is the one at the nearest point, which is not the sample, and may lie
     # to the side, where the surface bends more than along the course.
     moves = [np.sqrt((np.diff(values[..., half], axis=0) ** 2).sum(axis=2)) for half in HALVES]
-    turning = np.divide(moves[1], moves[0], out=np.zeros_like(moves[0]), where=moves[0] > 0.0)
-    sharpest = SHARPER * cells.sharpness[pairs].max(axis=1)
+    curvature = np.divide(moves[1], moves[0], out=np.zeros_like(moves[0]), where=moves[0] > 0.0)
+    sharpest = SHARPER * cells.max_curvature[pairs].max(axis=1)
     sharpest[smoothed] = 0.0  # measured, to the side too
-    stray[1] = stray[1] + np.maximum(turning.max(axis=0), sharpest) * stray[0]
-    by_course = cubics.reshape(count, 4, len(pairs), 6).transpose(2, 0, 1, 3)
-    return by_course, BETWEEN * np.stack(stray, axis=1)
+    deviation[1] = deviation[1] + np.maximum(curvature.max(axis=0), sharpest) * deviation[0]
+    by_curve = cubics.reshape(count, 4, len(pairs), 6).transpose(2, 0, 1, 3)
+    return by_curve, BETWEEN * np.stack(deviation, axis=1)
 
 
 @cache
@@ -292,10 +294,10 @@ def _basis(count: int, t: Array) -> Array:
 
 
 def _joined(
-    fitted: list[tuple[NDArray[np.int64], Array]], strays: Array, creased: NDArray[np.bool_]
-) -> Courses:
+    fitted: list[tuple[NDArray[np.int64], Array]], deviations: Array, creased: NDArray[np.bool_]
+) -> CellCurves:
     """All courses in the order of the pairs, with their bends; the last fit of each counts."""
-    counts, final = np.zeros((2, len(strays)), dtype=np.int64)
+    counts, final = np.zeros((2, len(deviations)), dtype=np.int64)
     for turn, (some, cubics) in enumerate(fitted):
         counts[some], final[some] = cubics.shape[1], turn
     first = np.concatenate([[0], np.cumsum(counts)])
@@ -304,13 +306,13 @@ def _joined(
         kept = final[some] == turn
         joined[first[some[kept]][:, None] + np.arange(cubics.shape[1])] = cubics[kept]
     rests = np.zeros(len(joined), dtype=bool)
-    for course in np.flatnonzero(creased):
-        legs = np.arange(first[course], first[course + 1]).reshape(LEGS, -1)
+    for curve in np.flatnonzero(creased):
+        legs = np.arange(first[curve], first[curve + 1]).reshape(LEGS, -1)
         rests[legs[1:, 0]] = rests[legs[:-1, -1]] = True
     square = np.repeat(counts, counts)[:, None] ** 2  # from s to t
     ends = [2.0 * joined[:, 2], 2.0 * joined[:, 2] + 6.0 * joined[:, 3]]
-    bends = np.stack(
+    derivative_bounds = np.stack(
         [np.max([np.linalg.norm(end[:, part], axis=1) for end in ends], axis=0) for part in HALVES],
         axis=1,
     )
-    return Courses(first, joined, ROUNDING * square * bends, strays, rests)
+    return CellCurves(first, joined, ROUNDING * square * derivative_bounds, deviations, rests)

@@ -16,7 +16,7 @@ from surfaces.surface import Surface
 if TYPE_CHECKING:
     import networkx as nx
 
-    from surfaces.cell_curves import Courses
+    from surfaces.cell_curves import CellCurves
 
 
 class Triangles(NamedTuple):
@@ -101,16 +101,16 @@ class Cells(ABC):
         return pairs
 
     @cached_property
-    def courses(self) -> Courses:
+    def curves(self) -> CellCurves:
         """The ways between the centres of the M `pairs`, as smooth curves."""
-        from surfaces.cell_curves import courses_of
+        from surfaces.cell_curves import curves_of
 
-        return courses_of(self)
+        return curves_of(self)
 
     @cached_property
-    def sharpness(self) -> NDArray[np.float64]:
-        """(N,) 1/m; see `Surface.sharpness`."""
-        return self.surface.sharpness(self)
+    def max_curvature(self) -> NDArray[np.float64]:
+        """(N,) 1/m; see `Surface.max_curvature`."""
+        return self.surface.max_curvature(self)
 
     def graph(self) -> nx.Graph:
         """Adjacency as a graph: nodes are flat indices, edges are `pairs`."""

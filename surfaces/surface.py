@@ -22,7 +22,7 @@ class SurfaceError(ValueError):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Foot:
+class ClosestPoint:
     """The points of a surface nearest to given points; every array has the points' leading shape.
 
     The foot lies on the whole surface that a patch is cut from; `inside` tells whether it lies
@@ -81,13 +81,13 @@ class Surface(ABC):
         return ()
 
     @property
-    def grain(self) -> float:
+    def mean_edge_length(self) -> float:
         """m, typical length of a mesh's edges; 0 where the surface is smooth."""
         return 0.0
 
     @abstractmethod
-    def closest(self, points: ArrayLike) -> Foot:
-        """The feet of `points` (..., 3) m on the surface; see `Foot`.
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """The feet of `points` (..., 3) m on the surface; see `ClosestPoint`.
 
         Raises:
             ValueError: `points` does not end in an axis of length 3.
@@ -121,15 +121,15 @@ class Surface(ABC):
         Returns:
             Places (m, k, 3) m and outward unit normals (m, k, 3).
         """
-        foot = self.closest(points)
-        return points - foot.height[..., None] * foot.normal, foot.normal
+        closest_point = self.closest(points)
+        return points - closest_point.height[..., None] * closest_point.normal, closest_point.normal
 
     def smoothed(self, cells: Cells, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
         """(m,) where ways are smoother than the surface, so that `beneath` tells how far off."""
-        return np.full(len(pairs), self.grain > 0.0)
+        return np.full(len(pairs), self.mean_edge_length > 0.0)
 
     @abstractmethod
-    def sharpness(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
+    def max_curvature(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
         """(N,) 1/m, how fast the normal turns in each cell, in the sharpest direction.
 
         Args:

@@ -7,7 +7,7 @@ from .case import load_case as load_case
 from .edits import as_read as as_read
 from .edits import make_absolute as make_absolute
 from .robot_table import read_robot as read_robot
-from .surface_kinds import CHARTED as CHARTED
+from .surface_kinds import CLOSED_FORM_KINDS as CLOSED_FORM_KINDS
 from .surface_kinds import OWN_KEYS as OWN_KEYS
 from .surface_table import faults_of_building as faults_of_building
 from .surface_table import read_surface as read_surface

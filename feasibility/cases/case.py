@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from feasibility.cases.edits import as_read, make_absolute, override
 from feasibility.cases.robot_table import RobotPart, read_robot
-from feasibility.cases.surface_kinds import CHARTED
+from feasibility.cases.surface_kinds import CLOSED_FORM_KINDS
 from feasibility.cases.surface_table import (
     SurfacePart,
     faults_of_building,
@@ -228,7 +228,7 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     surface = read_surface(tables["surface"], faults) if "surface" in tables else None
     task = read_task(tables["task"], faults) if "task" in tables else None
     search = read_search(tables.get("search", {}), faults)
-    if surface and search and search.method == "greedy" and surface.kind not in CHARTED:
+    if surface and search and search.method == "greedy" and surface.kind not in CLOSED_FORM_KINDS:
         faults.append(_no_greedy(surface.kind))
     if faults and "robot" in tables:
         faults += _robot_faults(robot or _named_robot(tables["robot"]))
@@ -242,7 +242,7 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
 
 def _no_greedy(kind: str) -> Fault:
     """The greedy search is asked for a surface that it does not know."""
-    kinds = alternatives(CHARTED)
+    kinds = alternatives(CLOSED_FORM_KINDS)
     return Fault(
         "search.method",
         f'"greedy" works on {kinds} only, not on a surface of kind {kind}; use "complete"',

@@ -14,7 +14,7 @@ OWN_KEYS: Mapping[str, tuple[str, ...]] = {
     "piecewise": PIECES_KEYS,
     "mesh": MESH_KEYS,
 }
-CHARTED = ("sphere", "cylinder", "hyperboloid", "plane")
+CLOSED_FORM_KINDS = ("sphere", "cylinder", "hyperboloid", "plane")
 """The kinds that the greedy search knows."""
 
 

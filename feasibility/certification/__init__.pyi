@@ -1,3 +1,3 @@
-from .replay import Replay as Replay
-from .replay import placements as placements
-from .replay import replay as replay
+from .motion_replay import Replay as Replay
+from .motion_replay import placements as placements
+from .motion_replay import replay as replay

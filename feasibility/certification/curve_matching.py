@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.target_curves import TargetCourses, beside_facets, target_courses
+from feasibility.target_curves import TargetCurves, beside_facets, target_curves
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from surfaces import Cells
@@ -37,13 +37,13 @@ class Following:
     """(m,) m, distance of each tool point from its target point."""
     chord: Array
     """(m,) |a - b| of tool axis and approach direction."""
-    bends: Array
+    derivative_bounds: Array
     """(m - 1, 3) largest second derivatives of target point and approach direction along each
     segment, by the segment's own parameter in 0..1; and how fast the direction turns along the
     target surface there, 1/m."""
-    strays: Array
+    deviations: Array
     """(m - 1, 2) how far target point and approach direction are from the surface's own."""
-    standing: float
+    centre_curvature: float
     """1/m, how fast the direction turns next to the cells' centres."""
     fault: str
     """What makes the walk no motion along courses; empty when nothing does."""
@@ -68,22 +68,22 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     if len(marks) == 0 or marks[0] != 0 or marks[-1] != m - 1:
         return _faulty(nothing, "the motion begins or ends away from every cell's centre")
     start, end = walk.cell[marks[:-1]], walk.cell[marks[1:]]
-    course = _courses(cells, start, end)
-    if (course < STAYS).any():
-        k = int(np.flatnonzero(course < STAYS)[0])
+    curve = _curves(cells, start, end)
+    if (curve < STAYS).any():
+        k = int(np.flatnonzero(curve < STAYS)[0])
         names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
         return _faulty(nothing, f"the motion goes from cell {names}, which do not touch")
-    tolerance = task.leeway
-    ways = target_courses(cells, task.standoff, tolerance)
+    tolerance = task.effective_tolerance
+    curves = target_curves(cells, task.standoff, tolerance)
 
     # Each segment, and each waypoint between marks, belongs to one stretch from mark to mark.
     stretch = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
     backwards = (start > end)[stretch]
     inner = np.flatnonzero(walk.cell < 0)
-    along = inner[course[stretch[inner]] != STAYS]
+    along = inner[curve[stretch[inner]] != STAYS]
     places, arrived = np.zeros(m), walk.cell >= 0
     places[along], arrived[along] = _places(
-        ways, course[stretch[along]], points[along], ARRIVED * tolerance
+        curves, curve[stretch[along]], points[along], ARRIVED * tolerance
     )
     t0, t1 = places[:-1].copy(), places[1:].copy()
     t0[marks[:-1]] = backwards[marks[:-1]]
@@ -95,26 +95,28 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         aims.points[walk.cell[marks]],
         aims.approaches[walk.cell[marks]],
     )
-    still = inner[course[stretch[inner]] == STAYS]
+    still = inner[curve[stretch[inner]] == STAYS]
     over = start[stretch[still]]
     target[still], approach[still] = aims.points[over], aims.approaches[over]
-    target[along], approach[along] = _at(ways, course[stretch[along]], places[along])
+    target[along], approach[along] = _at(curves, curve[stretch[along]], places[along])
 
-    bends, strays = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
-    bends[:, 2] = ways.standing
+    derivative_bounds, deviations = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
+    derivative_bounds[:, 2] = curves.centre_curvature
     # A motion over one centre, at the end of a course, is none along it.
     stands = (t0 == t1) & arrived[:-1] & arrived[1:]
-    moves = np.flatnonzero((course[stretch] != STAYS) & ~stands)
-    used, which = np.unique(course[stretch[moves]], return_inverse=True)
-    bends[moves] = _bends(ways, course[stretch[moves]], t0[moves], t1[moves])
-    found, fault = _strays(cells, task.standoff, used, tolerance)
-    strays[moves] = found[which]
+    moves = np.flatnonzero((curve[stretch] != STAYS) & ~stands)
+    used, which = np.unique(curve[stretch[moves]], return_inverse=True)
+    derivative_bounds[moves] = _derivative_bounds(
+        curves, curve[stretch[moves]], t0[moves], t1[moves]
+    )
+    found, fault = _deviations(cells, task.standoff, used, tolerance)
+    deviations[moves] = found[which]
     return Following(
         error=np.linalg.norm(points - target, axis=1),
         chord=np.linalg.norm(axes - approach, axis=1),
-        bends=bends,
-        strays=strays,
-        standing=ways.standing,
+        derivative_bounds=derivative_bounds,
+        deviations=deviations,
+        centre_curvature=curves.centre_curvature,
         fault=fault,
     )
 
@@ -124,7 +126,7 @@ def _faulty(following: Following, fault: str) -> Following:
     return replace(following, fault=fault)
 
 
-def _courses(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
+def _curves(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
     """(k,) the course between two cells; STAYS where they are one, less where there is none."""
     pairs, count = cells.pairs, len(cells)
     keys = pairs[:, 0] * count + pairs[:, 1]
@@ -136,18 +138,18 @@ def _courses(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> 
 
 
 def _pieces(
-    ways: TargetCourses, course: NDArray[np.int64], t: Array
+    curves: TargetCurves, curve: NDArray[np.int64], t: Array
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
     """Piece (k,) that holds at t, place s (k,) on it, and number of pieces (k,) of the course."""
-    count = np.diff(ways.first)[course]
+    count = np.diff(curves.first)[curve]
     piece = np.clip((t * count).astype(np.int64), 0, count - 1)
-    return ways.first[course] + piece, t * count - piece, count
+    return curves.first[curve] + piece, t * count - piece, count
 
 
-def _at(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+def _at(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
     """Target points and approach directions (k, 3) at t."""
-    piece, s, _ = _pieces(ways, course, t)
-    values = np.einsum("kp,kpd->kd", _powers(s), ways.cubics[piece])
+    piece, s, _ = _pieces(curves, curve, t)
+    values = np.einsum("kp,kpd->kd", _powers(s), curves.cubics[piece])
     return values[:, :3], values[:, 3:]
 
 
@@ -157,35 +159,35 @@ def _powers(s: Array) -> Array:
 
 
 def _places(
-    ways: TargetCourses, course: NDArray[np.int64], points: Array, near: float
+    curves: TargetCurves, curve: NDArray[np.int64], points: Array, near: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     """(k,) t on each course for a tool point, and whether that is at one of its centres.
 
     A tool point so `near` (m) to a centre is taken to be there, which puts it off by that way;
     only where that is less than what it strays beside the course.
     """
-    t = _nearest(ways, course, points)
-    arrived = np.zeros(len(course), dtype=bool)
-    pays = ways.strays[course, 1] > ways.standing * near
+    t = _nearest(curves, curve, points)
+    arrived = np.zeros(len(curve), dtype=bool)
+    pays = curves.deviations[curve, 1] > curves.centre_curvature * near
     for place in (0.0, 1.0):
-        centre, _ = _at(ways, course, np.full(len(course), place))
+        centre, _ = _at(curves, curve, np.full(len(curve), place))
         there = pays & (np.linalg.norm(points - centre, axis=1) <= near)
         t[there], arrived[there] = place, True
     return t, arrived
 
 
-def _slopes(ways: TargetCourses, course: NDArray[np.int64], t: Array) -> Array:
+def _slopes(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> Array:
     """(k, 3) m, derivatives of target points by t."""
-    piece, s, count = _pieces(ways, course, t)
+    piece, s, count = _pieces(curves, curve, t)
     by_s = _powers(s)[:, :3] * [1.0, 2.0, 3.0]
-    slopes = np.einsum("kp,kpd->kd", by_s, ways.cubics[piece, 1:, :3])
+    slopes = np.einsum("kp,kpd->kd", by_s, curves.cubics[piece, 1:, :3])
     return np.asarray(slopes * count[:, None])
 
 
-def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> Array:
+def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> Array:
     """(k,) t of the place on each course that is nearest to a point."""
-    t = np.empty(len(course))
-    counts = np.diff(ways.first)[course]
+    t = np.empty(len(curve))
+    counts = np.diff(curves.first)[curve]
     for count in np.unique(counts):
         alike = np.flatnonzero(counts == count)
         # Not where two pieces meet: a course may be at rest there, and Newton's method with it.
@@ -193,21 +195,21 @@ def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> A
         grid = np.concatenate([[0.0], inner, [1.0]])
         for first in range(0, len(alike), BLOCK):
             some = alike[first : first + BLOCK]
-            places, _ = _at(ways, np.repeat(course[some], len(grid)), np.tile(grid, len(some)))
+            places, _ = _at(curves, np.repeat(curve[some], len(grid)), np.tile(grid, len(some)))
             away = places.reshape(len(some), len(grid), 3) - points[some, None]
             t[some] = grid[np.argmin((away**2).sum(axis=2), axis=1)]
     # Newton's steps, shortened where one leads further away: next to a place where a course is at
     # rest they go too far.
     left, width = np.arange(len(t)), 1.0 / (GUESSES * counts)
-    off = _at(ways, course, t)[0] - points
+    off = _at(curves, curve, t)[0] - points
     for _ in range(REFINEMENTS):
-        slope = _slopes(ways, course[left], t[left])
+        slope = _slopes(curves, curve[left], t[left])
         square = (slope**2).sum(axis=1)
         step = (off[left] * slope).sum(axis=1)
         step = np.divide(step, square, out=np.zeros(len(left)), where=square > 0.0)
         step = np.clip(step, -width[left], width[left])
         tried = np.clip(t[left] - step, 0.0, 1.0)
-        there = _at(ways, course[left], tried)[0] - points[left]
+        there = _at(curves, curve[left], tried)[0] - points[left]
         nearer = (there**2).sum(axis=1) < (off[left] ** 2).sum(axis=1)
         t[left[nearer]], off[left[nearer]] = tried[nearer], there[nearer]
         width[left[~nearer]] = 0.25 * np.abs(step[~nearer])
@@ -217,11 +219,13 @@ def _nearest(ways: TargetCourses, course: NDArray[np.int64], points: Array) -> A
     return t
 
 
-def _bends(ways: TargetCourses, course: NDArray[np.int64], t0: Array, t1: Array) -> Array:
-    """(k, 3) see `Following.bends`, of segments from t0 to t1 on courses."""
-    low, _, _ = _pieces(ways, course, np.minimum(t0, t1))
-    high, _, _ = _pieces(ways, course, np.maximum(t0, t1))
-    known = np.column_stack([ways.bends, ways.turning])
+def _derivative_bounds(
+    curves: TargetCurves, curve: NDArray[np.int64], t0: Array, t1: Array
+) -> Array:
+    """(k, 3) see `Following.derivative_bounds`, of segments from t0 to t1 on courses."""
+    low, _, _ = _pieces(curves, curve, np.minimum(t0, t1))
+    high, _, _ = _pieces(curves, curve, np.maximum(t0, t1))
+    known = np.column_stack([curves.derivative_bounds, curves.curvature])
     most = known[low]
     for ahead in range(1, int((high - low).max(initial=0)) + 1):
         piece = np.minimum(low + ahead, high)
@@ -231,7 +235,7 @@ def _bends(ways: TargetCourses, course: NDArray[np.int64], t0: Array, t1: Array)
     return most
 
 
-def _strays(
+def _deviations(
     cells: Cells, standoff: float, used: NDArray[np.int64], tolerance: float
 ) -> tuple[Array, str]:
     """How far target points and directions of courses are from the surface's, and a fault.
@@ -242,37 +246,37 @@ def _strays(
     which may be nearer to them than the standoff: a thorn beside the course, another part of the
     mesh, or facets that are not square to the interpolated normal.
     """
-    courses, surface = cells.courses, cells.surface
+    curves, surface = cells.curves, cells.surface
     owner, t = _looks(cells, used, 0.5 * tolerance)
-    foot, normal = courses.at(used[owner], t)
-    feet = surface.closest(foot)
-    strays = courses.strays[used].copy()
-    np.maximum.at(strays[:, 0], owner, np.abs(feet.height))
-    np.maximum.at(strays[:, 1], owner, np.linalg.norm(normal - feet.normal, axis=1))
-    if not np.isfinite(strays).all():
-        return strays, "a course between two cells is not known"
-    if not feet.inside.all():
-        return strays, "a course between two cells leaves the surface"
-    strays[:, 0] += standoff * strays[:, 1]
-    if surface.grain > 0.0:
+    closest_point, normal = curves.at(used[owner], t)
+    closest_points = surface.closest(closest_point)
+    deviations = curves.deviations[used].copy()
+    np.maximum.at(deviations[:, 0], owner, np.abs(closest_points.height))
+    np.maximum.at(deviations[:, 1], owner, np.linalg.norm(normal - closest_points.normal, axis=1))
+    if not np.isfinite(deviations).all():
+        return deviations, "a course between two cells is not known"
+    if not closest_points.inside.all():
+        return deviations, "a course between two cells leaves the surface"
+    deviations[:, 0] += standoff * deviations[:, 1]
+    if surface.mean_edge_length > 0.0:
         found = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)
-        np.maximum.at(strays[:, 0], owner, found.off)
-        np.maximum.at(strays[:, 1], owner, found.leans)
+        np.maximum.at(deviations[:, 0], owner, found.off)
+        np.maximum.at(deviations[:, 1], owner, found.leans)
         if not found.off.max(initial=0.0) <= tolerance:
             away = found.away.min()
-            return strays, (
+            return deviations, (
                 f"on its way the tool point would come within {1e3 * away:.3g} mm of the "
                 f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something stands out "
                 "of it there, or its facets are too coarse for this standoff"
             )
-    return strays, ""
+    return deviations, ""
 
 
 def _looks(cells: Cells, used: NDArray[np.int64], apart: float) -> tuple[NDArray[np.int64], Array]:
     """Places (k,) to look at: which of the used courses, and t on it."""
-    courses = cells.courses
-    count = np.diff(courses.first)[used]
-    if cells.surface.grain > 0.0:
+    curves = cells.curves
+    count = np.diff(curves.first)[used]
+    if cells.surface.mean_edge_length > 0.0:
         ends = cells.centres[cells.pairs[used]]
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         fine = np.ceil(length / apart / len(LOOKS)).astype(np.int64)

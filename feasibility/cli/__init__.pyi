@@ -1,2 +1,1 @@
-from .main import main as main
 from .main import run as run

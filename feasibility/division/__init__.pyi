@@ -1,7 +1,7 @@
-from .divide import divide as divide
 from .division import Division as Division
 from .division import Plan as Plan
 from .division import SubPatch as SubPatch
+from .fewest_patches import divide as divide
 from .reconfiguration import Reconfiguration as Reconfiguration
-from .set_cover import set_cover as set_cover
-from .set_cover import undominated as undominated
+from .set_covering import set_cover as set_cover
+from .set_covering import undominated as undominated

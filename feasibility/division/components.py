@@ -14,8 +14,8 @@ import time
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.division.set_cover import set_cover
-from feasibility.roadmap import Explorer, root_of
+from feasibility.division.set_covering import set_cover
+from feasibility.roadmap import Exploration, root_of
 
 DRY_ROUNDS = 10  # rounds without gain after which components are taken as they are
 MOST_ROUNDS = 60
@@ -25,13 +25,13 @@ COVER_SECONDS = 2.0  # for the cover of one round, which need not be the best
 ELSEWHERE = 2  # state of a pair of cells that is not to be joined
 
 
-def table_of(explorer: Explorer) -> tuple[list[int], NDArray[np.bool_]]:
+def table_of(exploration: Exploration) -> tuple[list[int], NDArray[np.bool_]]:
     """The root components, and (K, N) the cells that each covers."""
-    roots = [r for r in explorer.roots() if explorer.roadmap.size[r] > 0]
-    return roots, explorer.roadmap.cover[roots].astype(bool)
+    roots = [r for r in exploration.roots() if exploration.roadmap.size[r] > 0]
+    return roots, exploration.roadmap.cover[roots].astype(bool)
 
 
-def gather(explorer: Explorer) -> None:
+def gather(exploration: Exploration) -> None:
     """Improve the components that the best cover uses, until some rounds in a row gain nothing.
 
     Raises:
@@ -39,52 +39,52 @@ def gather(explorer: Explorer) -> None:
     """
     dry, before = 0, (0, 0, 0)
     for _ in range(MOST_ROUNDS):
-        chosen = _chosen(explorer)
-        sizes = sum(int(explorer.roadmap.size[root]) for root in chosen)
-        standing = (int(explorer.reached.sum()), -len(chosen), sizes)
+        chosen = _chosen(exploration)
+        sizes = sum(int(exploration.roadmap.size[root]) for root in chosen)
+        standing = (int(exploration.reached.sum()), -len(chosen), sizes)
         dry = dry + 1 if standing == before else 0
         before = standing
         if len(chosen) < 2 or dry >= DRY_ROUNDS:
             return
-        _round(explorer, chosen)
-        explorer.rounds += 1
+        _round(exploration, chosen)
+        exploration.rounds += 1
 
 
-def _chosen(explorer: Explorer) -> list[int]:
+def _chosen(exploration: Exploration) -> list[int]:
     """Components of a least cover of all reached cells."""
-    roots, covers = table_of(explorer)
-    left = min(COVER_SECONDS, explorer.deadline - time.monotonic())
-    return [roots[row] for row in set_cover(covers[:, explorer.reached], left).rows]
+    roots, covers = table_of(exploration)
+    left = min(COVER_SECONDS, exploration.deadline - time.monotonic())
+    return [roots[row] for row in set_cover(covers[:, exploration.reached], left).rows]
 
 
-def _round(explorer: Explorer, chosen: list[int]) -> None:
+def _round(exploration: Exploration, chosen: list[int]) -> None:
     """Seed cells that few of the components reach, stir their borders, join where they meet."""
-    rng = explorer.rng
-    explorer.tick("looking for components that cover more")
-    counts = explorer.roadmap.cover[chosen].sum(axis=0)
-    rare = np.flatnonzero(explorer.reached & (counts < len(chosen)))
-    explorer.plant(int(rng.choice(rare)), explorer.guesses(SEEDS))
+    rng = exploration.rng
+    exploration.tick("looking for components that cover more")
+    counts = exploration.roadmap.cover[chosen].sum(axis=0)
+    rare = np.flatnonzero(exploration.reached & (counts < len(chosen)))
+    exploration.add_seeds(int(rng.choice(rare)), exploration.guesses(SEEDS))
     some = rng.permutation(chosen)[:TOP].tolist()
     for component in some:
-        explorer.tick("stirring the borders of components")
-        border = explorer.border(component)
+        exploration.tick("stirring the borders of components")
+        border = exploration.border(component)
         if len(border):
-            explorer.stir(int(rng.choice(border)))
+            exploration.explore_self_motions(int(rng.choice(border)))
     for a in range(len(some)):
         for b in range(a):
-            one, other = (int(root_of(explorer.roadmap, some[k])) for k in (a, b))
+            one, other = (int(root_of(exploration.roadmap, some[k])) for k in (a, b))
             if one == other or (len(some) > 3 and rng.random() > 0.3):
                 continue
-            explorer.tick("joining components where they meet")
-            explorer.meet(one, other)
-            shared = np.flatnonzero(explorer.covers(one) & explorer.covers(other))
+            exploration.tick("joining components where they meet")
+            exploration.bridge(one, other)
+            shared = np.flatnonzero(exploration.covers(one) & exploration.covers(other))
             if len(shared):
-                explorer.stir(int(rng.choice(shared)))
+                exploration.explore_self_motions(int(rng.choice(shared)))
 
 
-def tie(explorer: Explorer, component: int, wanted: NDArray[np.bool_]) -> None:
+def tie(exploration: Exploration, component: int, wanted: NDArray[np.bool_]) -> None:
     """Look for a motion of a component between every two neighbouring cells that are wanted."""
-    pairs = explorer.cells.pairs
+    pairs = exploration.cells.pairs
     state = np.zeros(len(pairs) + 1, dtype=np.int64)
     state[:-1][~wanted[pairs].all(axis=1)] = ELSEWHERE
-    explorer.join(state, component)
+    exploration.join(state, component)

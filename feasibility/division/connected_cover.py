@@ -27,7 +27,7 @@ from feasibility.division.connected_labels import (
     pieces_of,
 )
 from feasibility.division.separator_cuts import fewest_labels
-from feasibility.division.set_cover import set_cover, undominated
+from feasibility.division.set_covering import set_cover, undominated
 
 OTHER_COVERS = 40  # other choices of regions that patches are grown of
 

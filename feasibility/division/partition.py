@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from feasibility.division.connected_cover import connected_cover
 from feasibility.division.connected_labels import Bools, Ints, Labels, pieces_of
-from feasibility.division.set_cover import set_cover
+from feasibility.division.set_covering import set_cover
 
 TIME_LIMIT = 10.0  # [s]
 

@@ -19,7 +19,7 @@ from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.partition import Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
-from feasibility.roadmap import Explorer, Links, links_of, patch_walk
+from feasibility.roadmap import Exploration, Links, links_of, patch_walk
 from feasibility.task import Task
 from feasibility.verdict import Walk
 
@@ -41,18 +41,20 @@ class _Option:
     """Their configurations."""
 
 
-def plans(explorer: Explorer, task: Task) -> tuple[Plan, Plan]:
+def plans(exploration: Exploration, task: Task) -> tuple[Plan, Plan]:
     """The plan with the fewest motions, and the one with connected patches (maybe the same)."""
-    roots, covers = table_of(explorer)
-    cover = fewest_patches(covers, np.ones(len(explorer.cells), dtype=bool), explorer.cells.pairs)
-    fewest = plan_of(explorer, task, cover.fewest, roots, covers)
+    roots, covers = table_of(exploration)
+    cover = fewest_patches(
+        covers, np.ones(len(exploration.cells), dtype=bool), exploration.cells.pairs
+    )
+    fewest = plan_of(exploration, task, cover.fewest, roots, covers)
     if cover.connected is cover.fewest:
         return fewest, fewest
-    return fewest, plan_of(explorer, task, cover.connected, roots, covers)
+    return fewest, plan_of(exploration, task, cover.connected, roots, covers)
 
 
 def plan_of(
-    explorer: Explorer,
+    exploration: Exploration,
     task: Task,
     partition: Partition,
     roots: list[int],
@@ -67,11 +69,11 @@ def plan_of(
         roots: the K components that `partition.rows` counts.
         covers: (K, N) the cells that each covers.
     """
-    robot, cells = explorer.robot, explorer.cells
+    robot, cells = exploration.robot, exploration.cells
     if len(partition) == 0:
         return Plan((), (), partition.bound)
     wanted = [partition.patch == p for p in range(len(partition))]
-    chosen = itinerary(robot, _choices(explorer, wanted, roots, covers))
+    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers))
     patches = []
     for p, walk in zip(chosen.order, chosen.walks, strict=True):
         mine = wanted[p]
@@ -90,7 +92,7 @@ def plan_of(
 
 
 def _choices(
-    explorer: Explorer,
+    exploration: Exploration,
     wanted: Sequence[NDArray[np.bool_]],
     roots: list[int],
     covers: NDArray[np.bool_],
@@ -102,8 +104,8 @@ def _choices(
         most = MOST_COMPONENTS if len(wanted) > 1 else 1
         fitting.append([roots[row] for row in rows[:most].tolist()])
         for component in fitting[-1]:
-            tie(explorer, component, mine)
-    roadmap = explorer.roadmap
+            tie(exploration, component, mine)
+    roadmap = exploration.roadmap
     links = {root: links_of(roadmap, root) for root in {r for own in fitting for r in own}}
     options = []
     for p, (mine, own) in enumerate(zip(wanted, fitting, strict=True)):

@@ -33,7 +33,7 @@ from feasibility.division.connected_labels import (
     neighbours_of,
     pieces_of,
 )
-from feasibility.division.set_cover import lower_bound
+from feasibility.division.set_covering import lower_bound
 
 MOST_CUTS = 8  # nodes of one stray piece that get a constraint each
 OPTIMAL, INFEASIBLE = 0, 2  # words of scipy.optimize.milp
@@ -109,18 +109,18 @@ class _Programme:
 
     def cut(self, label: Ints, roots: Bools) -> int:
         """Add what the labels (n,) violate; returns the number of pieces without a root."""
-        stray = 0
+        deviation = 0
         piece = pieces_of(label, self.links)
         for k in range(int(piece.max()) + 1):
             inside = np.flatnonzero(piece == k)
             own = int(label[inside[0]])
             if roots[own, inside].any():
                 continue
-            stray += 1
+            deviation += 1
             certain = inside[self.fixed[self.at[own, inside]] == 1.0]
             heads = certain[:1] if len(certain) else inside[:: 1 + len(inside) // MOST_CUTS]
             self.separate(own, set(inside.tolist()), heads.tolist(), label == own)
-        return stray
+        return deviation
 
 
 def fewest_labels(regions: Bools, pairs: Ints, known: Labels, deadline: float) -> Labels:

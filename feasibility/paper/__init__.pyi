@@ -1,2 +1,2 @@
-from .greedy_check import greedy_check as greedy_check
-from .tree_walk import tree_walk as tree_walk
+from .greedy_search import greedy_check as greedy_check
+from .tree_motion import tree_walk as tree_walk

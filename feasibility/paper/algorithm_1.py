@@ -130,7 +130,7 @@ def _inside(lowest, highest, offsets, delta):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
+def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
     """Go on with a call of Algorithm 1 for at most `budget` more neighbours.
 
     Leaves counters[STATE] at FOUND (the stack and the last node are the path), EXHAUSTED (no
@@ -138,7 +138,7 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
     FULL (enlarge the memory, and call again).
 
     Args:
-        chain, chart, grid: a `Chain`, a `Chart` and a `Grid`.
+        chain, chart, grid: a `Chain`, a `PatchKernel` and a `Grid`.
         target, target_cell: (3,) p_T, m, and the flat index of ec_T.
         budget, cap: neighbours to look at now, and J-cells that the whole call may check.
         memory: a `Memory`, started by `begin_search`.
@@ -181,7 +181,7 @@ def extend_search(chain, chart, grid, target, target_cell, budget, cap, memory):
                 counters[PLACED] += top + 1 - placed
                 placed = top + 1
             move_tool(prismatic, step, sine, cosine, base, delta, held, partial)
-            cell = cell_of(chart, height, tolerance, cone_cosine, tool)
+            cell = cell_of(patch_kernel, height, tolerance, cone_cosine, tool)
             if cell == target_cell:
                 state = FOUND
                 break

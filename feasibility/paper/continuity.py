@@ -95,10 +95,10 @@ class JSpace:
         if origin.shape != (robot.n,) or not np.isfinite(origin).all():
             raise ValueError(f"start must be {robot.n} finite joint values, got {origin.tolist()}")
         self.start = origin
-        self.steps = Steps.of(robot, cells.charted, task, search) if steps is None else steps
+        self.steps = Steps.of(robot, cells.closed_form, task, search) if steps is None else steps
         size = self.steps.size
         self._chain = Chain.checked(robot) if chain is None else chain
-        self._chart = cells.chart
+        self._patch_kernel = cells.patch_kernel
         self._points = task.targets(cells).points
         cap = search.cap or round(CAP * max(1.0, CAP_STEP_DEG / search.step_deg))
         self._cap = min(cap, MOST_JCELLS)
@@ -123,7 +123,7 @@ class JSpace:
         target = np.zeros(3)
         jcells.begin_search(self._chain, self._grid, here, target, self._memory)
         jcells.extend_search(
-            self._chain, self._chart, self._grid, target, 0, 0, self._cap, self._memory
+            self._chain, self._patch_kernel, self._grid, target, 0, 0, self._cap, self._memory
         )
 
     def q(self, jcells: ArrayLike) -> NDArray[np.float64]:
@@ -138,7 +138,7 @@ class JSpace:
         tool = np.empty(6)
         place_tool(self._chain, self._grid, offsets, tool)
         grid = self._grid
-        return int(cell_of(self._chart, grid.height, grid.tolerance, grid.cone_cosine, tool))
+        return int(cell_of(self._patch_kernel, grid.height, grid.tolerance, grid.cone_cosine, tool))
 
     def continuity(
         self, jcell: ArrayLike, target_cell: int, deadline: float = math.inf
@@ -155,7 +155,7 @@ class JSpace:
         jcells.begin_search(self._chain, self._grid, offsets, target, self._memory)
         while True:
             jcells.extend_search(
-                self._chain, self._chart, self._grid, target, target_cell, BUDGET, self._cap,
+                self._chain, self._patch_kernel, self._grid, target, target_cell, BUDGET, self._cap,
                 self._memory,
             )  # fmt: skip
             state = self._memory.counters[jcells.STATE]

@@ -22,7 +22,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from robots import frames
-from surfaces.patches import cell_at, foot
+from surfaces.patches import cell_at, closest_on_patch
 
 HAIR = 1e-12  # [m], [1]: asked beyond the task, so that another rounding of the same q agrees
 
@@ -113,25 +113,25 @@ def _turn(x, y, z, vx, vy, vz, sine, cosine):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def cell_of(chart, height, tolerance, cosine, tool):  # type: ignore[no-untyped-def]
+def cell_of(patch_kernel, height, tolerance, cosine, tool):  # type: ignore[no-untyped-def]
     """E-cell of a tool point and axis (6,) that satisfy the task constraints; -1 where they do not.
 
     The paper's eqs. (5) and (7), with a tolerance, and with the angle of its prose: a.b >= cos.
 
     Args:
-        chart: a `Chart`.
+        chart: a `PatchKernel`.
         height: m, signed height of the tool point over the surface; of a `Grid`, as the next two.
         tolerance: m.
         cosine: least cosine of the angle between axis and approach direction.
         tool: (6,) tool point and axis.
     """
-    side = chart.side_sign
-    u, v, over, nx, ny, nz = foot(chart, tool[0], tool[1], tool[2])
+    side = patch_kernel.side_sign
+    u, v, over, nx, ny, nz = closest_on_patch(patch_kernel, tool[0], tool[1], tool[2])
     if not abs(over - height) <= tolerance - HAIR:
         return -1
     if not -side * (tool[3] * nx + tool[4] * ny + tool[5] * nz) >= cosine + HAIR:
         return -1
-    return cell_at(chart, u, v)
+    return cell_at(patch_kernel, u, v)
 
 
 @njit(cache=True, error_model="numpy")

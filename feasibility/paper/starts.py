@@ -130,10 +130,10 @@ class Fibre:
             size = np.abs(along).max(initial=0.0)
             if size < 1e-2 * CLOSE:
                 break
-            landed = self.project(q + along * min(1.0, STRIDE / size), align, steps=8)
-            if landed is None or not (np.linalg.norm(goal - landed) < np.linalg.norm(pull)):
+            projected = self.project(q + along * min(1.0, STRIDE / size), align, steps=8)
+            if projected is None or not (np.linalg.norm(goal - projected) < np.linalg.norm(pull)):
                 break
-            q = landed
+            q = projected
         return q
 
     def settle(self, q: NDArray[np.float64], align: bool) -> NDArray[np.float64]:

@@ -77,12 +77,12 @@ def replay(
         faults.append(f"a joint passes its limit by {-margin:.3g}")
 
     points, axes = tool_poses(robot, q)
-    foot = cells.surface.closest(points)
+    closest_point = cells.surface.closest(points)
     sign = cells.surface.side_sign
-    error = np.abs(foot.height - sign * task.standoff).max(initial=0.0) + steps.sag
-    chord = np.linalg.norm(axes + sign * foot.normal, axis=1).max(initial=0.0) + steps.turn
+    error = np.abs(closest_point.height - sign * task.standoff).max(initial=0.0) + steps.sag
+    chord = np.linalg.norm(axes + sign * closest_point.normal, axis=1).max(initial=0.0) + steps.turn
     angle = 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
-    if not foot.inside.all():
+    if not closest_point.inside.all():
         faults.append("the tool point leaves the patch")
     if not error <= steps.tolerance:
         faults.append(f"the tool point strays {error:.3g} m, beyond {steps.tolerance:.3g} m")
@@ -90,8 +90,8 @@ def replay(
         faults.append(f"the tool axis tilts {np.degrees(angle):.4f} degrees out of the cone")
 
     within = Borders(cells)
-    begins = within(foot.u[first], foot.v[first], [path.cell for path in paths])
-    ends = within(foot.u[last], foot.v[last], [path.neighbour for path in paths])
+    begins = within(closest_point.u[first], closest_point.v[first], [path.cell for path in paths])
+    ends = within(closest_point.u[last], closest_point.v[last], [path.neighbour for path in paths])
     if not begins.all() or not ends.all():
         faults.append("a path does not begin or end in the cell it claims")
     if not _continuous(paths):

@@ -1,5 +1,5 @@
-from .coverage_path import CoveragePath as CoveragePath
-from .coverage_path import coverage_path as coverage_path
+from .coverage import CoveragePath as CoveragePath
+from .coverage import coverage_path as coverage_path
 from .metrics import PathFigures as PathFigures
 from .order import Order as Order
 from .order import PathError as PathError

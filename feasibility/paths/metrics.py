@@ -83,8 +83,8 @@ def figures_of(
     """
     along, owner = _denser(walk.q)
     points = placements(robot, along).points
-    foot = cells.surface.closest(points)
-    places = points - foot.height[:, None] * foot.normal
+    closest_point = cells.surface.closest(points)
+    places = points - closest_point.height[:, None] * closest_point.normal
     way = np.linalg.norm(np.diff(places, axis=0), axis=1)
     margins = np.minimum(walk.q - robot.lower, robot.upper - walk.q)
     turns, slides = margins[:, ~robot.prismatic], margins[:, robot.prismatic]

@@ -1,8 +1,8 @@
 from .map import PlacementMap as PlacementMap
 from .map import map_around_best as map_around_best
-from .place import COUNT as COUNT
-from .place import Placements as Placements
-from .place import place as place
+from .placements import COUNT as COUNT
+from .placements import Placements as Placements
+from .placements import place as place
 from .refinement import Judge as Judge
 from .region import AXES as AXES
 from .region import Array as Array

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.placement.place import Placements
+from feasibility.placement.placements import Placements
 from feasibility.placement.refinement import BATCH, Judge
 from feasibility.placement.region import AXES, Array, PlacementError, Pose, Region
 from feasibility.placement.trial import Stage

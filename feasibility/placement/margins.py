@@ -16,21 +16,21 @@ from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
 from feasibility.roadmap import (
+    CONE_SLACK,
     HERE,
     NEWTON_STEPS,
     NEXT,
     NODES,
-    RIM_SLACK,
-    Explorer,
+    Exploration,
     accept,
     copy_slot,
-    correct,
     linearise,
     look_at,
+    margin_objective,
     place,
+    project,
     root_of,
     segment_holds,
-    wish_for_room,
 )
 
 NARROW = 0.1  # [1] of the cone: no axis is led further inside
@@ -47,7 +47,7 @@ def _room_at(problem, work, q, out):  # type: ignore[no-untyped-def]
         half = 0.5 * (problem.upper[j] - problem.lower[j])
         if half > 0.0 and half < np.inf:
             out[0] = min(out[0], 1.0 - abs((q[j] - problem.lower[j]) / half - 1.0))
-    out[1] = max(0.0, 1.0 - work.error[0, 1] / problem.rim)
+    out[1] = max(0.0, 1.0 - work.error[0, 1] / problem.cone_chord)
 
 
 @kernel
@@ -65,12 +65,12 @@ def _make_room(problem, aimed, work, target, approach, q, best):  # type: ignore
     size, stale = 0.3, 0
     for _ in range(ROOM_STEPS):
         copy_slot(work)
-        linearise(problem, work, NEXT, problem.rim)
-        wish_for_room(problem, work, q, size)
+        linearise(problem, work, NEXT, problem.cone_chord)
+        margin_objective(problem, work, q, size)
         for j in range(n):
             work.trial[j] = q[j]
-        slack = RIM_SLACK * size / 0.3
-        good = correct(aimed, work, work.trial, slack, work.error[1, 1], NEWTON_STEPS)
+        slack = CONE_SLACK * size / 0.3
+        good = project(aimed, work, work.trial, slack, work.error[1, 1], NEWTON_STEPS)
         if good:
             position, cone = segment_holds(problem, work, q, work.trial)
             good = position <= 1.0 and cone <= 1.0
@@ -90,17 +90,19 @@ def _make_room(problem, aimed, work, target, approach, q, best):  # type: ignore
             return
 
 
-def least_room(explorer: Explorer) -> NDArray[np.float64]:
+def least_room(exploration: Exploration) -> NDArray[np.float64]:
     """(2,) shares of limits and of cone that the best component leaves over every cell."""
-    problem, roadmap, work = explorer.problem, explorer.roadmap, explorer.work
+    problem, roadmap, work = exploration.problem, exploration.roadmap, exploration.work
     # Steps over a centre head for a cone that is next to nothing, and keep to the task's.
-    aimed = problem._replace(rim=NARROW * problem.rim if problem.rim < np.inf else np.inf)
+    aimed = problem._replace(
+        cone_chord=NARROW * problem.cone_chord if problem.cone_chord < np.inf else np.inf
+    )
     room = np.empty(2)
-    best = np.full((len(explorer.cells), 2), -1.0)  # limits and cone, of the roomiest so far
-    settled = np.zeros(len(explorer.cells), dtype=np.int64)
+    best = np.full((len(exploration.cells), 2), -1.0)  # limits and cone, of the roomiest so far
+    settled = np.zeros(len(exploration.cells), dtype=np.int64)
     for x in range(int(roadmap.counters[NODES])):
         cell = int(roadmap.cell[x])
-        if root_of(roadmap, roadmap.component[x]) != explorer.best:
+        if root_of(roadmap, roadmap.component[x]) != exploration.best:
             continue
         if settled[cell] == MOST_SETTLED:
             continue

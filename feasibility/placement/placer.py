@@ -18,7 +18,7 @@ from feasibility.placement.quick_search import MOST_COVERS, covers_of, probe, sk
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
 from feasibility.placement.trial import Margins, Stage, Trial
-from feasibility.roadmap import Explorer, Problem, cause_counts, problem_of
+from feasibility.roadmap import Exploration, Problem, cause_counts, problem_of
 from feasibility.search import Search
 from feasibility.task import Task
 from robots import Robot
@@ -63,22 +63,22 @@ class Placer:
         in_reach = float(self.reach.share(pose.values[None])[0])
         if early and distances.max() > self.reach.reach + self.reach.tolerance:
             return Trial(pose, Stage.BOUND, in_reach)
-        explorer = Explorer(self.robot, self.cells, self.problem_at(pose), self.search.seed)
-        probed = self._searched(explorer, distances, early)
+        exploration = Exploration(self.robot, self.cells, self.problem_at(pose), self.search.seed)
+        probed = self._searched(exploration, distances, early)
         if probed < 1.0:
-            fk = int(explorer.work.counts[0])
+            fk = int(exploration.work.counts[0])
             return Trial(pose, Stage.PROBE, in_reach, probed, fk=fk)
-        return replace(self.trial_of(explorer, pose, in_reach, probed), early=early)
+        return replace(self.trial_of(exploration, pose, in_reach, probed), early=early)
 
-    def _searched(self, explorer: Explorer, distances: Array, early: bool) -> float:
+    def _searched(self, exploration: Exploration, distances: Array, early: bool) -> float:
         """Probe and search; returns the share of probed cells that were reached."""
         if early:
             ends = [int(distances.argmax()), int(distances.argmin())]
             some = np.array(list(dict.fromkeys([*ends, *self.probes])), dtype=np.int64)
-            hits = probe(explorer, some)
+            hits = probe(exploration, some)
             if not hits.all():
                 return float(hits.mean())
-        skim(explorer, early)
+        skim(exploration, early)
         return 1.0
 
     def replayed(self, trial: Trial, component: int) -> str:
@@ -94,18 +94,18 @@ class Placer:
         cells = moved_cells(self.cells, trial.pose)
         if trial.stage is Stage.CHECK:
             problem = problem_of(self.robot, cells, self.task)
-            explorer = Explorer(self.robot, cells, problem, self.search.seed)
-            explore(explorer)
+            exploration = Exploration(self.robot, cells, problem, self.search.seed)
+            explore(exploration)
         else:
             problem = self.problem_at(trial.pose)
-            explorer = Explorer(self.robot, self.cells, problem, self.search.seed)
+            exploration = Exploration(self.robot, self.cells, problem, self.search.seed)
             distances = self.reach.distances(trial.pose.values[None])[0]
-            self._searched(explorer, distances, trial.early)
+            self._searched(exploration, distances, trial.early)
         cover = trial.covers[component]
-        for root in explorer.roots():
-            if (explorer.covers(root) >= cover).all():
-                walk = covering_walk(explorer.roadmap, root)
-                told = replay(self.robot, cells, self.task, walk, explorer.covers(root))
+        for root in exploration.roots():
+            if (exploration.covers(root) >= cover).all():
+                walk = covering_walk(exploration.roadmap, root)
+                told = replay(self.robot, cells, self.task, walk, exploration.covers(root))
                 return "" if told.accepted else told.refusal
         return "the search did not find this motion again"
 
@@ -147,19 +147,21 @@ class Placer:
         from feasibility.roadmap import explore
 
         problem = problem_of(self.robot, cells, self.task)
-        explorer = Explorer(self.robot, cells, problem, self.search.seed)
-        explore(explorer)
-        return self.trial_of(explorer, pose, 1.0, 1.0)
+        exploration = Exploration(self.robot, cells, problem, self.search.seed)
+        explore(exploration)
+        return self.trial_of(exploration, pose, 1.0, 1.0)
 
     def share_of(self, cover: NDArray[np.bool_]) -> float:
         """Share of the area that some cells (N,) have."""
         areas = self.cells.areas
         return 1.0 if cover.all() else float(areas[cover].sum() / areas.sum())
 
-    def trial_of(self, explorer: Explorer, pose: Pose, in_reach: float, probed: float) -> Trial:
+    def trial_of(
+        self, exploration: Exploration, pose: Pose, in_reach: float, probed: float
+    ) -> Trial:
         """What a search found."""
-        covers = covers_of(explorer)
-        margins = self._margins(explorer, pose) if explorer.complete else None
+        covers = covers_of(exploration)
+        margins = self._margins(exploration, pose) if exploration.complete else None
         return Trial(
             pose=pose,
             stage=Stage.SEARCH,
@@ -168,10 +170,10 @@ class Placer:
             share=self.share_of(covers[0]) if len(covers) else 0.0,
             margins=margins,
             covers=covers,
-            fk=int(explorer.work.counts[0]),
+            fk=int(exploration.work.counts[0]),
         )
 
-    def _margins(self, explorer: Explorer, pose: Pose) -> Margins:
+    def _margins(self, exploration: Exploration, pose: Pose) -> Margins:
         """The room that the component which covers every cell leaves."""
-        limits, cone = least_room(explorer).tolist()
+        limits, cone = least_room(exploration).tolist()
         return Margins(limits, cone, max(0.0, min(1.0, self.reach.slack(pose.values))))

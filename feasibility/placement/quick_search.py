@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
 from feasibility.division import undominated
-from feasibility.roadmap import LANDING_STEPS, Explorer, land, roomy
+from feasibility.roadmap import PROJECTION_STEPS, Exploration, margin_shares, project_onto_cell
 from surfaces import Cells
 
 PROBES = 8  # cells that represent the surface, besides the furthest and the nearest
@@ -32,46 +32,48 @@ def _probe(problem, work, cells, guesses, hits):  # type: ignore[no-untyped-def]
                 put(q, last)
             else:
                 put(q, guesses[g])
-            if land(problem, work, cells[k], q, LANDING_STEPS):
+            if project_onto_cell(problem, work, cells[k], q, PROJECTION_STEPS):
                 put(last, q)
                 known = True
                 hits[k] = 1
                 break
 
 
-def probe(explorer: Explorer, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+def probe(exploration: Exploration, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(k,) whether Newton's method finds a configuration over some cells (k,)."""
     hits = np.zeros(len(cells), dtype=np.int64)
-    _probe(explorer.problem, explorer.work, cells, explorer.guesses(STARTS), hits)
+    _probe(exploration.problem, exploration.work, cells, exploration.guesses(STARTS), hits)
     return hits.astype(bool)
 
 
-def skim(explorer: Explorer, early: bool) -> None:
+def skim(exploration: Exploration, early: bool) -> None:
     """A short search: the middle cell, some that it leaves unreached, some stirring at borders.
 
     With `early` it ends at a cell over which nothing is found: no motion will cover that one.
     """
-    pivot = explorer.cells.middle
-    guesses = explorer.guesses(PIVOT_SEEDS)
-    room = roomy(explorer.problem, explorer.work, pivot, guesses)
+    pivot = exploration.cells.middle
+    guesses = exploration.guesses(PIVOT_SEEDS)
+    room = margin_shares(exploration.problem, exploration.work, pivot, guesses)
     for k in np.argsort(-room, kind="stable"):
         if room[k] >= 0.0:
-            explorer.plant(pivot, guesses[k : k + 1])
-        if explorer.complete:
+            exploration.add_seeds(pivot, guesses[k : k + 1])
+        if exploration.complete:
             return
     for _ in range(MORE_CELLS):
-        missed = np.flatnonzero(~explorer.covered)
-        lost = missed[~explorer.reached[missed]]
+        missed = np.flatnonzero(~exploration.covered)
+        lost = missed[~exploration.reached[missed]]
         some = lost if len(lost) else missed
-        found = explorer.plant(int(explorer.rng.choice(some)), explorer.guesses(STARTS))
-        if explorer.complete or (early and len(lost) and not found):
+        found = exploration.add_seeds(
+            int(exploration.rng.choice(some)), exploration.guesses(STARTS)
+        )
+        if exploration.complete or (early and len(lost) and not found):
             return
     for _ in range(STIRS):
-        for root in explorer.roots()[:2]:
-            border = explorer.border(root)
+        for root in exploration.roots()[:2]:
+            border = exploration.border(root)
             if len(border):
-                explorer.stir(int(explorer.rng.choice(border)))
-            if explorer.complete:
+                exploration.explore_self_motions(int(exploration.rng.choice(border)))
+            if exploration.complete:
                 return
 
 
@@ -87,8 +89,8 @@ def spread_cells(cells: Cells) -> list[int]:
     return chosen
 
 
-def covers_of(explorer: Explorer) -> NDArray[np.bool_]:
+def covers_of(exploration: Exploration) -> NDArray[np.bool_]:
     """(K, N) the largest components, none inside another, the best first."""
-    roots = [root for root in explorer.roots() if explorer.roadmap.size[root] > 0]
-    covers = explorer.roadmap.cover[roots[: 4 * MOST_COVERS]].astype(bool)
+    roots = [root for root in exploration.roots() if exploration.roadmap.size[root] > 0]
+    covers = exploration.roadmap.cover[roots[: 4 * MOST_COVERS]].astype(bool)
     return np.asarray(covers[undominated(covers)][:MOST_COVERS])

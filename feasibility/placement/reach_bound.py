@@ -63,7 +63,7 @@ class Reach:
             areas=np.array(cells.areas),
             origin=np.array(robot.model.jointPlacements[1].translation),
             reach=robot.reach,
-            tolerance=task.leeway,
+            tolerance=task.effective_tolerance,
         )
 
     def distances(self, values: Array) -> Array:

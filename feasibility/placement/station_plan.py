@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from feasibility.placement.place import COUNT, Placements
+from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.placer import Placer
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.refinement import BATCH, Judge

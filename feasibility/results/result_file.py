@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.cases import CHARTED, Case, CaseError, shown
+from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, shown
 from feasibility.results.archive import Archive, ArchiveError, write_archive
 from feasibility.results.result_fields import Fields
 from feasibility.results.result_graph import pack_graph, ragged, unpack_graph, unpack_ragged
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from robots import Robot
 
 FORMAT = "coverable-result"
-FORMAT_VERSION = 2  # 1 had no `places`, and the kinds `CHARTED` alone
+FORMAT_VERSION = 2  # 1 had no `places`, and the kinds `CLOSED_FORM_KINDS` alone
 
 
 class ResultError(ValueError):
@@ -129,7 +129,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         case = _case(fields.table("case"), archive)
         setup = case.build()
         check_robot(setup.robot, fields.table("robot"), archive)
-        if found > 1 or case.surface.kind not in CHARTED:
+        if found > 1 or case.surface.kind not in CLOSED_FORM_KINDS:
             check_cells(setup.cells, case.surface.label, archive)
         verdict = _verdict(fields, archive, setup.robot, setup.cells)
     except CaseError as error:

@@ -201,17 +201,17 @@ def _shrink(problem, work, low, high, longest, lever, sine, directions):  # type
             half[j] = 0.5 * (high[j] - low[j])
         place(problem, work, NEXT, q)
         distance, chord = work.error[1, 0], work.error[1, 1]
-        if distance <= problem.tolerance and chord <= problem.rim:
+        if distance <= problem.tolerance and chord <= problem.cone_chord:
             return 2, by_point
         first, second, first_axis, second_axis = _reach_of_box(
             problem, work, half, longest, lever, sine
         )
         near = problem.tolerance + min(first, second) + ROUNDING
-        narrow = problem.rim + min(first_axis, second_axis) + ROUNDING
+        narrow = problem.cone_chord + min(first_axis, second_axis) + ROUNDING
         by_point = distance / near > chord / narrow
         if (
             distance > problem.tolerance + first + ROUNDING
-            or chord > problem.rim + first_axis + ROUNDING
+            or chord > problem.cone_chord + first_axis + ROUNDING
         ):
             return 1, by_point
         # The second order is of use only where it beats the first.

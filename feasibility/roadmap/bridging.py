@@ -13,14 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.expansion import CONNECT_STEPS
-from feasibility.roadmap.graph import NODES, WAYS, Roadmap, add_edge, root_of, unite
+from feasibility.roadmap.graph import NODES, WAYPOINTS, Roadmap, add_edge, root_of, unite
 from feasibility.roadmap.problem import Problem, Work, aim
 from feasibility.roadmap.self_motion import connect
 from feasibility.roadmap.tracking import MOST_STEPS, track
 
 NARROWEST, WIDEST = 0.1, 0.9  # [1] share of the way between two centres where a meeting is tried
 Room = Callable[[int], Roadmap]
-"""Makes sure that so many rows of `ways` and an edge fit, and returns the roadmap."""
+"""Makes sure that so many rows of `waypoints` and an edge fit, and returns the roadmap."""
 
 
 def nearest_pairs(
@@ -49,8 +49,8 @@ def nearest_pairs(
     return np.column_stack([x, y])[np.argsort(distance, kind="stable")]
 
 
-def meet(
-    problem: Problem, work: Work, room: Room, x: int, y: int, course: int, share: float
+def bridge(
+    problem: Problem, work: Work, room: Room, x: int, y: int, curve: int, share: float
 ) -> bool:
     """Try to join two nodes over neighbouring cells at a place between their centres.
 
@@ -67,26 +67,26 @@ def meet(
         True when an edge was added and the components are one now.
     """
     roadmap = room(0)
-    aim(problem, work, course, share)
+    aim(problem, work, curve, share)
     place, approach = work.target[0].copy(), work.target[1].copy()
     starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)
-    ways, ends = [], []
+    waypoints, ends = [], []
     for node, start in ((x, starts[0]), (y, starts[1])):
         q = roadmap.q[node].copy()
         rows = np.empty((MOST_STEPS + 1, len(q)))
-        count = track(problem, work, course, start, share, q, q, False, rows, 0)
+        count = track(problem, work, curve, start, share, q, q, False, rows, 0)
         if count < 0:
             return False
-        ways.append(rows[:count])
+        waypoints.append(rows[:count])
         ends.append(q)
     turn = _self_motion(problem, work, place, approach, ends)
     if turn is None:
         return False
     # From x to the place, the self-motion, and back along the way from y.
-    motion = np.vstack([ways[0], turn, ways[1][-2::-1], roadmap.q[y][None]])
+    motion = np.vstack([waypoints[0], turn, waypoints[1][-2::-1], roadmap.q[y][None]])
     roadmap = room(len(motion))
-    first = roadmap.counters[WAYS]
-    roadmap.ways[first : first + len(motion)] = motion
+    first = roadmap.counters[WAYPOINTS]
+    roadmap.waypoints[first : first + len(motion)] = motion
     add_edge(roadmap, x, y, len(motion))
     unite(roadmap, roadmap.component[x], roadmap.component[y])
     return True

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from feasibility.compiled import kernel, put
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.expansion import CONNECT_STEPS
-from feasibility.roadmap.exploration import Explorer
+from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import root_of
 from feasibility.roadmap.problem import (
     CONE,
@@ -37,7 +37,7 @@ from feasibility.roadmap.problem import (
     look_at,
     place,
 )
-from feasibility.roadmap.projection import LANDING_STEPS, cholesky_solve, land
+from feasibility.roadmap.projection import PROJECTION_STEPS, cholesky_solve, project_onto_cell
 from feasibility.roadmap.search import evenly
 from feasibility.roadmap.self_motion import connect
 from feasibility.verdict import Cause, CauseKind
@@ -58,7 +58,7 @@ def _solve(
     found = 0
     for guess in guesses:
         solutions[found] = guess
-        if land(problem, work, cell, solutions[found], LANDING_STEPS):
+        if project_onto_cell(problem, work, cell, solutions[found], PROJECTION_STEPS):
             found += 1
             if found == len(solutions):
                 break
@@ -118,9 +118,9 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
     return best
 
 
-def _within(problem: Problem, rim: float) -> Problem:
+def _within(problem: Problem, cone_chord: float) -> Problem:
     """The same problem with another cone, asked at one cell's centre: nothing strays there."""
-    return problem._replace(rim=rim, inner_rim=rim)
+    return problem._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord)
 
 
 def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -135,17 +135,19 @@ def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _nearest_to_limits(
-    explorer: Explorer, relaxed: Problem, cell: int, solutions: NDArray[np.float64]
+    exploration: Exploration, relaxed: Problem, cell: int, solutions: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(n,) the configuration over a cell that passes the limits least, among what is found."""
-    robot = explorer.robot
-    ways = np.empty((64, robot.n))
+    robot = exploration.robot
+    waypoints = np.empty((64, robot.n))
     target, approach = relaxed.points[cell], relaxed.approaches[cell]
     best, least = solutions[0], np.inf
     for q in solutions:
         here = _wrapped(robot, q)
         goal = np.clip(here, robot.lower, robot.upper)
-        connect(relaxed, explorer.work, target, approach, here, goal, ways, 0, CONNECT_STEPS)
+        connect(
+            relaxed, exploration.work, target, approach, here, goal, waypoints, 0, CONNECT_STEPS
+        )
         here = _wrapped(robot, here)
         past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
         if past < least:
@@ -153,23 +155,23 @@ def _nearest_to_limits(
     return best
 
 
-def _one(explorer: Explorer) -> NDArray[np.float64]:
+def _one(exploration: Exploration) -> NDArray[np.float64]:
     """Room for one solution."""
-    return np.empty((1, explorer.robot.n))
+    return np.empty((1, exploration.robot.n))
 
 
-def _smallest_angle(explorer: Explorer, relaxed: Problem, cell: int) -> float:
+def _smallest_angle(exploration: Exploration, relaxed: Problem, cell: int) -> float:
     """Smallest angle (rad) between tool axis and approach direction with the point reached."""
-    kinematics, approach = Kinematics(explorer.robot), relaxed.approaches[cell]
-    found = np.empty((STARTS, explorer.robot.n))
-    count = _solve(relaxed, explorer.work, cell, explorer.guesses(2 * STARTS), found)
+    kinematics, approach = Kinematics(exploration.robot), relaxed.approaches[cell]
+    found = np.empty((STARTS, exploration.robot.n))
+    count = _solve(relaxed, exploration.work, cell, exploration.guesses(2 * STARTS), found)
     chords = [float(np.linalg.norm(kinematics.tool(q)[1] - approach)) for q in found[:count]]
     low, high = 0.0, 2.0 * np.arcsin(min(0.5 * min(chords, default=2.0), 1.0))
     # Bisect on the cone: is there a configuration inside a narrower one?
     for _ in range(9):
         middle = 0.5 * (low + high)
         narrowed = _within(relaxed, 2.0 * np.sin(0.5 * middle))
-        if _solve(narrowed, explorer.work, cell, explorer.guesses(STARTS), _one(explorer)):
+        if _solve(narrowed, exploration.work, cell, exploration.guesses(STARTS), _one(exploration)):
             high = middle
         else:
             low = middle
@@ -203,7 +205,7 @@ def decimals(value: float, bound: float, least: int) -> int:
     return MOST_DECIMALS
 
 
-def diagnose(explorer: Explorer, cell: int) -> Cause:
+def diagnose(exploration: Exploration, cell: int) -> Cause:
     """Why nothing reaches a cell.
 
     The questions are asked with the tool point at its target, as the search asks them. A proof
@@ -216,30 +218,31 @@ def diagnose(explorer: Explorer, cell: int) -> Cause:
     Returns:
         The cause; proved where branch and bound or the reach bound ruled the cell out.
     """
-    cause = _cause(explorer, cell)
+    cause = _cause(exploration, cell)
     told = cause.proved or cause.kind is CauseKind.DISCONNECTED
-    if told or not explorer.problem.rim > 0.0:
+    if told or not exploration.problem.cone_chord > 0.0:
         return cause
     return replace(cause, detail=f"{cause.detail}; {UNPROVED}")
 
 
-def _cause(explorer: Explorer, cell: int) -> Cause:
+def _cause(exploration: Exploration, cell: int) -> Cause:
     """The same without a word on what was not proved."""
-    problem, robot, work = explorer.problem, explorer.robot, explorer.work
-    proved = explorer.rulings.get(cell) is Ruling.PROVED
+    problem, robot, work = exploration.problem, exploration.robot, exploration.work
+    proved = exploration.rulings.get(cell) is Ruling.PROVED
     n = robot.n
     solutions = np.empty((ENOUGH, n))
-    turning = ~robot.prismatic
+    curvature = ~robot.prismatic
     unlimited = problem._replace(
-        lower=np.where(turning, -np.inf, robot.lower), upper=np.where(turning, np.inf, robot.upper)
+        lower=np.where(curvature, -np.inf, robot.lower),
+        upper=np.where(curvature, np.inf, robot.upper),
     )
     slack_cone = _within(problem, np.inf)
     anything = _within(unlimited, np.inf)
-    guesses = explorer.guesses(STARTS)
-    if not problem.rim > 0.0 and not proved:
+    guesses = exploration.guesses(STARTS)
+    if not problem.cone_chord > 0.0 and not proved:
         detail = "a cone of 0 degrees leaves no room that a motion could be certified in"
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
-    if not _solve(anything, work, cell, guesses, _one(explorer)):
+    if not _solve(anything, work, cell, guesses, _one(exploration)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
         origin = robot.model.jointPlacements[1].translation
         away = float(np.linalg.norm(problem.points[cell] - origin))
@@ -259,10 +262,12 @@ def _cause(explorer: Explorer, cell: int) -> Cause:
     found = _solve(unlimited, work, cell, guesses, solutions)
     past = ""
     if found:
-        past = _past_limits(robot, _nearest_to_limits(explorer, unlimited, cell, solutions[:found]))
-    if _solve(slack_cone, work, cell, guesses, _one(explorer)):
-        angle = np.degrees(_smallest_angle(explorer, slack_cone, cell))
-        alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.rim, 1.0)))
+        past = _past_limits(
+            robot, _nearest_to_limits(exploration, unlimited, cell, solutions[:found])
+        )
+    if _solve(slack_cone, work, cell, guesses, _one(exploration)):
+        angle = np.degrees(_smallest_angle(exploration, slack_cone, cell))
+        alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.cone_chord, 1.0)))
         if angle <= alpha and not proved:
             detail = "the arm can stand there, but the search ended before it found a motion to it"
             return Cause(cell, CauseKind.DISCONNECTED, False, detail)
@@ -273,7 +278,9 @@ def _cause(explorer: Explorer, cell: int) -> Cause:
         return Cause(cell, CauseKind.ORIENTATION, proved, detail)
     if not past:
         found = _solve(anything, work, cell, guesses, solutions)
-        past = _past_limits(robot, _nearest_to_limits(explorer, anything, cell, solutions[:found]))
+        past = _past_limits(
+            robot, _nearest_to_limits(exploration, anything, cell, solutions[:found])
+        )
         past = (
             f"for the tool point alone {past}; inside the cone nothing was found at all"
             if past
@@ -282,9 +289,9 @@ def _cause(explorer: Explorer, cell: int) -> Cause:
     return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
 
 
-def disconnected(explorer: Explorer, cell: int) -> Cause:
+def disconnected(exploration: Exploration, cell: int) -> Cause:
     """Why the best component misses a cell that another one covers."""
-    roadmap, robot = explorer.roadmap, explorer.robot
+    roadmap, robot = exploration.roadmap, exploration.robot
     roots, node = set[int](), int(roadmap.first_node[cell])
     while node >= 0:
         roots.add(int(root_of(roadmap, roadmap.component[node])))
@@ -301,14 +308,14 @@ def disconnected(explorer: Explorer, cell: int) -> Cause:
     }.get(code)
     detail = (
         f"reached by another motion only, which covers {int(roadmap.size[other])} of "
-        f"{len(explorer.cells)} cells"
+        f"{len(exploration.cells)} cells"
     )
-    if reason and stopped >= 0 and root_of(roadmap, stopped) == explorer.best:
+    if reason and stopped >= 0 and root_of(roadmap, stopped) == exploration.best:
         detail += f"; on the way there from the covered cells {reason}"
     return Cause(cell, CauseKind.DISCONNECTED, False, detail)
 
 
-def causes_of(explorer: Explorer) -> tuple[Cause, ...]:
+def causes_of(exploration: Exploration) -> tuple[Cause, ...]:
     """One cause for each cell that the best component misses, in order of index.
 
     On fine grids `MOST_EXAMINED` cells, spread evenly, are examined one by one; the others are
@@ -317,21 +324,21 @@ def causes_of(explorer: Explorer) -> tuple[Cause, ...]:
     Raises:
         OutOfTime: the deadline passed.
     """
-    reached, points = explorer.reached, explorer.problem.points
-    missed = np.flatnonzero(~explorer.covered)
+    reached, points = exploration.reached, exploration.problem.points
+    missed = np.flatnonzero(~exploration.covered)
     causes: dict[int, Cause] = {}
     for cell in missed[reached[missed]].tolist():
-        causes[cell] = disconnected(explorer, cell)
+        causes[cell] = disconnected(exploration, cell)
     lost = missed[~reached[missed]]
     examined = evenly(lost)[:MOST_EXAMINED]
     for cell in examined.tolist():
-        explorer.tick("finding causes")
-        causes[cell] = diagnose(explorer, cell)
+        exploration.tick("finding causes")
+        causes[cell] = diagnose(exploration, cell)
     for cell in lost.tolist():
         if cell not in causes:
             near = int(examined[np.argmin(np.linalg.norm(points[examined] - points[cell], axis=1))])
-            proved = explorer.rulings.get(cell) is Ruling.PROVED
-            index = list(explorer.cells.unravel(near))
+            proved = exploration.rulings.get(cell) is Ruling.PROVED
+            index = list(exploration.cells.unravel(near))
             alike = causes[near].detail.removesuffix(f"; {UNPROVED}")
             detail = f"like {index}, the nearest cell examined: {alike}"
             causes[cell] = Cause(cell, causes[near].kind, proved, detail)

@@ -17,7 +17,7 @@ from feasibility.roadmap.graph import (
     HEAD,
     NODES,
     TAIL,
-    WAYS,
+    WAYPOINTS,
     Roadmap,
     add_edge,
     add_node,
@@ -25,7 +25,7 @@ from feasibility.roadmap.graph import (
     unite,
 )
 from feasibility.roadmap.problem import Problem, Work
-from feasibility.roadmap.projection import LANDING_STEPS, land
+from feasibility.roadmap.projection import PROJECTION_STEPS, project_onto_cell
 from feasibility.roadmap.self_motion import SETTLE_STEPS, connect, settle
 from feasibility.roadmap.tracking import track
 
@@ -62,10 +62,10 @@ def _rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyped-def]
 def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-untyped-def]
     """Try to reach, by self-motion from q over `cell`, a node of another component.
 
-    Waypoints go to `ways` behind the `rows` rows that are pending there.
+    Waypoints go to `waypoints` behind the `rows` rows that are pending there.
 
     Returns:
-        (node, rows written), or (-1, 0); (-1, -2) when `ways` is full.
+        (node, rows written), or (-1, 0); (-1, -2) when `waypoints` is full.
     """
     tried = np.empty(MOST_RIVALS, dtype=np.int64)
     here = np.empty(q.shape[0])
@@ -79,7 +79,7 @@ def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-u
         put(here, q)
         written, reached = connect(
             problem, work, problem.points[cell], problem.approaches[cell], here, roadmap.q[node],
-            roadmap.ways, roadmap.counters[WAYS] + rows, CONNECT_STEPS,
+            roadmap.waypoints, roadmap.counters[WAYPOINTS] + rows, CONNECT_STEPS,
         )  # fmt: skip
         if written == -2:
             return -1, -2
@@ -131,7 +131,7 @@ def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type:
             begin, end = (0.0, 1.0) if cell < target else (1.0, 0.0)
             rows = track(
                 problem, work, links[first + count[CURSOR]], begin, end, q, q, FREE,
-                roadmap.ways, count[WAYS],
+                roadmap.waypoints, count[WAYPOINTS],
             )  # fmt: skip
             if rows == -2:
                 return FULL
@@ -139,8 +139,8 @@ def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type:
             if rows < 0:
                 former = roadmap.blocked[target, 2]
                 if former < 0 or roadmap.size[own] >= roadmap.size[root_of(roadmap, former)]:
-                    roadmap.blocked[target, 0] = work.blame[0]
-                    roadmap.blocked[target, 1] = work.blame[1]
+                    roadmap.blocked[target, 0] = work.stop_reason[0]
+                    roadmap.blocked[target, 1] = work.stop_reason[1]
                     roadmap.blocked[target, 2] = own
                 continue
             node, more = join(problem, work, roadmap, target, q, own, rows, MOST_FAILURES)
@@ -184,7 +184,7 @@ def seed_cell(
         if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
             break
         q = guess.copy()
-        if not land(problem, work, cell, q, LANDING_STEPS):
+        if not project_onto_cell(problem, work, cell, q, PROJECTION_STEPS):
             continue
         found += 1
         settle(problem, work, target, approach, q, SETTLE_STEPS)
@@ -199,7 +199,7 @@ def seed_cell(
 
 
 @kernel
-def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
+def explore_self_motions(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
     """Explore the fibre over one cell from the nodes there, and join the components that meet.
 
     A rapidly exploring tree for each component: the node nearest to a random point of the fibre
@@ -234,7 +234,7 @@ def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untype
             if k == 0:
                 # Aim at a point of the fibre: a random guess, put onto it.
                 put(aimed, guesses[g])
-                if not land(problem, work, cell, aimed, AIM_STEPS):
+                if not project_onto_cell(problem, work, cell, aimed, AIM_STEPS):
                     break
             node = _rival(roadmap, cell, aimed, NOBODY, tried, NONE)
             if node < 0:
@@ -244,7 +244,7 @@ def stir(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untype
             put(q, roadmap.q[node])
             rows, _ = connect(
                 problem, work, problem.points[cell], problem.approaches[cell], q, aimed,
-                roadmap.ways, count[WAYS], CONNECT_STEPS,
+                roadmap.waypoints, count[WAYPOINTS], CONNECT_STEPS,
             )  # fmt: skip
             if rows == -2:
                 return FULL, g, merged
@@ -323,7 +323,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                     put(q, roadmap.q[a])
                     rows = track(
                         problem, work, k, begin, end, q, roadmap.q[b], attempt < 2,
-                        roadmap.ways, count[WAYS],
+                        roadmap.waypoints, count[WAYPOINTS],
                     )  # fmt: skip
                     if rows == -2:
                         state[k] = 0
@@ -333,7 +333,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                     put(arrival, q)
                     more, reached = connect(
                         problem, work, problem.points[j], problem.approaches[j], q, roadmap.q[b],
-                        roadmap.ways, count[WAYS] + rows, CONNECT_STEPS,
+                        roadmap.waypoints, count[WAYPOINTS] + rows, CONNECT_STEPS,
                     )  # fmt: skip
                     if more == -2:
                         state[k] = 0

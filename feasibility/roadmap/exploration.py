@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
-from feasibility.roadmap.bridging import NARROWEST, WIDEST, meet, nearest_pairs
-from feasibility.roadmap.expansion import close_pairs, seed_cell, spread_out, stir
+from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
+from feasibility.roadmap.expansion import close_pairs, explore_self_motions, seed_cell, spread_out
 from feasibility.roadmap.graph import (
     BEST,
     COMPONENTS,
@@ -19,7 +19,7 @@ from feasibility.roadmap.graph import (
     FULL,
     HEAD,
     TAIL,
-    WAYS,
+    WAYPOINTS,
     Roadmap,
     empty_roadmap,
     grown,
@@ -33,7 +33,7 @@ from surfaces import Cells
 
 BUDGET = 8_000  # evaluations of the arm between two looks at the clock
 GUESSES = 4  # of one stir
-MEETINGS = 6  # pairs of nodes that one round tries to join between two centres
+BRIDGES = 6  # pairs of nodes that one round tries to join between two centres
 PATIENCE = 60  # failed connections of two components that stirring allows
 
 
@@ -42,7 +42,7 @@ class OutOfTime(Exception):
 
 
 @dataclass
-class Explorer:
+class Exploration:
     """The state of one search; `explore` drives it and `checking` reads it."""
 
     robot: Robot
@@ -166,7 +166,7 @@ class Explorer:
                 self.roadmap = grown(self.roadmap)
             self.tick("spreading over the surface")
 
-    def plant(self, cell: int, guesses: NDArray[np.float64]) -> int:
+    def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
         """Seed a cell and spread what is new; returns how many guesses led onto the fibre."""
         found = 0
         for guess in guesses:
@@ -177,35 +177,37 @@ class Explorer:
                 break
         return found
 
-    def stir(self, cell: int) -> None:
+    def explore_self_motions(self, cell: int) -> None:
         """Explore the fibre over one cell and spread what is new."""
         guesses = self.guesses(GUESSES)
         while True:
-            status, used, _ = stir(self.problem, self.work, self.roadmap, cell, guesses, PATIENCE)
+            status, used, _ = explore_self_motions(
+                self.problem, self.work, self.roadmap, cell, guesses, PATIENCE
+            )
             guesses = guesses[used:]
             if status != FULL:
                 break
             self.roadmap = grown(self.roadmap)
         self.spread()
 
-    def meet(self, one: int, other: int) -> None:
+    def bridge(self, one: int, other: int) -> None:
         """Try to join two components between cell centres, where they come nearest first."""
         tries = 0
         nodes = nearest_pairs(self.roadmap, self.cells.pairs, one, other)
-        for x, y in nodes[: 2 * MEETINGS * (1 + self.rounds)].tolist():
+        for x, y in nodes[: 2 * BRIDGES * (1 + self.rounds)].tolist():
             if self.met.get((x, y), 0) > self.rounds // 4:
                 continue
             self.met[x, y] = self.met.get((x, y), 0) + 1
             share = float(self.rng.uniform(NARROWEST, WIDEST))
-            course = self.course(int(self.roadmap.cell[x]), int(self.roadmap.cell[y]))
-            if meet(self.problem, self.work, self.room, x, y, course, share):
+            curve = self.curve(int(self.roadmap.cell[x]), int(self.roadmap.cell[y]))
+            if bridge(self.problem, self.work, self.room, x, y, curve, share):
                 self.spread()
                 return
             tries += 1
-            if tries == MEETINGS:
+            if tries == BRIDGES:
                 return
 
-    def course(self, cell: int, other: int) -> int:
+    def curve(self, cell: int, other: int) -> int:
         """The course between two neighbouring cells."""
         entries = slice(self.indptr[cell], self.indptr[cell + 1])
         return int(self.links[entries][self.indices[entries] == other][0])
@@ -236,9 +238,9 @@ class Explorer:
             self.tick("joining neighbouring cells")
 
     def room(self, rows: int) -> Roadmap:
-        """The roadmap, grown until an edge and so many rows of `ways` fit."""
+        """The roadmap, grown until an edge and so many rows of `waypoints` fit."""
         self.roadmap = grown(self.roadmap)
-        while self.roadmap.counters[WAYS] + rows > len(self.roadmap.ways):
+        while self.roadmap.counters[WAYPOINTS] + rows > len(self.roadmap.waypoints):
             self.roadmap = grown(self.roadmap)
         return self.roadmap
 
@@ -260,7 +262,7 @@ class Explorer:
         # A box that is left undecided mostly straddles the tolerance: Newton starts well from it.
         # (A slide without ends has boxes without a middle.)
         if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and np.isfinite(q).all():
-            self.plant(cell, wound(self.problem, q)[None])
+            self.add_seeds(cell, wound(self.problem, q)[None])
         return ruling
 
 

@@ -20,7 +20,7 @@ from feasibility.compiled import kernel
 from feasibility.roadmap.problem import NEXT, place
 from feasibility.roadmap.self_motion import effects
 
-NODES, EDGES, WAYS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
+NODES, EDGES, WAYPOINTS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
 """Places in `Roadmap.counters`."""
 DONE, BUDGET, FULL, COVERED = range(4)
 """Why a compiled loop came back."""
@@ -46,8 +46,8 @@ class Roadmap(NamedTuple):
     ends: NDArray[np.int64]
     """(edges, 2) nodes that each edge joins."""
     way: NDArray[np.int64]
-    """(edges, 2) first row and number of rows of the edge's waypoints in `ways`."""
-    ways: NDArray[np.float64]
+    """(edges, 2) first row and number of rows of the edge's waypoints in `waypoints`."""
+    waypoints: NDArray[np.float64]
     """(rows, n) waypoints of all edges; an edge's start is not among them, its end is."""
     parent: NDArray[np.int64]
     """(components,) union-find over component slots."""
@@ -78,7 +78,7 @@ def empty_roadmap(cells: int, n: int) -> Roadmap:
         queue=np.empty(nodes, dtype=np.int64),
         ends=np.empty((4 * nodes, 2), dtype=np.int64),
         way=np.empty((4 * nodes, 2), dtype=np.int64),
-        ways=np.empty((16 * nodes, n)),
+        waypoints=np.empty((16 * nodes, n)),
         parent=np.arange(components),
         cover=np.zeros((components, cells), dtype=np.uint8),
         size=np.zeros(components, dtype=np.int64),
@@ -105,7 +105,7 @@ def grown(roadmap: Roadmap) -> Roadmap:
     fields["queue"] = longer(fields["queue"], count[TAIL], 8)
     for name in ("ends", "way"):
         fields[name] = longer(fields[name], count[EDGES], 16)
-    fields["ways"] = longer(fields["ways"], count[WAYS], 4096)
+    fields["waypoints"] = longer(fields["waypoints"], count[WAYPOINTS], 4096)
     slots = len(roadmap.parent)
     if count[COMPONENTS] + 2 > slots:
         fields["parent"] = np.concatenate([roadmap.parent, np.arange(slots, 2 * slots)])
@@ -178,15 +178,15 @@ def add_node(problem, work, roadmap, cell, q, component):  # type: ignore[no-unt
 
 @kernel
 def add_edge(roadmap, x, y, rows):  # type: ignore[no-untyped-def]
-    """Append an edge whose waypoints are the next `rows` rows of `ways`."""
+    """Append an edge whose waypoints are the next `rows` rows of `waypoints`."""
     count = roadmap.counters
     edge = count[EDGES]
     roadmap.ends[edge, 0] = x
     roadmap.ends[edge, 1] = y
-    roadmap.way[edge, 0] = count[WAYS]
+    roadmap.way[edge, 0] = count[WAYPOINTS]
     roadmap.way[edge, 1] = rows
     count[EDGES] += 1
-    count[WAYS] += rows
+    count[WAYPOINTS] += rows
 
 
 @kernel

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.covering_walk import edge_motion
 from feasibility.roadmap.graph import EDGES, NODES, Roadmap
+from feasibility.roadmap.walk import edge_motion
 from feasibility.verdict import Walk
 
 Step = tuple[int, int]

@@ -8,18 +8,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
-from feasibility.target_curves import target_courses
+from feasibility.target_curves import target_curves
 from feasibility.task import Task
 from robots import Chain, Robot, frames
 from surfaces import Cells
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
-NEWTON_RIM = 1e-4  # [1] share of the cone that it costs, by way of the turning of the normal
+NEWTON_CONE = 1e-4  # [1] share of the cone that it costs, by way of the turning of the normal
 ORDINARY = 0.01  # [1] share of the rim that an ordinary course may stray
 # The replay takes the place on the course that is nearest to the tool point, up to twice `near`
 # from the one aimed at, and wants the cone to hold at the tool point's own foot.
-ASIDE = 0.05  # [1] share of a piece by which that nearest place may lie off the one aimed at
-STANDING = 0.999  # [1] share of the tolerance that motions over a centre may use: courses stray too
+LATERAL = 0.05  # [1] share of a piece by which that nearest place may lie off the one aimed at
+CENTRE_SHARE = (
+    0.999  # [1] share of the tolerance that motions over a centre may use: courses stray too
+)
 SPARE = 1.1  # [1] courses over a mesh may stray that much more where the replay looks than was seen
 NEAR_COSTS = 3.0  # [1], times `near` and the turning of the normal: what that may cost of the rim
 
@@ -42,21 +44,21 @@ class Problem(NamedTuple):
     approaches: NDArray[np.float64]
     """(N, 3) approach directions of the cell centres."""
     first_piece: NDArray[np.int64]
-    """(M + 1,) where the pieces of each course begin, see `surfaces.courses`."""
+    """(M + 1,) where the pieces of each course begin, see `surfaces.curves`."""
     targets: NDArray[np.float64]
     """(P, 4, 6) cubics of target point and approach direction along each piece."""
-    bends: NDArray[np.float64]
+    derivative_bounds: NDArray[np.float64]
     """(P, 3) largest second derivatives of both (m, 1) by t, inf where the offset folds; and how
     fast the approach direction turns along the target surface (1/m)."""
-    strays: NDArray[np.float64]
+    deviations: NDArray[np.float64]
     """(M, 2) how far both may be from the surface's own on each course (m, 1)."""
-    rim: float
+    cone_chord: float
     """2 sin(alpha / 2): the largest |a - b|; inf when every direction will do."""
     tolerance: float
     """m."""
-    inner_rim: float
+    inner_cone_chord: float
     """What motions over one cell's centre keep to of the rim, less what follows from `near`."""
-    turning: float
+    curvature: float
     """1/m, how fast the approach direction turns next to the cells' centres, at most."""
     near: float
     """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_RIM."""
@@ -66,30 +68,36 @@ class Problem(NamedTuple):
 
 def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
     """Gather arm, cells and task for the compiled search."""
-    tolerance = task.leeway
+    tolerance = task.effective_tolerance
     targets = task.targets(cells)
-    ways = target_courses(cells, task.standoff, tolerance)
+    waypoints = target_curves(cells, task.standoff, tolerance)
     chain = Chain.checked(robot)
-    rim = task.rim
-    strays = ways.strays[:, 1]
-    ordinary = float(strays[strays <= ORDINARY * rim].max(initial=0.0)) if rim < np.inf else 0.0
+    cone_chord = task.cone_chord
+    deviations = waypoints.deviations[:, 1]
+    ordinary = (
+        float(deviations[deviations <= ORDINARY * cone_chord].max(initial=0.0))
+        if cone_chord < np.inf
+        else 0.0
+    )
     near = NEWTON * tolerance
-    if ways.standing > 0.0 and rim < np.inf:
-        near = min(near, NEWTON_RIM * rim / ways.standing)
+    if waypoints.centre_curvature > 0.0 and cone_chord < np.inf:
+        near = min(near, NEWTON_CONE * cone_chord / waypoints.centre_curvature)
     return Problem(
         chain=chain,
         lower=np.array(robot.lower),
         upper=np.array(robot.upper),
         points=np.ascontiguousarray(targets.points),
         approaches=np.ascontiguousarray(targets.approaches),
-        first_piece=ways.first,
-        targets=ways.cubics,
-        bends=np.column_stack([ways.bends, ways.turning]),
-        strays=ways.strays * (SPARE if cells.surface.grain else 1.0),
-        rim=rim,
+        first_piece=waypoints.first,
+        targets=waypoints.cubics,
+        derivative_bounds=np.column_stack([waypoints.derivative_bounds, waypoints.curvature]),
+        deviations=waypoints.deviations * (SPARE if cells.surface.mean_edge_length else 1.0),
+        cone_chord=cone_chord,
         tolerance=float(tolerance),
-        inner_rim=float(rim - ordinary - NEAR_COSTS * ways.standing * near),
-        turning=ways.standing,
+        inner_cone_chord=float(
+            cone_chord - ordinary - NEAR_COSTS * waypoints.centre_curvature * near
+        ),
+        curvature=waypoints.centre_curvature,
         near=float(near),
         # A gantry may have no links at all: its strokes are as good as any length then.
         scale=float(np.linalg.norm(chain.translations, axis=1).sum()) or 1.0,
@@ -117,7 +125,7 @@ class Work(NamedTuple):
     """(4, n) constraint rows of the step."""
     rhs: NDArray[np.float64]
     """(4,)"""
-    wish: NDArray[np.float64]
+    secondary_step: NDArray[np.float64]
     """(n,) where the free directions would like to go."""
     step: NDArray[np.float64]
     """(n,)"""
@@ -127,7 +135,7 @@ class Work(NamedTuple):
     """(n,)"""
     target: NDArray[np.float64]
     """(2, 3) target point and approach direction."""
-    bend: NDArray[np.float64]
+    derivative_bound: NDArray[np.float64]
     """(5,) largest second derivatives of target point and approach direction over the present
     step, by its own parameter in 0..1, zero while the target stands still; how fast the direction
     turns there (1/m); and how fast the target goes by that parameter at both ends (m)."""
@@ -135,7 +143,7 @@ class Work(NamedTuple):
     """(2,) what the present step keeps to of tolerance (m) and rim; 0 where it has no room."""
     counts: NDArray[np.int64]
     """(1,) forward kinematics evaluated."""
-    blame: NDArray[np.int64]
+    stop_reason: NDArray[np.int64]
     """(2,) why the last motion stopped: a code, and the joint for LIMIT."""
 
 
@@ -151,15 +159,15 @@ def work_for(n: int) -> Work:
         axis_rows=np.zeros((3, n)),
         rows=np.zeros((4, n)),
         rhs=np.zeros(4),
-        wish=np.zeros(n),
+        secondary_step=np.zeros(n),
         step=np.zeros(n),
         held=np.zeros(n, dtype=np.bool_),
         trial=np.zeros(n),
         target=np.zeros((2, 3)),
-        bend=np.zeros(5),
+        derivative_bound=np.zeros(5),
         room=np.zeros(2),
         counts=np.zeros(1, dtype=np.int64),
-        blame=np.zeros(2, dtype=np.int64),
+        stop_reason=np.zeros(2, dtype=np.int64),
     )
 
 
@@ -180,13 +188,13 @@ def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
 @kernel
 def look_at(problem, work, target, approach):  # type: ignore[no-untyped-def]
     """Set `work.target`, and let it stand still."""
-    work.bend[0] = 0.0
-    work.bend[1] = 0.0
-    work.bend[2] = problem.turning
-    work.bend[3] = 0.0
-    work.bend[4] = 0.0
-    work.room[0] = STANDING * problem.tolerance
-    work.room[1] = problem.inner_rim
+    work.derivative_bound[0] = 0.0
+    work.derivative_bound[1] = 0.0
+    work.derivative_bound[2] = problem.curvature
+    work.derivative_bound[3] = 0.0
+    work.derivative_bound[4] = 0.0
+    work.room[0] = CENTRE_SHARE * problem.tolerance
+    work.room[1] = problem.inner_cone_chord
     for k in range(3):
         work.target[0, k] = target[k]
         work.target[1, k] = approach[k]
@@ -207,10 +215,10 @@ def accept(work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def aim(problem, work, course, t):  # type: ignore[no-untyped-def]
+def aim(problem, work, curve, t):  # type: ignore[no-untyped-def]
     """Set `work.target` to the place on a course at t in [0, 1]."""
-    first = problem.first_piece[course]
-    count = problem.first_piece[course + 1] - first
+    first = problem.first_piece[curve]
+    count = problem.first_piece[curve + 1] - first
     piece = min(np.int64(t * count), count - 1)
     s = t * count - piece
     for k in range(3):
@@ -222,10 +230,10 @@ def aim(problem, work, course, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def speed_at(problem, course, t):  # type: ignore[no-untyped-def]
+def speed_at(problem, curve, t):  # type: ignore[no-untyped-def]
     """How far the target goes along a course for each unit of t, at t, m."""
-    first = problem.first_piece[course]
-    count = problem.first_piece[course + 1] - first
+    first = problem.first_piece[curve]
+    count = problem.first_piece[curve + 1] - first
     piece = min(np.int64(t * count), count - 1)
     s = t * count - piece
     square = 0.0
@@ -239,24 +247,28 @@ def speed_at(problem, course, t):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def bend_between(problem, work, course, t0, t1):  # type: ignore[no-untyped-def]
-    """Set `work.bend` and `work.room` for a step along a course from t0 to t1, either way."""
-    first = problem.first_piece[course]
-    count = problem.first_piece[course + 1] - first
-    low = min(np.int64(max(min(t0, t1) * count - ASIDE, 0.0)), count - 1)
-    high = min(np.int64(max(t0, t1) * count + ASIDE), count - 1)
+def bounds_between(problem, work, curve, t0, t1):  # type: ignore[no-untyped-def]
+    """Set `work.derivative_bound` and `work.room` for a step along a course from t0 to t1, either way."""
+    first = problem.first_piece[curve]
+    count = problem.first_piece[curve + 1] - first
+    low = min(np.int64(max(min(t0, t1) * count - LATERAL, 0.0)), count - 1)
+    high = min(np.int64(max(t0, t1) * count + LATERAL), count - 1)
     for part in range(3):
         most = 0.0
         for piece in range(low, high + 1):
-            most = max(most, problem.bends[first + piece, part])
-        work.bend[part] = most * (t1 - t0) ** 2 if part < 2 else most
-    work.bend[3] = speed_at(problem, course, t0) * abs(t1 - t0)
-    work.bend[4] = speed_at(problem, course, t1) * abs(t1 - t0)
+            most = max(most, problem.derivative_bounds[first + piece, part])
+        work.derivative_bound[part] = most * (t1 - t0) ** 2 if part < 2 else most
+    work.derivative_bound[3] = speed_at(problem, curve, t0) * abs(t1 - t0)
+    work.derivative_bound[4] = speed_at(problem, curve, t1) * abs(t1 - t0)
     # No more room than over the centres, and no less on an ordinary course: every configuration
     # that works over a cell can set out from it.
-    lost = problem.rim - problem.strays[course, 1] - NEAR_COSTS * work.bend[2] * problem.near
-    work.room[0] = max(problem.tolerance - problem.strays[course, 0], 0.0)
-    work.room[1] = max(min(problem.inner_rim, lost), 0.0)
+    lost = (
+        problem.cone_chord
+        - problem.deviations[curve, 1]
+        - NEAR_COSTS * work.derivative_bound[2] * problem.near
+    )
+    work.room[0] = max(problem.tolerance - problem.deviations[curve, 0], 0.0)
+    work.room[1] = max(min(problem.inner_cone_chord, lost), 0.0)
 
 
 @kernel

@@ -11,8 +11,8 @@ from robots import jacobians
 COMFORT = 0.7  # [1] share of the cone that a step keeps to where it can
 LARGEST_STEP = 0.35  # [rad] or [m], largest change of one joint in one Newton step
 POINT, POINT_AND_CONE = np.int64(3), np.int64(4)  # rows of a step
-LANDING_SLACK = 1e-6  # [1] share of the cone that a landing keeps free
-LANDING_STEPS = np.int64(60)
+PROJECTION_SLACK = 1e-6  # [1] share of the cone that a landing keeps free
+PROJECTION_STEPS = np.int64(60)
 
 
 @kernel
@@ -42,7 +42,7 @@ def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
 
 @kernel
 def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
-    """The step nearest to `work.wish` with rows @ step = rhs (first m rows), inside the limits.
+    """The step nearest to `work.secondary_step` with rows @ step = rhs (first m rows), inside the limits.
 
     Joints that would pass a limit are held at it, the furthest first, and the others take over.
     Returns False when too few joints are left.
@@ -58,7 +58,7 @@ def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
         for i in range(m):
             y[i] = work.rhs[i]
             for j in range(n):
-                y[i] -= work.rows[i, j] * (work.step[j] if work.held[j] else work.wish[j])
+                y[i] -= work.rows[i, j] * (work.step[j] if work.held[j] else work.secondary_step[j])
             for k in range(i + 1):
                 total = 0.0
                 for j in range(n):
@@ -76,7 +76,7 @@ def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
         for j in range(n):
             if work.held[j]:
                 continue
-            s = work.wish[j]
+            s = work.secondary_step[j]
             for i in range(m):
                 s += work.rows[i, j] * y[i]
             work.step[j] = s
@@ -85,7 +85,7 @@ def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
                 worst, furthest = j, over
         if worst < 0:
             return True
-        work.blame[1] = worst
+        work.stop_reason[1] = worst
         limit = problem.upper[worst] if work.step[worst] > 0.0 else problem.lower[worst]
         work.step[worst] = limit - q[worst]
         work.held[worst] = True
@@ -129,10 +129,10 @@ def linearise(problem, work, slot, chord_goal):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-def]
+def project(problem, work, q, slack, before, most):  # type: ignore[no-untyped-def]
     """Newton from q (in place) onto the fibre over `work.target`; slot 1 holds the result.
 
-    The first step starts at what slot 1 holds for q, heads for `work.wish`, and keeps well inside
+    The first step starts at what slot 1 holds for q, heads for `work.secondary_step`, and keeps well inside
     the cone; `before` is |a - b| at the start of the step, from where it comes in gradually (inf
     where that does not matter). Later steps are the least ones that mend the errors. Returns True
     when the tool point is at its target to `problem.near`, and the axis inside the cone.
@@ -149,10 +149,10 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
         if it == 0:
             # Come in from the rim by a part of what the target's motion costs anyway.
             inwards = max(0.5 * (chord - before), 150.0 * slack * before)
-            goal = min(hard, max(COMFORT * problem.rim, before - inwards))
+            goal = min(hard, max(COMFORT * problem.cone_chord, before - inwards))
         norm = linearise(problem, work, NEXT, goal)
         usable = norm > 1e-9
-        work.blame[1] = -1
+        work.stop_reason[1] = -1
         cone = chord > goal and usable
         done = least_step(problem, work, q, POINT_AND_CONE if cone else POINT)
         if done and not cone and usable and chord > 0.3 * goal:
@@ -170,7 +170,9 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
             work.rhs[3] = hard - chord
             done = least_step(problem, work, q, POINT_AND_CONE)
         if not done:
-            work.blame[0] = LIMIT if work.blame[1] >= 0 else (CONE if cone else SINGULAR)
+            work.stop_reason[0] = (
+                LIMIT if work.stop_reason[1] >= 0 else (CONE if cone else SINGULAR)
+            )
             return False
         largest = 0.0
         for j in range(n):
@@ -178,10 +180,10 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
         shrink = 1.0 if largest <= LARGEST_STEP else LARGEST_STEP / largest
         for j in range(n):
             q[j] = min(max(q[j] + shrink * work.step[j], problem.lower[j]), problem.upper[j])
-            work.wish[j] = 0.0
+            work.secondary_step[j] = 0.0
         place(problem, work, NEXT, q)
         error = work.error[1, 0] / problem.scale + max(work.error[1, 1] - inner, 0.0)
-        work.blame[0] = LIMIT if work.blame[1] >= 0 else (CONE if cone else SINGULAR)
+        work.stop_reason[0] = LIMIT if work.stop_reason[1] >= 0 else (CONE if cone else SINGULAR)
         if not error < np.inf or (it > 2 and error > 2.0 * last and most < 20):
             return False
         last = error
@@ -189,10 +191,10 @@ def correct(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
 
 
 @kernel
-def land(problem, work, cell, q, most):  # type: ignore[no-untyped-def]
+def project_onto_cell(problem, work, cell, q, most):  # type: ignore[no-untyped-def]
     """Newton from a guess q (in place) onto the fibre over a cell's centre; True when it lands."""
     look_at(problem, work, problem.points[cell], problem.approaches[cell])
     place(problem, work, NEXT, q)
     for j in range(q.shape[0]):
-        work.wish[j] = 0.0
-    return correct(problem, work, q, LANDING_SLACK, np.inf, most)
+        work.secondary_step[j] = 0.0
+    return project(problem, work, q, PROJECTION_SLACK, np.inf, most)

@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
-from feasibility.roadmap.exploration import Explorer
+from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import EDGES, NODES, root_of
-from feasibility.roadmap.self_motion import roomy
+from feasibility.roadmap.self_motion import margin_shares
 
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
@@ -38,65 +38,69 @@ MOST_RULED = 500  # cells ruled on in a row without reaching any; on a fine grid
 NEWTON_STARTS = 25
 
 
-def explore(explorer: Explorer) -> None:
+def explore(exploration: Exploration) -> None:
     """Run the search to its end; the explorer holds the result.
 
     Raises:
         OutOfTime: the deadline passed; what was found until then stands.
     """
-    if len(explorer.cells) == 0 or _pivot(explorer):
+    if len(exploration.cells) == 0 or _pivot(exploration):
         return
-    _unreached(explorer)
-    _rounds(explorer)
+    _unreached(exploration)
+    _rounds(exploration)
 
 
-def _pivot(explorer: Explorer) -> bool:
+def _pivot(exploration: Exploration) -> bool:
     """Step 1; True when one component covers every cell."""
-    pivot = explorer.cells.middle
-    explorer.tick("looking for configurations")
-    guesses = explorer.guesses(PIVOT_SEEDS)
-    room = roomy(explorer.problem, explorer.work, pivot, guesses)
+    pivot = exploration.cells.middle
+    exploration.tick("looking for configurations")
+    guesses = exploration.guesses(PIVOT_SEEDS)
+    room = margin_shares(exploration.problem, exploration.work, pivot, guesses)
     # The one with most room first: it is the least likely to get stuck.
     for k in np.argsort(-room, kind="stable"):
         if room[k] >= 0.0:
-            explorer.plant(pivot, guesses[k : k + 1])
-        if explorer.complete:
+            exploration.add_seeds(pivot, guesses[k : k + 1])
+        if exploration.complete:
             return True
     return False
 
 
-def _unreached(explorer: Explorer) -> None:
+def _unreached(exploration: Exploration) -> None:
     """Step 2: a ruling on every cell that nothing has reached."""
     distance = np.linalg.norm(
-        explorer.problem.points - explorer.robot.model.jointPlacements[1].translation, axis=1
+        exploration.problem.points - exploration.robot.model.jointPlacements[1].translation, axis=1
     )
-    beyond = distance > explorer.robot.reach + explorer.problem.tolerance
+    beyond = distance > exploration.robot.reach + exploration.problem.tolerance
     for cell in np.flatnonzero(beyond).tolist():
-        explorer.rulings[cell] = Ruling.PROVED
+        exploration.rulings[cell] = Ruling.PROVED
     open_boxes: dict[int, Boxes] = {}
     fruitless = 0
-    for cell in evenly(np.flatnonzero(~explorer.reached & ~beyond)).tolist():
-        if explorer.reached[cell]:
+    for cell in evenly(np.flatnonzero(~exploration.reached & ~beyond)).tolist():
+        if exploration.reached[cell]:
             fruitless = 0
             continue  # reached from a cell ruled on before it
         fruitless += 1
         if fruitless > MOST_RULED:
             break
-        boxes = root_box(explorer.problem)
-        if explorer.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
-            if explorer.plant(cell, explorer.guesses(NEWTON_STARTS)) == 0:
+        boxes = root_box(exploration.problem)
+        if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
+            if exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS)) == 0:
                 open_boxes[cell] = boxes
-        elif explorer.rulings[cell] is Ruling.UNKNOWN:
-            explorer.plant(cell, explorer.guesses(NEWTON_STARTS))
+        elif exploration.rulings[cell] is Ruling.UNKNOWN:
+            exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
     for cell, boxes in open_boxes.items():
-        if not explorer.reached[cell]:
-            explorer.rule(cell, boxes, MORE_BOXES)
-    if Ruling.PROVED in explorer.rulings.values():
+        if not exploration.reached[cell]:
+            exploration.rule(cell, boxes, MORE_BOXES)
+    if Ruling.PROVED in exploration.rulings.values():
         return
     # One proof is enough for the verdict: look deeper at the furthest of what is left.
-    left = [c for c in open_boxes if explorer.rulings[c] is Ruling.OPEN and not explorer.reached[c]]
+    left = [
+        c
+        for c in open_boxes
+        if exploration.rulings[c] is Ruling.OPEN and not exploration.reached[c]
+    ]
     for cell in sorted(left, key=lambda c: -distance[c])[:DEEP_CELLS]:
-        if explorer.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
+        if exploration.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
             return
 
 
@@ -106,70 +110,70 @@ def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]
 
 
-def _rounds(explorer: Explorer) -> None:
+def _rounds(exploration: Exploration) -> None:
     """Step 3: rounds of seeding and stirring, until some in a row have gained nothing."""
     dry = 0
-    enough = SETTLED_ROUNDS if Ruling.PROVED in explorer.rulings.values() else DRY_ROUNDS
+    enough = SETTLED_ROUNDS if Ruling.PROVED in exploration.rulings.values() else DRY_ROUNDS
     for _ in range(MOST_ROUNDS):
-        roots = explorer.roots()
-        if not roots or explorer.covered[explorer.reached].all():
+        roots = exploration.roots()
+        if not roots or exploration.covered[exploration.reached].all():
             return  # nothing is missed that anything reaches
-        before = _standing(explorer)
-        _round(explorer, roots[:TOP])
-        explorer.rounds += 1
-        dry = dry + 1 if _standing(explorer) == before else 0
-        if explorer.complete or dry >= enough:
+        before = _standing(exploration)
+        _round(exploration, roots[:TOP])
+        exploration.rounds += 1
+        dry = dry + 1 if _standing(exploration) == before else 0
+        if exploration.complete or dry >= enough:
             return
 
 
-def _standing(explorer: Explorer) -> tuple[int, ...]:
+def _standing(exploration: Exploration) -> tuple[int, ...]:
     """What a round must change to have gained something."""
-    roots = explorer.roots()[:TOP]
-    return tuple(int(explorer.roadmap.size[r]) for r in roots)
+    roots = exploration.roots()[:TOP]
+    return tuple(int(exploration.roadmap.size[r]) for r in roots)
 
 
-def _round(explorer: Explorer, top: list[int]) -> None:
+def _round(exploration: Exploration, top: list[int]) -> None:
     """One round: seed what the best component misses, stir borders and meeting places."""
-    rng = explorer.rng
-    missed = np.flatnonzero(~explorer.covered & explorer.reached)
+    rng = exploration.rng
+    missed = np.flatnonzero(~exploration.covered & exploration.reached)
     if len(missed):
-        explorer.plant(int(rng.choice(missed)), explorer.guesses(SEEDS))
+        exploration.add_seeds(int(rng.choice(missed)), exploration.guesses(SEEDS))
     for component in top:
-        if explorer.complete:
+        if exploration.complete:
             return
-        explorer.tick("stirring the borders of components")
-        border = explorer.border(component)
+        exploration.tick("stirring the borders of components")
+        border = exploration.border(component)
         if len(border):
-            explorer.stir(int(rng.choice(border)))
+            exploration.explore_self_motions(int(rng.choice(border)))
     for a in range(len(top)):
         for b in range(a):
-            one, other = (int(root_of(explorer.roadmap, top[k])) for k in (a, b))
+            one, other = (int(root_of(exploration.roadmap, top[k])) for k in (a, b))
             # Every pair every round would cost too much where there are many.
             if one == other or (len(top) > 3 and rng.random() > 0.3):
                 continue
-            explorer.tick("joining components where they meet")
-            explorer.meet(one, other)
-            shared = np.flatnonzero(explorer.covers(one) & explorer.covers(other))
-            if explorer.complete:
+            exploration.tick("joining components where they meet")
+            exploration.bridge(one, other)
+            shared = np.flatnonzero(exploration.covers(one) & exploration.covers(other))
+            if exploration.complete:
                 return
             if len(shared):
-                explorer.stir(int(rng.choice(shared)))
+                exploration.explore_self_motions(int(rng.choice(shared)))
 
 
-def close(explorer: Explorer) -> None:
+def close(exploration: Exploration) -> None:
     """Try to join every neighbouring pair of cells of the best component (graph G's edges).
 
     Raises:
         OutOfTime: the deadline passed.
     """
-    if explorer.roadmap.counters[NODES] == 0:
+    if exploration.roadmap.counters[NODES] == 0:
         return
-    explorer.join(explorer.pairs, explorer.best)
+    exploration.join(exploration.pairs, exploration.best)
 
 
-def pair_edges(explorer: Explorer) -> dict[tuple[int, int], int]:
+def pair_edges(exploration: Exploration) -> dict[tuple[int, int], int]:
     """One edge of the best component for each pair of cells that has any."""
-    roadmap, best = explorer.roadmap, explorer.best
+    roadmap, best = exploration.roadmap, exploration.best
     edges: dict[tuple[int, int], int] = {}
     for e in range(roadmap.counters[EDGES]):
         x, y = roadmap.ends[e]

@@ -12,7 +12,7 @@ s_j = |z_j x a| in place of r_j bounds |a''| <= Da.
 
 A vector function whose second derivative is at most M stays within s (1 - s) M / 2 of its chord, so
 its norm is at most (1 - s) c0 + s c1 + s (1 - s) M / 2: see `peak`. Meanwhile the target moves
-along its course, a piecewise cubic with |T''| <= Tp and |b''| <= Tb (`work.bend`, zero where it
+along its course, a piecewise cubic with |T''| <= Tp and |b''| <= Tb (`work.derivative_bound`, zero where it
 stands still). So, with p - T and a - b as the vector functions,
 
     |p - T|(s)  <= peak of both ends with M = D + Tp
@@ -92,11 +92,14 @@ def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
     longer = 1.0
     for slot in range(2):
         error = work.error[slot, 0]
-        speed = max(work.bend[3 + slot], np.sqrt(error * work.bend[0]))
+        speed = max(work.derivative_bound[3 + slot], np.sqrt(error * work.derivative_bound[0]))
         if speed > 0.0:
             longer += 2.0 * error / speed
-    way, turn = longer * longer * work.bend[0], longer * longer * work.bend[1]
+    way, turn = (
+        longer * longer * work.derivative_bound[0],
+        longer * longer * work.derivative_bound[1],
+    )
     position = peak(work.error[0, 0], work.error[1, 0], total + way)
-    aside = work.bend[2] * (total + way)
-    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + turn + aside)
+    lateral_curvature = work.derivative_bound[2] * (total + way)
+    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + turn + lateral_curvature)
     return position / work.room[0], cone / work.room[1]

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
 from feasibility.roadmap.problem import HERE, NEXT, Problem, Work, accept, copy_slot, look_at, place
-from feasibility.roadmap.projection import LANDING_STEPS, correct, land, linearise
+from feasibility.roadmap.projection import PROJECTION_STEPS, linearise, project, project_onto_cell
 from feasibility.roadmap.segment_bound import segment_holds
 
-RIM_SLACK = 1e-3  # [1] share of the cone kept free by a full step; it shrinks with the step
+CONE_SLACK = 1e-3  # [1] share of the cone kept free by a full step; it shrinks with the step
 NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
 SETTLE_STEPS = np.int64(40)  # of `settle`
 
@@ -42,28 +42,28 @@ def effects(problem, work, slot, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def wish_for_room(problem, work, q, size):  # type: ignore[no-untyped-def]
-    """Set `work.wish` to lead away from limits and from the rim of the cone (slot 1's rows)."""
+def margin_objective(problem, work, q, size):  # type: ignore[no-untyped-def]
+    """Set `work.secondary_step` to lead away from limits and from the rim of the cone (slot 1's rows)."""
     n = q.shape[0]
     for j in range(n):
         half = 0.5 * (problem.upper[j] - problem.lower[j])
-        work.wish[j] = 0.0
+        work.secondary_step[j] = 0.0
         if half < np.inf and half > 0.0:
             x = (q[j] - problem.lower[j]) / half - 1.0
             x2 = x * x
-            work.wish[j] = -size * x * x2 * x2
-    share = work.error[1, 1] / problem.rim
+            work.secondary_step[j] = -size * x * x2 * x2
+    share = work.error[1, 1] / problem.cone_chord
     norm = 0.0
     for j in range(n):
         norm += work.rows[3, j] ** 2
     if norm > 1e-12 and share < np.inf:
         push = size * min(share, 1.0) ** 5 / np.sqrt(norm)
         for j in range(n):
-            work.wish[j] -= push * work.rows[3, j]
+            work.secondary_step[j] -= push * work.rows[3, j]
 
 
 @kernel
-def connect(problem, work, target, approach, q, goal, ways, first, most):  # type: ignore[no-untyped-def]
+def connect(problem, work, target, approach, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
     """Self-motion over one target from q (in place) towards the configuration `goal`.
 
     Each step heads for the goal and is put back onto the fibre. It gives up when the way lags:
@@ -72,7 +72,7 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
     stands, and is certified.
 
     Returns:
-        (rows, reached): number of waypoints written, -2 when `ways` is full; and whether the last
+        (rows, reached): number of waypoints written, -2 when `waypoints` is full; and whether the last
         one is `goal`.
     """
     n = q.shape[0]
@@ -91,21 +91,21 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
             place(problem, work, NEXT, work.trial)
             position, cone = segment_holds(problem, work, q, work.trial)
             if position <= 1.0 and cone <= 1.0:
-                if first + written >= ways.shape[0]:
+                if first + written >= waypoints.shape[0]:
                     return -2, False
                 for j in range(n):
                     q[j] = goal[j]
-                    ways[first + written, j] = q[j]
+                    waypoints[first + written, j] = q[j]
                 return written + 1, True
             size = 0.5 * left
         copy_slot(work)
         for j in range(n):
             work.trial[j] = q[j]
-            work.wish[j] = (goal[j] - q[j]) * min(1.0, size / max(left, 1e-12))
+            work.secondary_step[j] = (goal[j] - q[j]) * min(1.0, size / max(left, 1e-12))
         position, cone = np.inf, np.inf
         remaining, moved = np.inf, 0.0
-        slack = 0.25 * RIM_SLACK * min(1.0, size / 0.1)
-        if correct(problem, work, work.trial, slack, np.inf, NEWTON_STEPS):
+        slack = 0.25 * CONE_SLACK * min(1.0, size / 0.1)
+        if project(problem, work, work.trial, slack, np.inf, NEWTON_STEPS):
             position, cone = segment_holds(problem, work, q, work.trial)
             remaining = 0.0
             for j in range(n):
@@ -117,11 +117,11 @@ def connect(problem, work, target, approach, q, goal, ways, first, most):  # typ
             allowed -= moved
             if left - remaining < 0.05 * size or allowed < remaining:
                 return written, False
-            if first + written >= ways.shape[0]:
+            if first + written >= waypoints.shape[0]:
                 return -2, False
             for j in range(n):
                 q[j] = work.trial[j]
-                ways[first + written, j] = q[j]
+                waypoints[first + written, j] = q[j]
             written += 1
             left = remaining
             accept(work)
@@ -142,11 +142,11 @@ def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped
     size = 0.3
     for _ in range(most):
         copy_slot(work)
-        linearise(problem, work, NEXT, problem.rim)
-        wish_for_room(problem, work, q, size)
+        linearise(problem, work, NEXT, problem.cone_chord)
+        margin_objective(problem, work, q, size)
         for j in range(n):
             work.trial[j] = q[j]
-        good = correct(problem, work, work.trial, RIM_SLACK, np.inf, NEWTON_STEPS)
+        good = project(problem, work, work.trial, CONE_SLACK, np.inf, NEWTON_STEPS)
         if good:
             position, cone = segment_holds(problem, work, q, work.trial)
             good = position <= 1.0 and cone <= 1.0
@@ -164,7 +164,7 @@ def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped
                 return
 
 
-def roomy(
+def margin_shares(
     problem: Problem, work: Work, cell: int, guesses: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Put guesses (in place) onto the fibre over a cell, and say how much room each has.
@@ -177,11 +177,12 @@ def roomy(
     ranged = (half > 0.0) & (half < np.inf)
     room = np.full(len(guesses), -1.0)
     for g, q in enumerate(guesses):
-        if not land(problem, work, cell, q, LANDING_STEPS):
+        if not project_onto_cell(problem, work, cell, q, PROJECTION_STEPS):
             continue
         settle(problem, work, problem.points[cell], problem.approaches[cell], q, SETTLE_STEPS)
         off_middle = np.abs((q - problem.lower)[ranged] / half[ranged] - 1.0)
         room[g] = min(
-            max(0.0, 1.0 - work.error[0, 1] / problem.rim), (1.0 - off_middle).min(initial=np.inf)
+            max(0.0, 1.0 - work.error[0, 1] / problem.cone_chord),
+            (1.0 - off_middle).min(initial=np.inf),
         )
     return room

@@ -1,6 +1,6 @@
 """One certified motion along the surface, from one cell's centre to its neighbour's.
 
-The way between the centres is a course (`surfaces.courses`), so that nothing here knows what kind
+The way between the centres is a course (`surfaces.curves`), so that nothing here knows what kind
 of surface it is.
 
 The target moves, the arm follows: a predictor step, Newton on the tool point, and the free
@@ -23,13 +23,13 @@ from feasibility.roadmap.problem import (
     SINGULAR,
     accept,
     aim,
-    bend_between,
+    bounds_between,
     copy_slot,
     place,
 )
-from feasibility.roadmap.projection import correct, linearise
+from feasibility.roadmap.projection import linearise, project
 from feasibility.roadmap.segment_bound import segment_holds
-from feasibility.roadmap.self_motion import RIM_SLACK, wish_for_room
+from feasibility.roadmap.self_motion import CONE_SLACK, margin_objective
 
 SMALLEST_STEP = 2.0**-7  # [1] share of the way between two centres below which a track gives up
 MOST_STEPS = 400  # accepted steps of one motion
@@ -37,17 +37,17 @@ NEWTON_STEPS = np.int64(8)  # of one step
 
 
 @kernel
-def span_of(problem, work, course, begin, end):  # type: ignore[no-untyped-def]
+def span_of(problem, work, curve, begin, end):  # type: ignore[no-untyped-def]
     """How far apart two places of a course are, over the problem's scale."""
-    aim(problem, work, course, begin)
+    aim(problem, work, curve, begin)
     x, y, z = work.target[0, 0], work.target[0, 1], work.target[0, 2]
-    aim(problem, work, course, end)
+    aim(problem, work, curve, end)
     dx, dy, dz = work.target[0, 0] - x, work.target[0, 1] - y, work.target[0, 2] - z
     return np.sqrt(dx * dx + dy * dy + dz * dz) / problem.scale
 
 
 @kernel
-def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  # type: ignore[no-untyped-def]
+def track(problem, work, curve, begin, end, q, goal, has_goal, waypoints, first):  # type: ignore[no-untyped-def]
     """Follow a course from `begin` to `end`, from q (in place).
 
     Args:
@@ -59,16 +59,16 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
         ways, first: (m, n) receives the waypoints after the start, from row `first` on.
 
     Returns:
-        Number of waypoints written, or -1 when the motion stopped short (`work.blame` says why)
-        and -2 when `ways` is full.
+        Number of waypoints written, or -1 when the motion stopped short (`work.stop_reason` says why)
+        and -2 when `waypoints` is full.
     """
     n = q.shape[0]
-    size = span_of(problem, work, course, begin, end)
-    aim(problem, work, course, begin)
+    size = span_of(problem, work, curve, begin, end)
+    aim(problem, work, curve, begin)
     place(problem, work, HERE, q)
-    bend_between(problem, work, course, begin, begin)
+    bounds_between(problem, work, curve, begin, begin)
     if not (work.error[0, 0] <= work.room[0] and work.error[0, 1] <= work.room[1]):
-        work.blame[0] = SINGULAR if work.room[0] > 0.0 and work.room[1] > 0.0 else FOLD
+        work.stop_reason[0] = SINGULAR if work.room[0] > 0.0 and work.room[1] > 0.0 else FOLD
         return -1
     t, dt, written = 0.0, 1.0, 0
     for _ in range(MOST_STEPS):
@@ -76,29 +76,29 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
         if 1.0 - t - dt < 0.1 * dt:
             dt = 1.0 - t  # no sliver at the end
         here, there = begin + t * (end - begin), begin + (t + dt) * (end - begin)
-        bend_between(problem, work, course, here, there)
-        if not (work.bend[0] < np.inf and work.room[0] > 0.0 and work.room[1] > 0.0):
-            work.blame[0] = FOLD
+        bounds_between(problem, work, curve, here, there)
+        if not (work.derivative_bound[0] < np.inf and work.room[0] > 0.0 and work.room[1] > 0.0):
+            work.stop_reason[0] = FOLD
             return -1
-        aim(problem, work, course, there)
+        aim(problem, work, curve, there)
         copy_slot(work)
         if has_goal:
             for j in range(n):
-                work.wish[j] = dt / (1.0 - t) * (goal[j] - q[j])
+                work.secondary_step[j] = dt / (1.0 - t) * (goal[j] - q[j])
         else:
-            linearise(problem, work, NEXT, problem.rim)
-            wish_for_room(problem, work, q, 2.0 * size * dt)
+            linearise(problem, work, NEXT, problem.cone_chord)
+            margin_objective(problem, work, q, 2.0 * size * dt)
         put(work.trial, q)
         position, cone = np.inf, np.inf
-        if correct(problem, work, work.trial, RIM_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
+        if project(problem, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
             # Slot 0's errors are against the old target; they were stored when it was accepted.
             position, cone = segment_holds(problem, work, q, work.trial)
         if position <= 1.0 and cone <= 1.0:
-            if first + written >= ways.shape[0]:
+            if first + written >= waypoints.shape[0]:
                 return -2
             for j in range(n):
                 q[j] = work.trial[j]
-                ways[first + written, j] = q[j]
+                waypoints[first + written, j] = q[j]
             written += 1
             t += dt
             if t >= 1.0 - 1e-12:
@@ -111,9 +111,9 @@ def track(problem, work, course, begin, end, q, goal, has_goal, ways, first):  #
             else:
                 factor = 0.5
                 if position < np.inf:
-                    work.blame[0] = CONE
+                    work.stop_reason[0] = CONE
             dt *= factor
             if dt < SMALLEST_STEP:
                 return -1
-    work.blame[0] = LONG
+    work.stop_reason[0] = LONG
     return -1

@@ -1,6 +1,6 @@
-from .explain import Dropped as Dropped
-from .explain import Explanation as Explanation
-from .explain import explain as explain
+from .explanation import Dropped as Dropped
+from .explanation import Explanation as Explanation
+from .explanation import explain as explain
 from .parameters import LEAST_CONE_DEG as LEAST_CONE_DEG
 from .parameters import Kind as Kind
 from .parameters import Quantity as Quantity

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap import NODES, Explorer, OutOfTime, Problem
+from feasibility.roadmap import NODES, Exploration, OutOfTime, Problem
 from feasibility.verdict import Answer, Evidence, Walk
 
 LEAST = 100  # evaluations between two looks at the ration
 
 
 @dataclass
-class Rationed(Explorer):
+class Rationed(Exploration):
     """An exploration that stops after a number of evaluations of the arm, whatever the clock."""
 
     most: float = np.inf
@@ -30,14 +30,14 @@ class Rationed(Explorer):
             raise OutOfTime
 
     def before_next_look(self) -> int:
-        """No more than is left of the ration; see `Explorer.before_next_look`."""
+        """No more than is left of the ration; see `Exploration.before_next_look`."""
         left = self.most - float(self.work.counts[0])
         return int(min(super().before_next_look(), max(left, LEAST)))
 
-    def plant(self, cell: int, guesses: NDArray[np.float64]) -> int:
-        """Plant, unless the ration is used up; see `Explorer.plant`."""
+    def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
+        """Plant, unless the ration is used up; see `Exploration.add_seeds`."""
         self.tick("looking for configurations")
-        return super().plant(cell, guesses)
+        return super().add_seeds(cell, guesses)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -61,15 +61,15 @@ class Trial:
         return self.walk is not None
 
 
-def configurations(explorer: Explorer) -> NDArray[np.float64]:
+def configurations(exploration: Exploration) -> NDArray[np.float64]:
     """(N, n) a configuration of the best component over each cell; NaN where it has none."""
-    roadmap = explorer.roadmap
-    q = np.full((len(explorer.cells), explorer.robot.n), np.nan)
+    roadmap = exploration.roadmap
+    q = np.full((len(exploration.cells), exploration.robot.n), np.nan)
     nodes = np.arange(roadmap.counters[NODES])[::-1]  # the first one over a cell is written last
     root = roadmap.component[nodes]
     while not np.array_equal(roadmap.parent[root], root):
         root = roadmap.parent[root]
-    mine = nodes[np.equal(root, explorer.best)]
+    mine = nodes[np.equal(root, exploration.best)]
     q[roadmap.cell[mine]] = roadmap.q[mine]
     return q
 
@@ -80,6 +80,6 @@ def certifiable(problem: Problem) -> bool:
     Not in a cone of 0 degrees, where the offset surface folds, or where the surface is known less
     well than the task asks for.
     """
-    smooth = bool(np.isfinite(problem.bends).all())
-    known = bool((problem.strays < (problem.tolerance, problem.rim)).all())
-    return smooth and known and problem.rim > 0.0
+    smooth = bool(np.isfinite(problem.derivative_bounds).all())
+    known = bool((problem.deviations < (problem.tolerance, problem.cone_chord)).all())
+    return smooth and known and problem.cone_chord > 0.0

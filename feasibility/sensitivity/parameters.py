@@ -100,9 +100,9 @@ def shifted(cells: Cells, translation: np.ndarray) -> Cells:
     moved = replace(cells, surface=surface, centres=cells.centres + translation)
     # What is derived from the cells is moved too: deriving the courses again takes longer than a
     # search along them.
-    cubics = cells.courses.cubics.copy()
+    cubics = cells.curves.cubics.copy()
     cubics[:, 0, :3] += translation  # the constant coefficients of the feet
-    vars(moved)["courses"] = replace(cells.courses, cubics=cubics)
+    vars(moved)["curves"] = replace(cells.curves, cubics=cubics)
     vars(moved)["neighbours"] = cells.neighbours
     return moved
 

@@ -18,16 +18,16 @@ from numpy.typing import NDArray
 from feasibility.certification import replay
 from feasibility.roadmap import (
     HERE,
-    Explorer,
+    Exploration,
     OutOfTime,
     Problem,
     Ruling,
     covering_walk,
     evenly,
     explore,
+    margin_shares,
     place,
     problem_of,
-    roomy,
     root_box,
     rule,
     work_for,
@@ -35,7 +35,7 @@ from feasibility.roadmap import (
 )
 from feasibility.sensitivity.limited_search import Rationed, Trial, certifiable, configurations
 from feasibility.sensitivity.parameters import Kind, Quantity, Setup
-from feasibility.sensitivity.warm_start import NO_CELL, follow_all, land_guesses
+from feasibility.sensitivity.warm_start import NO_CELL, follow_all, project_guesses
 from feasibility.verdict import Answer, Evidence
 
 PLANTS = 2  # missed cells that an attempt starts from, besides the first
@@ -43,7 +43,7 @@ SAME = 0.05  # [1], postures nearer than that are taken for one, see `Prober._po
 MOST_SUSPECTS = 12  # cells that are taken for hard
 AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
 LANDINGS = 16  # random configurations that are put over a cell that no known one covers
-LANDING_STEPS = np.int64(20)  # Newton steps of each
+PROJECTION_STEPS = np.int64(20)  # Newton steps of each
 LEAST_BOXES = 120  # for one cell, however dear proofs have turned out to be
 
 
@@ -113,11 +113,13 @@ class Prober:
 
     def _coned(self, cone: float) -> Problem | None:
         """The problem with another cone (rad), as it is over the cells' centres, nearly."""
-        rim, former = float(2.0 * np.sin(0.5 * cone)), self.problem
-        if not (cone < np.pi and former.rim < np.inf and former.rim > 0.0):
+        cone_chord, former = float(2.0 * np.sin(0.5 * cone)), self.problem
+        if not (cone < np.pi and former.cone_chord < np.inf and former.cone_chord > 0.0):
             return None
-        lost = (former.rim - former.inner_rim) * min(1.0, rim / former.rim)
-        return former._replace(rim=rim, inner_rim=rim - lost)
+        lost = (former.cone_chord - former.inner_cone_chord) * min(
+            1.0, cone_chord / former.cone_chord
+        )
+        return former._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord - lost)
 
     def order(self) -> NDArray[np.int64]:
         """(N,) all cells, the hard ones first, then those at the edge of the surface."""
@@ -146,11 +148,11 @@ class Prober:
         self.tick()
         found = q.copy()
         order = self.order()
-        landed = int(follow_all(problem, self.work, order, found))
-        if landed == len(order):
+        projected = int(follow_all(problem, self.work, order, found))
+        if projected == len(order):
             return NO_CELL, found
-        self.suspect(int(order[landed]))
-        return int(order[landed]), found
+        self.suspect(int(order[projected]))
+        return int(order[projected]), found
 
     def rule(
         self, problem: Problem, cell: int, boxes: int
@@ -178,8 +180,8 @@ class Prober:
             return ruling, None
         row = np.full((len(problem.points), len(q)), np.nan)
         row[cell] = wound(problem, q)
-        landed = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
-        return ruling, row[cell] if landed else None
+        projected = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
+        return ruling, row[cell] if projected else None
 
     def beyond_reach(self, problem: Problem) -> NDArray[np.bool_]:
         """(N,) cells that are further away than the arm reaches.
@@ -221,36 +223,36 @@ class Prober:
         robot, cells, _ = self.setup
         robot = robot.with_limits(np.column_stack([problem.lower, problem.upper]))
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
-        explorer = Rationed(
+        exploration = Rationed(
             robot, cells, problem, self.seed, self.deadline, lambda *_: self.tick(), most=most
         )
         ended = False
         try:
-            self._plant(explorer, seeds, deep)
-            if hard != NO_CELL and not explorer.complete:
-                self._land(explorer, hard)
-            if deep and not explorer.complete:
-                explore(explorer)
+            self._add_seeds(exploration, seeds, deep)
+            if hard != NO_CELL and not exploration.complete:
+                self._project(exploration, hard)
+            if deep and not exploration.complete:
+                explore(exploration)
                 ended = True
         except OutOfTime:
             pass
         finally:
-            self.spent_before += int(explorer.work.counts[0])
-        q = configurations(explorer)
-        if needed.any() and explorer.covered[needed].all():
-            walk = covering_walk(explorer.roadmap, explorer.best)
+            self.spent_before += int(exploration.work.counts[0])
+        q = configurations(exploration)
+        if needed.any() and exploration.covered[needed].all():
+            walk = covering_walk(exploration.roadmap, exploration.best)
             detail = f"one motion of {len(walk.q)} waypoints"
             return Trial(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
-        proved = [k for k, ruling in explorer.rulings.items() if ruling is Ruling.PROVED]
+        proved = [k for k, ruling in exploration.rulings.items() if ruling is Ruling.PROVED]
         if proved:
             self.suspect(proved[0])
             detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
             return Trial(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
-        best = f"the best motion covers {int(explorer.covered.sum())} of {len(cells)} cells"
+        best = f"the best motion covers {int(exploration.covered.sum())} of {len(cells)} cells"
         if ended and certifiable(problem):
             detail = f"the search ended without a covering motion; {best}"
             return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
-        detail = f"not found with {int(explorer.work.counts[0])} evaluations of the arm; {best}"
+        detail = f"not found with {int(exploration.work.counts[0])} evaluations of the arm; {best}"
         if time.monotonic() > self.deadline:
             detail = "unknown, because the time limit ran out"
         return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
@@ -279,9 +281,9 @@ class Prober:
             most: searches.
         """
         robot, cells, _ = self.setup
-        explorer = Explorer(robot, cells, self.problem, self.seed + 1)
-        tried = explorer.guesses(guesses)
-        room = roomy(self.problem, self.work, cells.middle, tried)
+        exploration = Exploration(robot, cells, self.problem, self.seed + 1)
+        tried = exploration.guesses(guesses)
+        room = margin_shares(self.problem, self.work, cells.middle, tried)
         order = np.argsort(-room, kind="stable")
         trials = []
         tried = tried[order[room[order] >= 0.0]]
@@ -300,34 +302,36 @@ class Prober:
         origins, axes = self.work.origins[0] / self.problem.scale, self.work.axes[0]
         return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
 
-    def _plant(self, explorer: Rationed, seeds: NDArray[np.float64], deep: bool) -> None:
+    def _add_seeds(self, exploration: Rationed, seeds: NDArray[np.float64], deep: bool) -> None:
         """Plant seeds until one component covers every cell, hard cells first."""
         known = np.asarray(np.isfinite(seeds).all(axis=1))
         first = [cell for cell in self.suspects if known[cell]][:1]
         for cell in first or np.flatnonzero(known)[:1].tolist():
-            explorer.plant(cell, np.clip(seeds[[cell]], explorer.low, explorer.high))
+            exploration.add_seeds(cell, np.clip(seeds[[cell]], exploration.low, exploration.high))
         if not deep:
-            explorer.most = min(explorer.most, AGAIN * float(explorer.work.counts[0]))
+            exploration.most = min(exploration.most, AGAIN * float(exploration.work.counts[0]))
         for _ in range(PLANTS):
-            missed = np.flatnonzero(known & ~explorer.covered)
-            if explorer.complete or not len(missed):
+            missed = np.flatnonzero(known & ~exploration.covered)
+            if exploration.complete or not len(missed):
                 return
             cell = int(missed[len(missed) // 2])
             known[cell] = False
-            explorer.plant(cell, seeds[[cell]])
+            exploration.add_seeds(cell, seeds[[cell]])
 
-    def _land(self, explorer: Rationed, cell: int) -> None:
+    def _project(self, exploration: Rationed, cell: int) -> None:
         """Plant what random configurations lead to over one cell, the hardest.
 
         Where they lead to nothing, little hope is left: half of the ration will do.
         """
-        guesses = explorer.guesses(LANDINGS)
-        landed = np.zeros(len(guesses), dtype=bool)
-        land_guesses(explorer.problem, explorer.work, cell, guesses, LANDING_STEPS, landed)
-        if landed.any():
-            explorer.plant(cell, guesses[landed])
-        elif explorer.roadmap.first_node[cell] < 0:
-            explorer.most = 0.5 * (explorer.most + float(explorer.work.counts[0]))
+        guesses = exploration.guesses(LANDINGS)
+        projected = np.zeros(len(guesses), dtype=bool)
+        project_guesses(
+            exploration.problem, exploration.work, cell, guesses, PROJECTION_STEPS, projected
+        )
+        if projected.any():
+            exploration.add_seeds(cell, guesses[projected])
+        elif exploration.roadmap.first_node[cell] < 0:
+            exploration.most = 0.5 * (exploration.most + float(exploration.work.counts[0]))
 
 
 def apart(features: NDArray[np.float64], most: int) -> list[int]:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
-from feasibility.roadmap import land
+from feasibility.roadmap import project_onto_cell
 from feasibility.sensitivity.parameters import Quantity
 from feasibility.sensitivity.thresholds import last_true
 
@@ -39,16 +39,16 @@ def follow_all(problem, work, order, q):  # type: ignore[no-untyped-def]
         row = q[order[k]]
         for j in range(row.shape[0]):
             row[j] = min(max(row[j], problem.lower[j]), problem.upper[j])
-        if not land(problem, work, order[k], row, FOLLOW_STEPS):
+        if not project_onto_cell(problem, work, order[k], row, FOLLOW_STEPS):
             return k
     return order.shape[0]
 
 
 @kernel
-def land_guesses(problem, work, cell, guesses, steps, landed):  # type: ignore[no-untyped-def]
-    """Newton onto the fibre over one cell from each guess (k, n) in place; fills `landed` (k,)."""
+def project_guesses(problem, work, cell, guesses, steps, projected):  # type: ignore[no-untyped-def]
+    """Newton onto the fibre over one cell from each guess (k, n) in place; fills `projected` (k,)."""
     for k in range(guesses.shape[0]):
-        landed[k] = land(problem, work, cell, guesses[k], steps)
+        projected[k] = project_onto_cell(problem, work, cell, guesses[k], steps)
 
 
 class Reached(NamedTuple):

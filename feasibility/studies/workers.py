@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
 from feasibility.notices import compiling_notice, notify
-from feasibility.roadmap import Gate, warm_up, warm_up_in_turn
+from feasibility.roadmap import SharedLock, warm_up, warm_up_in_turn
 
 ATTEMPTS = 3  # to start worker processes anew
 LOST = "the connection to the workers was lost; what was finished is kept, run again to continue"
@@ -215,7 +215,7 @@ def _pass_on(heard: Connection) -> None:
     notify()
 
 
-def _begin(leash: Connection, word: Connection, gate: Gate | None) -> None:
+def _begin(leash: Connection, word: Connection, gate: SharedLock | None) -> None:
     """In a new worker: watch the leash; load the kernels, one worker first, if there is a gate."""
 
     def watch() -> None:

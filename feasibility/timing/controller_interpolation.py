@@ -14,8 +14,8 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.speed_limits import MotionLimits, tool_slopes
-from feasibility.timing.trajectory import Trajectory
 from feasibility.verdict import Walk
 from robots import Robot
 

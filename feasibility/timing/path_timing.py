@@ -26,10 +26,10 @@ from feasibility.timing.controller_interpolation import (
     past_limits,
     used,
 )
+from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smoothing import Curve, blended
 from feasibility.timing.speed_limits import MotionLimits, motion_limits, number
 from feasibility.timing.timed_curve import samples, timed_curve
-from feasibility.timing.trajectory import Trajectory
 from feasibility.verdict import Walk
 from robots import Robot
 

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from feasibility.paths import PathError
+from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smoothing import Curve, inside
 from feasibility.timing.speed_limits import MotionLimits, fine_grid, squared_speeds, tool_slopes
 from feasibility.timing.time_optimal import acceleration_excess, parameterised
-from feasibility.timing.trajectory import Trajectory
 from robots import Robot
 
 Array = NDArray[np.float64]

@@ -39,7 +39,7 @@ class Skin:
     """(F,) cell of each face."""
     places: Ints
     """(V,) equal for vertices that share a place, where normals differ."""
-    rim: NDArray[np.bool_]
+    cone_chord: NDArray[np.bool_]
     """(V,) vertices on the border of the mesh."""
 
     def __post_init__(self) -> None:
@@ -73,7 +73,7 @@ class Skin:
         apart = np.minimum.reduceat(owner, starts) != np.maximum.reduceat(owner, starts)
         single = np.diff(np.append(starts, len(key))) == 1
         drawn = halves[order[starts]]
-        return self.vertices[drawn[apart | (single & self.rim[drawn].all(axis=1))]]
+        return self.vertices[drawn[apart | (single & self.cone_chord[drawn].all(axis=1))]]
 
 
 _skins: WeakKeyDictionary[MeshCells, Skin] = WeakKeyDictionary()
@@ -99,11 +99,11 @@ def make_skin(cells: MeshCells, budget: int = BUDGET) -> Skin:
     More are left where cells are so many that each would be drawn by too few.
     """
     mesh, surface = cells.surface.mesh, cells.surface
-    rim = np.zeros(len(mesh.vertices), dtype=bool)
-    rim[mesh.edges.border_vertices] = True
+    cone_chord = np.zeros(len(mesh.vertices), dtype=bool)
+    cone_chord[mesh.edges.border_vertices] = True
     merged = _Merged(mesh.faces, cells.labels)
     if len(mesh.faces) > budget:
-        merged = _thinned(cells, rim, budget)
+        merged = _thinned(cells, cone_chord, budget)
         normals = np.zeros_like(mesh.vertices)
         for k in range(3):
             np.add.at(normals, mesh.faces[:, k], surface.corner_normals[:, k])
@@ -122,16 +122,16 @@ def make_skin(cells: MeshCells, budget: int = BUDGET) -> Skin:
         faces=faces.reshape(-1, 3).astype(np.int64),
         labels=np.array(merged.labels),
         places=corner[first],
-        rim=rim[corner[first]],
+        cone_chord=cone_chord[corner[first]],
     )
 
 
-def _thinned(cells: MeshCells, rim: NDArray[np.bool_], budget: int) -> _Merged:
+def _thinned(cells: MeshCells, cone_chord: NDArray[np.bool_], budget: int) -> _Merged:
     """Merge vertices at a wider and wider spacing, until few enough faces are left."""
     mesh = cells.surface.mesh
-    kinds = _kinds(mesh.faces, cells.labels, rim)
+    kinds = _kinds(mesh.faces, cells.labels, cone_chord)
     widest = WIDEST * np.sqrt(cells.areas.mean())
-    spacing = min(cells.surface.grain * np.sqrt(len(mesh.faces) / budget), widest)
+    spacing = min(cells.surface.mean_edge_length * np.sqrt(len(mesh.faces) / budget), widest)
     merged = _merged(cells, kinds, spacing)
     while len(merged.faces) > budget and spacing * COARSER <= widest:
         spacing *= COARSER
@@ -144,15 +144,15 @@ def _thinned(cells: MeshCells, rim: NDArray[np.bool_], budget: int) -> _Merged:
     )
 
 
-def _kinds(faces: Ints, labels: Ints, rim: NDArray[np.bool_]) -> Ints:
+def _kinds(faces: Ints, labels: Ints, cone_chord: NDArray[np.bool_]) -> Ints:
     """(V,) equal for vertices that may be merged: in one cell, or on one border of two cells."""
     count = int(labels.max()) + 1
     touching = np.unique(faces.ravel() * count + np.repeat(labels, 3))
     vertex, cell = np.divmod(touching, count)
-    first = np.searchsorted(vertex, np.arange(len(rim)))
+    first = np.searchsorted(vertex, np.arange(len(cone_chord)))
     number = np.diff(np.append(first, len(vertex)))
     low, high = cell[first], cell[first + number - 1]
-    kind = 2 * (low * count + high) + rim
+    kind = 2 * (low * count + high) + cone_chord
     alone = number > 2  # where borders meet
     kind[alone] = -1 - np.flatnonzero(alone)
     return np.unique(kind, return_inverse=True)[1].reshape(-1).astype(np.int64)

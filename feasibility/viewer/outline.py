@@ -117,7 +117,12 @@ def _stroke(cells: Cells, length: float) -> Array:
     if np.linalg.norm(mean) < TELLING:
         return np.empty((0, 2, 3))
     away = np.linalg.norm(cells.centres - cells.centres.mean(axis=0), axis=1)
-    foot = int(np.argmax(away <= away.min() + ALIKE * away.max()))  # the first of several as near
+    closest_point = int(
+        np.argmax(away <= away.min() + ALIKE * away.max())
+    )  # the first of several as near
     # The tool stands on the side that the targets lie on.
-    tip = cells.centres[foot] + length * cells.surface.side_sign * cells.normals[foot]
-    return _at_home(cells, np.stack([cells.centres[foot], tip]))[None]
+    tip = (
+        cells.centres[closest_point]
+        + length * cells.surface.side_sign * cells.normals[closest_point]
+    )
+    return _at_home(cells, np.stack([cells.centres[closest_point], tip]))[None]

@@ -113,13 +113,13 @@ def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
     cells = verdict.cells
     pairs = np.array(list(verdict.graph.edges), dtype=np.int64).reshape(-1, 2)
     keys = cells.pairs[:, 0] * len(cells) + cells.pairs[:, 1]
-    course = np.searchsorted(keys, pairs.min(axis=1) * len(cells) + pairs.max(axis=1))
+    curve = np.searchsorted(keys, pairs.min(axis=1) * len(cells) + pairs.max(axis=1))
     t = np.linspace(0.0, 1.0, _edge_points(cells))
     backwards = (pairs[:, 0] > pairs[:, 1])[:, None]
     places = np.where(backwards, 1.0 - t, t)
-    foot, normal = cells.courses.at(np.repeat(course, len(t)), places.reshape(-1))
+    closest_point, normal = cells.curves.at(np.repeat(curve, len(t)), places.reshape(-1))
     height = cells.surface.side_sign * verdict.task.standoff
-    return (foot + height * normal).reshape(len(pairs), len(t), 3)
+    return (closest_point + height * normal).reshape(len(pairs), len(t), 3)
 
 
 def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64]]:

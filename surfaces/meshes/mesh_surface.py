@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfaces.arguments import Checks
 from surfaces.meshes.normals import WIDTH, blended, carried, corner_normals, sectors, unit
 from surfaces.meshes.triangle_mesh import TriangleMesh
-from surfaces.surface import Foot, Side, Surface, points_of, sharpest_turn
+from surfaces.surface import ClosestPoint, Side, Surface, points_of, sharpest_turn
 
 if TYPE_CHECKING:
     from surfaces.cells import Cells
@@ -56,14 +56,14 @@ class MeshSurface(Surface):
         return self.mesh.notes
 
     @cached_property
-    def grain(self) -> float:
+    def mean_edge_length(self) -> float:
         """m, the mean length of the edges."""
         edges = self.mesh.edges
         lengths = np.concatenate([edges.lengths, edges.border_lengths])
         return float(lengths.mean())
 
-    def closest(self, points: ArrayLike) -> Foot:
-        """The points of the mesh nearest to `points` (..., 3) m; see `Foot`.
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """The points of the mesh nearest to `points` (..., 3) m; see `ClosestPoint`.
 
         `height` is the whole distance, positive where the point lies on the outer side of the
         surface; the mesh ends at its border, so every foot is inside.
@@ -78,7 +78,7 @@ class MeshSurface(Surface):
         distance = np.linalg.norm(off, axis=1)
         shape = points.shape[:-1]
         nowhere = np.full(shape, np.nan)
-        return Foot(
+        return ClosestPoint(
             u=nowhere,
             v=nowhere,
             height=np.where(outer, distance, -distance).reshape(shape),
@@ -102,7 +102,7 @@ class MeshSurface(Surface):
         # Not by the face's own normal: beyond a sharp edge a point may lie under its plane.
         mean = self.normals_at(face, weights) @ self.rotation
         outer = np.where(np.einsum("ki,ki->k", off, mean) >= 0.0, 1.0, -1.0)
-        on = distance <= ON * self.grain
+        on = distance <= ON * self.mean_edge_length
         direction = off * (outer / np.where(on, 1.0, distance))[:, None]
         flat = self.mesh.face_normals[face]
         return distance, np.where(on[:, None], flat, direction) @ self.rotation.T
@@ -198,8 +198,8 @@ class MeshSurface(Surface):
         put_on_cells(*self._balls, members, indptr, near, near_indptr, pairs, local, faces, weights)
         return faces, weights
 
-    def sharpness(self, cells: Cells, height: float = 0.0) -> Array:
-        """See `Surface.sharpness`: of the face of each cell where the normal turns fastest."""
+    def max_curvature(self, cells: Cells, height: float = 0.0) -> Array:
+        """See `Surface.max_curvature`: of the face of each cell where the normal turns fastest."""
         from surfaces.meshes.cells import MeshCells
 
         if not isinstance(cells, MeshCells):

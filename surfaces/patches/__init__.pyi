@@ -1,11 +1,11 @@
 from .closed_form import ClosedFormPatch as ClosedFormPatch
 from .closed_form_kernels import cell_at as cell_at
-from .closed_form_kernels import foot as foot
+from .closed_form_kernels import closest_on_patch as closest_on_patch
 from .cone import cone as cone
 from .cylinder import cylinder as cylinder
 from .ellipsoid import ellipsoid as ellipsoid
 from .grid_cells import GridCells as GridCells
-from .grid_cells import charted_grid as charted_grid
+from .grid_cells import closed_form_grid as closed_form_grid
 from .hyperboloid import hyperboloid as hyperboloid
 from .nurbs import bspline as bspline
 from .nurbs import read_net as read_net

@@ -14,25 +14,25 @@ from numpy.typing import ArrayLike
 
 from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
 from surfaces.patches.patch import Patch
-from surfaces.surface import Foot, points_of
+from surfaces.surface import ClosestPoint, points_of
 
 if TYPE_CHECKING:
-    from surfaces.patches.closed_form_kernels import Chart
+    from surfaces.patches.closed_form_kernels import PatchKernel
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class ClosedFormPatch(Patch):
-    """A patch that `surfaces.chart` knows."""
+    """A patch that `surfaces.patch_kernel` knows."""
 
     code: ClassVar[int]
-    """What `surfaces.chart` dispatches on."""
+    """What `surfaces.patch_kernel` dispatches on."""
 
     @abstractmethod
     def curvature_slices(self, margin: float) -> CurvatureSlices:
         """Bounds on the curvatures of the patch, widened by `margin` where it has open ends."""
 
-    def closest(self, points: ArrayLike) -> Foot:
-        """The feet of `points` (..., 3) m on the surface; see `Foot`.
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """The feet of `points` (..., 3) m on the surface; see `ClosestPoint`.
 
         Where several points are equally near (centre of a sphere, axis of a cylinder), one of
         them is taken, on the patch if there is one.
@@ -40,12 +40,12 @@ class ClosedFormPatch(Patch):
         Raises:
             ValueError: `points` does not end in an axis of length 3.
         """
-        from surfaces.patches.closed_form_kernels import feet
+        from surfaces.patches.closed_form_kernels import closest_points
 
         points = points_of(points)
         shape = points.shape[:-1]
-        values, inside = feet(self.chart(), np.array(points.reshape(-1, 3)))
-        return Foot(
+        values, inside = closest_points(self.patch_kernel(), np.array(points.reshape(-1, 3)))
+        return ClosestPoint(
             u=values[:, 0].reshape(shape),
             v=values[:, 1].reshape(shape),
             height=values[:, 2].reshape(shape),
@@ -53,11 +53,11 @@ class ClosedFormPatch(Patch):
             inside=inside.reshape(shape),
         )
 
-    def chart(self, nu: int = 1, nv: int = 1) -> Chart:
+    def patch_kernel(self, nu: int = 1, nv: int = 1) -> PatchKernel:
         """What compiled loops need of the surface, cut into nu x nv cells."""
-        from surfaces.patches.closed_form_kernels import Chart
+        from surfaces.patches.closed_form_kernels import PatchKernel
 
-        return Chart(
+        return PatchKernel(
             code=self.code,
             shape=(*map(float, self.lengths), 0.0, 0.0)[:2],
             rotation=tuple(self.rotation.ravel().tolist()),

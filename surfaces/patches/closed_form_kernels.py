@@ -1,7 +1,7 @@
 """The surface as compiled loops see it: the foot of a point, and the cell it falls in.
 
 One implementation serves `ClosedFormPatch.closest` and the search kernels alike. A new kind of surface
-adds a code, a `_..._foot` function in its own frame, and a branch in `foot`.
+adds a code, a `_..._foot` function in its own frame, and a branch in `closest_on_patch`.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lie
 _TURN = 2.0 * math.pi
 
 
-class Chart(NamedTuple):
+class PatchKernel(NamedTuple):
     """A patch of a surface, cut into cells; a plain tuple, as numba likes it.
 
     It holds no arrays: numba counts references to an array whenever it is read out of a tuple,
     and that took longer than the geometry.
 
-    Built by `ClosedFormPatch.chart` and `GridCells.chart`.
+    Built by `ClosedFormPatch.patch_kernel` and `GridCells.patch_kernel`.
     """
 
     code: int
@@ -56,7 +56,7 @@ def wrap(angle, low, high):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _sphere_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+def _closest_on_sphere(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
     """Foot on the sphere about the origin: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     distance = math.hypot(rho, z)
@@ -72,7 +72,7 @@ def _sphere_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _cylinder_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
+def _closest_on_cylinder(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
     """Foot on the cylinder about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     if rho == 0.0:
@@ -82,7 +82,7 @@ def _cylinder_foot(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def hyperbola_foot(waist, slope, rho, z):  # type: ignore[no-untyped-def]
+def closest_on_hyperbola(waist, slope, rho, z):  # type: ignore[no-untyped-def]
     """Abscissa t of the point of r(t) = sqrt(waist^2 + slope^2 t^2) nearest to (z, rho).
 
     It is a root of f(t) = (1 + s^2) t - s^2 rho t / r(t) - z. For z >= 0, f is convex on t >= 0
@@ -108,11 +108,11 @@ def hyperbola_foot(waist, slope, rho, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _hyperboloid_foot(waist, flare, x, y, z, low, high):  # type: ignore[no-untyped-def]
+def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):  # type: ignore[no-untyped-def]
     """Foot on the hyperboloid of one sheet about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     slope = waist / flare
-    t = hyperbola_foot(waist, slope, rho, z)
+    t = closest_on_hyperbola(waist, slope, rho, z)
     r = math.sqrt(waist * waist + slope * slope * t * t)
     rise = slope * slope * t / r
     length = math.sqrt(1.0 + rise * rise)
@@ -127,11 +127,11 @@ def _hyperboloid_foot(waist, flare, x, y, z, low, high):  # type: ignore[no-unty
 
 
 @njit(cache=True, error_model="numpy")
-def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
+def closest_on_patch(patch_kernel, x, y, z):  # type: ignore[no-untyped-def]
     """The point of the surface nearest to (x, y, z), all in the root frame.
 
     Args:
-        chart: a `Chart`.
+        chart: a `PatchKernel`.
         x: m, as y and z.
         y: m.
         z: m.
@@ -141,20 +141,25 @@ def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
         range, or stays outside it if no turn brings it in), signed height along the outward
         normal (m), and that unit normal.
     """
-    r, shape, low, high = chart.rotation, chart.shape, chart.low, chart.high
-    dx = x - chart.position[0]
-    dy = y - chart.position[1]
-    dz = z - chart.position[2]
+    r, shape, low, high = (
+        patch_kernel.rotation,
+        patch_kernel.shape,
+        patch_kernel.low,
+        patch_kernel.high,
+    )
+    dx = x - patch_kernel.position[0]
+    dy = y - patch_kernel.position[1]
+    dz = z - patch_kernel.position[2]
     a = r[0] * dx + r[3] * dy + r[6] * dz
     b = r[1] * dx + r[4] * dy + r[7] * dz
     c = r[2] * dx + r[5] * dy + r[8] * dz
-    if chart.code == SPHERE:
-        u, v, height, na, nb, nc = _sphere_foot(shape[0], a, b, c, low, high)
-    elif chart.code == CYLINDER:
-        u, v, height, na, nb, nc = _cylinder_foot(shape[0], a, b, c, low, high)
-    elif chart.code == HYPERBOLOID:
-        u, v, height, na, nb, nc = _hyperboloid_foot(shape[0], shape[1], a, b, c, low, high)
-    elif chart.code == PLANE:
+    if patch_kernel.code == SPHERE:
+        u, v, height, na, nb, nc = _closest_on_sphere(shape[0], a, b, c, low, high)
+    elif patch_kernel.code == CYLINDER:
+        u, v, height, na, nb, nc = _closest_on_cylinder(shape[0], a, b, c, low, high)
+    elif patch_kernel.code == HYPERBOLOID:
+        u, v, height, na, nb, nc = _closest_on_hyperboloid(shape[0], shape[1], a, b, c, low, high)
+    elif patch_kernel.code == PLANE:
         u, v, height, na, nb, nc = a, b, c, 0.0, 0.0, 1.0
     else:
         u, v, height, na, nb, nc = math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
@@ -169,28 +174,28 @@ def foot(chart, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def spot(chart, u, v):  # type: ignore[no-untyped-def]
+def spot(patch_kernel, u, v):  # type: ignore[no-untyped-def]
     """The point of the surface at parameters u, v (rad or m), and the normal there.
 
     Returns:
         (x, y, z, nx, ny, nz): the point (m) and the outward unit normal, in the root frame.
     """
-    r, shape, position = chart.rotation, chart.shape, chart.position
-    if chart.code == SPHERE:
+    r, shape, position = patch_kernel.rotation, patch_kernel.shape, patch_kernel.position
+    if patch_kernel.code == SPHERE:
         s = math.sin(u)
         na, nb, nc = s * math.cos(v), s * math.sin(v), math.cos(u)
         a, b, c = shape[0] * na, shape[0] * nb, shape[0] * nc
-    elif chart.code == CYLINDER:
+    elif patch_kernel.code == CYLINDER:
         na, nb, nc = math.cos(u), math.sin(u), 0.0
         a, b, c = shape[0] * na, shape[0] * nb, v
-    elif chart.code == HYPERBOLOID:
+    elif patch_kernel.code == HYPERBOLOID:
         slope = shape[0] / shape[1]
         radius = math.sqrt(shape[0] * shape[0] + slope * slope * v * v)
         rise = slope * slope * v / radius
         length = math.sqrt(1.0 + rise * rise)
         na, nb, nc = math.cos(u) / length, math.sin(u) / length, -rise / length
         a, b, c = radius * math.cos(u), radius * math.sin(u), v
-    elif chart.code == PLANE:
+    elif patch_kernel.code == PLANE:
         na, nb, nc = 0.0, 0.0, 1.0
         a, b, c = u, v, 0.0
     else:
@@ -207,22 +212,32 @@ def spot(chart, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def on_patch(chart, u, v):  # type: ignore[no-untyped-def]
-    """True where u and v (rad or m, wrapped as `foot` returns them) lie in the patch's ranges."""
-    u0, u1, v0, v1 = chart.low[0], chart.high[0], chart.low[1], chart.high[1]
+def on_patch(patch_kernel, u, v):  # type: ignore[no-untyped-def]
+    """True where u and v (rad or m, wrapped as `closest_on_patch` returns them) lie in the patch's ranges."""
+    u0, u1, v0, v1 = (
+        patch_kernel.low[0],
+        patch_kernel.high[0],
+        patch_kernel.low[1],
+        patch_kernel.high[1],
+    )
     return u0 - EDGE <= u <= u1 + EDGE and v0 - EDGE <= v <= v1 + EDGE
 
 
 @njit(cache=True, error_model="numpy")
-def cell_at(chart, u, v):  # type: ignore[no-untyped-def]
+def cell_at(patch_kernel, u, v):  # type: ignore[no-untyped-def]
     """Flat row-major index of the cell at u, v (rad or m), or -1 outside the patch.
 
     A closed parameter may be off by any number of turns. A border belongs to the cell of higher
     index, the outermost border to the last cell.
     """
-    u0, u1, v0, v1 = chart.low[0], chart.high[0], chart.low[1], chart.high[1]
-    u_closed, v_closed = chart.closed[0], chart.closed[1]
-    rows, columns = chart.cells[0], chart.cells[1]
+    u0, u1, v0, v1 = (
+        patch_kernel.low[0],
+        patch_kernel.high[0],
+        patch_kernel.low[1],
+        patch_kernel.high[1],
+    )
+    u_closed, v_closed = patch_kernel.closed[0], patch_kernel.closed[1]
+    rows, columns = patch_kernel.cells[0], patch_kernel.cells[1]
     if u_closed:
         u = wrap(u, u0, u1)
     if v_closed:
@@ -236,18 +251,20 @@ def cell_at(chart, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def feet(chart, points):  # type: ignore[no-untyped-def]
-    """`foot` of many points (k, 3): values (k, 6) in the order of `foot`, and `on_patch` (k,)."""
+def closest_points(patch_kernel, points):  # type: ignore[no-untyped-def]
+    """`closest_on_patch` of many points (k, 3): values (k, 6) in the order of `closest_on_patch`, and `on_patch` (k,)."""
     count = points.shape[0]
     values = np.empty((count, 6))
     inside = np.empty(count, dtype=np.bool_)
     for k in range(count):
-        u, v, height, nx, ny, nz = foot(chart, points[k, 0], points[k, 1], points[k, 2])
+        u, v, height, nx, ny, nz = closest_on_patch(
+            patch_kernel, points[k, 0], points[k, 1], points[k, 2]
+        )
         values[k, 0] = u
         values[k, 1] = v
         values[k, 2] = height
         values[k, 3] = nx
         values[k, 4] = ny
         values[k, 5] = nz
-        inside[k] = on_patch(chart, u, v)
+        inside[k] = on_patch(patch_kernel, u, v)
     return values, inside

@@ -38,7 +38,7 @@ class Jet(NamedTuple):
     """(n, d, d, m) second derivatives."""
 
 
-class FootSearch:
+class ClosestPointSearch:
     """Nearest points of a smooth map from a box with d = 1 or 2 parameters."""
 
     def __init__(

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import LARGEST_RATIO, Checks, real
-from surfaces.patches.smooth_patch import LocalFeet, SmoothPatch, azimuth
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -54,7 +54,7 @@ class Cone(SmoothPatch):
         middle = self.radius + self.slope * (v0 + v1) / 2.0
         return np.asarray((u1 - u0) * (v1 - v0) * math.hypot(1.0, self.slope) * middle)
 
-    def local_feet(self, points: Array) -> LocalFeet:
+    def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """Perpendicular to the straight meridian at the point's azimuth.
 
         Past the apex the foot is the apex, which no patch holds; `height` is then the distance
@@ -69,7 +69,7 @@ class Cone(SmoothPatch):
             v = np.where(past, -self.radius / self.slope, v)
         u = azimuth(x, y, *self.u_range, size=self.radius)
         height = (rho - self.radius - self.slope * z) / length
-        return LocalFeet(u, v, height, self.local_normal(u, v), ~past)
+        return LocalClosestPoints(u, v, height, self.local_normal(u, v), ~past)
 
 
 def cone(

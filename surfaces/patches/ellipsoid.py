@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import Checks
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.patches.smooth_patch import LocalFeet, SmoothPatch, azimuth
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ class Ellipsoid(SmoothPatch):
 
         return rectangle_areas(element, u0, u1, v0, v1)
 
-    def local_feet(self, points: Array) -> LocalFeet:
+    def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """From the one root that the normal equations leave; see `nearest_on_ellipsoid`.
 
         Where several feet are equally near (on the planes inside that the normals of opposite
@@ -76,22 +76,24 @@ class Ellipsoid(SmoothPatch):
         """
         axes = np.array(self.semi_axes)
         middle = _unit(*(np.array(sum(ends) / 2.0) for ends in (self.u_range, self.v_range)))
-        foot = nearest_on_ellipsoid(axes, points, middle)
-        u, v = self._parameters(foot)
+        closest_point = nearest_on_ellipsoid(axes, points, middle)
+        u, v = self._parameters(closest_point)
         off = np.flatnonzero(~self._on_patch(u, v))
         if len(off):
             across = nearest_on_ellipsoid(axes, points[off], -middle)
             u_across, v_across = self._parameters(across)
             better = self._on_patch(u_across, v_across)
             gap = np.linalg.norm(across - points[off], axis=1)
-            better &= gap <= np.linalg.norm(foot[off] - points[off], axis=1) * (1.0 + 1e-12)
+            better &= gap <= np.linalg.norm(closest_point[off] - points[off], axis=1) * (
+                1.0 + 1e-12
+            )
             u[off[better]], v[off[better]] = u_across[better], v_across[better]
         normal = self.local_normal(u, v)
         height = np.einsum("ni,ni->n", points - self.local_point(u, v), normal)
-        return LocalFeet(u, v, height, normal, np.ones(len(u), dtype=bool))
+        return LocalClosestPoints(u, v, height, normal, np.ones(len(u), dtype=bool))
 
-    def _parameters(self, foot: Array) -> tuple[Array, Array]:
-        x, y, z = (foot / np.array(self.semi_axes)).T
+    def _parameters(self, closest_point: Array) -> tuple[Array, Array]:
+        x, y, z = (closest_point / np.array(self.semi_axes)).T
         return np.arctan2(np.hypot(x, y), z), azimuth(x, y, *self.v_range, size=1.0)
 
 

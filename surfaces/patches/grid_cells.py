@@ -17,10 +17,10 @@ from surfaces.patches.patch import Patch
 from surfaces.surface import SurfaceError
 
 if TYPE_CHECKING:
-    from surfaces.patches.closed_form_kernels import Chart
+    from surfaces.patches.closed_form_kernels import PatchKernel
 
 
-CHARTED = "a sphere, cylinder, hyperboloid or plane"
+CLOSED_FORM_KINDS = "a sphere, cylinder, hyperboloid or plane"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,20 +75,20 @@ class GridCells(Cells):
         return self.index(self.shape[0] // 2, self.shape[1] // 2)
 
     @property
-    def charted(self) -> ClosedFormPatch:
+    def closed_form(self) -> ClosedFormPatch:
         """The patch, for the greedy search.
 
         Raises:
             SurfaceError: the patch is of a kind that its compiled loops do not know.
         """
         if not isinstance(self.surface, ClosedFormPatch):
-            raise _uncharted(self.surface.kind)
+            raise _no_closed_form(self.surface.kind)
         return self.surface
 
     @cached_property
-    def chart(self) -> Chart:
-        """What compiled loops of the greedy search need of these cells; see `charted`."""
-        return self.charted.chart(*self.shape)
+    def patch_kernel(self) -> PatchKernel:
+        """What compiled loops of the greedy search need of these cells; see `closed_form`."""
+        return self.closed_form.patch_kernel(*self.shape)
 
     def index(self, i: int, j: int) -> int:
         """Flat index of the cell in row i (u) and column j (v).
@@ -141,8 +141,8 @@ class GridCells(Cells):
 
     def locate(self, points: ArrayLike) -> NDArray[np.int64]:
         """See `Cells.locate`."""
-        foot = self.surface.closest(points)
-        return np.where(foot.inside, self.at(foot.u, foot.v), -1)
+        closest_point = self.surface.closest(points)
+        return np.where(closest_point.inside, self.at(closest_point.u, closest_point.v), -1)
 
     def at(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.int64]:
         """The cells at some parameters; -1 where these are NaN, or where there are no cells.
@@ -211,21 +211,21 @@ class GridCells(Cells):
         return f"Cells({self.shape[0]} x {self.shape[1]} of {self.surface!r})"
 
 
-def charted_grid(cells: Cells) -> GridCells:
+def closed_form_grid(cells: Cells) -> GridCells:
     """The cells, for the greedy search.
 
     Raises:
         SurfaceError: they are no grid on a patch that its compiled loops know.
     """
     if not isinstance(cells, GridCells) or not isinstance(cells.surface, ClosedFormPatch):
-        raise _uncharted(cells.surface.kind)
+        raise _no_closed_form(cells.surface.kind)
     return cells
 
 
-def _uncharted(kind: str) -> SurfaceError:
+def _no_closed_form(kind: str) -> SurfaceError:
     """What to say of a surface that the greedy search does not know."""
     return SurfaceError(
-        f"the greedy search works on {CHARTED} only, not on a {kind}; use "
+        f"the greedy search works on {CLOSED_FORM_KINDS} only, not on a {kind}; use "
         'search.method = "complete"'
     )
 

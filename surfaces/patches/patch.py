@@ -109,8 +109,8 @@ class Patch(Surface):
         us[over], vs[over] = _over_a_pole(self, cells, pairs[over], t)
         return self.point(us, vs), self.normal(us, vs)
 
-    def sharpness(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
-        """See `Surface.sharpness`: the larger principal curvature, by central differences."""
+    def max_curvature(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
+        """See `Surface.max_curvature`: the larger principal curvature, by central differences."""
         places = cells.u, cells.v  # type: ignore[attr-defined]  # of a grid
         slopes, turns = [], []
         for axis, (low, high) in enumerate((self.u_range, self.v_range)):
@@ -155,5 +155,5 @@ def _over_a_pole(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Parameters (m, k) of the feet of straight lines between centres."""
     start, end = cells.centres[pairs[:, 0], None], cells.centres[pairs[:, 1], None]
-    foot = patch.closest(start + t[:, None] * (end - start))
-    return foot.u, foot.v
+    closest_point = patch.closest(start + t[:, None] * (end - start))
+    return closest_point.u, closest_point.v

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfaces.arguments import Checks, metres
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.patches.revolution_profile import Profile
-from surfaces.patches.smooth_patch import EDGE, LocalFeet, SmoothPatch, azimuth
+from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ class Revolution(SmoothPatch):
         around = rectangle_areas(element, u0, u1, 0.0, 1.0, u_breaks=self.profile.knots)
         return np.asarray((np.asarray(v1, float) - np.asarray(v0, float)) * around)
 
-    def local_feet(self, points: Array) -> LocalFeet:
+    def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """The nearest point of the profile, turned to the point's azimuth."""
         x, y, z = points.T
         flat = np.column_stack([np.hypot(x, y), z])
@@ -78,7 +78,7 @@ class Revolution(SmoothPatch):
         away = flat - self.profile.at(u)
         height = away[:, 0] * out + away[:, 1] * up
         upright = np.abs(away[:, 1] * out - away[:, 0] * up) <= EDGE
-        return LocalFeet(u, v, height, self.local_normal(u, v), upright)
+        return LocalClosestPoints(u, v, height, self.local_normal(u, v), upright)
 
 
 def _normal(profile: Profile, u: Array) -> tuple[Array, Array]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.patches.closest_point import FootSearch, Jet
+from surfaces.patches.closest_point import ClosestPointSearch, Jet
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -80,7 +80,7 @@ class Profile:
         return np.append(inner.reshape(-1), self.knots[-1])
 
     @cached_property
-    def search(self) -> FootSearch:
+    def search(self) -> ClosestPointSearch:
         """Nearest points of the curve in the half plane."""
 
         def jet(x: Array) -> Jet:
@@ -88,7 +88,7 @@ class Profile:
             return Jet(self.at(s), self.at(s, 1)[:, None], self.at(s, 2)[:, None, None])
 
         line = self.fractions(_SAMPLES)
-        return FootSearch(lambda x: self.at(x[:, 0]), jet, (line,), (False,))
+        return ClosestPointSearch(lambda x: self.at(x[:, 0]), jet, (line,), (False,))
 
     def faults(self) -> list[str]:
         """What keeps the curve from making a smooth surface; empty if nothing does."""

@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.patches.patch import Patch
-from surfaces.surface import Foot, points_of
+from surfaces.surface import ClosestPoint, points_of
 
 Array = NDArray[np.float64]
 
 EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lies on it
 
 
-class LocalFeet(NamedTuple):
+class LocalClosestPoints(NamedTuple):
     """Feet of n points in the own frame of a patch, before the ranges are looked at."""
 
     u: Array
@@ -38,11 +38,11 @@ class SmoothPatch(Patch):
     """A patch that gives points, normals and feet in its own frame."""
 
     @abstractmethod
-    def local_feet(self, points: Array) -> LocalFeet:
+    def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """Feet of finite points (n, 3) m, given in the own frame."""
 
-    def closest(self, points: ArrayLike) -> Foot:
-        """The feet of `points` (..., 3) m on the surface; see `Foot`.
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """The feet of `points` (..., 3) m on the surface; see `ClosestPoint`.
 
         Where a point has no foot with its normal through the point, because the nearest place is
         on a border, `height` is the part of the distance along the normal there and `inside` is
@@ -57,13 +57,22 @@ class SmoothPatch(Patch):
         values = np.full((len(flat), 6), np.nan)
         inside = np.zeros(len(flat), dtype=bool)
         if finite.any():
-            feet = self.local_feet((flat[finite] - self.position) @ self.rotation)
-            values[finite] = np.column_stack(
-                [feet.u, feet.v, feet.height, feet.normal @ self.rotation.T]
+            closest_points = self.local_closest_points(
+                (flat[finite] - self.position) @ self.rotation
             )
-            inside[finite] = feet.upright & self._on_patch(feet.u, feet.v)
+            values[finite] = np.column_stack(
+                [
+                    closest_points.u,
+                    closest_points.v,
+                    closest_points.height,
+                    closest_points.normal @ self.rotation.T,
+                ]
+            )
+            inside[finite] = closest_points.upright & self._on_patch(
+                closest_points.u, closest_points.v
+            )
         shape = points.shape[:-1]
-        return Foot(
+        return ClosestPoint(
             u=values[:, 0].reshape(shape),
             v=values[:, 1].reshape(shape),
             height=values[:, 2].reshape(shape),

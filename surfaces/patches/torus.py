@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import Checks
-from surfaces.patches.smooth_patch import LocalFeet, SmoothPatch, azimuth
+from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -55,14 +55,16 @@ class Torus(SmoothPatch):
         rise = 2.0 * np.cos((v0 + v1) / 2.0) * np.sin((v1 - v0) / 2.0)
         return np.asarray((u1 - u0) * self.tube * (self.ring * (v1 - v0) + self.tube * rise))
 
-    def local_feet(self, points: Array) -> LocalFeet:
+    def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """Along the line from the middle of the tube at the point's azimuth."""
         x, y, z = points.T
         u = azimuth(x, y, *self.u_range, size=self.ring)
         beyond = np.hypot(x, y) - self.ring
         v = azimuth(beyond, z, *self.v_range, size=self.tube)
         height = np.hypot(beyond, z) - self.tube
-        return LocalFeet(u, v, height, self.local_normal(u, v), np.ones(len(u), dtype=bool))
+        return LocalClosestPoints(
+            u, v, height, self.local_normal(u, v), np.ones(len(u), dtype=bool)
+        )
 
 
 def torus(

@@ -158,8 +158,11 @@ def _normals(surface: Piecewise, first: Ints, pairs: Ints, places: Array) -> Arr
         for end in (0, 1):
             some = np.flatnonzero(pieces[:, end] == k)
             if len(some):
-                foot = patch.closest(places[some])
-                u, v = np.clip(foot.u, *patch.u_range), np.clip(foot.v, *patch.v_range)
+                closest_point = patch.closest(places[some])
+                u, v = (
+                    np.clip(closest_point.u, *patch.u_range),
+                    np.clip(closest_point.v, *patch.v_range),
+                )
                 normals[some, end] = surface.signs[k] * patch.normal(u, v)
     return normals
 

@@ -18,7 +18,7 @@ BLOCK = 50_000  # points at once, to bound the memory
 PARALLEL = 1e-3  # [1], sine of an angle below which two normals are one
 
 
-class PieceFeet(NamedTuple):
+class PieceClosestPoints(NamedTuple):
     """For each of k points its nearest place on some pieces."""
 
     piece: Ints
@@ -39,7 +39,7 @@ class PieceFeet(NamedTuple):
 
 def nearest_places(
     patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
-) -> PieceFeet:
+) -> PieceClosestPoints:
     """The nearest places of all patches.
 
     Where the foot on a patch lies beyond its border, the place on the border at the same parameters
@@ -58,12 +58,12 @@ def nearest_places(
     for first in range(0, len(finite) if patches else 0, BLOCK):
         some = finite[first : first + BLOCK]
         piece[some], values[some], inside[some] = _nearest(patches, signs, points[some], gap)
-    return PieceFeet(
+    return PieceClosestPoints(
         piece, values[:, 0], values[:, 1], values[:, 2:5], values[:, 5:8], values[:, 8], inside
     )
 
 
-class _Feet(NamedTuple):
+class _ClosestPoints(NamedTuple):
     """Nearest places on one patch."""
 
     values: Array
@@ -73,25 +73,39 @@ class _Feet(NamedTuple):
     inside: NDArray[np.bool_]
 
 
-def _feet(patch: Patch, sign: float, points: Array) -> _Feet:
+def _closest_points(patch: Patch, sign: float, points: Array) -> _ClosestPoints:
     """Nearest places on one patch."""
-    foot = patch.closest(points)
-    u, v = np.clip(foot.u, *patch.u_range), np.clip(foot.v, *patch.v_range)
+    closest_point = patch.closest(points)
+    u, v = np.clip(closest_point.u, *patch.u_range), np.clip(closest_point.v, *patch.v_range)
     places, normals = patch.point(u, v), sign * patch.normal(u, v)
     away = points - places
-    height = np.where(foot.inside, sign * foot.height, (away * normals).sum(axis=1))
-    distance = np.where(foot.inside, np.abs(foot.height), np.linalg.norm(away, axis=1))
-    return _Feet(np.column_stack([u, v, places, normals, height]), distance, foot.inside)
+    height = np.where(
+        closest_point.inside, sign * closest_point.height, (away * normals).sum(axis=1)
+    )
+    distance = np.where(
+        closest_point.inside, np.abs(closest_point.height), np.linalg.norm(away, axis=1)
+    )
+    return _ClosestPoints(
+        np.column_stack([u, v, places, normals, height]), distance, closest_point.inside
+    )
 
 
 def _nearest(
     patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
 ) -> tuple[Ints, Array, NDArray[np.bool_]]:
-    """Piece (k,), values (k, 9) as in `_Feet`, and whether they are inside, of finite points."""
-    found = [_feet(patch, sign, points) for patch, sign in zip(patches, signs, strict=True)]
-    distance = np.stack([feet.distance + np.where(feet.inside, 0.0, TIE) for feet in found])
+    """Piece (k,), values (k, 9) as in `_ClosestPoints`, and whether they are inside, of finite points."""
+    found = [
+        _closest_points(patch, sign, points) for patch, sign in zip(patches, signs, strict=True)
+    ]
+    distance = np.stack(
+        [
+            closest_points.distance + np.where(closest_points.inside, 0.0, TIE)
+            for closest_points in found
+        ]
+    )
     values, within = (
-        np.stack([getattr(feet, name) for feet in found]) for name in ("values", "inside")
+        np.stack([getattr(closest_points, name) for closest_points in found])
+        for name in ("values", "inside")
     )
     row = np.arange(len(points))
     piece = np.argmin(distance, axis=0)

@@ -74,8 +74,8 @@ def on_each_other(patches: Sequence[Patch], gap: float) -> tuple[int, ...]:
         near = ((low - margin <= high[a]) & (low[a] <= high + margin)).all(axis=1)
         near[a] = False
         for b in np.flatnonzero(near).tolist():
-            foot = patches[b].closest(points)
-            if (foot.inside & (np.abs(foot.height) <= gap)).sum() >= TOGETHER:
+            closest_point = patches[b].closest(points)
+            if (closest_point.inside & (np.abs(closest_point.height) <= gap)).sum() >= TOGETHER:
                 return (min(a, b), max(a, b))
     return ()
 

@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import Checks
 from surfaces.patches import Patch
-from surfaces.piecewise.closest_point import PieceFeet, nearest_places
+from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
 from surfaces.piecewise.consistency import groups_of, on_each_other, turned_pieces
 from surfaces.piecewise.seams import Seam, sides_of, survey
-from surfaces.surface import Foot, Side, Surface, SurfaceError, points_of
+from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
     from surfaces.cells import Cells
@@ -91,7 +91,7 @@ class Piecewise(Surface):
         """+1.0 where a piece's own normal is outward, -1.0 where it is turned over."""
         return tuple(-1.0 if turned else 1.0 for turned in self.turned)
 
-    def nearest(self, points: ArrayLike, pieces: Sequence[int] | None = None) -> PieceFeet:
+    def nearest(self, points: ArrayLike, pieces: Sequence[int] | None = None) -> PieceClosestPoints:
         """The nearest places of some pieces (all if None) to points (k, 3) m, in the root frame."""
         some = range(len(self.pieces)) if pieces is None else pieces
         found = nearest_places(
@@ -100,8 +100,8 @@ class Piecewise(Surface):
         )  # fmt: skip
         return found._replace(piece=np.asarray(some, dtype=np.int64)[found.piece])
 
-    def closest(self, points: ArrayLike) -> Foot:
-        """The feet of `points` (..., 3) m on the nearest piece; see `Foot`.
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """The feet of `points` (..., 3) m on the nearest piece; see `ClosestPoint`.
 
         u and v are NaN: pieces count them each in its own way. Over the outer side of a crease the
         foot lies on the seam, and `height` is the whole distance. Beyond a free border `height` is
@@ -111,7 +111,7 @@ class Piecewise(Surface):
         found = self.nearest(points)
         shape = points.shape[:-1]
         nowhere = np.full(shape, np.nan)
-        return Foot(
+        return ClosestPoint(
             u=nowhere,
             v=nowhere,
             height=found.height.reshape(shape),
@@ -146,10 +146,10 @@ class Piecewise(Surface):
         creased[creased] = cells.joints.of(pairs[creased]).creases > SMOOTH
         return creased
 
-    def sharpness(self, cells: Cells, height: float = 0.0) -> Array:
-        """See `Surface.sharpness`."""
+    def max_curvature(self, cells: Cells, height: float = 0.0) -> Array:
+        """See `Surface.max_curvature`."""
         cells = _own(cells)
-        return np.concatenate([grid.surface.sharpness(grid, height) for grid in cells.grids])
+        return np.concatenate([grid.surface.max_curvature(grid, height) for grid in cells.grids])
 
     def cells(self, counts: Any) -> PieceCells:
         """Cut every piece into a grid of cells.

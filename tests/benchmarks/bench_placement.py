@@ -6,7 +6,7 @@ import time
 
 from feasibility.cases import load_case
 from feasibility.placement import Pose, Region, Stage, place
-from feasibility.placement.place import Local
+from feasibility.placement.placements import Local
 from feasibility.placement.placer import Placer
 from feasibility.placement.reach_bound import Reach
 

@@ -168,9 +168,11 @@ def random_surface(rng: np.random.Generator, kind: str) -> Surface:
 
 def target_near(surface: Surface, standoff: float, point: Floats) -> tuple[Floats, Floats]:
     """Target point and approach direction of the target surface that are nearest to a point."""
-    foot = surface.closest(point)
+    closest_point = surface.closest(point)
     sign = surface.side_sign
-    return point + (sign * standoff - foot.height) * foot.normal, -sign * foot.normal
+    return point + (
+        sign * standoff - closest_point.height
+    ) * closest_point.normal, -sign * closest_point.normal
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -187,11 +189,11 @@ class Deviation:
 
 def deviation(surface: Surface, standoff: float, points: Floats, axes: Floats) -> Deviation:
     """Distance from the target surface, and |a - b|, at tool points and axes (k, 3)."""
-    foot = surface.closest(points)
+    closest_point = surface.closest(points)
     return Deviation(
-        np.abs(foot.height - surface.side_sign * standoff),
-        np.linalg.norm(axes + surface.side_sign * foot.normal, axis=1),
-        foot.inside,
+        np.abs(closest_point.height - surface.side_sign * standoff),
+        np.linalg.norm(axes + surface.side_sign * closest_point.normal, axis=1),
+        closest_point.inside,
     )
 
 

@@ -348,7 +348,7 @@ task = { standoff = 0, cone_deg = 20.7 }
 TELL_WHEN_SEARCHING = """
 import sys
 import feasibility.checking as checking
-from feasibility.cli import main
+from feasibility.cli.main import main
 check = checking.check
 def told(*setup, **settings):
     print("searching", flush=True)

@@ -51,10 +51,10 @@ def held(verdict: Verdict, points: int = 20) -> None:
     tips, axes = tools(robot, q)
     surface = cells.surface
     sign = surface.side_sign
-    foot = surface.closest(tips)
-    assert foot.inside.all()
-    assert np.abs(foot.height - sign * task.standoff).max() <= tolerance + 1e-9
-    cosine = -sign * (axes * foot.normal).sum(axis=1)
+    closest_point = surface.closest(tips)
+    assert closest_point.inside.all()
+    assert np.abs(closest_point.height - sign * task.standoff).max() <= tolerance + 1e-9
+    cosine = -sign * (axes * closest_point.normal).sum(axis=1)
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).max() <= task.cone_deg + 1e-6
     marked = walk.cell >= 0
     assert set(walk.cell[marked].tolist()) == set(range(len(cells)))

@@ -51,7 +51,7 @@ def local_frame(surface: Surface, u: Floats, v: Floats) -> tuple[Floats, Floats]
     return np.stack([radius * np.cos(u), radius * np.sin(u), v], -1), normal
 
 
-def feet(surface: Surface, points: Floats) -> tuple[Floats, Floats]:
+def closest_points(surface: Surface, points: Floats) -> tuple[Floats, Floats]:
     """Parameters (k,) of the surface's points nearest to points (k, 3) of the root frame."""
     x, y, z = ((points - surface.position) @ surface.rotation).T
     across = np.hypot(x, y)
@@ -126,7 +126,7 @@ def assert_motion(verdict: Verdict, q: Floats) -> None:
     part = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
     dense = (q[:-1, None] * (1.0 - part) + q[1:, None] * part).reshape(-1, robot.n)
     points, axes = tools(robot, np.concatenate([dense, q[-1:]]))
-    u, v = onto_patch(surface, *feet(surface, points))
+    u, v = onto_patch(surface, *closest_points(surface, points))
     target, approach = placed(surface, task, u, v)
     assert np.linalg.norm(points - target, axis=1).max() <= tolerance + SAME
     assert angles(axes, approach).max() <= task.cone + SAME

@@ -146,11 +146,11 @@ def test_every_stored_path_replays(name: str, moves: str) -> None:
         found = []
         for q in motion:
             point, axis = kinematics.tool(q)
-            foot = cells.surface.closest(point)
-            assert abs(foot.height + task.standoff) <= steps.tolerance
-            assert axis @ foot.normal >= math.cos(task.cone)
-            assert foot.inside
-            found.append(cell_at(verdict, float(foot.u), float(foot.v)))
+            closest_point = cells.surface.closest(point)
+            assert abs(closest_point.height + task.standoff) <= steps.tolerance
+            assert axis @ closest_point.normal >= math.cos(task.cone)
+            assert closest_point.inside
+            found.append(cell_at(verdict, float(closest_point.u), float(closest_point.v)))
         assert {found[0], found[-1]} == {a, b}
 
 

@@ -40,8 +40,8 @@ class Samples:
             reach /= 1.1  # stay where every point has one foot
         self.height = rng.uniform(-reach, reach, count)
         self.normal = surface.normal(self.u, self.v)
-        self.foot = surface.point(self.u, self.v)
-        self.point = self.foot + self.height[:, None] * self.normal
+        self.closest_point = surface.point(self.u, self.v)
+        self.point = self.closest_point + self.height[:, None] * self.normal
 
 
 @pytest.fixture(params=PATCHES, ids=str)

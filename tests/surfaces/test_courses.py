@@ -30,42 +30,42 @@ def cells(request):
 def places(cells, count=23):
     """Every course at `count` places that are no multiples of anything."""
     t = np.linspace(0.0, 1.0, count)
-    return np.repeat(np.arange(len(cells.courses)), count), np.tile(t, len(cells.courses))
+    return np.repeat(np.arange(len(cells.curves)), count), np.tile(t, len(cells.curves))
 
 
 def test_courses_run_from_centre_to_centre(cells):
     """One for each pair, from the smaller index to the larger, normals too."""
-    courses = cells.courses
-    assert len(courses) == len(cells.pairs)
-    which = np.arange(len(courses))
+    curves = cells.curves
+    assert len(curves) == len(cells.pairs)
+    which = np.arange(len(curves))
     for end, column in ((0.0, 0), (1.0, 1)):
-        foot, normal = courses.at(which, np.full(len(which), end))
-        np.testing.assert_allclose(foot, cells.centres[cells.pairs[:, column]], atol=1e-12)
+        closest_point, normal = curves.at(which, np.full(len(which), end))
+        np.testing.assert_allclose(closest_point, cells.centres[cells.pairs[:, column]], atol=1e-12)
         np.testing.assert_allclose(normal, cells.normals[cells.pairs[:, column]], atol=1e-12)
 
 
 def test_courses_lie_on_the_patch_within_what_they_say(cells):
     """Heights and normals at 23 places each, against the surface's own nearest points."""
     which, t = places(cells)
-    foot, normal = cells.courses.at(which, t)
-    found = cells.surface.closest(foot)
-    strays = cells.courses.strays[which]
+    closest_point, normal = cells.curves.at(which, t)
+    found = cells.surface.closest(closest_point)
+    deviations = cells.curves.deviations[which]
     rounding = 1e-12
     assert found.inside.all()
-    assert (np.abs(found.height) <= strays[:, 0] + rounding).all()
-    assert (np.linalg.norm(normal - found.normal, axis=1) <= strays[:, 1] + rounding).all()
-    assert cells.courses.strays.max() <= 2e-6
+    assert (np.abs(found.height) <= deviations[:, 0] + rounding).all()
+    assert (np.linalg.norm(normal - found.normal, axis=1) <= deviations[:, 1] + rounding).all()
+    assert cells.curves.deviations.max() <= 2e-6
 
 
 def test_bends_bound_second_differences(cells):
     """Between 23 places each, where no piece ends in between or one does; some reach the bound."""
     count = 23
     which, t = places(cells, count)
-    values = np.hstack(cells.courses.at(which, t)).reshape(-1, count, 6)
+    values = np.hstack(cells.curves.at(which, t)).reshape(-1, count, 6)
     second = (values[:, 2:] - 2.0 * values[:, 1:-1] + values[:, :-2]) * (count - 1.0) ** 2
     for part, half in enumerate((slice(0, 3), slice(3, 6))):
         found = np.linalg.norm(second[..., half], axis=2).max(axis=1)
-        most = np.maximum.reduceat(cells.courses.bends[:, part], cells.courses.first[:-1])
+        most = np.maximum.reduceat(cells.curves.derivative_bounds[:, part], cells.curves.first[:-1])
         assert (found <= most * (1.0 + 1e-6) + 1e-8).all()
         bent = most > 1e-6
         assert (found[bent] >= 0.8 * most[bent]).all()
@@ -73,14 +73,14 @@ def test_bends_bound_second_differences(cells):
 
 def test_slopes_are_continuous(cells):
     """Where one piece ends and the next begins, value and slope agree."""
-    courses = cells.courses
-    count = np.diff(courses.first)
-    ends = np.delete(np.arange(courses.first[-1]), courses.first[1:] - 1)  # pieces with a next one
+    curves = cells.curves
+    count = np.diff(curves.first)
+    ends = np.delete(np.arange(curves.first[-1]), curves.first[1:] - 1)  # pieces with a next one
     powers, slopes = np.ones(4), np.array([0.0, 1.0, 2.0, 3.0])
-    left = courses.cubics[ends]
+    left = curves.cubics[ends]
     for power, here in (
-        (powers, courses.cubics[ends + 1, 0]),
-        (slopes, courses.cubics[ends + 1, 1]),
+        (powers, curves.cubics[ends + 1, 0]),
+        (slopes, curves.cubics[ends + 1, 1]),
     ):
         np.testing.assert_allclose(np.einsum("p,kpd->kd", power, left), here, atol=1e-9)
     assert (count >= 1).all()
@@ -93,7 +93,7 @@ def test_the_offset_folds_where_it_reaches_the_radius(side):
     rows, columns = np.divmod(cells.pairs, 4)
     around, along = columns[:, 0] == columns[:, 1], rows[:, 0] == rows[:, 1]
     for share, folds in ((0.9, False), (0.99, False), (1.0, True), (1.5, True)):
-        found = cells.courses.folds(side * share * 0.3)
+        found = cells.curves.folds(side * share * 0.3)
         assert (found[around] == (folds and side < 0.0)).all()
         assert not found[along].any()
 
@@ -102,11 +102,11 @@ def test_turning_is_the_largest_curvature_of_the_offset():
     """Of parallel surfaces: 1 / (R + h) on a sphere, the steeper of two on a saddle."""
     dome = sphere(1.0, (10, 90), (10, 180)).cells(9, 10)
     for height in (-0.5, -0.005, 0.0, 0.3):
-        turning = dome.courses.turning(height)
-        assert turning.max() == pytest.approx(1.0 / (1.0 + height), rel=1e-4)
-        assert turning.shape == dome.courses.first[-1:]
+        curvature = dome.curves.curvature(height)
+        assert curvature.max() == pytest.approx(1.0 / (1.0 + height), rel=1e-4)
+        assert curvature.shape == dome.curves.first[-1:]
     flat = plane((0, 1), (0, 1)).cells(3, 3)
-    assert flat.courses.turning(0.1).max() < 1e-12
+    assert flat.curves.curvature(0.1).max() < 1e-12
 
 
 def test_a_rigid_motion_moves_the_courses_along(cells):
@@ -115,19 +115,21 @@ def test_a_rigid_motion_moves_the_courses_along(cells):
     moved = cells.surface.moved(turn, [0.3, -0.2, 0.1]).cells(*cells.shape)
     which, t = places(cells, 5)
     for here, there, shift in zip(
-        cells.courses.at(which, t), moved.courses.at(which, t), ([0.3, -0.2, 0.1], 0.0), strict=True
+        cells.curves.at(which, t), moved.curves.at(which, t), ([0.3, -0.2, 0.1], 0.0), strict=True
     ):
         np.testing.assert_allclose(here @ turn.T + shift, there, atol=1e-9)
-    np.testing.assert_allclose(cells.courses.bends, moved.courses.bends, atol=1e-6)
+    np.testing.assert_allclose(
+        cells.curves.derivative_bounds, moved.curves.derivative_bounds, atol=1e-6
+    )
 
 
 def test_no_pairs_no_courses():
     """A single cell, or none."""
     for shape in ((1, 1), (0, 5)):
-        courses = plane((0, 1), (0, 1)).cells(*shape).courses
-        assert len(courses) == 0
-        assert courses.folds(0.1).shape == (0,)
-        assert courses.turning(0.1).shape == (0,)
+        curves = plane((0, 1), (0, 1)).cells(*shape).curves
+        assert len(curves) == 0
+        assert curves.folds(0.1).shape == (0,)
+        assert curves.curvature(0.1).shape == (0,)
 
 
 def test_links_name_the_pair_of_each_neighbour(cells):

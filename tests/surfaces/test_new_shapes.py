@@ -98,13 +98,13 @@ def test_closest_recovers_parameters_height_and_normal(shape):
     reach = 0.45 * least_curvature_radius(shape)
     h = np.random.default_rng(1).uniform(-reach, reach, 2000)
     n = shape.normal(u, v)
-    foot = shape.closest(shape.point(u, v) + h[:, None] * n)
-    assert np.abs(foot.height - h).max() < 1e-14
-    assert np.abs(foot.normal - n).max() < 1e-11
-    assert np.abs(foot.u - u).max() < 1e-11
+    closest_point = shape.closest(shape.point(u, v) + h[:, None] * n)
+    assert np.abs(closest_point.height - h).max() < 1e-14
+    assert np.abs(closest_point.normal - n).max() < 1e-11
+    assert np.abs(closest_point.u - u).max() < 1e-11
     lever = np.sin(u) if shape.kind == "ellipsoid" else 1.0
-    assert np.abs((foot.v - v) * lever).max() < 1e-11
-    assert foot.inside.all()
+    assert np.abs((closest_point.v - v) * lever).max() < 1e-11
+    assert closest_point.inside.all()
 
 
 def test_no_point_of_the_whole_surface_is_nearer_than_the_foot(shape):
@@ -112,8 +112,8 @@ def test_no_point_of_the_whole_surface_is_nearer_than_the_foot(shape):
     size = size_of(shape)
     points = shape.position + rng.normal(scale=0.6 * size, size=(30, 3))
     points[0] = shape.position + shape.rotation @ [1e-13, 0, 0.1 * size]
-    foot = shape.closest(points)
-    placed = shape.point(foot.u, foot.v)
+    closest_point = shape.closest(points)
+    placed = shape.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
     expected = np.array([least_distance(shape, p, *whole_ranges(shape)) for p in points])
     assert (distance <= expected + 1e-12).all()
@@ -123,12 +123,12 @@ def test_no_point_of_the_whole_surface_is_nearer_than_the_foot(shape):
         plain = np.linalg.norm(placed - apex, axis=1) > 0.05 * size
     assert plain.sum() > 20
     assert np.abs(distance - expected)[plain].max() < 1e-9 * size
-    ordinary = np.abs(np.abs(foot.height) - distance) < 1e-12  # not the apex of a cone
+    ordinary = np.abs(np.abs(closest_point.height) - distance) < 1e-12  # not the apex of a cone
     assert ordinary.sum() > 15
     assert ordinary.all() or shape.kind == "cone"
-    rebuilt = placed + foot.height[:, None] * foot.normal
+    rebuilt = placed + closest_point.height[:, None] * closest_point.normal
     assert np.abs(rebuilt - points)[ordinary].max() < 1e-12
-    assert not foot.inside[~ordinary].any()
+    assert not closest_point.inside[~ordinary].any()
 
 
 def test_inside_marks_exactly_the_feet_on_the_patch(shape):
@@ -141,7 +141,7 @@ def test_inside_marks_exactly_the_feet_on_the_patch(shape):
     else:
         radius = shape.radius + shape.slope * v if shape.kind == "cone" else np.ones_like(v)
         u, v = u[radius > 0.01], v[radius > 0.01]
-    foot = shape.closest(shape.point(u, v) + 0.002 * shape.normal(u, v))
+    closest_point = shape.closest(shape.point(u, v) + 0.002 * shape.normal(u, v))
     expected = np.ones(len(u), dtype=bool)
     for value, (low, high), angle in (
         (u, shape.u_range, shape.u_angle),
@@ -149,7 +149,7 @@ def test_inside_marks_exactly_the_feet_on_the_patch(shape):
     ):
         turned = low + np.mod(value - low, math.tau) if angle else value
         expected &= (turned >= low) & (turned <= high)
-    assert (foot.inside == expected).all()
+    assert (closest_point.inside == expected).all()
     closed = shape.u_closed or shape.v_closed
     assert closed or 0 < expected.sum() < len(u)
 
@@ -191,23 +191,23 @@ def test_ellipsoid_feet_near_the_planes_where_normals_meet(axes):
     points = rng.uniform(-1, 1, (40, 3)) * axes
     points[np.arange(40), rng.integers(0, 3, 40)] *= np.tile([0.0, 1e-300, 1e-17, 1e-9], 10)
     points[0], points[1] = 0.0, 1e-12
-    foot = whole.closest(points)
-    distance = np.linalg.norm(points - whole.point(foot.u, foot.v), axis=1)
+    closest_point = whole.closest(points)
+    distance = np.linalg.norm(points - whole.point(closest_point.u, closest_point.v), axis=1)
     expected = [least_distance(whole, p, *whole_ranges(whole)) for p in points]
     assert np.abs(distance - expected).max() < 1e-9
-    assert np.abs(np.abs(foot.height) - distance).max() < 1e-12
-    assert foot.inside.all()
+    assert np.abs(np.abs(closest_point.height) - distance).max() < 1e-12
+    assert closest_point.inside.all()
 
 
 def test_a_foot_of_two_is_taken_on_the_patch():
     for low, high in ((0, 60), (120, 180)):
         half = ellipsoid((1.0, 0.8, 0.3), polar_deg=(low, high), azimuth_deg=(20, 70))
         point = [0.1, 0.1, 0.0]
-        foot = half.closest(point)
-        assert foot.inside
-        assert half.point(foot.u, foot.v) + foot.height * foot.normal == pytest.approx(
-            np.array(point), abs=1e-14
-        )
+        closest_point = half.closest(point)
+        assert closest_point.inside
+        assert half.point(
+            closest_point.u, closest_point.v
+        ) + closest_point.height * closest_point.normal == pytest.approx(np.array(point), abs=1e-14)
     for kind in (cone(0.4, 0.5, (100, 200), (1, 2)), torus(0.4, 0.1, (100, 200), (140, 200))):
         assert kind.closest([0.0, 0.0, 1.7 if kind.kind == "cone" else 0.0]).inside
     assert torus(0.4, 0.1, (100, 200), (140, 200)).closest([-0.4, 0.0, 0.0]).inside
@@ -215,17 +215,19 @@ def test_a_foot_of_two_is_taken_on_the_patch():
 
 def test_points_past_the_apex_have_their_foot_there_and_outside():
     spike = cone(0.5, -0.5, (0, 360), (0, 0.8))
-    foot = spike.closest([[0.0, 0.0, 1.5], [0.05, 0.1, 2.0]])
-    assert foot.v == pytest.approx([1.0, 1.0])
-    assert not foot.inside.any()
+    closest_point = spike.closest([[0.0, 0.0, 1.5], [0.05, 0.1, 2.0]])
+    assert closest_point.v == pytest.approx([1.0, 1.0])
+    assert not closest_point.inside.any()
 
 
 def test_points_that_are_not_finite_have_no_foot(shape):
-    foot = shape.closest([[np.nan, 0, 0], [0, np.inf, 0], shape.point(shape.u_range[0], 0.1)])
-    assert np.isnan(foot.height[:2]).all()
-    assert np.isnan(foot.normal[:2]).all()
-    assert np.isfinite(foot.height[2])
-    assert not foot.inside[:2].any()
+    closest_point = shape.closest(
+        [[np.nan, 0, 0], [0, np.inf, 0], shape.point(shape.u_range[0], 0.1)]
+    )
+    assert np.isnan(closest_point.height[:2]).all()
+    assert np.isnan(closest_point.normal[:2]).all()
+    assert np.isfinite(closest_point.height[2])
+    assert not closest_point.inside[:2].any()
     assert shape.closest(np.empty((0, 3))).height.shape == (0,)
     assert shape.closest(np.zeros((2, 5, 3))).normal.shape == (2, 5, 3)
     with pytest.raises(ValueError, match="shape"):
@@ -240,9 +242,9 @@ def test_surfaces_pickle_and_move(shape, motion):
     assert moved.point(u, v) == pytest.approx(shape.point(u, v) @ rotation.T + translation)
     assert moved.normal(u, v) == pytest.approx(shape.normal(u, v) @ rotation.T)
     points = shape.point(u, v) - 0.003 * shape.normal(u, v)
-    foot = moved.closest(points @ rotation.T + translation)
-    assert foot.height == pytest.approx(np.full(100, -0.003), abs=1e-14)
-    assert foot.inside.all()
+    closest_point = moved.closest(points @ rotation.T + translation)
+    assert closest_point.height == pytest.approx(np.full(100, -0.003), abs=1e-14)
+    assert closest_point.inside.all()
     assert (type(moved), moved.side) == (type(shape), shape.side)
     with pytest.raises(ValueError, match="read-only"):
         moved.rotation[0, 0] = 2.0
@@ -263,10 +265,10 @@ def test_seams_and_poles_are_joined():
 def test_cells_stand_on_the_surface(shape):
     cells = shape.cells(4, 5)
     assert isinstance(cells, Cells)
-    foot = shape.closest(cells.centres)
-    assert np.abs(foot.height).max() < 1e-13
-    assert foot.inside.all()
-    assert foot.normal == pytest.approx(cells.normals, abs=1e-11)
+    closest_point = shape.closest(cells.centres)
+    assert np.abs(closest_point.height).max() < 1e-13
+    assert closest_point.inside.all()
+    assert closest_point.normal == pytest.approx(cells.normals, abs=1e-11)
 
 
 BAD = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
-from surfaces.cell_curves import courses_of
+from surfaces.cell_curves import curves_of
 from surfaces.patches.cone import cone
 from surfaces.patches.ellipsoid import ellipsoid
 from surfaces.patches.nurbs.bspline import bspline
@@ -33,25 +33,25 @@ PATCHES = {
 def test_courses_run_on_the_surface_and_the_short_way(name):
     patch = PATCHES[name]
     cells = patch.cells(6, 9)
-    courses = courses_of(cells)
+    curves = curves_of(cells)
     pair = np.repeat(np.arange(len(cells.pairs)), 21)
     t = np.tile(np.linspace(0, 1, 21), len(cells.pairs))
-    foot, normal = courses.at(pair, t)
-    on = patch.closest(foot)
+    closest_point, normal = curves.at(pair, t)
+    on = patch.closest(closest_point)
     assert on.inside.all()
-    assert (np.abs(on.height) <= courses.strays[pair, 0] + 1e-12).all()
+    assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
     # The foot's own normal may lie across the course, where the surface bends more than along it.
     apart = np.linalg.norm(normal - on.normal, axis=1)
-    assert (apart <= courses.strays[pair, 1] + 1e-12).all()
-    assert courses.strays.max() < 2e-5
-    ends = foot.reshape(-1, 21, 3)
+    assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
+    assert curves.deviations.max() < 2e-5
+    ends = closest_point.reshape(-1, 21, 3)
     assert ends[:, 0] == pytest.approx(cells.centres[cells.pairs[:, 0]], abs=1e-14)
     assert ends[:, -1] == pytest.approx(cells.centres[cells.pairs[:, 1]], abs=1e-14)
     # No course goes the long way round: it is at most as long as half a circle on its chord.
     travel = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)
     chord = np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
     assert (travel <= math.pi / 2 * chord).all()
-    assert not courses.folds(0.005 * patch.side_sign).any()
+    assert not curves.folds(0.005 * patch.side_sign).any()
 
 
 @pytest.mark.parametrize("name", ["cone", "torus", "hood"])
@@ -59,14 +59,14 @@ def test_courses_run_on_the_surface_and_the_short_way(name):
 def test_a_single_row_counts_the_bend_to_its_side(name, shape):
     """No other course shows how sharply the surface bends across these."""
     patch = PATCHES[name]
-    courses = courses_of(patch.cells(*shape))
-    pair = np.repeat(np.arange(len(courses)), 21)
-    foot, normal = courses.at(pair, np.tile(np.linspace(0, 1, 21), len(courses)))
-    on = patch.closest(foot)
+    curves = curves_of(patch.cells(*shape))
+    pair = np.repeat(np.arange(len(curves)), 21)
+    closest_point, normal = curves.at(pair, np.tile(np.linspace(0, 1, 21), len(curves)))
+    on = patch.closest(closest_point)
     assert on.inside.all()
-    assert (np.abs(on.height) <= courses.strays[pair, 0] + 1e-12).all()
+    assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
     apart = np.linalg.norm(normal - on.normal, axis=1)
-    assert (apart <= courses.strays[pair, 1] + 1e-12).all()
+    assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
 
 
 @pytest.mark.parametrize("name", PATCHES, ids=str)
@@ -85,5 +85,5 @@ def test_sharpness_is_the_largest_of_many_directions(name):
         step = patch.point(u + du, v + dv) - patch.point(u - du, v - dv)
         rates = np.linalg.norm(turn, axis=2) / np.linalg.norm(step, axis=2)
         best = np.maximum(best, rates.max(axis=1))
-    assert (best <= cells.sharpness * (1 + 1e-3) + 1e-6).all()
-    assert (best >= cells.sharpness * 0.97 - 1e-6).all()
+    assert (best <= cells.max_curvature * (1 + 1e-3) + 1e-6).all()
+    assert (best >= cells.max_curvature * 0.97 - 1e-6).all()

@@ -29,7 +29,11 @@ FAR = 10.0  # times a mesh's edges: the height in which foot and normal are weig
 
 
 def over_bends(
-    cells: MeshCells, fitted: list[tuple[Ints, Array]], courses: Ints, close: Array, strays: Array
+    cells: MeshCells,
+    fitted: list[tuple[Ints, Array]],
+    curves: Ints,
+    close: Array,
+    deviations: Array,
 ) -> list[tuple[Ints, Array]]:
     """Courses at an even pace of foot and normal together, where these stray less.
 
@@ -40,32 +44,32 @@ def over_bends(
         fitted: the courses as they are; the last fit of each counts.
         courses: (k,) which to try.
         close: (M, 2) how near to the surface is near enough.
-        strays: (M, 2) how far the courses stray, see `Courses`; brought up to date.
+        strays: (M, 2) how far the courses stray, see `CellCurves`; brought up to date.
 
     Returns:
         Some of the courses, with their cubics (m, pieces, 4, 6), for each number of pieces.
     """
-    ends = cells.normals[cells.pairs[courses]]
+    ends = cells.normals[cells.pairs[curves]]
     turned = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > TURNED
-    courses = courses[turned & (strays[courses, 1] > ROUGH)]
-    if len(courses) == 0:
+    curves = curves[turned & (deviations[curves, 1] > ROUGH)]
+    if len(curves) == 0:
         return []
-    weights = np.array([1.0, FAR * cells.surface.grain])
+    weights = np.array([1.0, FAR * cells.surface.mean_edge_length])
     side = cells.surface.side_sign
-    hollow = np.empty(len(strays))
+    hollow = np.empty(len(deviations))
     for some, cubics in fitted:
         hollow[some] = _hollow(cubics, side)
     found: list[tuple[Ints, Array]] = []
-    for start in range(0, len(courses), BLOCK):
-        block = courses[start : start + BLOCK]
+    for start in range(0, len(curves), BLOCK):
+        block = curves[start : start + BLOCK]
         lines, pace = _paced(cells, cells.pairs[block])
         for count in PIECES[1:]:
-            left = np.flatnonzero((strays[block] > close[block]).any(axis=1))
+            left = np.flatnonzero((deviations[block] > close[block]).any(axis=1))
             some = block[left]
-            cubics, stray = _by_pace(cells, cells.pairs[some], lines[left], pace[left], count)
-            better = stray @ weights < ENOUGH * (strays[some] @ weights)
+            cubics, deviation = _by_pace(cells, cells.pairs[some], lines[left], pace[left], count)
+            better = deviation @ weights < ENOUGH * (deviations[some] @ weights)
             better &= _hollow(cubics, side) <= hollow[some]
-            strays[some[better]] = stray[better]
+            deviations[some[better]] = deviation[better]
             found.append((some[better], cubics[better]))
     return found
 
@@ -74,9 +78,9 @@ def _hollow(cubics: Array, side: float) -> Array:
     """(m,) 1/m, the largest curvature of m courses (m, count, 4, 6) that is hollow to a side."""
     most = np.zeros(len(cubics))
     for s in np.linspace(0.0, 1.0, PLACES):
-        foot, normal = np.split(slopes_of(cubics, s), 2, axis=2)
-        square = (foot**2).sum(axis=2)
-        turn = -side * (foot * normal).sum(axis=2)
+        point, normal = np.split(slopes_of(cubics, s), 2, axis=2)
+        square = (point**2).sum(axis=2)
+        turn = -side * (point * normal).sum(axis=2)
         curvature = np.divide(turn, square, out=np.full_like(turn, np.inf), where=square > 0.0)
         most = np.maximum(most, curvature.max(axis=1))
     return most

@@ -27,7 +27,7 @@ ENOUGH = 0.7  # [1] of how far a course strays: what more cubics must reach to b
 
 
 def over_creases(
-    cells: MeshCells, courses: Ints, close: Array, strays: Array
+    cells: MeshCells, curves: Ints, close: Array, deviations: Array
 ) -> list[tuple[Ints, Array]]:
     """Courses by way of a corner on a crease, where these stray less.
 
@@ -35,30 +35,30 @@ def over_creases(
         cells: the cells.
         courses: (k,) which to try.
         close: (M, 2) how near to the surface is near enough.
-        strays: (M, 2) how far the courses stray, see `Courses`; brought up to date.
+        strays: (M, 2) how far the courses stray, see `CellCurves`; brought up to date.
 
     Returns:
         Some of the courses, with their cubics (m, pieces, 4, 6), for each number of pieces.
     """
-    corners, found = _corners(cells, cells.pairs[courses])
-    courses, corners = courses[found], corners[found]
+    corners, found = _corners(cells, cells.pairs[curves])
+    curves, corners = curves[found], corners[found]
     fitted: list[tuple[Ints, Array]] = []
     for count in PIECES[1:-2]:
-        left = np.flatnonzero((strays[courses] > close[courses]).any(axis=1))
+        left = np.flatnonzero((deviations[curves] > close[curves]).any(axis=1))
         for start in range(0, len(left), BLOCK):
             some = left[start : start + BLOCK]
-            cubics, stray = _by_corners(cells, cells.pairs[courses[some]], corners[some], count)
-            before = strays[courses[some]]
-            better = (stray <= np.maximum(before, close[courses[some]])).all(axis=1)
-            better &= (stray < ENOUGH * before).any(axis=1)
-            strays[courses[some[better]]] = stray[better]
-            fitted.append((courses[some[better]], cubics[better]))
+            cubics, deviation = _by_corners(cells, cells.pairs[curves[some]], corners[some], count)
+            before = deviations[curves[some]]
+            better = (deviation <= np.maximum(before, close[curves[some]])).all(axis=1)
+            better &= (deviation < ENOUGH * before).any(axis=1)
+            deviations[curves[some[better]]] = deviation[better]
+            fitted.append((curves[some[better]], cubics[better]))
     return fitted
 
 
 def _by_corners(cells: MeshCells, pairs: Ints, corners: Array, count: int) -> tuple[Array, Array]:
     """Cubics (m, 4 count, 4, 6) by way of corners (m, 3) m, and how far they stray (m, 2)."""
-    cubics, strays = [], []
+    cubics, deviations = [], []
     for end in range(2):
         centre = cells.centres[pairs[:, end]]
         rim = _rims(cells, pairs, centre, corners)
@@ -67,11 +67,11 @@ def _by_corners(cells: MeshCells, pairs: Ints, corners: Array, count: int) -> tu
         first[0] = np.hstack([centre, cells.normals[pairs[:, end]]])
         second = _along(cells, pairs, rim, corners, tau * tau * (3.0 - 2.0 * tau))
         for values, rests in ((first, "last"), (second, "both")):
-            part, stray = fitted_to(cells, pairs, values, count, rests)
+            part, deviation = fitted_to(cells, pairs, values, count, rests)
             cubics.append(part if end == 0 else _backwards(part))
-            strays.append(stray)
+            deviations.append(deviation)
     order = (0, 1, 3, 2)
-    return np.concatenate([cubics[k] for k in order], axis=1), np.max(strays, axis=0)
+    return np.concatenate([cubics[k] for k in order], axis=1), np.max(deviations, axis=0)
 
 
 def _along(cells: MeshCells, pairs: Ints, start: Array, stop: Array, share: Array) -> Array:
@@ -141,12 +141,14 @@ def _shortest(centres: Array, edges: Array, inwards: Array) -> Array:
     origin, along = edges[:, 0], edges[:, 1] - edges[:, 0]
     square = (along**2).sum(axis=1)
     off = centres - origin[:, None]  # (k, 2, 3)
-    feet = (off * along[:, None]).sum(axis=2) / square[:, None]
-    out = off - feet[..., None] * along[:, None]
+    closest_points = (off * along[:, None]).sum(axis=2) / square[:, None]
+    out = off - closest_points[..., None] * along[:, None]
     far = np.linalg.norm(out, axis=2)
     lies = (out[:, :, None] * inwards[:, None]).sum(axis=3).argmax(axis=2)  # (k, 2) on which face
     share = far[:, 0] / np.maximum(far.sum(axis=1), 1e-300)
-    place = np.clip(feet[:, 0] + share * (feet[:, 1] - feet[:, 0]), 0.0, 1.0)
+    place = np.clip(
+        closest_points[:, 0] + share * (closest_points[:, 1] - closest_points[:, 0]), 0.0, 1.0
+    )
     points = origin + place[:, None] * along
     way = np.linalg.norm(points[:, None] - centres, axis=2).sum(axis=1)
     way[lies[:, 0] == lies[:, 1]] = np.inf  # it would touch the crease and come back

@@ -142,12 +142,18 @@ def _ladders(points, faces, of_face, longest, first, count, out):  # type: ignor
     """Write the parts of all faces; each next rung is the shorter of the two there could be."""
     written = 0
     for face in range(faces.shape[0]):
-        foot = 0  # the edge that stays whole; one that is not the longest if there is a choice
+        closest_point = (
+            0  # the edge that stays whole; one that is not the longest if there is a choice
+        )
         for k in range(3):
             if count[of_face[face, k]] == 1 and (k != longest[face]):
-                foot = k
-        b, c, a = faces[face, foot], faces[face, (foot + 1) % 3], faces[face, (foot + 2) % 3]
-        right, left = of_face[face, (foot + 2) % 3], of_face[face, (foot + 1) % 3]
+                closest_point = k
+        b, c, a = (
+            faces[face, closest_point],
+            faces[face, (closest_point + 1) % 3],
+            faces[face, (closest_point + 2) % 3],
+        )
+        right, left = of_face[face, (closest_point + 2) % 3], of_face[face, (closest_point + 1) % 3]
         i, j = 0, 0
         p, q = b, c
         while i + 1 < count[right] or j + 1 < count[left]:

@@ -1,2 +1,2 @@
-from .read_mesh import metres_per_unit as metres_per_unit
-from .read_mesh import read_mesh as read_mesh
+from .mesh_file import metres_per_unit as metres_per_unit
+from .mesh_file import read_mesh as read_mesh

@@ -20,7 +20,7 @@ from surfaces.patches.nurbs.nurbs_checks import (
     regularity_faults,
 )
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.patches.smooth_patch import EDGE, LocalFeet, SmoothPatch
+from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.surface import Side, SurfaceError
 
 if TYPE_CHECKING:
@@ -84,14 +84,14 @@ class SplinePatch(SmoothPatch):
             places.append(x[pairs[:, 0], None] + t * along[:, None])
         return self.point(*places), self.normal(*places)
 
-    def local_feet(self, points: Array) -> LocalFeet:
+    def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """By search; see `surfaces.foot_search`."""
         x = self.net.search.nearest(points)
         normal = self.net.normal(x)
         away = points - self.net.point(x)
         height = np.einsum("ni,ni->n", away, normal)
         beside = np.linalg.norm(away - height[:, None] * normal, axis=1)
-        return LocalFeet(x[:, 0], x[:, 1], height, normal, beside <= EDGE)
+        return LocalClosestPoints(x[:, 0], x[:, 1], height, normal, beside <= EDGE)
 
 
 def bspline(

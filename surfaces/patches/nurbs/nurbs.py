@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.patches.closest_point import FootSearch, Jet
+from surfaces.patches.closest_point import ClosestPointSearch, Jet
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline
@@ -168,7 +168,7 @@ class SplineMap:
         return np.where(np.array(self.closed) & ((x < low) | (x > high)), turned, x)
 
     @cached_property
-    def search(self) -> FootSearch:
+    def search(self) -> ClosestPointSearch:
         """Nearest points of the patch."""
         lines = []
         for axis in (0, 1):
@@ -177,4 +177,4 @@ class SplineMap:
             if len(line) > _MOST_SAMPLES:
                 line = self.line(axis, 0, max(1, _MOST_SAMPLES // spans))
             lines.append(line)
-        return FootSearch(self.point, self.jet, lines, self.closed)
+        return ClosestPointSearch(self.point, self.jet, lines, self.closed)

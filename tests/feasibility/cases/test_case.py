@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from surface_parts import pairs, surfaces, triples
 
-from feasibility.cases import CHARTED, Case, builtin_cases, load_case
+from feasibility.cases import CLOSED_FORM_KINDS, Case, builtin_cases, load_case
 from feasibility.cases.case import CaseError
 from feasibility.cases.patch_keys import MOST_CELLS
 from feasibility.cases.robot_table import RobotPart
@@ -132,7 +132,7 @@ searches = st.builds(
 @st.composite
 def cases(draw):
     case = Case(draw(robots()), draw(surfaces()), draw(tasks), draw(searches))
-    if case.surface.kind not in CHARTED:  # then the greedy search is refused
+    if case.surface.kind not in CLOSED_FORM_KINDS:  # then the greedy search is refused
         case = replace(case, search=replace(case.search, method="complete"))
     return case
 

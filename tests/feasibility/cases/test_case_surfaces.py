@@ -14,7 +14,15 @@ from small_cases import small_case, small_verdict
 from surface_files import MESH, NET, POINTS, cube, mesh_case, net_case, sheet, write_stl
 
 import surfaces
-from feasibility.cases import CHARTED, OWN_KEYS, Case, Fault, as_read, load_case, read_surface
+from feasibility.cases import (
+    CLOSED_FORM_KINDS,
+    OWN_KEYS,
+    Case,
+    Fault,
+    as_read,
+    load_case,
+    read_surface,
+)
 from feasibility.cases.case import CaseError
 from feasibility.cases.mesh_keys import MOST_MESH_CELLS
 from feasibility.cases.patch_keys import PATCHES, STEEPEST
@@ -82,7 +90,7 @@ def test_the_kinds_are_those_that_are_tested():
     assert set(OWN_KEYS) == {*PATCHES, "piecewise", "mesh"}
     assert set(PATCHES) == set(surface_parts.PATCHES)
     assert all(callable(getattr(surfaces, kind)) for kind in OWN_KEYS)
-    assert set(CHARTED) < set(PATCHES)
+    assert set(CLOSED_FORM_KINDS) < set(PATCHES)
 
 
 def test_caps_are_those_of_the_surfaces():

@@ -177,8 +177,8 @@ def test_tolerance_and_cone_are_those_of_the_task(name):
     tilted = ask(name, cone_deg=cone - 0.01)
     assert "tilts" in tilted.refusal
     # The tolerance also sets the band over which the surface's curvature is bounded.
-    strayed = ask(name, tolerance=0.99 * figures.max_position_error)
-    assert "strays" in strayed.refusal
+    deviated = ask(name, tolerance=0.99 * figures.max_position_error)
+    assert "strays" in deviated.refusal
 
 
 def test_marks_are_checked(name):
@@ -197,11 +197,13 @@ def test_marks_are_checked(name):
     missing = np.where(walk.cell == walk.cell[other], -1, walk.cell)
     unmarked = ask(name, cell=missing).refusal
     assert any(words in unmarked for words in ("never visited", "strays", *misplaced))
-    standing = Walk(walk.q[:1], walk.cell[:1])
+    centre_curvature = Walk(walk.q[:1], walk.cell[:1])
     needed = np.zeros(len(cells), dtype=bool)
     needed[[walk.cell[0], walk.cell[other]]] = True
     robot, _, task = question(name)
-    assert replay(robot, cells, task, standing, needed).refusal == "1 cells are never visited"
+    assert (
+        replay(robot, cells, task, centre_curvature, needed).refusal == "1 cells are never visited"
+    )
     for impossible in (len(cells), -2, 10**9):
         bad = walk.cell.copy()
         bad[first] = impossible
@@ -258,11 +260,11 @@ def test_one_waypoint_for_one_cell():
     robot, cells, task = question("puma, dome")
     walk = witness("puma, dome")
     row = int(np.flatnonzero(walk.cell == 7)[0])
-    standing = Walk(walk.q[row : row + 1], np.array([7]))
+    centre_curvature = Walk(walk.q[row : row + 1], np.array([7]))
     needed = np.zeros(len(cells), dtype=bool)
-    assert not replay(robot, cells, task, standing, ~needed).accepted
+    assert not replay(robot, cells, task, centre_curvature, ~needed).accepted
     needed[7] = True
-    outcome = replay(robot, cells, task, standing, needed)
+    outcome = replay(robot, cells, task, centre_curvature, needed)
     assert outcome.accepted
     twice = Walk(walk.q[[row, row]], np.array([7, 7]))
     again = replay(robot, cells, task, twice, needed)
@@ -325,9 +327,9 @@ def test_it_shares_no_code_with_the_search():
     search |= {"robots.chain", "robots.Chain", "surfaces.patches.closed_form_kernels", "numba"}
     assert not {name for name in imported if any(part_of(name, room) for room in search)}
     shown = subprocess.run(
-        [sys.executable, "-c", "import sys, feasibility.certification.replay; print(*sys.modules)"],
+        [sys.executable, "-c", "import sys, feasibility.certification.motion_replay; print(*sys.modules)"],
         capture_output=True, text=True, check=True, cwd=path.parents[2],
     )  # fmt: skip
     loaded = set(shown.stdout.split())
-    assert "feasibility.certification.replay" in loaded
+    assert "feasibility.certification.motion_replay" in loaded
     assert not {m for m in loaded if any(part_of(m, f"feasibility.{room}") for room in SEARCH)}

@@ -8,7 +8,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from feasibility.target_curves import closed_courses, target_courses
+from feasibility.target_curves import blocked_curves, target_curves
 from feasibility.task import Task
 from surfaces.meshes import TriangleMesh, mesh
 from surfaces.patches import plane
@@ -36,9 +36,9 @@ def told(text: str) -> int:
 def test_the_parts_that_closed_ways_leave_are_counted(turns: tuple[int, ...]) -> None:
     """A motion goes round outer edges, not into hollow ones."""
     cells, task = mesh(zigzag(*turns)).cells(60), Task(standoff=0.02, cone_deg=60)
-    text = closed_courses(cells, task)
-    ways = target_courses(cells, task.standoff, 1e-3)
-    usable = ~ways.folded & (ways.strays[:, 0] < 1e-3) & (ways.strays[:, 1] < 1.0)
+    text = blocked_curves(cells, task)
+    ways = target_curves(cells, task.standoff, 1e-3)
+    usable = ~ways.folded & (ways.deviations[:, 0] < 1e-3) & (ways.deviations[:, 1] < 1.0)
     graph = nx.Graph(cells.pairs[usable].tolist())
     graph.add_nodes_from(range(len(cells)))
     assert told(text) == nx.number_connected_components(graph)
@@ -49,4 +49,4 @@ def test_the_parts_that_closed_ways_leave_are_counted(turns: tuple[int, ...]) ->
 
 def test_where_every_way_is_open_nothing_is_said() -> None:
     for cells in (plane((0, 1), (0, 1)).cells(3, 4), sphere(0.5, (20, 80), (0, 90)).cells(4, 4)):
-        assert closed_courses(cells, Task(standoff=0.02, cone_deg=30)) == ""
+        assert blocked_curves(cells, Task(standoff=0.02, cone_deg=30)) == ""

@@ -85,11 +85,11 @@ def assert_held(verdict, part, position, lean):
         [(walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share).reshape(-1, 6), walk.q[-1:]]
     )
     tips, axes = tools(verdict.robot, q)
-    foot = nearest(part.vertices[part.faces] + position, tips)
-    away = np.linalg.norm(tips - foot, axis=1)
+    closest_point = nearest(part.vertices[part.faces] + position, tips)
+    away = np.linalg.norm(tips - closest_point, axis=1)
     tolerance = 1e-3 if task.tolerance is None else task.tolerance
     assert np.abs(away - task.standoff).max() <= tolerance
-    cosine = ((foot - tips) * axes).sum(axis=1) / away
+    cosine = ((closest_point - tips) * axes).sum(axis=1) / away
     assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + lean
     assert set(walk.cell[walk.cell >= 0].tolist()) == set(range(len(verdict.cells)))
 

@@ -36,11 +36,11 @@ def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) 
     share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
     q = walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share
     tips, axes = tools(verdict.robot, np.concatenate([q.reshape(-1, 6), walk.q[-1:]]))
-    foot = nearest(part.vertices[part.faces] + surface.position, tips)
-    away = np.linalg.norm(tips - foot, axis=1)
+    closest_point = nearest(part.vertices[part.faces] + surface.position, tips)
+    away = np.linalg.norm(tips - closest_point, axis=1)
     assert np.abs(away - task.standoff).max() <= certificate.max_position_error
     if name not in ("smooth", "hollow"):  # where normals are interpolated
-        cosine = ((foot - tips) * axes).sum(axis=1) / away
+        cosine = ((closest_point - tips) * axes).sum(axis=1) / away
         assert np.arccos(np.clip(cosine, -1, 1)).max() <= certificate.max_angle + 1e-9
 
 
@@ -51,8 +51,8 @@ def test_what_is_over_a_sharp_edge_is_outside(angle: int) -> None:
     turn = np.radians(np.linspace(-0.49, 0.49, 25) * angle)
     over = np.column_stack([np.sin(turn), np.zeros(len(turn)), np.cos(turn)])
     for y in np.linspace(0.01, 0.29, 8):
-        foot = surface.closest([0.0, y, 0.0] + 0.05 * over)
-        np.testing.assert_allclose(foot.height, 0.05, rtol=1e-12)
+        closest_point = surface.closest([0.0, y, 0.0] + 0.05 * over)
+        np.testing.assert_allclose(closest_point.height, 0.05, rtol=1e-12)
         assert surface.closest([0.0, y, -0.01]).height < 0.0
 
 

@@ -75,21 +75,21 @@ class Reader:
             _unit(np.einsum("kc,kci->ki", weights, self.normals[face])),
         )
 
-    def feet(self, points, height):
+    def closest_points(self, points, height):
         """Where x + height n(x) comes nearest to `points`, by turns.
 
         The distance left over bounds that to the target surface from above, wherever this ends.
         """
-        foot = self.nearest(points)
+        closest_point = self.nearest(points)
         moving = np.arange(len(points))
         for _ in range(TURNS):
-            again = self.nearest(points[moving] - height * foot.normals[moving])
-            step = np.linalg.norm(again.points - foot.points[moving], axis=1)
-            foot.points[moving], foot.normals[moving] = again
+            again = self.nearest(points[moving] - height * closest_point.normals[moving])
+            step = np.linalg.norm(again.points - closest_point.points[moving], axis=1)
+            closest_point.points[moving], closest_point.normals[moving] = again
             moving = moving[step > SETTLED]
             if len(moving) == 0:
                 break
-        return foot
+        return closest_point
 
 
 def _unit(vectors):
@@ -136,10 +136,10 @@ def assert_held(verdict, vertices, faces):
     tips, axes = tools(robot, q)
     tips, axes = (tips - surface.position) @ surface.rotation, axes @ surface.rotation
     sign = surface.side_sign
-    foot = Reader(vertices, faces).feet(tips, sign * task.standoff)
-    targets = foot.points + sign * task.standoff * foot.normals
+    closest_point = Reader(vertices, faces).closest_points(tips, sign * task.standoff)
+    targets = closest_point.points + sign * task.standoff * closest_point.normals
     assert np.linalg.norm(tips - targets, axis=1).max() <= tolerance
-    assert angles(axes, -sign * foot.normals).max() <= task.cone + 1e-6
+    assert angles(axes, -sign * closest_point.normals).max() <= task.cone + 1e-6
     marked = walk.cell >= 0
     assert set(walk.cell[marked].tolist()) == set(range(len(cells)))
     aims = task.targets(cells).points[walk.cell[marked]]
@@ -248,8 +248,8 @@ def thorny_plate():
     points = np.column_stack([x.ravel(), y.ravel()])
     tip, turns = np.array(THORN), np.arange(6) * np.pi / 3
     points = points[np.linalg.norm(points - tip, axis=1) > 2e-3]
-    foot = tip + 5e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
-    points = np.concatenate([points, foot, tip[None]])
+    closest_point = tip + 5e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
+    points = np.concatenate([points, closest_point, tip[None]])
     faces = Delaunay(points).simplices.astype(np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
     turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])

@@ -274,7 +274,7 @@ def test_what_a_library_says_of_an_interrupt_is_no_error(ask, monkeypatch, plate
 
 
 def test_ctrl_c_ends_a_running_search(tmp_path):
-    slow = "import sys, time, feasibility.checking as c; from feasibility.cli import main\n"
+    slow = "import sys, time, feasibility.checking as c; from feasibility.cli.main import main\n"
     slow += "def wait(*a, **k): print('ready', flush=True); time.sleep(60)\n"
     slow += "c.check = wait; sys.exit(main(['check', 'paper/4a']))"
     child = subprocess.Popen(
@@ -414,7 +414,7 @@ def test_robots_lists_joints_reach_and_limits(ask):
 
 @pytest.mark.parametrize("args", [["--help"], ["check", "--help"], ["--version"], ["chek"]])
 def test_help_loads_no_heavy_library(args):
-    program = "import sys; from feasibility.cli import main; status = main(sys.argv[1:])\n"
+    program = "import sys; from feasibility.cli.main import main; status = main(sys.argv[1:])\n"
     program += "print(sorted({m.partition('.')[0] for m in sys.modules}), file=sys.stderr)"
     done = subprocess.run(
         [sys.executable, "-c", program, *args], capture_output=True, text=True, check=True
@@ -465,7 +465,7 @@ def test_progress_shows_on_a_terminal_and_nowhere_else(monkeypatch):
 
 def test_a_terminal_sees_progress_and_a_file_does_not(plate):
     """The bar goes to stderr's terminal; stdout holds the answer alone."""
-    program = "import sys, feasibility.checking as c; from feasibility.cli import main\n"
+    program = "import sys, feasibility.checking as c; from feasibility.cli.main import main\n"
     program += "real = c.check\n"
     program += "def told(*a, progress=None):\n"
     program += "    progress(3, 12, 'a search'); return real(*a)\n"

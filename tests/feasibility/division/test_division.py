@@ -28,7 +28,7 @@ from feasibility.division.partition import Partition
 from feasibility.division.plans import plan_of
 from feasibility.division.reconfiguration import AS_GOOD, itinerary
 from feasibility.reports.division import STATUS, answer_of, as_json, as_text
-from feasibility.roadmap import Explorer, explore, links_of, patch_walk, problem_of
+from feasibility.roadmap import Exploration, explore, links_of, patch_walk, problem_of
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.verdict import CauseKind, Walk
@@ -215,29 +215,29 @@ def test_walks_over_random_parts_of_a_component(seed: int) -> None:
     """Any cells, connected or not: the replay finds them all visited."""
     rng = np.random.default_rng(seed)
     robot, cells, task, _ = load_case("paper/4c", []).build()
-    explorer = Explorer(robot, cells, problem_of(robot, cells, task), seed)
-    explore(explorer)
-    assert explorer.complete
+    exploration = Exploration(robot, cells, problem_of(robot, cells, task), seed)
+    explore(exploration)
+    assert exploration.complete
     wanted = rng.random(len(cells)) < rng.uniform(0.03, 0.9)
     wanted[rng.integers(len(cells))] = True
-    tie(explorer, explorer.best, wanted)
-    links = links_of(explorer.roadmap, explorer.best)
-    inside = links.nodes[wanted[explorer.roadmap.cell[links.nodes]]]
+    tie(exploration, exploration.best, wanted)
+    links = links_of(exploration.roadmap, exploration.best)
+    inside = links.nodes[wanted[exploration.roadmap.cell[links.nodes]]]
     start = int(rng.choice(inside))
     walk = patch_walk(links, wanted, start)
     assert replay(robot, cells, task, walk, wanted).accepted
-    assert (walk.q[0] == explorer.roadmap.q[start]).all()
+    assert (walk.q[0] == exploration.roadmap.q[start]).all()
     assert wanted[walk.cell[-1]]
     assert_motion(check(robot, cells, task), walk.q)
 
 
 def test_a_cell_that_the_component_misses_is_an_error() -> None:
     robot, cells, task, _ = load_case("paper/4d", []).build()
-    explorer = Explorer(robot, cells, problem_of(robot, cells, task), 0)
-    explore(explorer)
-    links = links_of(explorer.roadmap, explorer.best)
+    exploration = Exploration(robot, cells, problem_of(robot, cells, task), 0)
+    explore(exploration)
+    links = links_of(exploration.roadmap, exploration.best)
     wanted = np.zeros(90, dtype=bool)
-    wanted[[int(explorer.roadmap.cell[links.nodes[0]]), 89]] = True
+    wanted[[int(exploration.roadmap.cell[links.nodes[0]]), 89]] = True
     with pytest.raises(ValueError, match="leads to cell 89"):
         patch_walk(links, wanted, int(links.nodes[0]))
 
@@ -404,17 +404,17 @@ def test_text_of_a_division() -> None:
 def test_a_plan_of_connected_patches_beside_the_fewest() -> None:
     """Three patches of one component: as a plan of their own, in JSON and in the text."""
     division = divide(*load_case("paper/4c", []).build())
-    explorer = Explorer(
+    exploration = Exploration(
         division.robot,
         division.cells,
         problem_of(division.robot, division.cells, division.task),
         division.seed,
     )
-    explore(explorer)
+    explore(exploration)
     third = np.arange(90) // 30
     made = Partition(rows=np.zeros(3), patch=third, pieces=3, bound=2)
-    roots, covers = table_of(explorer)
-    plan = plan_of(explorer, division.task, made, roots, covers)
+    roots, covers = table_of(exploration)
+    plan = plan_of(exploration, division.task, made, roots, covers)
     assert (len(plan.patches), plan.optimal) == (3, False)
     both = replace(division, connected=plan)
     assert_division(both)

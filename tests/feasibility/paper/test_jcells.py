@@ -167,17 +167,17 @@ def reference(
     def cell_and_point(jc: tuple[int, ...]) -> tuple[int, np.ndarray]:
         value = q + np.array(jc) * steps.size
         point, axis = kinematics.tool(value)
-        foot = cells.surface.closest(point)
-        error = abs(float(foot.height) - sign * task.standoff)
+        closest_point = cells.surface.closest(point)
+        error = abs(float(closest_point.height) - sign * task.standoff)
         good = (
             error <= steps.tolerance - steps.sag
-            and -sign * float(foot.normal @ axis) >= steps.cone_cosine
-            and bool(foot.inside)
+            and -sign * float(closest_point.normal @ axis) >= steps.cone_cosine
+            and bool(closest_point.inside)
         )
         nu, nv = cells.shape
         (u0, u1), (v0, v1) = cells.surface.u_range, cells.surface.v_range
-        i = min(int((float(foot.u) - u0) / (u1 - u0) * nu), nu - 1)
-        j = min(int((float(foot.v) - v0) / (v1 - v0) * nv), nv - 1)
+        i = min(int((float(closest_point.u) - u0) / (u1 - u0) * nu), nu - 1)
+        j = min(int((float(closest_point.v) - v0) / (v1 - v0) * nv), nv - 1)
         return (i * nv + j if good else -1), point
 
     def cont(jc: tuple[int, ...], point: np.ndarray) -> list[tuple[int, ...]] | None:

@@ -51,18 +51,18 @@ def test_its_csv_is_one_motion_that_enters_every_cell(moves: str, step: float) -
     )  # fmt: skip
     assert len(corners) < len(q)
 
-    steps = Steps.of(PUMA, DOME.charted, TASK, search)
+    steps = Steps.of(PUMA, DOME.closed_form, TASK, search)
     assert ((q >= PUMA.lower) & (q <= PUMA.upper)).all()
     points, axes = tool_poses(PUMA, q)
-    foot = DOME.surface.closest(points)
+    closest_point = DOME.surface.closest(points)
     sign = DOME.surface.side_sign
-    assert foot.inside.all()
-    assert np.abs(foot.height - sign * TASK.standoff).max() + steps.sag <= steps.tolerance
-    chord = np.linalg.norm(axes + sign * foot.normal, axis=1).max() + steps.turn
+    assert closest_point.inside.all()
+    assert np.abs(closest_point.height - sign * TASK.standoff).max() + steps.sag <= steps.tolerance
+    chord = np.linalg.norm(axes + sign * closest_point.normal, axis=1).max() + steps.turn
     assert 2.0 * np.arcsin(0.5 * chord) <= TASK.cone
     within = Borders(DOME)
     for cell in range(len(DOME)):
-        assert within(foot.u, foot.v, [cell] * len(q)).any()
+        assert within(closest_point.u, closest_point.v, [cell] * len(q)).any()
 
 
 def test_a_row_is_at_a_cell_only_where_the_tool_is_at_its_centre() -> None:

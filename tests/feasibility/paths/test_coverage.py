@@ -155,8 +155,10 @@ def test_the_figures_of_a_path_measured_again(name):
     dense = walk.q[:-1, None] * (1 - t) + walk.q[1:, None] * t
     kinematics = Kinematics(robot)
     points = np.array([kinematics.tool(q)[0] for q in [*dense.reshape(-1, robot.n), walk.q[-1]]])
-    foot = verdict.cells.surface.closest(points)
-    way = np.linalg.norm(np.diff(points - foot.height[:, None] * foot.normal, axis=0), axis=1)
+    closest_point = verdict.cells.surface.closest(points)
+    way = np.linalg.norm(
+        np.diff(points - closest_point.height[:, None] * closest_point.normal, axis=0), axis=1
+    )
     assert figures.length == pytest.approx(way.sum(), rel=1e-3)
     by_mark, seen, start = [0.0, 0.0], {int(walk.cell[0])}, 0
     for k in np.flatnonzero(walk.cell >= 0)[1:].tolist():

@@ -35,7 +35,7 @@ from feasibility.placement import (
     trial_table,
 )
 from feasibility.placement.map import axes_of, placement_map
-from feasibility.placement.place import Local
+from feasibility.placement.placements import Local
 from feasibility.placement.placer import Placer
 from feasibility.placement.quick_search import MOST_COVERS, covers_of, skim
 from feasibility.placement.reach_bound import Reach
@@ -43,7 +43,13 @@ from feasibility.placement.region import PlacementError
 from feasibility.placement.stations import stations_of
 from feasibility.placement.study_tasks import trial_from
 from feasibility.reports.placement import as_csv, as_json, as_text, settings_of
-from feasibility.roadmap import LANDING_STEPS, Explorer, covering_walk, land, problem_of
+from feasibility.roadmap import (
+    PROJECTION_STEPS,
+    Exploration,
+    covering_walk,
+    problem_of,
+    project_onto_cell,
+)
 from feasibility.safe_files import FileError
 from feasibility.search import Search
 from feasibility.studies import Store, open_workers
@@ -271,7 +277,15 @@ def test_a_moved_problem_is_the_problem_of_the_moved_surface(name: str) -> None:
         pose = moved_away(placement_case("ur5 plate"), seed)
         one = placer.problem_at(pose)
         two = problem_of(setup.robot, moved_cells(cells, pose), setup.task)
-        for field in ("points", "approaches", "first_piece", "bends", "strays", "turning", "near"):
+        for field in (
+            "points",
+            "approaches",
+            "first_piece",
+            "derivative_bounds",
+            "deviations",
+            "curvature",
+            "near",
+        ):
             assert getattr(one, field) == pytest.approx(getattr(two, field), abs=1e-7), field
         assert one.targets == pytest.approx(two.targets, abs=1e-7)
         # Of the same types, so that no kernel has to be compiled for it anew.
@@ -300,7 +314,7 @@ def test_moved_cells_are_those_of_the_case_to_the_last_bit(name: str) -> None:
         moved = moved_cells(cells, pose)
         for field in ("centres", "normals", "areas"):
             assert (getattr(moved, field) == getattr(built, field)).all()
-        assert (moved.courses.cubics == built.courses.cubics).all()
+        assert (moved.curves.cubics == built.curves.cubics).all()
 
 
 def test_moving_a_mesh_is_rigid() -> None:
@@ -309,15 +323,15 @@ def test_moving_a_mesh_is_rigid() -> None:
     moved = moved_cells(cells, pose)
     assert (moved.labels == cells.labels).all()
     turn = pose.rotation @ cells.surface.rotation.T
-    foot = moved.surface.closest(moved.centres)
-    assert np.abs(foot.height).max() < 1e-9
+    closest_point = moved.surface.closest(moved.centres)
+    assert np.abs(closest_point.height).max() < 1e-9
     assert moved.normals == pytest.approx(cells.normals @ turn.T, abs=1e-12)
     assert (moved.locate(moved.centres) == np.arange(len(cells))).all()
 
 
 def test_the_margin_can_be_kept_over_every_cell() -> None:
     """With limits and cone drawn in by its shares, every cell still has a configuration."""
-    roomy = 0
+    margin_shares = 0
     for name in TEXTS:
         setup = placement_case(name).build()
         placer = Placer(*setup)
@@ -325,20 +339,26 @@ def test_the_margin_can_be_kept_over_every_cell() -> None:
         trial = placer.try_at(pose)
         assert trial.complete, name
         limits, cone, _ = vars_of(trial)
-        roomy += min(limits, cone) > 0.05
-        explorer = Explorer(setup.robot, setup.cells, placer.problem_at(pose), 1)
-        problem = explorer.problem
+        margin_shares += min(limits, cone) > 0.05
+        exploration = Exploration(setup.robot, setup.cells, placer.problem_at(pose), 1)
+        problem = exploration.problem
         half = 0.5 * (problem.upper - problem.lower)
         bounded = np.isfinite(half)
         inwards = np.where(bounded, (limits - 1e-3) * half, 0.0)
-        rim = (1.0 - cone + 1e-3) * problem.rim
+        cone_chord = (1.0 - cone + 1e-3) * problem.cone_chord
         drawn_in = problem._replace(
-            lower=problem.lower + inwards, upper=problem.upper - inwards, rim=rim, inner_rim=rim
+            lower=problem.lower + inwards,
+            upper=problem.upper - inwards,
+            cone_chord=cone_chord,
+            inner_cone_chord=cone_chord,
         )
         for cell in range(len(setup.cells)):
-            guesses = np.clip(explorer.guesses(400), drawn_in.lower, drawn_in.upper)
-            assert any(land(drawn_in, explorer.work, cell, q, LANDING_STEPS) for q in guesses)
-    assert roomy >= 4
+            guesses = np.clip(exploration.guesses(400), drawn_in.lower, drawn_in.upper)
+            assert any(
+                project_onto_cell(drawn_in, exploration.work, cell, q, PROJECTION_STEPS)
+                for q in guesses
+            )
+    assert margin_shares >= 4
 
 
 def test_what_a_short_search_covers_is_one_motion() -> None:
@@ -348,14 +368,16 @@ def test_what_a_short_search_covers_is_one_motion() -> None:
         case = placement_case(name)
         setup = case.build()
         placer, pose = Placer(*setup), moved_away(case, seed)
-        explorer = Explorer(setup.robot, setup.cells, placer.problem_at(pose), 0)
-        skim(explorer, False)
-        covers = covers_of(explorer)
+        exploration = Exploration(setup.robot, setup.cells, placer.problem_at(pose), 0)
+        skim(exploration, False)
+        covers = covers_of(exploration)
         assert 0 < len(covers) <= MOST_COVERS
-        roots = {explorer.roadmap.cover[r].astype(bool).tobytes(): r for r in explorer.roots()}
+        roots = {
+            exploration.roadmap.cover[r].astype(bool).tobytes(): r for r in exploration.roots()
+        }
         cells = moved_cells(setup.cells, pose)
         for cover in covers:
-            walk = covering_walk(explorer.roadmap, roots[cover.tobytes()])
+            walk = covering_walk(exploration.roadmap, roots[cover.tobytes()])
             assert replay(setup.robot, cells, setup.task, walk, cover).accepted
         several += len(covers) > 1
     assert several > 0

@@ -8,12 +8,12 @@ from random_arms import QUESTIONS, finite_limits, question, tools
 
 from feasibility.certification import replay
 from feasibility.roadmap import (
-    Explorer,
+    Exploration,
     close,
     edge_motion,
     explore,
+    margin_shares,
     problem_of,
-    roomy,
     track,
     work_for,
 )
@@ -39,17 +39,17 @@ def test_tracks_end_over_the_next_centre(name):
     arrived = 0
     for cell in range(0, len(cells), 2):
         guesses = rng.uniform(*finite_limits(robot), (6, robot.n))
-        starts = guesses[roomy(problem, work, cell, guesses) >= 0.0]
+        starts = guesses[margin_shares(problem, work, cell, guesses) >= 0.0]
         entries = slice(*cells.neighbours.indptr[cell : cell + 2])
         links = cells.neighbours.links[entries]
-        for other, course in zip(cells.neighbours.of(cell), links, strict=True):
+        for other, curve in zip(cells.neighbours.of(cell), links, strict=True):
             begin, end = (0.0, 1.0) if cell < other else (1.0, 0.0)
             for start in starts[:2]:
                 q = start.copy()
-                rows = track(problem, work, course, begin, end, q, q, False, ways, 0)
+                rows = track(problem, work, curve, begin, end, q, q, False, ways, 0)
                 if rows < 0:
                     assert rows == -1
-                    assert work.blame[0] > 0
+                    assert work.stop_reason[0] > 0
                     continue
                 arrived += 1
                 motion = np.vstack([start[None], ways[:rows]])
@@ -74,13 +74,13 @@ def test_a_track_does_not_start_off_its_target():
 def test_every_motion_that_a_search_stores_holds(name, seed):
     """Spread, stirred and closed: each edge runs from node to node, and the replay accepts it."""
     robot, cells, task = question(name)
-    explorer = Explorer(robot, cells, problem_of(robot, cells, task), seed)
-    explore(explorer)
+    exploration = Exploration(robot, cells, problem_of(robot, cells, task), seed)
+    explore(exploration)
     for cell in range(0, len(cells), 3):
-        explorer.plant(cell, explorer.guesses(3))
-        explorer.stir(cell)
-    close(explorer)
-    roadmap = explorer.roadmap
+        exploration.add_seeds(cell, exploration.guesses(3))
+        exploration.explore_self_motions(cell)
+    close(exploration)
+    roadmap = exploration.roadmap
     count = int(roadmap.counters[EDGES])
     assert count >= len(cells) - 1
     for e in range(count):

@@ -9,7 +9,7 @@ from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
 
 from feasibility.certification import replay
 from feasibility.checking import check
-from feasibility.roadmap import Explorer, connect, problem_of, roomy, work_for
+from feasibility.roadmap import Exploration, connect, margin_shares, problem_of, work_for
 from feasibility.roadmap.self_motion import settle
 from feasibility.task import Task
 from feasibility.verdict import Walk
@@ -24,7 +24,7 @@ def over_a_cell(request):
     rng = np.random.default_rng(4)
     cell = len(cells) // 2
     guesses = rng.uniform(*finite_limits(robot), (60, robot.n))
-    room = roomy(problem, work, cell, guesses)
+    room = margin_shares(problem, work, cell, guesses)
     return robot, cells, task, problem, work, cell, guesses[room >= 0.0], room[room >= 0.0]
 
 
@@ -122,7 +122,7 @@ def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
     robot = robot_of([joint(1, "prismatic", axis=(1, 0, 0), limits=(-1, 1)), joint(2)])
     robot = robot.with_limits({"j1": stroke})
     cells = plane((tool - 0.1, tool + 0.1), (-1e-4, 1e-4), side="outside").cells(3, 1)
-    guesses = Explorer(robot, cells, problem_of(robot, cells, Task(0.0, 180)), 0).guesses(50)
+    guesses = Exploration(robot, cells, problem_of(robot, cells, Task(0.0, 180)), 0).guesses(50)
     assert (guesses >= robot.lower).all()
     assert (guesses <= robot.upper).all()
     verdict = check(robot, cells, Task(0.0, 180))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from random_arms import QUESTIONS, finite_limits, planar_arm, question, tools
 
-from feasibility.roadmap import correct, look_at, place, problem_of, work_for
+from feasibility.roadmap import look_at, place, problem_of, project, work_for
 from feasibility.task import Task
 from surfaces.patches import plane
 
@@ -18,8 +18,8 @@ def solve(problem, work, target, approach, q, most=60):
     """Newton from q (in place) onto a target point, inside the cone about a direction."""
     look_at(problem, work, target, approach)
     place(problem, work, 1, q)
-    work.wish[:] = 0.0
-    return correct(problem, work, q, SLACK, np.inf, most)
+    work.secondary_step[:] = 0.0
+    return project(problem, work, q, SLACK, np.inf, most)
 
 
 @pytest.mark.parametrize("name", QUESTIONS)

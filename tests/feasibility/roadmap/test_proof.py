@@ -19,7 +19,15 @@ from random_arms import (
     turn_onto,
 )
 
-from feasibility.roadmap import Explorer, Ruling, problem_of, roomy, root_box, rule, work_for
+from feasibility.roadmap import (
+    Exploration,
+    Ruling,
+    margin_shares,
+    problem_of,
+    root_box,
+    rule,
+    work_for,
+)
 from feasibility.task import Task
 from robots import load_robot
 from surfaces.patches import plane
@@ -84,10 +92,10 @@ def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
         q = random_configuration(robot, rng)
         (point,), (axis,) = tools(robot, q[None])
         task = Task(0.0, (0.0, 0.01, 5.0, 45.0, 120.0, 180.0)[k % 6], (1e-3, 1e-5, 0.02)[k % 3])
-        stray = rng.normal(size=3)
-        stray *= 0.999 * task.tolerance / np.linalg.norm(stray)
+        deviation = rng.normal(size=3)
+        deviation *= 0.999 * task.tolerance / np.linalg.norm(deviation)
         approach = tilted(axis, 0.9999 * task.cone, rng)
-        cells = one_target(point + stray, approach, rng)
+        cells = one_target(point + deviation, approach, rng)
         width = 10.0 ** rng.uniform(-3.0, 0.3)
         share = np.clip(rng.uniform(-0.3, 1.3, robot.n), 0.0, 1.0)
         low = q - share * width
@@ -96,7 +104,7 @@ def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
         assert outcome is not Ruling.PROVED, (q.tolist(), box.lower, box.upper, task)
         if outcome is Ruling.REACHED:
             (there,), (held,) = tools(robot, found[None])
-            assert np.linalg.norm(there - point - stray) <= task.tolerance + 1e-12
+            assert np.linalg.norm(there - point - deviation) <= task.tolerance + 1e-12
             assert np.arccos(np.clip(held @ approach, -1, 1)) <= task.cone + 1e-7
         aside = np.column_stack([low, low + width]) + 1.5 * width + 0.05
         beside.append(ruling(robot.with_limits(aside), cells, task)[0])
@@ -142,7 +150,7 @@ def test_newton_finds_nothing_where_there_is_a_proof(name):
         low = np.maximum(robot.lower, -np.pi)
         high = np.minimum(robot.upper, np.pi)
         guesses = rng.uniform(low, high, (25, robot.n))
-        assert (roomy(problem, work, 0, guesses) == -1.0).all()
+        assert (margin_shares(problem, work, 0, guesses) == -1.0).all()
     assert 5 <= proved < 60
 
 
@@ -230,10 +238,10 @@ def test_what_branch_and_bound_finds_is_planted_at_its_winding(limits):
     for angle in np.radians([-170.0, -90.0, -10.0, 5.0, 95.0, 175.0]):
         target = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
         cells = one_target(target, np.array([0.0, 0.0, 1.0]), rng)
-        explorer = Explorer(robot, cells, problem_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
-        said = explorer.rule(0, root_box(explorer.problem), BOXES)
+        exploration = Exploration(robot, cells, problem_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
+        said = exploration.rule(0, root_box(exploration.problem), BOXES)
         assert said in (Ruling.REACHED, Ruling.UNKNOWN)
-        assert explorer.reached[0]
+        assert exploration.reached[0]
 
 
 def test_a_continuous_joint_turns_all_the_way():

@@ -18,8 +18,8 @@ from random_arms import (
     turn_onto,
 )
 
-from feasibility.roadmap import correct, look_at, place, problem_of, segment_holds, work_for
-from feasibility.roadmap.problem import aim, bend_between
+from feasibility.roadmap import look_at, place, problem_of, project, segment_holds, work_for
+from feasibility.roadmap.problem import aim, bounds_between
 from feasibility.roadmap.segment_bound import peak, spread
 from feasibility.task import Task
 from surfaces.patches import GridCells, plane
@@ -63,14 +63,16 @@ def test_second_derivatives_bound_the_sag_of_every_segment():
             previous = robot
         place(problem, work, 0, q0)
         place(problem, work, 1, q1)
-        bends = spread(problem, work, q0, q1)
+        derivative_bounds = spread(problem, work, q0, q1)
         s, q = between(q0, q1, 32)
-        for values, bend, ratios in zip(tools(robot, q), bends, (used, used_axis), strict=True):
+        for values, derivative_bound, ratios in zip(
+            tools(robot, q), derivative_bounds, (used, used_axis), strict=True
+        ):
             chord = (1.0 - s[:, None]) * values[0] + s[:, None] * values[-1]
             sag = np.linalg.norm(values - chord, axis=1)
-            allowed = 0.5 * bend * s * (1.0 - s)
+            allowed = 0.5 * derivative_bound * s * (1.0 - s)
             assert (sag <= allowed * (1.0 + 1e-9) + ROUNDING).all(), (robot.urdf, q0, q1)
-            if bend > 1e-6:
+            if derivative_bound > 1e-6:
                 ratios.append((sag[1:-1] / allowed[1:-1]).max())
     for ratios in (used, used_axis):
         assert max(ratios) > 0.99
@@ -85,11 +87,11 @@ def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
     robot = planar_arm(2, (-3.1, 3.1))
     problem, work = problem_of(robot, far_plane(), Task(0.0, 30)), work_for(2)
     worst = 0.0
-    for bend in np.linspace(0.05, 3.1, 60):
+    for derivative_bound in np.linspace(0.05, 3.1, 60):
         for turn in (0.01, 0.1, 1.0, 3.0):
             for q0, q1 in (
-                (np.array([0.0, -bend]), np.array([turn, bend])),
-                (np.array([turn, -bend]), np.array([0.0, bend])),
+                (np.array([0.0, -derivative_bound]), np.array([turn, derivative_bound])),
+                (np.array([turn, -derivative_bound]), np.array([0.0, derivative_bound])),
             ):
                 place(problem, work, 0, q0)
                 place(problem, work, 1, q1)
@@ -123,16 +125,16 @@ def test_peak_is_the_largest_value():
         assert np.isnan(peak(*values))
 
 
-def two_cells(surface, feet):
+def two_cells(surface, closest_points):
     """Two neighbouring cells of a patch with their centres at given parameters (2, 2)."""
-    (u0, v0), (u1, v1) = feet
+    (u0, v0), (u1, v1) = closest_points
     u, v = np.array([u0, u1]), np.array([v0, v1])
     return GridCells(
         surface, surface.point(u, v), surface.normal(u, v), np.ones(2), (1, 2), u=u, v=v
     )
 
 
-def surface_segment(rng, robot, kind, task, share, strays, longest, onto):
+def surface_segment(rng, robot, kind, task, share, deviations, longest, onto):
     """A segment that starts near a random target surface, axis at a share of the cone.
 
     Its targets run along a course from the foot of one end to the foot of the other. Returns
@@ -148,20 +150,20 @@ def surface_segment(rng, robot, kind, task, share, strays, longest, onto):
     (point,), (axis,) = tools(robot, q0[None])
     approach = tilted(axis, share * min(task.cone, 3.1), rng)
     turn = turn_onto(-sign * normal, approach, rng)
-    stray = rng.normal(size=3)
-    stray *= rng.choice(strays) * task.tolerance / np.linalg.norm(stray)
-    surface = surface.moved(turn, point + stray - turn @ target)
+    deviation = rng.normal(size=3)
+    deviation *= rng.choice(deviations) * task.tolerance / np.linalg.norm(deviation)
+    surface = surface.moved(turn, point + deviation - turn @ target)
     q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, longest)
     (away,), _ = tools(robot, q1[None])
-    feet = surface.closest(np.array([surface.point(u, v), away]))
-    cells = two_cells(surface, np.column_stack([feet.u, feet.v]))
+    closest_points = surface.closest(np.array([surface.point(u, v), away]))
+    cells = two_cells(surface, np.column_stack([closest_points.u, closest_points.v]))
     problem, work = problem_of(robot, cells, task), work_for(robot.n)
     aim(problem, work, 0, 1.0)
     place(problem, work, 1, q1)
-    bend_between(problem, work, 0, 0.0, 1.0)
+    bounds_between(problem, work, 0, 0.0, 1.0)
     if onto:
-        work.wish[:] = 0.0
-        if not correct(problem, work, q1, 1e-6, np.inf, 60):
+        work.secondary_step[:] = 0.0
+        if not project(problem, work, q1, 1e-6, np.inf, 60):
             return None
         place(problem, work, 1, q1)
     aim(problem, work, 0, 0.0)
@@ -173,9 +175,9 @@ def beside_the_course(robot, cells, task, q0, q1, samples):
     """Distance from the moving target, and |a - b| there and at the tool point's own foot."""
     s, q = between(q0, q1, samples)
     points, axes = tools(robot, q)
-    foot, normal = cells.courses.at(np.zeros(len(s), dtype=np.int64), s)
+    closest_point, normal = cells.curves.at(np.zeros(len(s), dtype=np.int64), s)
     sign = cells.surface.side_sign
-    distance = np.linalg.norm(points - foot - sign * task.standoff * normal, axis=1)
+    distance = np.linalg.norm(points - closest_point - sign * task.standoff * normal, axis=1)
     chord = np.linalg.norm(axes + sign * normal, axis=1)
     return distance, chord, deviation(cells.surface, task.standoff, points, axes).chord
 
@@ -267,7 +269,7 @@ def test_a_normal_that_bulges_away_from_a_fixed_axis(surface, half):
     for slot, q in enumerate((q0, q1)):
         aim(problem, work, 0, float(slot))
         place(problem, work, slot, q)
-    bend_between(problem, work, 0, 0.0, 1.0)
+    bounds_between(problem, work, 0, 0.0, 1.0)
     position, cone = segment_holds(problem, work, q0, q1)
     assert position * 0.1 >= 1.0 - np.cos(half)
     assert position * 0.1 <= 1.2 * (1.0 - np.cos(half))
@@ -293,6 +295,6 @@ def test_nothing_that_is_not_a_number_passes():
         position, cone = segment_holds(problem, work, q, wrong)
         assert not (position <= 1.0 and cone <= 1.0)
     place(problem, work, 1, q)
-    work.bend[:] = np.inf
+    work.derivative_bound[:] = np.inf
     position, cone = segment_holds(problem, work, q, q + 1e-9)
     assert not (position <= 1.0 and cone <= 1.0)

@@ -11,7 +11,7 @@ from random_arms import QUESTIONS, planar_arm, question
 
 from feasibility.roadmap import (
     NODES,
-    Explorer,
+    Exploration,
     close,
     covering_walk,
     edge_motion,
@@ -22,7 +22,7 @@ from feasibility.roadmap import (
 from feasibility.roadmap.graph import (
     COMPONENTS,
     EDGES,
-    WAYS,
+    WAYPOINTS,
     add_edge,
     add_node,
     empty_roadmap,
@@ -54,9 +54,9 @@ def roadmap_of(graph, cells, cell_of=None, rng=None):
     for x, y in graph.edges:
         roadmap = grown(roadmap)
         rows = int(rng.integers(1, 5))
-        first = int(roadmap.counters[WAYS])
-        roadmap.ways[first : first + rows] = rng.random((rows, 2))
-        roadmap.ways[first + rows - 1] = roadmap.q[y]
+        first = int(roadmap.counters[WAYPOINTS])
+        roadmap.waypoints[first : first + rows] = rng.random((rows, 2))
+        roadmap.waypoints[first + rows - 1] = roadmap.q[y]
         add_edge(roadmap, x, y, rows)
     return roadmap, slot_of
 
@@ -162,9 +162,9 @@ def test_a_component_that_does_not_hang_together_is_no_walk():
 def test_the_walk_of_a_search(name):
     """Every cell, along stored motions alone, with at most 40 per cent more visits than cells."""
     robot, cells, task = question(name)
-    explorer = Explorer(robot, cells, problem_of(robot, cells, task), 0)
-    explore(explorer)
-    close(explorer)
-    order = check_walk(explorer.roadmap, covering_walk(explorer.roadmap, explorer.best))
+    exploration = Exploration(robot, cells, problem_of(robot, cells, task), 0)
+    explore(exploration)
+    close(exploration)
+    order = check_walk(exploration.roadmap, covering_walk(exploration.roadmap, exploration.best))
     assert set(order) == set(range(len(cells)))
     assert len(order) <= 1.4 * len(cells)

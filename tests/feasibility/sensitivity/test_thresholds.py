@@ -176,9 +176,9 @@ def test_shifted_cells_are_those_of_the_shifted_surface(surface) -> None:  # typ
     np.testing.assert_allclose(moved.normals, fresh.normals, atol=1e-12)
     np.testing.assert_allclose(moved.areas, fresh.areas, atol=1e-12)
     np.testing.assert_array_equal(moved.pairs, fresh.pairs)
-    for name in ("first", "cubics", "bends", "strays"):
+    for name in ("first", "cubics", "derivative_bounds", "deviations"):
         np.testing.assert_allclose(
-            getattr(moved.courses, name), getattr(fresh.courses, name), atol=1e-9
+            getattr(moved.curves, name), getattr(fresh.curves, name), atol=1e-9
         )
 
 

@@ -139,8 +139,8 @@ def test_a_mesh_cut_once_and_placed_is_the_mesh_cut_in_place(tmp_path) -> None:
         for name in ("rotation", "position", "side"):
             ours, theirs = getattr(placed.surface, name), getattr(fresh.surface, name)
             assert np.array_equal(ours, theirs)
-        for name in ("first", "cubics", "bends", "strays"):
-            ours, theirs = getattr(placed.courses, name), getattr(fresh.courses, name)
+        for name in ("first", "cubics", "derivative_bounds", "deviations"):
+            ours, theirs = getattr(placed.curves, name), getattr(fresh.curves, name)
             assert np.array_equal(ours, theirs), name
 
 
@@ -265,7 +265,7 @@ def test_workers_killed_from_outside(undisturbed, tmp_path) -> None:
 
 def start(code: str, *arguments: object) -> subprocess.Popen[str]:
     """Another process that can import what these tests share."""
-    environment = {**os.environ, "PYTHONPATH": str(SHARED)}
+    environment = {**os.environ, "PYTHONPATH": f"{SHARED}{os.pathsep}{SHARED.parent}"}
     return subprocess.Popen(
         [sys.executable, "-c", code, *map(str, arguments)],
         env=environment,
@@ -322,7 +322,7 @@ def alive(pid: int) -> bool:
 
 STUDY_COMMAND = """
 import sys
-from feasibility.cli import main
+from feasibility.cli.main import main
 if __name__ == "__main__":
     study, out, csv, *how = sys.argv[1:]
     sys.exit(main(["study", study, "--out", out, "--csv", csv, *how]))
@@ -472,7 +472,7 @@ def test_the_others_wait_for_the_first_to_compile(monkeypatch, fails) -> None:
         with suppress(ValueError):
             warm_up_in_turn(gate, int)
 
-    monkeypatch.setattr("feasibility.roadmap.warm_up.warm_up", compile_or_load)
+    monkeypatch.setattr("feasibility.roadmap.warmup.warm_up", compile_or_load)
     threads = [threading.Thread(target=begin) for _ in range(4)]
     for thread in threads:
         thread.start()

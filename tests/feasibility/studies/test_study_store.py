@@ -209,7 +209,7 @@ def test_the_words_for_a_full_disk(tmp_path) -> None:
 
 KEEP_ON = """
 import sys
-from feasibility.study_store import Record, Store
+from feasibility.studies.store import Record, Store
 with Store(sys.argv[1]) as store:
     for k in range(100_000):
         store.keep([Record(f"key{k}", {"k": k}, "done", {"text": "x" * 2000}, 1.0)])

@@ -120,9 +120,9 @@ def test_each_cell_is_filled_by_its_own_triangles(cells):
         np.testing.assert_allclose(np.linalg.norm(drawn.normals, axis=1), 1.0, atol=1e-12)
     whole = cell_shapes.patch(cells, np.arange(COUNT))
     assert len(whole.vertices) == len(cells.surface.mesh.vertices), "triangles share corners"
-    foot = cells.surface.closest(whole.vertices)
-    np.testing.assert_allclose(foot.height, 0.0, atol=1e-12)
-    np.testing.assert_allclose(foot.normal, whole.normals, atol=1e-6)
+    closest_point = cells.surface.closest(whole.vertices)
+    np.testing.assert_allclose(closest_point.height, 0.0, atol=1e-12)
+    np.testing.assert_allclose(closest_point.normal, whole.normals, atol=1e-6)
 
 
 def test_borders_are_the_edges_between_cells_and_the_rim(cells):
@@ -134,8 +134,8 @@ def test_borders_are_the_edges_between_cells_and_the_rim(cells):
     assert len(drawn) == len(expected)
     assert set(drawn) == expected
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
-    rim = cells.surface.mesh.edges.border_lengths.sum()
-    assert length == pytest.approx(cells.border_lengths.sum() + rim)
+    cone_chord = cells.surface.mesh.edges.border_lengths.sum()
+    assert length == pytest.approx(cells.border_lengths.sum() + cone_chord)
 
 
 def test_creases_stay_sharp():
@@ -176,15 +176,15 @@ def test_a_fine_mesh_is_thinned_and_its_cells_still_meet_as_they_did(fine):
     area = np.bincount(skin.labels, areas_of(skin.vertices, skin.faces), 25)
     np.testing.assert_allclose(area, fine.areas, rtol=0.06)
     assert area.sum() == pytest.approx(fine.areas.sum(), rel=0.005)
-    foot = fine.surface.closest(skin.vertices)
-    assert ((foot.normal * skin.normals).sum(axis=1) > np.cos(np.radians(2.0))).all()
+    closest_point = fine.surface.closest(skin.vertices)
+    assert ((closest_point.normal * skin.normals).sum(axis=1) > np.cos(np.radians(2.0))).all()
     around = edges_of(skin.places[skin.faces], skin.labels)
     met = {tuple(sorted(set(labels))) for labels in around.values() if len(set(labels)) == 2}
     assert met == set(map(tuple, fine.pairs.tolist()))
     lines = skin.borders()
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
-    rim = fine.surface.mesh.edges.border_lengths.sum()
-    assert length == pytest.approx(fine.border_lengths.sum() + rim, rel=0.02)
+    cone_chord = fine.surface.mesh.edges.border_lengths.sum()
+    assert length == pytest.approx(fine.border_lengths.sum() + cone_chord, rel=0.02)
     assert len(lines) < len(fine.borders()) / 2
 
 
@@ -215,9 +215,11 @@ def test_edges_run_from_target_to_target_at_the_standoff(verdict):
     row = {tuple(pair): k for k, pair in enumerate(cells.pairs.tolist())}
     for pair, line in zip(verdict.graph.edges, lines, strict=True):
         np.testing.assert_allclose(line[[0, -1]], points[list(pair)], atol=1e-9)
-        foot, normal = cells.courses.strays[row[tuple(sorted(pair))]]
+        closest_point, normal = cells.curves.deviations[row[tuple(sorted(pair))]]
         height = cells.surface.closest(line).height
-        allowed = foot + TASK.standoff * normal + 1e-5  # the facets of a mesh are not its normals
+        allowed = (
+            closest_point + TASK.standoff * normal + 1e-5
+        )  # the facets of a mesh are not its normals
         assert np.abs(height + TASK.standoff).max() <= allowed, "on the tool's side, not through it"
 
 

@@ -373,8 +373,8 @@ def test_stations_are_drawn_where_they_stand():
         points = vertices(drawn[f"/stations/station {k + 1}/cells"])
         away = np.linalg.norm(points[:, None] - centres[None], axis=2).min(axis=1)
         assert away.max() < 0.5 * np.hypot(0.1, 0.1) + 1e-6
-        rim = vertices(drawn[f"/stations/station {k + 1}/outline"])
-        np.testing.assert_allclose(rim, turned(outline(CELLS), trial.pose), atol=2e-5)
+        cone_chord = vertices(drawn[f"/stations/station {k + 1}/outline"])
+        np.testing.assert_allclose(cone_chord, turned(outline(CELLS), trial.pose), atol=2e-5)
     shown = {entry.label: entry.shown for entry in view.legend.entries}
     assert shown["station 1 (4 cells)"]
     assert shown["station 2 (2 cells)"]

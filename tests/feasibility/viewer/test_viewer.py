@@ -128,10 +128,10 @@ def test_cells_that_are_not_covered_are_coloured_by_their_cause(infeasible):
     for kind, cells in expected.items():
         words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
         path = f"/cells/{words} ({len(cells)})"
-        foot = infeasible.cells.surface.closest(vertices(objects(drawn.commands)[path]))
-        assert np.allclose(foot.height, 0.0, atol=1e-4)
-        rows = np.floor((foot.u - np.radians(10)) / np.radians(80) * 5)
-        columns = np.floor((foot.v - np.radians(10)) / np.radians(170) * 6)
+        closest_point = infeasible.cells.surface.closest(vertices(objects(drawn.commands)[path]))
+        assert np.allclose(closest_point.height, 0.0, atol=1e-4)
+        rows = np.floor((closest_point.u - np.radians(10)) / np.radians(80) * 5)
+        columns = np.floor((closest_point.v - np.radians(10)) / np.radians(170) * 6)
         assert set((rows * 6 + columns).astype(int)) == cells
         colour = scene.MISSED if kind is None else scene.CAUSES[kind]
         entry = only(e for e in drawn.legend.entries if e.path == path)
@@ -151,9 +151,9 @@ def test_a_covered_surface_shows_no_missed_cells_and_marks_the_start(feasible, d
 
 def test_the_surface_is_smooth_and_its_normals_are_the_surfaces(feasible):
     points, faces, normals = cell_shapes.patch(feasible.cells, np.arange(20))
-    foot = feasible.cells.surface.closest(points)
-    assert np.allclose(foot.height, 0.0, atol=1e-12)
-    assert np.allclose(foot.normal, normals, atol=1e-9)
+    closest_point = feasible.cells.surface.closest(points)
+    assert np.allclose(closest_point.height, 0.0, atol=1e-12)
+    assert np.allclose(closest_point.normal, normals, atol=1e-9)
     corners = points[faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(across, axis=1).sum() / 2.0

@@ -382,8 +382,8 @@ import resource, sys
 resource.setrlimit(resource.RLIMIT_CPU, (60, 60))
 resource.setrlimit(resource.RLIMIT_AS, (2 * 2**30, 2 * 2**30))
 from urdf_corpus import ACCEPTED, FAULTY, REFUSED
-from robots.urdf_xml import UrdfError, parse_xml
-from robots.urdf import check_urdf, check_urdf_text
+from robots.urdf.xml import UrdfError, parse_xml
+from robots.urdf.checked_urdf import check_urdf, check_urdf_text
 import tempfile, os
 counts = {"refused": 0, "accepted": 0}
 with tempfile.TemporaryDirectory() as folder:

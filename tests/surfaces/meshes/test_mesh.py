@@ -66,12 +66,12 @@ def test_nearest_places_are_the_nearest(name):
     low, high = surface.mesh.vertices.min(axis=0), surface.mesh.vertices.max(axis=0)
     local = rng.uniform(low - 0.3, high + 0.3, (120, 3))
     points = local @ surface.rotation.T + surface.position
-    foot = surface.closest(points)
+    closest_point = surface.closest(points)
     expected = nearest_by_force(surface, points)
-    np.testing.assert_allclose(np.abs(foot.height), expected, atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(foot.normal, axis=1), 1.0, atol=1e-12)
-    assert foot.inside.all()
-    assert np.isnan(foot.u).all()
+    np.testing.assert_allclose(np.abs(closest_point.height), expected, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(closest_point.normal, axis=1), 1.0, atol=1e-12)
+    assert closest_point.inside.all()
+    assert np.isnan(closest_point.u).all()
     assert surface.closest(points.reshape(4, 30, 3)).height.shape == (4, 30)
 
 
@@ -80,9 +80,9 @@ def test_points_that_are_not_numbers_have_no_foot():
     surface = surface_of("dome")
     points = np.array([[0.0, 0.0, 2.0], [np.nan, 0.0, 0.0], [0.0, np.inf, 0.0]])
     with np.errstate(invalid="ignore"):
-        foot = surface.closest(points)
-    assert np.isfinite(foot.height[0])
-    assert not np.isfinite(foot.height[1:]).any()
+        closest_point = surface.closest(points)
+    assert np.isfinite(closest_point.height[0])
+    assert not np.isfinite(closest_point.height[1:]).any()
 
 
 @pytest.mark.parametrize("patch", [
@@ -150,23 +150,23 @@ def test_cutting_leaves_the_surface_what_it_was(name):
 def test_courses_of_a_mesh_lie_on_it_within_what_they_say(name):
     """Feet at odd places, against the mesh; on smooth ones within a twentieth of a face."""
     cells = surface_of(name).cells(60)
-    courses = cells.courses
-    which = np.repeat(np.arange(len(courses)), 17)
-    t = np.tile(np.linspace(0.0, 1.0, 17), len(courses))
-    foot, normal = courses.at(which, t)
-    found = cells.surface.closest(foot)
-    strays = courses.strays[which]
-    open_ = strays[:, 1] < 0.02
-    assert (np.abs(found.height) <= strays[:, 0] + 1e-12)[open_].all()
+    curves = cells.curves
+    which = np.repeat(np.arange(len(curves)), 17)
+    t = np.tile(np.linspace(0.0, 1.0, 17), len(curves))
+    closest_point, normal = curves.at(which, t)
+    found = cells.surface.closest(closest_point)
+    deviations = curves.deviations[which]
+    open_ = deviations[:, 1] < 0.02
+    assert (np.abs(found.height) <= deviations[:, 0] + 1e-12)[open_].all()
     turned = np.linalg.norm(normal - found.normal, axis=1)
-    assert (turned <= 1.5 * strays[:, 1] + 1e-9)[open_].mean() > 0.999
+    assert (turned <= 1.5 * deviations[:, 1] + 1e-9)[open_].mean() > 0.999
     if name in SMOOTH:
         assert open_.all()
-        assert courses.strays[:, 0].max() < 0.05 * cells.surface.grain
+        assert curves.deviations[:, 0].max() < 0.05 * cells.surface.mean_edge_length
     for end, column in ((0.0, 0), (1.0, 1)):
-        places = np.full(len(courses), end)
-        foot, normal = courses.at(np.arange(len(courses)), places)
-        np.testing.assert_allclose(foot, cells.centres[cells.pairs[:, column]], atol=1e-9)
+        places = np.full(len(curves), end)
+        closest_point, normal = curves.at(np.arange(len(curves)), places)
+        np.testing.assert_allclose(closest_point, cells.centres[cells.pairs[:, column]], atol=1e-9)
         np.testing.assert_allclose(normal, cells.normals[cells.pairs[:, column]], atol=1e-9)
 
 
@@ -179,7 +179,7 @@ def test_a_rigid_motion_moves_everything_along():
     np.testing.assert_array_equal(one.labels, other.labels)
     np.testing.assert_allclose(one.centres @ turn.T + shift, other.centres, atol=1e-12)
     np.testing.assert_allclose(one.normals @ turn.T, other.normals, atol=1e-12)
-    np.testing.assert_allclose(one.courses.strays, other.courses.strays, atol=1e-9)
+    np.testing.assert_allclose(one.curves.deviations, other.curves.deviations, atol=1e-9)
 
 
 def test_cells_pickle_and_are_the_same_again():
@@ -188,7 +188,7 @@ def test_cells_pickle_and_are_the_same_again():
     again = pickle.loads(pickle.dumps(cells))
     np.testing.assert_array_equal(cells.centres, again.centres)
     np.testing.assert_array_equal(cells.pairs, again.pairs)
-    np.testing.assert_array_equal(cells.courses.cubics, again.courses.cubics)
+    np.testing.assert_array_equal(cells.curves.cubics, again.curves.cubics)
 
 
 def test_what_is_drawn_is_the_surface():

@@ -113,8 +113,13 @@ def test_a_finite_bound_means_that_feet_do_not_jump(patch):
         u = u[1:-1]
         for height, jumps in ((0.98 * low, False), (1.02 * low, True)):
             points = patch.point(u, v) + sign * height * patch.normal(u, v)
-            foot = patch.closest(points)
-            same = np.linalg.norm(patch.point(foot.u, foot.v) - patch.point(u, v), axis=1) < 1e-6
+            closest_point = patch.closest(points)
+            same = (
+                np.linalg.norm(
+                    patch.point(closest_point.u, closest_point.v) - patch.point(u, v), axis=1
+                )
+                < 1e-6
+            )
             assert same.all() != jumps
 
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from smooth_probes import least_distance
 
-from surfaces.patches.closest_point import FootSearch, Jet
+from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.patches.cylinder import cylinder
-from surfaces.patches.smooth_patch import EDGE, LocalFeet, SmoothPatch
+from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.patches.sphere import sphere
 
 
@@ -45,7 +45,7 @@ class Searched(SmoothPatch):
     units: ClassVar[tuple[str, str]] = ("rad", "rad")
     u_angle: ClassVar[bool] = False
     v_angle: ClassVar[bool] = False
-    search: FootSearch
+    search: ClosestPointSearch
     jet: object
     sign: float
 
@@ -61,13 +61,13 @@ class Searched(SmoothPatch):
     def area(self, u0, u1, v0, v1):
         raise NotImplementedError
 
-    def local_feet(self, points):
+    def local_closest_points(self, points):
         x = self.search.nearest(points)
         normal = self.local_normal(*x.T)
         away = points - self.local_point(*x.T)
         height = np.einsum("ni,ni->n", away, normal)
         beside = np.linalg.norm(away - height[:, None] * normal, axis=1)
-        return LocalFeet(*x.T, height, normal, beside <= EDGE)
+        return LocalClosestPoints(*x.T, height, normal, beside <= EDGE)
 
 
 def searched(exact, jet, sign=1.0, samples=(40, 50)):
@@ -76,7 +76,7 @@ def searched(exact, jet, sign=1.0, samples=(40, 50)):
         for ends, count in zip((exact.u_range, exact.v_range), samples, strict=True)
     ]
     closed = (exact.u_closed, exact.v_closed)
-    search = FootSearch(lambda x: jet(x).point, jet, lines, closed)
+    search = ClosestPointSearch(lambda x: jet(x).point, jet, lines, closed)
     return Searched(
         exact.rotation, exact.position, exact.side, exact.u_range, exact.v_range, search, jet, sign
     )
@@ -103,20 +103,20 @@ def test_feet_over_the_patch_are_those_of_the_closed_form(both):
     u, v = rng.uniform(*exact.u_range, 3000), rng.uniform(*exact.v_range, 3000)
     h = rng.uniform(-0.9 * exact.radius, 3.0, 3000)
     points = exact.point(u, v) + h[:, None] * exact.normal(u, v)
-    foot, expected = found.closest(points), exact.closest(points)
-    assert foot.inside.all()
-    assert np.abs(foot.height - expected.height).max() < 1e-13
-    assert np.abs(foot.u - expected.u).max() < 1e-10
-    assert np.abs(foot.v - expected.v).max() < 1e-10
-    assert np.abs(foot.normal - expected.normal).max() < 1e-10
+    closest_point, expected = found.closest(points), exact.closest(points)
+    assert closest_point.inside.all()
+    assert np.abs(closest_point.height - expected.height).max() < 1e-13
+    assert np.abs(closest_point.u - expected.u).max() < 1e-10
+    assert np.abs(closest_point.v - expected.v).max() < 1e-10
+    assert np.abs(closest_point.normal - expected.normal).max() < 1e-10
 
 
 def test_points_anywhere_get_the_nearest_point_of_the_patch(both):
     exact, found = both
     rng = np.random.default_rng(6)
     points = exact.position + rng.normal(scale=exact.radius, size=(25, 3))
-    foot = found.closest(points)
-    placed = found.point(foot.u, foot.v)
+    closest_point = found.closest(points)
+    placed = found.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
     ranges = tuple(
         (low - 0.5 * closed, high + 0.5 * closed)
@@ -129,20 +129,24 @@ def test_points_anywhere_get_the_nearest_point_of_the_patch(both):
     assert np.abs(distance - expected).max() < 1e-9
     # A foot in the patch stands under its point; one on the border leans, and says so.
     whole = exact.closest(points)
-    assert (foot.inside == (np.abs(np.abs(foot.height) - distance) < 1e-12)).all()
-    assert (foot.inside >= whole.inside).all()
-    assert 0 < foot.inside.sum() < len(points)
-    assert foot.height == pytest.approx(np.einsum("ij,ij->i", points - placed, foot.normal))
+    assert (closest_point.inside == (np.abs(np.abs(closest_point.height) - distance) < 1e-12)).all()
+    assert (closest_point.inside >= whole.inside).all()
+    assert 0 < closest_point.inside.sum() < len(points)
+    assert closest_point.height == pytest.approx(
+        np.einsum("ij,ij->i", points - placed, closest_point.normal)
+    )
 
 
 def test_a_point_off_the_border_has_its_foot_on_it_and_not_inside():
     exact = cylinder(0.5, (-60, 100), (0.0, 0.9))
     found = searched(exact, lambda x: cylinder_jet(0.5, x))
-    foot = found.closest([[0.6, 0.0, -0.2], [0.6, 0.0, 0.0], [0.6, 0.0, 1.0], [0.2, -0.6, 0.5]])
-    assert foot.v == pytest.approx([0.0, 0.0, 0.9, 0.5], abs=1e-15)
-    assert foot.u == pytest.approx([0.0, 0.0, 0.0, -math.pi / 3], abs=1e-12)
-    assert foot.height[:3] == pytest.approx([0.1, 0.1, 0.1])
-    assert foot.inside.tolist() == [False, True, False, False]
+    closest_point = found.closest(
+        [[0.6, 0.0, -0.2], [0.6, 0.0, 0.0], [0.6, 0.0, 1.0], [0.2, -0.6, 0.5]]
+    )
+    assert closest_point.v == pytest.approx([0.0, 0.0, 0.9, 0.5], abs=1e-15)
+    assert closest_point.u == pytest.approx([0.0, 0.0, 0.0, -math.pi / 3], abs=1e-12)
+    assert closest_point.height[:3] == pytest.approx([0.1, 0.1, 0.1])
+    assert closest_point.inside.tolist() == [False, True, False, False]
 
 
 def test_coarse_samples_and_a_seam_find_the_same_feet():
@@ -150,20 +154,20 @@ def test_coarse_samples_and_a_seam_find_the_same_feet():
     coarse = searched(exact, lambda x: cylinder_jet(0.5, x), samples=(7, 3))
     angle = np.linspace(0, math.tau, 101)
     points = np.column_stack([0.7 * np.cos(angle), 0.7 * np.sin(angle), np.linspace(-1, 1, 101)])
-    foot = coarse.closest(points)
-    assert foot.inside.all()
-    assert np.abs(np.sin((foot.u - angle) / 2)).max() < 1e-12
-    assert foot.height == pytest.approx(np.full(101, 0.2), abs=1e-14)
-    assert (foot.u >= exact.u_range[0] - 1e-12).all()
-    assert (foot.u <= exact.u_range[1] + 1e-12).all()
+    closest_point = coarse.closest(points)
+    assert closest_point.inside.all()
+    assert np.abs(np.sin((closest_point.u - angle) / 2)).max() < 1e-12
+    assert closest_point.height == pytest.approx(np.full(101, 0.2), abs=1e-14)
+    assert (closest_point.u >= exact.u_range[0] - 1e-12).all()
+    assert (closest_point.u <= exact.u_range[1] + 1e-12).all()
 
 
 def test_where_all_points_are_equally_near_one_is_taken():
     exact = sphere(0.8, (40, 150), (0, 360))
     found = searched(exact, lambda x: sphere_jet(0.8, x))
-    foot = found.closest([[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0]])
-    assert foot.height == pytest.approx([-0.8, -0.8], abs=2e-9)
-    assert np.isfinite(foot.u).all()
+    closest_point = found.closest([[0.0, 0.0, 0.0], [1e-9, 0.0, 0.0]])
+    assert closest_point.height == pytest.approx([-0.8, -0.8], abs=2e-9)
+    assert np.isfinite(closest_point.u).all()
 
 
 def wave_jet(x):
@@ -177,7 +181,7 @@ def wave_jet(x):
 
 def test_the_nearest_of_many_valleys_is_found_on_a_curve_in_the_plane():
     line = np.linspace(-6, 6, 160)
-    search = FootSearch(lambda x: wave_jet(x).point, wave_jet, (line,), (False,))
+    search = ClosestPointSearch(lambda x: wave_jet(x).point, wave_jet, (line,), (False,))
     rng = np.random.default_rng(8)
     points = np.column_stack([rng.uniform(-7, 7, 150), rng.uniform(-12, 12, 150)])
     found = search.nearest(points)

@@ -25,7 +25,7 @@ def local(surface, points):
 
 
 def test_points_satisfy_the_implicit_equation(patch, samples):
-    x, y, z = local(patch, samples.foot).T
+    x, y, z = local(patch, samples.closest_point).T
     if patch.kind == "sphere":
         residual = np.sqrt(x**2 + y**2 + z**2) - patch.radius
     elif patch.kind == "cylinder":
@@ -34,11 +34,11 @@ def test_points_satisfy_the_implicit_equation(patch, samples):
         residual = np.sqrt(x**2 + y**2) - patch.waist * np.sqrt(1 + (z / patch.flare) ** 2)
     else:
         residual = z
-    assert np.abs(residual).max() < 2e-15 * (1 + np.abs(samples.foot).max())
+    assert np.abs(residual).max() < 2e-15 * (1 + np.abs(samples.closest_point).max())
 
 
 def test_parameters_mean_what_the_case_file_says(patch, samples):
-    x, y, z = local(patch, samples.foot).T
+    x, y, z = local(patch, samples.closest_point).T
     if patch.kind == "plane":
         expected = [x - samples.u, y - samples.v]
     else:
@@ -60,34 +60,41 @@ def test_normals_are_unit_outward_and_normal_to_finite_differences(patch, sample
     if patch.kind == "plane":
         assert n == pytest.approx(np.broadcast_to(patch.rotation[:, 2], n.shape), abs=1e-15)
     else:
-        away = local(patch, samples.foot) * [1, 1, patch.kind == "sphere"]
+        away = local(patch, samples.closest_point) * [1, 1, patch.kind == "sphere"]
         assert np.einsum("ij,ij->i", away, n @ patch.rotation).min() > 0
 
 
 def test_closest_recovers_parameters_height_and_normal(patch, samples):
-    foot = patch.closest(samples.point)
-    assert foot.u == pytest.approx(samples.u, abs=2e-13)
-    assert np.abs(foot.height - samples.height).max() < 5e-15 * (1 + np.abs(samples.point).max())
-    assert foot.normal == pytest.approx(samples.normal, abs=2e-13)
-    assert foot.inside.all()
+    closest_point = patch.closest(samples.point)
+    assert closest_point.u == pytest.approx(samples.u, abs=2e-13)
+    assert np.abs(closest_point.height - samples.height).max() < 5e-15 * (
+        1 + np.abs(samples.point).max()
+    )
+    assert closest_point.normal == pytest.approx(samples.normal, abs=2e-13)
+    assert closest_point.inside.all()
     # The azimuth is worth as much as the distance from the polar axis.
     lever = np.sin(samples.u) if patch.kind == "sphere" else 1.0
-    assert np.abs((foot.v - samples.v) * lever).max() < 2e-13
+    assert np.abs((closest_point.v - samples.v) * lever).max() < 2e-13
 
 
 def test_any_point_is_foot_plus_height_along_normal_and_no_patch_point_is_nearer(patch, samples):
     rng = np.random.default_rng(1)
-    size = np.ptp(samples.foot, axis=0).max()
+    size = np.ptp(samples.closest_point, axis=0).max()
     points = np.concatenate([
-        samples.foot[:300] + rng.normal(scale=size, size=(300, 3)),
+        samples.closest_point[:300] + rng.normal(scale=size, size=(300, 3)),
         patch.position + np.linspace(-2 * size, 2 * size, 41)[:, None] * patch.rotation[:, 2],
     ])  # fmt: skip
-    foot = patch.closest(points)
-    rebuilt = patch.point(foot.u, foot.v) + foot.height[:, None] * foot.normal
+    closest_point = patch.closest(points)
+    rebuilt = (
+        patch.point(closest_point.u, closest_point.v)
+        + closest_point.height[:, None] * closest_point.normal
+    )
     assert rebuilt == pytest.approx(points, abs=1e-13 * (1 + np.abs(points).max()))
-    assert foot.normal == pytest.approx(patch.normal(foot.u, foot.v), abs=1e-13)
-    distance = np.linalg.norm(points[:, None] - samples.foot[None], axis=2).min(axis=1)
-    assert (np.abs(foot.height) <= distance + 1e-12).all()
+    assert closest_point.normal == pytest.approx(
+        patch.normal(closest_point.u, closest_point.v), abs=1e-13
+    )
+    distance = np.linalg.norm(points[:, None] - samples.closest_point[None], axis=2).min(axis=1)
+    assert (np.abs(closest_point.height) <= distance + 1e-12).all()
 
 
 @pytest.mark.parametrize("kind", [cylinder, sphere, hyperboloid])
@@ -98,19 +105,19 @@ def test_points_without_a_unique_foot_get_one_on_the_patch(kind):
         hyperboloid: lambda: hyperboloid(0.4, 1.0, (100, 200), (0.3, 0.8)),
     }[kind]()
     point = [0, 0, 0] if kind is sphere else [0, 0, 1.5 if kind is cylinder else 0.5]
-    foot = made.closest(point)
-    assert foot.inside
-    assert made.point(foot.u, foot.v) + foot.height * foot.normal == pytest.approx(
-        np.array(point), abs=1e-15
-    )
+    closest_point = made.closest(point)
+    assert closest_point.inside
+    assert made.point(
+        closest_point.u, closest_point.v
+    ) + closest_point.height * closest_point.normal == pytest.approx(np.array(point), abs=1e-15)
 
 
 def test_a_foot_at_the_pole_lies_on_an_open_patch_that_reaches_it():
     quarter = sphere(0.7, (0, 90), (100, 190), position=(0.1, 0.2, 0.3), rpy_deg=(10, 20, 30))
     over = quarter.point(0.0, np.linspace(0, 6, 20)) + 0.2 * quarter.normal(0.0, 0.0)
-    foot = quarter.closest(over)
-    assert foot.inside.all()
-    assert np.abs(foot.u).max() < 1e-15
+    closest_point = quarter.closest(over)
+    assert closest_point.inside.all()
+    assert np.abs(closest_point.u).max() < 1e-15
 
 
 def test_hyperboloid_foot_is_exact_far_off_and_near_the_focal_curve():
@@ -118,22 +125,26 @@ def test_hyperboloid_foot_is_exact_far_off_and_near_the_focal_curve():
     rng = np.random.default_rng(3)
     z = np.concatenate([rng.uniform(-5, 5, 3000), [0.0, 1e-300, -1e-12]])
     rho = np.concatenate([10.0 ** rng.uniform(-14, 2, 3000), [0.0, 0.0, 0.3]])
-    foot = horn.closest(np.column_stack([rho, np.zeros_like(z), z]))
-    assert np.isfinite(foot.height).all()
-    tangent = np.column_stack([foot.normal[:, 2], np.zeros_like(z), -foot.normal[:, 0]])
-    away = np.column_stack([rho, np.zeros_like(z), z]) - horn.point(foot.u, foot.v)
+    closest_point = horn.closest(np.column_stack([rho, np.zeros_like(z), z]))
+    assert np.isfinite(closest_point.height).all()
+    tangent = np.column_stack(
+        [closest_point.normal[:, 2], np.zeros_like(z), -closest_point.normal[:, 0]]
+    )
+    away = np.column_stack([rho, np.zeros_like(z), z]) - horn.point(
+        closest_point.u, closest_point.v
+    )
     along = np.abs(np.einsum("ij,ij->i", away, tangent))
     assert (along < 1e-14 * (1 + rho + np.abs(z))).all()
-    assert (foot.v * z >= 0).all()
+    assert (closest_point.v * z >= 0).all()
 
 
 def test_inside_marks_exactly_the_feet_on_the_patch():
     horn = hyperboloid(0.5, 0.5, angle_deg=(120, 240), height=(0.1, 0.5))
     u, v = np.meshgrid(np.radians(np.arange(0.5, 360)), np.linspace(-0.5, 1, 301), indexing="ij")
-    foot = horn.closest(horn.point(u, v) - 0.01 * horn.normal(u, v))
+    closest_point = horn.closest(horn.point(u, v) - 0.01 * horn.normal(u, v))
     expected = (u > math.radians(120)) & (u < math.radians(240))
     expected &= (v > 0.1 - 1e-12) & (v < 0.5 + 1e-12)
-    assert (foot.inside == expected).all()
+    assert (closest_point.inside == expected).all()
 
 
 def test_area_is_the_integral_of_the_tangents_cross_product(patch):
@@ -173,7 +184,7 @@ def test_a_rigid_motion_moves_everything_and_changes_no_number(patch, samples, m
     rotation, translation = motion
     moved = patch.moved(rotation, translation)
     assert moved.point(samples.u, samples.v) == pytest.approx(
-        samples.foot @ rotation.T + translation, abs=1e-14
+        samples.closest_point @ rotation.T + translation, abs=1e-14
     )
     assert moved.normal(samples.u, samples.v) == pytest.approx(
         samples.normal @ rotation.T, abs=1e-14
@@ -220,7 +231,7 @@ def test_a_plane_seven_metres_wide_is_no_full_turn():
 def test_surfaces_pickle_and_stay_protected(patch, samples):
     copy = pickle.loads(pickle.dumps(patch))
     assert type(copy) is type(patch)
-    assert (copy.point(samples.u, samples.v) == samples.foot).all()
+    assert (copy.point(samples.u, samples.v) == samples.closest_point).all()
     assert (copy.side, copy.u_range, copy.v_range) == (patch.side, patch.u_range, patch.v_range)
     for surface in (patch, copy):
         with pytest.raises(ValueError, match="read-only"):
@@ -234,9 +245,11 @@ def test_shapes_broadcast(patch):
     v = np.linspace(*patch.v_range, 4)
     points = patch.point(u, v)
     assert points.shape == patch.normal(u, v).shape == (5, 4, 3)
-    foot = patch.closest(points)
-    assert foot.u.shape == foot.height.shape == foot.inside.shape == (5, 4)
-    assert foot.normal.shape == (5, 4, 3)
+    closest_point = patch.closest(points)
+    assert (
+        closest_point.u.shape == closest_point.height.shape == closest_point.inside.shape == (5, 4)
+    )
+    assert closest_point.normal.shape == (5, 4, 3)
     assert patch.closest(np.empty((0, 3))).u.shape == (0,)
     assert patch.closest(points[2, 1]).height.shape == ()
     with pytest.raises(ValueError, match=r"\(\.\.\., 3\)"):

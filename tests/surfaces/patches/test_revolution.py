@@ -98,27 +98,27 @@ def test_closest_recovers_parameters_height_and_normal(shape):
     u, v = random_parameters(shape, 2000)
     h = np.random.default_rng(1).uniform(-0.03, 0.03, 2000)
     n = shape.normal(u, v)
-    foot = shape.closest(shape.point(u, v) + h[:, None] * n)
-    assert foot.inside.all()
-    assert np.abs(foot.height - h).max() < 1e-14
-    assert np.abs(foot.u - u).max() < 1e-12
-    assert np.abs(foot.normal - n).max() < 1e-10
+    closest_point = shape.closest(shape.point(u, v) + h[:, None] * n)
+    assert closest_point.inside.all()
+    assert np.abs(closest_point.height - h).max() < 1e-14
+    assert np.abs(closest_point.u - u).max() < 1e-12
+    assert np.abs(closest_point.normal - n).max() < 1e-10
     lever = shape.profile.at(u)[:, 0]
-    assert np.abs((foot.v - v) * lever).max() < 1e-12
+    assert np.abs((closest_point.v - v) * lever).max() < 1e-12
 
 
 def test_no_point_of_the_whole_turn_is_nearer_than_the_foot(shape):
     rng = np.random.default_rng(3)
     points = shape.position + rng.normal(scale=0.5, size=(25, 3))
-    foot = shape.closest(points)
-    placed = shape.point(foot.u, foot.v)
+    closest_point = shape.closest(points)
+    placed = shape.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
     ranges = shape.u_range, (-1.0, math.tau + 1.0)
     expected = np.array([least_distance(shape, p, *ranges) for p in points])
     assert np.abs(distance - expected).max() < 1e-9
-    leaning = np.abs(np.abs(foot.height) - distance) > 1e-12
-    assert not foot.inside[leaning].any()
-    at_end = (foot.u == 0.0) | (foot.u == shape.profile.length)
+    leaning = np.abs(np.abs(closest_point.height) - distance) > 1e-12
+    assert not closest_point.inside[leaning].any()
+    at_end = (closest_point.u == 0.0) | (closest_point.u == shape.profile.length)
     assert (leaning <= at_end).all()
 
 
@@ -129,14 +129,16 @@ def test_poles_have_a_normal_along_the_axis_and_join_their_row():
     assert PATCHES["shield"].poles == (False, False)
     down = bowl.normal(bowl.profile.length, np.linspace(-3, 3, 7))
     assert down == pytest.approx(np.tile(-bowl.rotation[:, 2], (7, 1)), abs=1e-14)
-    foot = PATCHES["shield"].closest([0.0, 0.0, -0.5])  # on the axis every azimuth is one
-    assert foot.inside
-    assert foot.height == pytest.approx(-0.1)  # listed downwards: outward is towards the axis
+    closest_point = PATCHES["shield"].closest([0.0, 0.0, -0.5])  # on the axis every azimuth is one
+    assert closest_point.inside
+    assert closest_point.height == pytest.approx(
+        -0.1
+    )  # listed downwards: outward is towards the axis
     cells = bowl.cells(4, 8)
     assert np.diff(cells.neighbours.indptr)[-8:].min() == 8
-    foot = bowl.closest(cells.centres)
-    assert foot.inside.all()
-    assert np.abs(foot.height).max() < 1e-14
+    closest_point = bowl.closest(cells.centres)
+    assert closest_point.inside.all()
+    assert np.abs(closest_point.height).max() < 1e-14
 
 
 def test_area_matches_fine_triangles(shape):
@@ -181,9 +183,9 @@ def test_surfaces_pickle_and_move(shape, motion):
     u, v = random_parameters(shape, 100)
     points = shape.point(u, v)
     assert moved.point(u, v) == pytest.approx(points @ rotation.T + translation)
-    foot = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
-    assert foot.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
-    assert foot.inside.all()
+    closest_point = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
+    assert closest_point.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
+    assert closest_point.inside.all()
     with pytest.raises(ValueError, match="read-only"):
         shape.profile.points[0, 0] = 1.0
 

@@ -110,17 +110,17 @@ def test_a_patch_in_pieces_has_the_cells_and_neighbours_of_the_whole(name):
 @pytest.mark.parametrize("name", WHOLE, ids=str)
 def test_the_courses_of_pieces_run_on_the_whole(name):
     whole, parts = cut_alike(name)
-    courses = parts.courses
+    curves = parts.curves
     pair = np.repeat(np.arange(len(parts.pairs)), 23)
-    foot, normal = courses.at(pair, np.tile(np.linspace(0, 1, 23), len(parts.pairs)))
+    closest_point, normal = curves.at(pair, np.tile(np.linspace(0, 1, 23), len(parts.pairs)))
     for surface in (whole.surface, parts.surface):
-        on = surface.closest(foot)
+        on = surface.closest(closest_point)
         assert on.inside.all()
-        assert (np.abs(on.height) <= courses.strays[pair, 0] + 1e-12).all()
+        assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
         apart = np.linalg.norm(normal - on.normal, axis=1)
-        assert (apart <= courses.strays[pair, 1] + 1e-12).all()
-    assert courses.strays.max() < 1e-5
-    ends = foot.reshape(-1, 23, 3)
+        assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
+    assert curves.deviations.max() < 1e-5
+    ends = closest_point.reshape(-1, 23, 3)
     assert ends[:, 0] == pytest.approx(parts.centres[parts.pairs[:, 0]], abs=1e-12)
     assert ends[:, -1] == pytest.approx(parts.centres[parts.pairs[:, 1]], abs=1e-12)
 
@@ -158,9 +158,9 @@ def test_heights_are_distances_to_the_nearest_piece():
     assert "crease of up to 26.6 degrees" in surface.notes[0]
     rng = np.random.default_rng(4)
     points = rng.uniform((0.1, -0.1, 0.3), (0.4, 0.1, 0.5), (40, 3))
-    foot = surface.closest(points)
-    assert foot.inside.all()
-    for point, height in zip(points, foot.height, strict=True):
+    closest_point = surface.closest(points)
+    assert closest_point.inside.all()
+    for point, height in zip(points, closest_point.height, strict=True):
         away = [
             least_distance(piece, point, piece.u_range, piece.v_range) for piece in surface.pieces
         ]
@@ -191,7 +191,7 @@ def test_long_sides_against_short_ones():
                     expected.add((cells.index(0, rows[0], j), cells.index(other, rows[other], k)))
     across = {tuple(pair) for pair in cells.joints.pairs.tolist() if cells.piece[pair[0]] == 0}
     assert across == expected
-    assert cells.courses.strays.max() < 1e-6
+    assert cells.curves.deviations.max() < 1e-6
 
 
 def test_pieces_that_meet_in_a_point_are_not_joined():
@@ -208,8 +208,8 @@ def test_borders_join_within_the_gap(apart, joined):
     assert len(surface.seams) == joined
     cells = surface.cells((3, 3))
     assert len(cells.joints.pairs) == (7 if joined else 0)
-    foot, _ = cells.courses.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
-    on = surface.closest(foot)
+    closest_point, _ = cells.curves.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
+    on = surface.closest(closest_point)
     assert on.inside.all()
     assert np.abs(on.height).max() <= apart
     wide = piecewise([plane((0, 1), (0, 1)), plane((1 + apart, 2), (0, 1))], gap=2e-4)
@@ -258,17 +258,17 @@ def test_a_crease_is_told_with_its_angle(angle):
     cells = surface.cells((3, 4))
     assert cells.joints.creases == pytest.approx(math.radians(abs(angle)), abs=1e-9)
     # Courses across it stray by at least half of the angle, those along it by nothing.
-    strays = cells.courses.strays[:, 1]
+    deviations = cells.curves.deviations[:, 1]
     across = cells.piece[cells.pairs[:, 0]] != cells.piece[cells.pairs[:, 1]]
-    assert (strays[across] >= 2.0 * math.sin(0.25 * math.radians(abs(angle)))).all()
-    assert strays[~across].max() < 1e-12
+    assert (deviations[across] >= 2.0 * math.sin(0.25 * math.radians(abs(angle)))).all()
+    assert deviations[~across].max() < 1e-12
     # And what they say holds against the surface's own nearest places.
     pair = np.repeat(np.arange(len(cells.pairs)), 23)
-    foot, normal = cells.courses.at(pair, np.tile(np.linspace(0, 1, 23), len(cells.pairs)))
-    on = surface.closest(foot)
+    closest_point, normal = cells.curves.at(pair, np.tile(np.linspace(0, 1, 23), len(cells.pairs)))
+    on = surface.closest(closest_point)
     assert on.inside.all()
-    assert (np.abs(on.height) <= cells.courses.strays[pair, 0] + 1e-12).all()
-    assert (np.linalg.norm(normal - on.normal, axis=1) <= strays[pair] + 1e-12).all()
+    assert (np.abs(on.height) <= cells.curves.deviations[pair, 0] + 1e-12).all()
+    assert (np.linalg.norm(normal - on.normal, axis=1) <= deviations[pair] + 1e-12).all()
 
 
 def test_three_pieces_on_one_seam_are_refused():
@@ -303,7 +303,7 @@ def test_a_full_turn_stacked_on_a_full_turn():
     met = np.bincount(cells.joints.pairs.ravel(), minlength=len(cells))
     assert sorted(set(met.tolist())) == [0, 2]
     assert (met > 0).sum() == 18
-    assert cells.courses.strays.max() < 1e-5
+    assert cells.curves.deviations.max() < 1e-5
 
 
 def test_a_pipe_of_two_shells_is_crossed_at_both_seams():
@@ -312,9 +312,9 @@ def test_a_pipe_of_two_shells_is_crossed_at_both_seams():
     surface = piecewise(shells)
     assert len(surface.seams) == 2
     cells = surface.cells((1, 2))
-    assert cells.courses.strays.max() < 1e-3
-    foot, _ = cells.courses.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
-    assert np.hypot(foot[:, 0], foot[:, 1]) == pytest.approx(0.3, abs=1e-3)
+    assert cells.curves.deviations.max() < 1e-3
+    closest_point, _ = cells.curves.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
+    assert np.hypot(closest_point[:, 0], closest_point[:, 1]) == pytest.approx(0.3, abs=1e-3)
 
 
 def test_a_rigid_motion_moves_everything_along():
@@ -331,7 +331,9 @@ def test_a_rigid_motion_moves_everything_along():
         assert here.joints.crossings @ turn.T + shift == pytest.approx(
             there.joints.crossings, abs=1e-12
         )
-        assert here.courses.bends == pytest.approx(there.courses.bends, abs=1e-7)
+        assert here.curves.derivative_bounds == pytest.approx(
+            there.curves.derivative_bounds, abs=1e-7
+        )
 
 
 def test_cells_and_surface_survive_pickling():
@@ -419,7 +421,7 @@ def test_wrong_counts_are_refused(counts):
 def test_one_piece_and_pieces_without_cells():
     alone = piecewise([plane((0, 1), (0, 1))]).cells((3, 3))
     assert len(alone.pairs) == 20
-    assert alone.courses.strays.max() < 1e-12
+    assert alone.curves.deviations.max() < 1e-12
     some = split_hood(0.5).cells([(0, 3), (2, 3)])
     assert len(some) == 6
     assert len(some.joints.pairs) == 0

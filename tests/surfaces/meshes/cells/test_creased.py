@@ -23,9 +23,9 @@ def roof(angle_deg, side=0.3):
 
 def creased_courses(cells):
     """Courses that come to rest, each as its pieces (4 k, 4, 6)."""
-    courses = cells.courses
-    which = np.flatnonzero(courses.creased)
-    return which, [courses.cubics[courses.first[k] : courses.first[k + 1]] for k in which]
+    curves = cells.curves
+    which = np.flatnonzero(curves.creased)
+    return which, [curves.cubics[curves.first[k] : curves.first[k + 1]] for k in which]
 
 
 @pytest.mark.parametrize("angle", [40, 90, 150, -90])
@@ -62,17 +62,17 @@ def test_creased_courses_are_smooth_in_time_and_stay_on_the_surface(name):
         quarter = len(cubics) // 4
         assert np.abs(cubics[[quarter, 2 * quarter, 3 * quarter], 1]).max() < 1e-12
         assert np.abs(slopes[[quarter - 1, 2 * quarter - 1, 3 * quarter - 1]]).max() < 1e-12
-    courses = cells.courses
-    assert np.flatnonzero(courses.rests).size == 6 * len(which)
+    curves = cells.curves
+    assert np.flatnonzero(curves.rests).size == 6 * len(which)
     t = np.random.default_rng(0).uniform(size=200)
     pair = np.repeat(which, len(t))
-    foot, normal = courses.at(pair, np.tile(t, len(which)))
-    on = cells.surface.closest(foot)
-    assert (np.abs(on.height) <= courses.strays[pair, 0] + 1e-9).all()
-    good = courses.strays[pair, 1] < 0.01
+    closest_point, normal = curves.at(pair, np.tile(t, len(which)))
+    on = cells.surface.closest(closest_point)
+    assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-9).all()
+    good = curves.deviations[pair, 1] < 0.01
     assert good.mean() > 0.7
     apart = np.linalg.norm(normal - on.normal, axis=1)[good]
-    assert (apart <= 1.1 * courses.strays[pair[good], 1]).all()
+    assert (apart <= 1.1 * curves.deviations[pair[good], 1]).all()
 
 
 def can():
@@ -110,10 +110,10 @@ def test_the_last_fit_of_a_course_counts(counts):
         (np.array([0, 2]), rng.normal(size=(2, others, 4, 6))),
         (np.array([3]), rng.normal(size=(1, after, 4, 6))),
     ]
-    courses = _joined(fits, np.zeros((4, 2)), np.zeros(4, dtype=bool))
+    curves = _joined(fits, np.zeros((4, 2)), np.zeros(4, dtype=bool))
     expected = [fits[1][1][0], fits[0][1][0], fits[1][1][1], fits[2][1][0]]
-    assert np.diff(courses.first).tolist() == [len(cubics) for cubics in expected]
-    np.testing.assert_array_equal(courses.cubics, np.concatenate(expected))
+    assert np.diff(curves.first).tolist() == [len(cubics) for cubics in expected]
+    np.testing.assert_array_equal(curves.cubics, np.concatenate(expected))
 
 
 @pytest.mark.parametrize("name", PARTS)
@@ -141,7 +141,7 @@ def test_the_normal_turns_in_a_narrow_strip_alone():
     flat = np.column_stack([np.sign(x), 0 * x, np.ones(4001)]) / np.sqrt(2)
     turned = np.linalg.norm(normals - flat, axis=1) > 1e-6
     assert turned.any()
-    assert np.abs(x[turned]).max() < 0.1 * surface.grain
+    assert np.abs(x[turned]).max() < 0.1 * surface.mean_edge_length
     assert normals[2000] == pytest.approx([0, 0, 1], abs=1e-9)
 
 
@@ -163,7 +163,7 @@ def test_the_normal_turns_no_faster_than_is_said(name):
     way = np.einsum("kc,kci->ki", ahead - weights, corners)
     turn = surface.normals_at(face, ahead) - surface.normals_at(face, weights)
     rate = (np.linalg.norm(turn, axis=1) / np.linalg.norm(way, axis=1))[inside]
-    said = cells.sharpness[cells.labels[face[inside]]]
+    said = cells.max_curvature[cells.labels[face[inside]]]
     assert (rate <= said * (1.0 + 1e-6)).all()
     assert (rate / said).max() > 0.6
 

@@ -51,7 +51,7 @@ def test_the_whole_corpus_in_two_gigabytes(tmp_path):
 import resource
 resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
 from pathlib import Path
-from surfaces.mesh_file import read_mesh
+from surfaces.meshes.files import read_mesh
 from surfaces.surface import SurfaceError
 for path in sorted(Path({str(tmp_path)!r}).iterdir()):
     try:

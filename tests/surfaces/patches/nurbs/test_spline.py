@@ -118,31 +118,33 @@ def test_closest_recovers_parameters_height_and_normal(shape):
     u, v = random_parameters(shape, 1500)
     h = np.random.default_rng(1).uniform(-0.03, 0.03, 1500)
     n = shape.normal(u, v)
-    foot = shape.closest(shape.point(u, v) + h[:, None] * n)
-    assert foot.inside.all()
-    assert np.abs(foot.height - h).max() < 2e-15 * 10
-    assert np.abs(foot.normal - n).max() < 1e-10
-    assert np.abs(foot.u - u).max() < 1e-11
-    assert np.abs(foot.v - v).max() < 1e-11
+    closest_point = shape.closest(shape.point(u, v) + h[:, None] * n)
+    assert closest_point.inside.all()
+    assert np.abs(closest_point.height - h).max() < 2e-15 * 10
+    assert np.abs(closest_point.normal - n).max() < 1e-10
+    assert np.abs(closest_point.u - u).max() < 1e-11
+    assert np.abs(closest_point.v - v).max() < 1e-11
 
 
 def test_no_point_of_the_patch_is_nearer_than_the_foot(shape):
     rng = np.random.default_rng(3)
     centre = shape.point(*(sum(ends) / 2 for ends in (shape.u_range, shape.v_range)))
     points = centre + rng.normal(scale=0.5, size=(25, 3))
-    foot = shape.closest(points)
-    placed = shape.point(foot.u, foot.v)
+    closest_point = shape.closest(points)
+    placed = shape.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
     expected = np.array([least_distance(shape, p, shape.u_range, shape.v_range) for p in points])
     assert np.abs(distance - expected).max() < 1e-9
-    leaning = np.abs(np.abs(foot.height) - distance) > 1e-12
-    assert (foot.inside == ~leaning).all()
-    assert foot.height == pytest.approx(np.einsum("ij,ij->i", points - placed, foot.normal))
+    leaning = np.abs(np.abs(closest_point.height) - distance) > 1e-12
+    assert (closest_point.inside == ~leaning).all()
+    assert closest_point.height == pytest.approx(
+        np.einsum("ij,ij->i", points - placed, closest_point.normal)
+    )
     at_end = [
         ((x == low) | (x == high)) & (not closed)
         for x, (low, high), closed in (
-            (foot.u, shape.u_range, shape.u_closed),
-            (foot.v, shape.v_range, shape.v_closed),
+            (closest_point.u, shape.u_range, shape.u_closed),
+            (closest_point.v, shape.v_range, shape.v_closed),
         )
     ]
     assert (leaning <= at_end[0] | at_end[1]).all()
@@ -204,9 +206,9 @@ def test_a_part_is_the_whole_within_its_range():
     assert (part.point(u, v) == whole.point(u, v)).all()
     assert (part.normal(u, v) == whole.normal(u, v)).all()
     beyond = whole.point(0.05, 0.5) + 0.01 * whole.normal(0.05, 0.5)
-    foot = part.closest(beyond)
-    assert foot.u == 0.1
-    assert not foot.inside
+    closest_point = part.closest(beyond)
+    assert closest_point.u == 0.1
+    assert not closest_point.inside
     assert whole.closest(beyond).inside
 
 
@@ -225,9 +227,9 @@ def test_surfaces_pickle_and_move(shape, motion):
     u, v = random_parameters(shape, 100)
     points = shape.point(u, v)
     assert moved.point(u, v) == pytest.approx(points @ rotation.T + translation)
-    foot = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
-    assert foot.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
-    assert foot.inside.all()
+    closest_point = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
+    assert closest_point.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
+    assert closest_point.inside.all()
     assert moved.net is shape.net
     for array in (shape.net.points, *shape.net.knots):
         with pytest.raises(ValueError, match="read-only"):
@@ -239,9 +241,9 @@ def test_a_net_of_many_spans_is_searched_within_its_samples():
     points = hood(m, n)
     patch = bspline(points)
     u, v = random_parameters(patch, 400)
-    foot = patch.closest(patch.point(u, v) - 0.02 * patch.normal(u, v))
-    assert np.abs(foot.u - u).max() < 1e-11
-    assert foot.height == pytest.approx(np.full(400, -0.02), abs=1e-14)
+    closest_point = patch.closest(patch.point(u, v) - 0.02 * patch.normal(u, v))
+    assert np.abs(closest_point.u - u).max() < 1e-11
+    assert closest_point.height == pytest.approx(np.full(400, -0.02), abs=1e-14)
 
 
 def changed(place, value):

@@ -8,7 +8,7 @@ from typing import Protocol
 from feasibility.notices import compiling_notice
 
 
-class Gate(Protocol):
+class SharedLock(Protocol):
     """A lock that processes share, such as `multiprocessing.Lock()`."""
 
     def acquire(self, block: bool = True) -> bool:
@@ -18,7 +18,7 @@ class Gate(Protocol):
         """Give it back."""
 
 
-def warm_up_in_turn(gate: Gate, say: Callable[[], None]) -> None:
+def warm_up_in_turn(gate: SharedLock, say: Callable[[], None]) -> None:
     """`warm_up` in one of several new processes: one of them compiles, the others load the result.
 
     Args:
@@ -47,11 +47,11 @@ def warm_up() -> None:
         return
     from feasibility.certification import replay
     from feasibility.roadmap.branch_and_bound import root_box
-    from feasibility.roadmap.covering_walk import covering_walk
     from feasibility.roadmap.diagnosis import diagnose
-    from feasibility.roadmap.exploration import Explorer
+    from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.problem import problem_of
     from feasibility.roadmap.search import close, explore
+    from feasibility.roadmap.walk import covering_walk
     from feasibility.task import Task
     from robots import load_robot
     from surfaces.patches import plane
@@ -59,15 +59,21 @@ def warm_up() -> None:
     robot = load_robot("puma560")
     cells = plane(width=(0.7, 0.72), length=(0.1, 0.12), side="outside").cells(1, 2)
     task = Task(standoff=0.01, cone_deg=60)
-    explorer = Explorer(robot, cells, problem_of(robot, cells, task), 0)
-    explore(explorer)
-    close(explorer)
-    explorer.stir(0)
-    explorer.rule(0, root_box(explorer.problem), 1)
-    diagnose(explorer, 0)
+    exploration = Exploration(robot, cells, problem_of(robot, cells, task), 0)
+    explore(exploration)
+    close(exploration)
+    exploration.explore_self_motions(0)
+    exploration.rule(0, root_box(exploration.problem), 1)
+    diagnose(exploration, 0)
     beyond = plane(width=(5.0, 5.02), length=(0.1, 0.12), side="outside").cells(1, 2)
-    diagnose(Explorer(robot, beyond, problem_of(robot, beyond, task), 0), 0)
-    replay(robot, cells, task, covering_walk(explorer.roadmap, explorer.best), explorer.covered)
+    diagnose(Exploration(robot, beyond, problem_of(robot, beyond, task), 0), 0)
+    replay(
+        robot,
+        cells,
+        task,
+        covering_walk(exploration.roadmap, exploration.best),
+        exploration.covered,
+    )
     _warm = True
 
 

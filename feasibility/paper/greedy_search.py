@@ -95,7 +95,7 @@ def greedy_check(
     """
     search = Search(method="greedy") if search is None else search
     called = time.perf_counter()
-    chain, steps = Chain.checked(robot), Steps.of(robot, cells.charted, task, search)
+    chain, steps = Chain.checked(robot), Steps.of(robot, cells.closed_form, task, search)
     with compiling_notice():
         JSpace(robot, cells, task, np.zeros(robot.n), search, chain, steps).load()
     began = time.perf_counter()

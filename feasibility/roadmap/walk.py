@@ -192,11 +192,11 @@ def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
         first, rows = roadmap.way[e, 0], roadmap.way[e, 1]
         if route[k] > 0:
             for i in range(rows):
-                put(q[row + i], roadmap.ways[first + i])
+                put(q[row + i], roadmap.waypoints[first + i])
             node = roadmap.ends[e, 1]
         else:
             for i in range(rows - 1):
-                put(q[row + i], roadmap.ways[first + rows - 2 - i])
+                put(q[row + i], roadmap.waypoints[first + rows - 2 - i])
             node = roadmap.ends[e, 0]
             put(q[row + rows - 1], roadmap.q[node])
         row += rows
@@ -223,4 +223,4 @@ def edge_motion(roadmap: Roadmap, edge: int) -> NDArray[np.float64]:
     """(k, n) waypoints of one edge, from its first node to its second, both included."""
     first, rows = roadmap.way[edge]
     start = roadmap.q[roadmap.ends[edge, 0]]
-    return np.vstack([start[None], roadmap.ways[first : first + rows]])
+    return np.vstack([start[None], roadmap.waypoints[first : first + rows]])

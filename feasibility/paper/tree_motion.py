@@ -73,7 +73,7 @@ def _at_centres(verdict: Verdict, q: NDArray[np.float64]) -> NDArray[np.int64]:
     from scipy.spatial import KDTree
 
     kinematics, task = Kinematics(verdict.robot), verdict.task
-    tolerance = task.leeway
+    tolerance = task.effective_tolerance
     points = np.array([kinematics.tool(row)[0] for row in q])
     away, cell = KDTree(task.targets(verdict.cells).points).query(points)
     return np.where(away <= tolerance, cell, -1).astype(np.int64)

@@ -16,7 +16,7 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    from feasibility.roadmap import Explorer
+    from feasibility.roadmap import Exploration
 
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
@@ -69,14 +69,14 @@ def divide(
 
         warm_up()
     began = time.monotonic()
-    explorer, ended = _searched(robot, cells, task, search, progress)
+    exploration, ended = _searched(robot, cells, task, search, progress)
     searched = time.monotonic()
-    blocked = _no_room(explorer) if len(cells) else ""
+    blocked = _no_room(exploration) if len(cells) else ""
     nothing = Plan((), (), 0)
-    fewest, connected = (nothing, nothing) if blocked else plans(explorer, task)
-    folded = bool(_folds(explorer).any())
+    fewest, connected = (nothing, nothing) if blocked else plans(exploration, task)
+    folded = bool(_folds(exploration).any())
     missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
-    causes = _causes(explorer, missing, ended)
+    causes = _causes(exploration, missing, ended)
     return Division(
         robot=robot,
         cells=cells,
@@ -89,28 +89,28 @@ def divide(
         ended=ended and not blocked and not folded,
         message=blocked or _message(fewest, connected, len(missing), len(cells), ended, folded),
         timing=_timing(called, began, searched),
-        statistics=_statistics(explorer),
+        statistics=_statistics(exploration),
     )
 
 
 def _searched(
     robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
-) -> tuple[Explorer, bool]:
+) -> tuple[Exploration, bool]:
     """The search with all components that it found, and whether it ran to its end."""
     from feasibility.division.components import gather
-    from feasibility.roadmap import Explorer, OutOfTime, explore, problem_of
+    from feasibility.roadmap import Exploration, OutOfTime, explore, problem_of
 
     deadline = np.inf if search.time_limit is None else time.monotonic() + search.time_limit
     problem = problem_of(robot, cells, task)
-    explorer = Explorer(robot, cells, problem, search.seed, deadline, progress)
+    exploration = Exploration(robot, cells, problem, search.seed, deadline, progress)
     ended = True
     try:
-        explore(explorer)
-        gather(explorer)
+        explore(exploration)
+        gather(exploration)
     except OutOfTime:
         ended = False
-    explorer.deadline = np.inf
-    return explorer, ended
+    exploration.deadline = np.inf
+    return exploration, ended
 
 
 def _timing(called: float, began: float, searched: float) -> dict[str, float]:
@@ -124,47 +124,47 @@ def _timing(called: float, began: float, searched: float) -> dict[str, float]:
     }
 
 
-def _statistics(explorer: Explorer) -> dict[str, int]:
+def _statistics(exploration: Exploration) -> dict[str, int]:
     """Counts of the work done."""
     return {
-        "fk": int(explorer.work.counts[0]),
-        "nodes": int(explorer.roadmap.counters[0]),
-        "components": len(explorer.roots()),
-        "boxes": explorer.boxes,
-        "rounds": explorer.rounds,
+        "fk": int(exploration.work.counts[0]),
+        "nodes": int(exploration.roadmap.counters[0]),
+        "components": len(exploration.roots()),
+        "boxes": exploration.boxes,
+        "rounds": exploration.rounds,
     }
 
 
-def _causes(explorer: Explorer, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
+def _causes(exploration: Exploration, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
     """Why cells are in no patch; of a search that did not end, only what is proved."""
     from feasibility.roadmap import Ruling, causes_of, diagnose, disconnected
 
     if not ended:
-        proved = [c for c in missing.tolist() if explorer.rulings.get(c) is Ruling.PROVED]
-        return tuple(diagnose(explorer, cell) for cell in proved[:MOST_EXPLAINED])
-    known = {cause.cell: cause for cause in causes_of(explorer)}
+        proved = [c for c in missing.tolist() if exploration.rulings.get(c) is Ruling.PROVED]
+        return tuple(diagnose(exploration, cell) for cell in proved[:MOST_EXPLAINED])
+    known = {cause.cell: cause for cause in causes_of(exploration)}
     return tuple(
-        known.get(c) or (disconnected if explorer.reached[c] else diagnose)(explorer, c)
+        known.get(c) or (disconnected if exploration.reached[c] else diagnose)(exploration, c)
         for c in missing.tolist()
     )
 
 
-def _no_room(explorer: Explorer) -> str:
+def _no_room(exploration: Exploration) -> str:
     """Why no motion at all can be certified; empty where one can."""
-    problem = explorer.problem
-    if not problem.rim > 0.0:
+    problem = exploration.problem
+    if not problem.cone_chord > 0.0:
         return (
             "A cone of 0 degrees leaves a motion no room between samples, so none can be "
             "certified; allow a small angle."
         )
-    if len(problem.bends) and _folds(explorer).all():
+    if len(problem.derivative_bounds) and _folds(exploration).all():
         return (
             "The offset surface folds: the standoff reaches the surface's radius of curvature on "
             "its hollow side, so no motion can be certified; use a smaller standoff."
         )
     if (
-        len(problem.strays)
-        and (problem.strays >= (problem.tolerance, problem.rim)).any(axis=1).all()
+        len(problem.deviations)
+        and (problem.deviations >= (problem.tolerance, problem.cone_chord)).any(axis=1).all()
     ):
         return (
             "The surface is rougher than the task allows, so no motion can be certified; use a "
@@ -173,9 +173,9 @@ def _no_room(explorer: Explorer) -> str:
     return ""
 
 
-def _folds(explorer: Explorer) -> NDArray[np.bool_]:
+def _folds(exploration: Exploration) -> NDArray[np.bool_]:
     """Ways from cell to cell on which the offset surface folds, so that no motion follows them."""
-    return np.asarray(np.isinf(explorer.problem.bends).any(axis=1), dtype=bool)
+    return np.asarray(np.isinf(exploration.problem.derivative_bounds).any(axis=1), dtype=bool)
 
 
 def _message(

@@ -161,24 +161,33 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     fault = _malformed(robot, cells, walk)
     if fault:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
-    tolerance = task.leeway
-    rim = task.rim
+    tolerance = task.effective_tolerance
+    cone_chord = task.cone_chord
     poses = placements(robot, walk.q)
     beside = follow(cells, task, walk, poses.points, poses.axes)
     if beside.fault:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), beside.fault)
     steps = np.abs(np.diff(walk.q, axis=0))
-    bend = second_derivatives(steps, robot.prismatic, poses.levers, np.inf) + beside.bends[:, 0]
-    turn = second_derivatives(steps, robot.prismatic, poses.sines, 1.0) + beside.bends[:, 1]
-    error, chord, aside = beside.error, beside.chord, beside.bends[:, 2]
+    derivative_bound = (
+        second_derivatives(steps, robot.prismatic, poses.levers, np.inf)
+        + beside.derivative_bounds[:, 0]
+    )
+    turn = (
+        second_derivatives(steps, robot.prismatic, poses.sines, 1.0)
+        + beside.derivative_bounds[:, 1]
+    )
+    error, chord, lateral_curvature = beside.error, beside.chord, beside.derivative_bounds[:, 2]
     with np.errstate(invalid="ignore", over="ignore"):  # a fold: inf * 0 is NaN, and refused
-        turn = turn + aside * bend
+        turn = turn + lateral_curvature * derivative_bound
         # At the tool point's own foot the normal is another than at its target.
-        before, after = chord[:-1] + aside * error[:-1], chord[1:] + aside * error[1:]
-    strayed = _peaks(error[:-1], error[1:], bend) + beside.strays[:, 0]
-    tilted = _peaks(before, after, turn) + beside.strays[:, 1]
-    position = np.max(strayed, initial=np.max(error, initial=0.0))
-    alone = chord + beside.standing * error if len(chord) == 1 else chord
+        before, after = (
+            chord[:-1] + lateral_curvature * error[:-1],
+            chord[1:] + lateral_curvature * error[1:],
+        )
+    deviated = _peaks(error[:-1], error[1:], derivative_bound) + beside.deviations[:, 0]
+    tilted = _peaks(before, after, turn) + beside.deviations[:, 1]
+    position = np.max(deviated, initial=np.max(error, initial=0.0))
+    alone = chord + beside.centre_curvature * error if len(chord) == 1 else chord
     worst = np.max(tilted, initial=np.max(alone, initial=0.0))
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
@@ -195,14 +204,14 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
         refusals.append(f"a joint passes its limit by {-margin:.3g}")
     if not position <= tolerance:
         refusals.append(f"the tool point strays {position:.3g} m, more than {tolerance:.3g} m")
-    if not worst <= rim + CLOSE_TO_ZERO:
+    if not worst <= cone_chord + CLOSE_TO_ZERO:
         refusals.append(
             f"the tool axis tilts {np.degrees(certificate.max_angle):.4f} deg, "
             f"more than {task.cone_deg:g} deg"
         )
     at = walk.cell >= 0
-    if not (position <= tolerance and worst <= rim + CLOSE_TO_ZERO) and (
-        (beside.error[at] > tolerance).any() or (beside.chord[at] > rim).any()
+    if not (position <= tolerance and worst <= cone_chord + CLOSE_TO_ZERO) and (
+        (beside.error[at] > tolerance).any() or (beside.chord[at] > cone_chord).any()
     ):
         refusals.append("a marked waypoint is not at its cell's centre target")
     if not visited[needed].all():

@@ -34,7 +34,7 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
         kinds = [str(cause.kind) for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
     from feasibility.roadmap.diagnosis import diagnose
-    from feasibility.roadmap.exploration import Explorer
+    from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.problem import problem_of
 
     reached = np.zeros(len(verdict.cells), dtype=bool)
@@ -46,9 +46,9 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
         return CauseCounts(_counted(kinds), 0)
     # A fresh explorer: what is asked of it are Newton's method and random starts alone.
     problem = problem_of(verdict.robot, verdict.cells, verdict.task)
-    explorer = Explorer(verdict.robot, verdict.cells, problem, verdict.seed)
+    exploration = Exploration(verdict.robot, verdict.cells, problem, verdict.seed)
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
-    examined = [diagnose(explorer, int(cell)) for cell in few]
+    examined = [diagnose(exploration, int(cell)) for cell in few]
     centres = verdict.cells.centres
     away = np.linalg.norm(centres[lost][:, None] - centres[few][None], axis=2)  # (L, E)
     kinds += [str(examined[int(k)].kind) for k in away.argmin(axis=1)]

@@ -29,7 +29,7 @@ from feasibility.placement.refinement import Hunt, Judge
 from feasibility.placement.region import PlacementError, Pose, Region
 from feasibility.placement.trial import Stage, Trial
 from feasibility.search import Progress, Search
-from feasibility.target_curves import closed_courses
+from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence
 from robots import Robot
@@ -270,7 +270,7 @@ def _told(
             + (f", and most of the rest is {MISSED[cause]}" if cause else "")
             + ("; the time limit ran out." if hunt.late else ". This is no proof.")
         )
-        closed = closed_courses(cells, task)
+        closed = blocked_curves(cells, task)
         if closed and answer is Answer.UNDECIDED:
             message += f" Wherever it stands: {closed}"
     return Placements(
