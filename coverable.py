@@ -1,1 +1,250 @@
-"""x"""
+"""Can this arm move its tool continuously over this whole surface?
+
+The front door: everything that a user needs, by name. What a name needs is imported when the name
+is first used, so `import coverable` costs nothing.
+
+>>> from coverable import Task, check, load_robot, sphere
+>>> puma = load_robot("puma560", limits="set-1")
+>>> dome = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")
+>>> verdict = check(puma, dome.cells(9, 10), Task(standoff=0.005, cone_deg=45))
+>>> verdict.feasible, verdict.n_covered, verdict.n_edges
+(True, 90, 305)
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from feasibility import (
+        Answer,
+        Cause,
+        CauseKind,
+        Evidence,
+        Search,
+        Task,
+        Verdict,
+        check,
+    )
+    from feasibility.cases import Case, CaseError, builtin_cases, load_case
+    from feasibility.certification import replay
+    from feasibility.division import Division, divide
+    from feasibility.paper import greedy_check, starts
+    from feasibility.paths import CoveragePath, PathError, coverage_path
+    from feasibility.paths import coverage_path as path
+    from feasibility.placement import (
+        Placements,
+        Pose,
+        Region,
+        place,
+        placement_map,
+        station_plan,
+    )
+    from feasibility.reports.comparison import as_text as comparison_text
+    from feasibility.reports.comparison import chart as comparison_chart
+    from feasibility.reports.division import as_text as division_text
+    from feasibility.reports.explanation import as_text as explanation_text
+    from feasibility.reports.path import as_text as path_text
+    from feasibility.reports.placement import as_text as placement_text
+    from feasibility.reports.placement import settings_of
+    from feasibility.reports.study import as_text as study_text
+    from feasibility.results import load_result, load_trajectory, save_result, save_trajectory
+    from feasibility.sensitivity import Explanation, explain
+    from feasibility.studies import (
+        Comparison,
+        Store,
+        Study,
+        compare,
+        load_study,
+        open_workers,
+        read_study,
+        run_tasks,
+    )
+    from feasibility.timing import Trajectory, motion_limits, trajectory
+    from feasibility.viewer import (
+        Plot,
+        View,
+        plot_causes,
+        plot_graph,
+        plot_map,
+        plot_transition,
+        show,
+        unrolled_edges,
+        view,
+        view_division,
+        view_path,
+        view_placements,
+        view_study,
+    )
+    from robots import Robot, RobotError, list_robots, load_robot
+    from surfaces import (
+        Cells,
+        MeshSurface,
+        Patch,
+        Piecewise,
+        Surface,
+        SurfaceError,
+        bspline,
+        cone,
+        cut_box,
+        cut_plane,
+        cylinder,
+        ellipsoid,
+        faces_within_cone,
+        hyperboloid,
+        mesh,
+        piecewise,
+        plane,
+        read_net,
+        revolution,
+        sphere,
+        take_faces,
+        torus,
+    )
+
+    __version__: str
+
+__all__ = [
+    "Answer",
+    "Case",
+    "CaseError",
+    "Cause",
+    "CauseKind",
+    "Cells",
+    "Comparison",
+    "CoveragePath",
+    "Division",
+    "Evidence",
+    "Explanation",
+    "MeshSurface",
+    "Patch",
+    "PathError",
+    "Piecewise",
+    "Placements",
+    "Plot",
+    "Pose",
+    "Region",
+    "Robot",
+    "RobotError",
+    "Search",
+    "Store",
+    "Study",
+    "Surface",
+    "SurfaceError",
+    "Task",
+    "Trajectory",
+    "Verdict",
+    "View",
+    "__version__",
+    "bspline",
+    "builtin_cases",
+    "check",
+    "compare",
+    "comparison_chart",
+    "comparison_text",
+    "cone",
+    "coverage_path",
+    "cut_box",
+    "cut_plane",
+    "cylinder",
+    "divide",
+    "division_text",
+    "ellipsoid",
+    "explain",
+    "explanation_text",
+    "faces_within_cone",
+    "greedy_check",
+    "hyperboloid",
+    "list_robots",
+    "load_case",
+    "load_result",
+    "load_robot",
+    "load_study",
+    "load_trajectory",
+    "mesh",
+    "motion_limits",
+    "open_workers",
+    "path",
+    "path_text",
+    "piecewise",
+    "place",
+    "placement_map",
+    "placement_text",
+    "plane",
+    "plot_causes",
+    "plot_graph",
+    "plot_map",
+    "plot_transition",
+    "read_net",
+    "read_study",
+    "replay",
+    "revolution",
+    "run_tasks",
+    "save_result",
+    "save_trajectory",
+    "settings_of",
+    "show",
+    "sphere",
+    "starts",
+    "station_plan",
+    "study_text",
+    "take_faces",
+    "torus",
+    "trajectory",
+    "unrolled_edges",
+    "view",
+    "view_division",
+    "view_path",
+    "view_placements",
+    "view_study",
+]
+
+_ROOMS = (
+    "robots",
+    "surfaces",
+    "feasibility",
+    "feasibility.cases",
+    "feasibility.certification",
+    "feasibility.paper",
+    "feasibility.paths",
+    "feasibility.timing",
+    "feasibility.division",
+    "feasibility.sensitivity",
+    "feasibility.results",
+    "feasibility.studies",
+    "feasibility.placement",
+    "feasibility.viewer",
+)
+_RENAMED = {  # name -> module, name there
+    "comparison_chart": ("feasibility.reports.comparison", "chart"),
+    "comparison_text": ("feasibility.reports.comparison", "as_text"),
+    "division_text": ("feasibility.reports.division", "as_text"),
+    "explanation_text": ("feasibility.reports.explanation", "as_text"),
+    "path": ("feasibility.paths", "coverage_path"),
+    "path_text": ("feasibility.reports.path", "as_text"),
+    "placement_text": ("feasibility.reports.placement", "as_text"),
+    "settings_of": ("feasibility.reports.placement", "settings_of"),
+    "study_text": ("feasibility.reports.study", "as_text"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its room when it is first used."""
+    if name == "__version__":
+        return import_module("feasibility.version").version()
+    if name not in __all__:
+        raise AttributeError(f"module 'coverable' has no attribute {name!r}")
+    if name in _RENAMED:
+        module, there = _RENAMED[name]
+        value = getattr(import_module(module), there)
+    else:
+        room = next(r for r in map(import_module, _ROOMS) if name in r.__all__)
+        value = getattr(room, name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return list(__all__)

@@ -19,13 +19,10 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from feasibility.checking import check
-from feasibility.task import Task
+from feasibility import Task, check
 from feasibility.viewer import View, view
 from robots import load_robot
-from surfaces.meshes import mesh
-from surfaces.patches.nurbs.bspline import bspline
-from surfaces.patches.sphere import sphere
+from surfaces import bspline, mesh, sphere
 
 HERE = Path(__file__).parent
 SIZE = (900, 650)  # [pixel]

@@ -2,7 +2,11 @@ from .arguments import table as table
 from .cells import Cells as Cells
 from .cells import Triangles as Triangles
 from .meshes import MeshSurface as MeshSurface
+from .meshes import cut_box as cut_box
+from .meshes import cut_plane as cut_plane
+from .meshes import faces_within_cone as faces_within_cone
 from .meshes import mesh as mesh
+from .meshes import take_faces as take_faces
 from .patches import Patch as Patch
 from .patches import bspline as bspline
 from .patches import cone as cone

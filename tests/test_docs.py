@@ -11,11 +11,10 @@ from typing import Any
 
 import pytest
 
+from feasibility import Search, check
 from feasibility.cases import Case, builtin_cases
-from feasibility.checking import check
 from feasibility.cli.main import main
 from feasibility.roadmap.search import DRY_ROUNDS
-from feasibility.search import Search
 
 ROOT = Path(__file__).parents[1]
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")

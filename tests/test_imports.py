@@ -1,9 +1,11 @@
-"""Imports run one way: arms and surfaces never meet, the question asks both, the edge serves it."""
+"""Imports run one way: rooms in their order, each entered by its door."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import NamedTuple
@@ -12,85 +14,163 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("robots", "surfaces", "feasibility")
+MOST_MODULES = 20  # of one folder
 
-# Modules of `feasibility`, lowest first; a module may import from its own layer and those below.
-# What is named nowhere belongs to the searches.
-WORDS = "search target_courses task verdict version"
-SEARCHES = ""
-ASKING = "checking"
-USING = "explain placement placement_map placer"
-STORED = """archive case case_edits case_faults case_kinds case_mesh case_patches case_pieces
-    case_robot case_surface case_task files result result_cells result_fields result_graph
-    result_robot toml_text trajectory_files"""
-STUDIES = """comparison placement_stations placement_study stations study study_axes study_dask
-    study_dealing study_file study_frames study_outcome study_store study_workers"""
-EDGE = """asking cell_shapes cli cli_jobs cli_studies commands comparison_report console
-    division_report explain_report job_commands job_view listing meshcat_server meshes motion page
-    path_report placement_commands placement_plot placement_report placement_view plots pose_layers
-    pose_outline report robot_visuals scene
-    skin study_commands study_page study_plot study_report threejs viewer"""
-LAYERS = tuple(names.split() for names in (WORDS, SEARCHES, ASKING, USING, STORED, STUDIES, EDGE))
+# A line a room, two for a room split round its subrooms: each may import from its own line and from
+# those above it. Arms and surfaces never meet, see below.
+ORDER = """
+robots: robot kinematics chain reach
+robots.urdf
+robots: pinocchio_model library dh
+surfaces: surface cells adjacency cell_curves arguments
+surfaces.patches
+surfaces.patches.nurbs
+surfaces.piecewise
+surfaces.meshes: triangle_mesh normals closest_point
+surfaces.meshes.repair
+surfaces.meshes.files
+surfaces.meshes.cells
+surfaces.meshes: mesh_surface selection
+feasibility: version compiled notices safe_files search task verdict target_curves
+feasibility.certification
+feasibility.paper
+feasibility.cases
+feasibility.roadmap
+feasibility: checking
+feasibility.paths
+feasibility.timing
+feasibility.division
+feasibility.sensitivity
+feasibility.results
+feasibility.studies
+feasibility.placement
+feasibility.viewer
+feasibility.reports
+feasibility.cli
+coverable
+"""
+
+# `surface.cells(...)` makes the cells, which know their surface: the one import upwards of each.
+FACTORIES = {
+    ("surfaces.patches.patch", "surfaces.patches.grid_cells"),
+    ("surfaces.piecewise.piecewise_surface", "surfaces.piecewise.cells"),
+    ("surfaces.meshes.mesh_surface", "surfaces.meshes.cells.mesh_cells"),
+}
 
 HEAVY = {"matplotlib", "meshcat", "rich", "trimesh", "yourdfpy"}
 
 
 class Import(NamedTuple):
+    """A name that a file imports."""
+
     module: str
+    name: str
+    """Empty for `import module`."""
     deferred: bool
-    """Inside a function: not needed to load the file."""
+    """Inside a function, or for type checkers alone: not needed to load the file."""
 
 
 def imports(source: str) -> Iterator[Import]:
-    """The imports that can run; not those for type checkers alone."""
+    """All imports of a file, also those inside functions and for type checkers alone."""
 
     def visit(node: ast.AST, deferred: bool) -> Iterator[Import]:
         for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING":
-                for branch in child.orelse:
-                    yield from visit(ast.Module([branch], []), deferred)
-                continue
             if isinstance(child, ast.Import):
-                yield from (Import(name.name, deferred) for name in child.names)
+                yield from (Import(name.name, "", deferred) for name in child.names)
             elif isinstance(child, ast.ImportFrom):
                 assert child.level == 0, "imports are absolute"
-                module = str(child.module)
-                for name in child.names:
-                    inner = f"{module}.{name.name}"
-                    yield Import(inner if inner in FILES else module, deferred)
-            is_function = isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
-            yield from visit(child, deferred or is_function)
+                yield from (Import(str(child.module), n.name, deferred) for n in child.names)
+            later = isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda))
+            types = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
+            yield from visit(child, deferred or later or types)
 
     yield from visit(ast.parse(source), False)
 
 
 def _files() -> dict[str, Path]:
-    found = {}
+    """Every module of the product that is not just the door of a room."""
+    paths = [*ROOT.glob("coverable*.py")]
     for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            parts = path.relative_to(ROOT).with_suffix("").parts
-            found[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path
-    return found
+        paths += sorted((ROOT / package).rglob("*.py"))
+    names = {".".join(path.relative_to(ROOT).with_suffix("").parts): path for path in paths}
+    return {name: path for name, path in names.items() if not name.endswith("__init__")}
 
 
 FILES = _files()
 IMPORTS = {name: frozenset(imports(path.read_text("utf-8"))) for name, path in FILES.items()}
 
 
-def layer(module: str) -> int:
-    """Which layer of `feasibility` a module belongs to."""
-    name = module.removeprefix("feasibility.")
-    return next((k for k, names in enumerate(LAYERS) if name in names), LAYERS.index([]))
+@cache
+def door(room: str) -> dict[str, str]:
+    """What a room hands on: each public name, and the module that defines it."""
+    stub = ROOT.joinpath(*room.split("."), "__init__.pyi")
+    handed: dict[str, str] = {}
+    for node in ast.walk(ast.parse(stub.read_text("utf-8"))):
+        if isinstance(node, ast.ImportFrom):
+            module = f"{room}.{node.module}" if node.module else room
+            for name in node.names:
+                assert name.asname == name.name, f"{stub}: {name.name} is handed on by that name"
+                inner = f"{module}.{name.name}"
+                handed[name.name] = home(module, name.name) if inner not in FILES else inner
+    return handed
+
+
+def is_room(module: str) -> bool:
+    """Is this a folder with a door?"""
+    return ROOT.joinpath(*module.split("."), "__init__.pyi").exists()
+
+
+def home(module: str, name: str) -> str:
+    """The module that defines what `from module import name` imports."""
+    if not is_room(module):
+        return module
+    inner = f"{module}.{name}"
+    return inner if inner in FILES else door(module)[name]
+
+
+def homes(name: str, now_only: bool = False) -> set[str]:
+    """The project's modules that a module imports from."""
+    found: set[str] = set()
+    for i in IMPORTS[name]:
+        if (now_only and i.deferred) or not (
+            i.module.split(".")[0] in PACKAGES or i.module in FILES
+        ):
+            continue
+        whole = is_room(i.module) and not i.name  # `import room` may use all that it hands on
+        found |= set(door(i.module).values()) if whole else {home(i.module, i.name)}
+    return found
+
+
+def room_of(module: str) -> str:
+    """The folder that a module lies in; empty for the top level."""
+    return module.rpartition(".")[0]
+
+
+def _places() -> dict[str, int]:
+    """The line of `ORDER` that each module stands on."""
+    lines = ORDER.split("\n")[1:-1]
+    place: dict[str, int] = {}
+    split = {line.split(":")[0] for line in lines if ":" in line}
+    for number, line in enumerate(lines):
+        room, _, modules = line.partition(": ")
+        named = [f"{room}.{module}" for module in modules.split()]
+        if not modules:
+            named = [room] if room in FILES else [m for m in FILES if room_of(m) == room]
+        assert named, f"{line}: no such room"
+        assert (room in split) == bool(modules)
+        place |= dict.fromkeys(named, number)
+    return place
 
 
 def loaded_with(module: str) -> set[str]:
-    """Every module that loading one of them loads, ours and the libraries'."""
+    """The project's modules that loading one of them loads."""
     seen: set[str] = set()
     waiting = [module]
     while waiting:
         name = waiting.pop()
         if name not in seen:
             seen.add(name)
-            waiting += [i.module for i in IMPORTS.get(name, ()) if not i.deferred]
+            waiting += homes(name, now_only=True)
     return seen
 
 
@@ -103,45 +183,77 @@ if TYPE_CHECKING:
     import networkx
 class A:
     def f(self):
-        from robots.chain import Chain
+        from robots import Chain
 """
     assert list(imports(source)) == [
-        Import("typing", False),
-        Import("numpy.linalg", False),
-        Import("feasibility.task", False),
-        Import("feasibility", False),
-        Import("robots.chain", True),
+        Import("typing", "TYPE_CHECKING", False),
+        Import("numpy.linalg", "", False),
+        Import("feasibility", "task", False),
+        Import("feasibility", "check", False),
+        Import("networkx", "", True),
+        Import("robots", "Chain", True),
     ]
-    assert {"robots.chain", "surfaces.cells", "feasibility.checking"} <= set(FILES)
+    assert home("feasibility", "task") == "feasibility.task"
+    assert home("feasibility", "check") == "feasibility.checking"
+    assert home("robots", "Chain") == "robots.chain"
+    assert home("surfaces", "bspline") == "surfaces.patches.nurbs.bspline"
 
 
-def test_every_layer_names_real_modules() -> None:
-    named = [f"feasibility.{name}" for names in LAYERS for name in names]
-    assert sorted(set(named)) == sorted(named)
-    assert set(named) <= set(FILES)
+def test_every_module_has_its_line() -> None:
+    assert set(_places()) == set(FILES)
 
 
-@pytest.mark.parametrize("package", ["robots", "surfaces"])
-def test_arms_and_surfaces_know_only_themselves(package: str) -> None:
-    others = set(PACKAGES) - {package}
-    for name in (name for name in FILES if name.split(".")[0] == package):
-        reached = {i.module.split(".")[0] for i in IMPORTS[name]}
-        assert not reached & others, f"{name} imports {reached & others}"
-
-
-def test_feasibility_imports_downwards() -> None:
+def test_imports_follow_the_order_of_rooms() -> None:
+    place = _places()
     upward = [
-        f"{name} imports {i.module}"
+        f"{name} imports {used}"
         for name in FILES
-        if name.startswith("feasibility.")
-        for i in IMPORTS[name]
-        if i.module.startswith("feasibility.") and layer(i.module) > layer(name)
+        for used in homes(name)
+        if place[used] > place[name] and (name, used) not in FACTORIES
     ]
     assert upward == []
 
 
+def test_rooms_are_entered_by_their_door() -> None:
+    """A module may be named only inside its room, and in the rooms within it."""
+    past = [
+        f"{name} imports {i.module}"
+        for name in FILES
+        for i in IMPORTS[name]
+        if i.module in FILES and room_of(i.module)
+        and not f"{room_of(name)}.".startswith(f"{room_of(i.module)}.")
+        and i.module not in door(room_of(i.module)).values()  # handed on as a module
+    ]  # fmt: skip
+    assert past == []
+
+
+def test_what_a_room_hands_on_is_no_module_of_its_own() -> None:
+    """Lazy loading would give the module. Kinds of surfaces have their own file, and a guard."""
+    for room in {room_of(name) for name in FILES} - {"", "surfaces.patches", "surfaces"}:
+        own = {name.rpartition(".")[2] for name in FILES if room_of(name) == room}
+        names = {n for n, module in door(room).items() if module != f"{room}.{n}"}
+        assert not names & own, room
+
+
+def test_no_folder_holds_more_than_twenty_modules() -> None:
+    for folder in {path.parent for path in FILES.values()}:
+        modules = [path for path in folder.glob("*.py") if path.stem != "__init__"]
+        assert len(modules) <= MOST_MODULES, folder
+
+
+@pytest.mark.parametrize("package", ["robots", "surfaces"])
+def test_arms_and_surfaces_know_only_themselves(package: str) -> None:
+    for name in (name for name in FILES if name.split(".")[0] == package):
+        reached = {used.split(".")[0] for used in homes(name)} - {package}
+        assert all(re.fullmatch(r"coverable_\w+", other) for other in reached), name
+
+
 def test_no_cycles() -> None:
-    graph = {name: {i.module for i in IMPORTS[name] if not i.deferred} for name in FILES}
+    """Imports for type checkers alone count, and those inside functions."""
+    graph = {
+        name: {used for used in homes(name) if (name, used) not in FACTORIES} - {name}
+        for name in FILES
+    }
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -149,13 +261,12 @@ def test_no_cycles() -> None:
 
 
 def test_the_certificate_shares_nothing_with_the_search() -> None:
-    ours = {name for name in loaded_with("feasibility.certificate") if name in FILES}
+    ours = loaded_with("feasibility.certification.motion_replay")
     feasibility = {name for name in ours if name.startswith("feasibility.")}
-    words = {"certificate", "following", "target_courses", "task", "verdict"}
-    assert feasibility <= {f"feasibility.{name}" for name in words}
+    words = {"feasibility.target_curves", "feasibility.task", "feasibility.verdict"}
+    assert {n for n in feasibility if room_of(n) != "feasibility.certification"} <= words
     assert "robots.chain" not in ours
-    deferred = {i.module for name in feasibility for i in IMPORTS[name] if i.deferred}
-    assert not {name for name in deferred if name in FILES}
+    assert not any(i.deferred and i.module in FILES for name in feasibility for i in IMPORTS[name])
 
 
 def test_surfaces_know_neither_pinocchio_nor_networkx() -> None:
@@ -165,11 +276,8 @@ def test_surfaces_know_neither_pinocchio_nor_networkx() -> None:
 
 
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
-    """plots.py is matplotlib's own file, and nothing loads it before a plot is asked for."""
+    """paper_figures.py is matplotlib's own file; it is loaded when a plot is asked for."""
     for name in FILES:
         now = {i.module.split(".")[0] for i in IMPORTS[name] if not i.deferred}
-        allowed = {"matplotlib"} if name == "feasibility.plots" else set()
+        allowed = {"matplotlib"} if name == "feasibility.viewer.paper_figures" else set()
         assert not now & HEAVY - allowed, name
-    assert not any(
-        "feasibility.plots" in {i.module for i in IMPORTS[name]} for name in FILES
-    )  # fmt: skip

@@ -1,5 +1,6 @@
 from .map import PlacementMap as PlacementMap
 from .map import map_around_best as map_around_best
+from .map import placement_map as placement_map
 from .placements import COUNT as COUNT
 from .placements import Placements as Placements
 from .placements import place as place

@@ -19,8 +19,7 @@ from oracle_build import built
 from oracle_cases import Problem
 from paper_cases import PAPER_CASES
 
-from feasibility.checking import check
-from feasibility.verdict import Evidence, Verdict
+from feasibility import Evidence, Verdict, check
 from robots import load_robot
 
 ROOT = Path(__file__).resolve().parents[2]

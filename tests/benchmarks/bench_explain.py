@@ -9,16 +9,12 @@ from collections.abc import Callable
 import numpy as np
 from paper_cases import PAPER_CASES
 
-from feasibility.checking import check
+from feasibility import Evidence, Task, check
 from feasibility.sensitivity import explain
 from feasibility.sensitivity.parameters import Setup
-from feasibility.task import Task
-from feasibility.verdict import Evidence
 from robots import load_robot
+from surfaces import cylinder, plane, sphere
 from surfaces.meshes import TriangleMesh, mesh
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
 
 GRID = (9, 10)  # rows and columns of cells
 SOME = 5  # verdicts in a row

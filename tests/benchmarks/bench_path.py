@@ -7,7 +7,7 @@ import time
 import numpy as np
 from paper_cases import PAPER_CASES
 
-from feasibility.checking import check
+from feasibility import check
 from feasibility.paths import coverage_path
 from feasibility.paths.order import ORDERS
 from feasibility.timing import trajectory

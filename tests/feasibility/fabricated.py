@@ -7,10 +7,10 @@ import itertools
 import networkx as nx
 import numpy as np
 
-from feasibility.task import Task
+from feasibility import Task
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from robots import Kinematics
-from surfaces.patches.sphere import sphere
+from surfaces import sphere
 
 STEPS = 13
 DOME = sphere(radius=1.0, polar_deg=(10, 90), azimuth_deg=(10, 180), side="inside")

@@ -7,13 +7,11 @@ from functools import cache
 import numpy as np
 from small_cases import paper_verdict
 
-from feasibility.checking import check
+from feasibility import Task, check
 from feasibility.paths import coverage_path
-from feasibility.task import Task
 from feasibility.timing import trajectory
 from robots import Kinematics, load_robot
-from surfaces.patches import plane
-from surfaces.patches.sphere import sphere
+from surfaces import plane, sphere
 
 FEASIBLE = ("4a", "4b", "4c", "4e", "5a", "5b", "5c", "5d", "5e", "5f")
 BEST = dict.fromkeys(FEASIBLE, "shortest") | {"5c": "spiral", "5a": "columns"}

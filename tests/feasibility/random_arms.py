@@ -9,15 +9,11 @@ import numpy as np
 from arm_urdfs import FREE, arm, joint
 from numpy.typing import NDArray
 
-from feasibility.task import Task
+from feasibility import Task
 from robots import Kinematics, Robot, load_robot
 from robots.pinocchio_model import robot_from_urdf
 from robots.urdf.checked_urdf import check_urdf_text
-from surfaces import Cells, Surface
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import Cells, Surface, cylinder, hyperboloid, plane, sphere
 
 Floats = NDArray[np.float64]
 RIGHT_ANGLES = (-np.pi / 2, 0.0, np.pi / 2, np.pi)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 
+from feasibility import check
 from feasibility.cases import Case, load_case
-from feasibility.checking import check
 
 TEXTS = {
     # ur5 above a small plate: feasible

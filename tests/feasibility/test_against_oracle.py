@@ -8,10 +8,8 @@ from oracle_build import built
 from oracle_cases import Answer
 from random_cases import read
 
-from feasibility.checking import check
-from feasibility.search import Search
+from feasibility import CauseKind, Search, Verdict, check
 from feasibility.verdict import Answer as Said
-from feasibility.verdict import CauseKind, Verdict
 from robots import load_robot
 
 CHUNKS = 8

@@ -12,15 +12,9 @@ import pytest
 from arm_builds import bare, built, on_a_base
 from dense_replay import assert_witness
 
-from feasibility.checking import check
-from feasibility.task import Task
-from feasibility.verdict import Answer, CauseKind, Evidence
+from feasibility import Answer, CauseKind, Evidence, Task, check
 from robots import Robot, load_robot
-from surfaces import Surface
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import Surface, cylinder, hyperboloid, plane, sphere
 
 ARMS = ("ur5", "panda", "kinova", "xarm7", "ur5 on a rail")
 RAIL = (-1.0, 1.0)  # [m]

@@ -19,17 +19,13 @@ from oracle_build import built
 from oracle_cases import Problem
 from random_cases import draw, draw_ur5
 
+from feasibility import Answer, CauseKind, Evidence, Search, Task, Verdict, check
 from feasibility.cases import load_case
 from feasibility.certification import replay
-from feasibility.checking import check
 from feasibility.roadmap import warm_up
 from feasibility.roadmap.exploration import BUDGET
-from feasibility.search import Search
-from feasibility.task import Task
-from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
 from robots import load_robot
-from surfaces.patches import plane
-from surfaces.patches.sphere import sphere
+from surfaces import plane, sphere
 
 DRAWN = [("puma560", number) for number in range(24)] + [("ur5", number) for number in range(12)]
 

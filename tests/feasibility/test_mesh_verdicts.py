@@ -8,12 +8,11 @@ import mesh_patches
 import numpy as np
 import pytest
 
+from feasibility import Task, check
 from feasibility.cases import load_case
 from feasibility.certification import replay
-from feasibility.checking import check
-from feasibility.task import Task
 from robots import load_robot
-from surfaces.meshes import mesh
+from surfaces import mesh
 from surfaces.meshes.cells import MeshCells
 
 CASES = ["4a", "4b", "4c", "4d", "4e", "4f", "5a", "5b", "5c", "5d", "5e", "5f"]

@@ -13,15 +13,9 @@ from dense_replay import assert_witness, tools
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from feasibility.checking import check
-from feasibility.task import Task
-from feasibility.verdict import Verdict
+from feasibility import Task, Verdict, check
 from robots import Robot, load_robot
-from surfaces import Surface, rotation_from_rpy
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import Surface, cylinder, hyperboloid, plane, rotation_from_rpy, sphere
 
 FEW = settings(max_examples=12, derandomize=True, deadline=None, database=None)
 PUMA = load_robot("puma560", limits="set-1")

@@ -11,22 +11,24 @@ from dense_replay import tools
 from paper_cases import PAPER_CASES
 from spline_nets import hood
 
-from feasibility.checking import check
-from feasibility.search import Search
-from feasibility.task import Task
-from feasibility.verdict import Answer, Evidence, Verdict
+from feasibility import Answer, Evidence, Search, Task, Verdict, check
 from robots import load_robot
-from surfaces import Cells, Surface, rotation_from_rpy
+from surfaces import (
+    Cells,
+    Patch,
+    Surface,
+    bspline,
+    cone,
+    cylinder,
+    ellipsoid,
+    piecewise,
+    plane,
+    revolution,
+    rotation_from_rpy,
+    sphere,
+    torus,
+)
 from surfaces.meshes import TriangleMesh, mesh
-from surfaces.patches import Patch, plane
-from surfaces.patches.cone import cone
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.ellipsoid import ellipsoid
-from surfaces.patches.nurbs.bspline import bspline
-from surfaces.patches.revolution import revolution
-from surfaces.patches.sphere import sphere
-from surfaces.patches.torus import torus
-from surfaces.piecewise import piecewise
 
 HOOD = 0.5 * hood()
 SPRAY = Task(standoff=0.01, cone_deg=30)

@@ -10,8 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from feasibility.task import Task
-from feasibility.verdict import Verdict
+from feasibility import Task, Verdict
 from robots import Robot
 from surfaces import Cells, Surface
 

@@ -5,13 +5,9 @@ from __future__ import annotations
 import numpy as np
 from oracle_cases import Problem
 
-from feasibility.task import Task
+from feasibility import Task
 from robots import Robot
-from surfaces import Cells, Surface
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import Cells, Surface, cylinder, hyperboloid, plane, sphere
 
 
 def surface_of(problem: Problem) -> Surface:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from feasibility.task import Task
+from feasibility import Task
 from robots import Robot, load_robot
-from surfaces import Cells
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import Cells, cylinder, hyperboloid, sphere
 
 
 class PaperCase(NamedTuple):

@@ -12,9 +12,7 @@ import pytest
 from dense_replay import assert_motion, assert_over, assert_witness
 from paper_cases import PAPER_CASES
 
-from feasibility.checking import check
-from feasibility.search import Search
-from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
+from feasibility import Answer, CauseKind, Evidence, Search, Verdict, check
 
 INFEASIBLE = {"4d": 60, "4f": 6}
 """Cells of the best single component, by an independent analytic computation."""

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from paper_cases import PAPER_CASES
 
+from feasibility import Answer, Evidence, Search, Verdict
 from feasibility.paper import greedy_check
 from feasibility.paper.jcell_steps import Steps
-from feasibility.search import Search
-from feasibility.verdict import Answer, Evidence, Verdict
 from robots import Kinematics
 
 STEP_DEG = {"single": 0.02, "all": 0.5}

@@ -6,10 +6,7 @@ import pickle
 import numpy as np
 import pytest
 
-from surfaces import SurfaceError
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
+from surfaces import SurfaceError, cylinder, plane, sphere
 
 
 def test_centres_normals_and_areas(patch):

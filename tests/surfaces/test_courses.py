@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import cylinder, hyperboloid, plane, sphere
 
 PATCHES = {
     "dome": lambda: sphere(1.0, (10, 90), (10, 180)).cells(9, 10),

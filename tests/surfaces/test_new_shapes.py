@@ -14,10 +14,7 @@ from smooth_probes import (
     tangents,
 )
 
-from surfaces import Cells, SurfaceError
-from surfaces.patches.cone import cone
-from surfaces.patches.ellipsoid import ellipsoid
-from surfaces.patches.torus import torus
+from surfaces import Cells, SurfaceError, cone, ellipsoid, torus
 
 PATCHES = {
     "funnel": cone(0.2, 1.0, angle_deg=(0, 360), height=(-0.1, 0.4), **POSE),
@@ -175,8 +172,7 @@ def test_ellipsoid_area_is_thomas_closed_form_for_spheroids():
 
 
 def test_a_ball_is_an_ellipsoid_and_a_cone_of_slope_zero_is_a_cylinder():
-    from surfaces.patches.cylinder import cylinder
-    from surfaces.patches.sphere import sphere
+    from surfaces import cylinder, sphere
 
     ball = ellipsoid((0.7, 0.7, 0.7), (10, 170), (-50, 60), **POSE)
     assert same_surface(sphere(0.7, (10, 170), (-50, 60), **POSE), ball, 1e-13)

@@ -6,12 +6,8 @@ import numpy as np
 import pytest
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
+from surfaces import bspline, cone, ellipsoid, revolution, torus
 from surfaces.cell_curves import curves_of
-from surfaces.patches.cone import cone
-from surfaces.patches.ellipsoid import ellipsoid
-from surfaces.patches.nurbs.bspline import bspline
-from surfaces.patches.revolution import revolution
-from surfaces.patches.torus import torus
 
 
 def nurbs_pipe():

@@ -13,13 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from surface_parts import pairs, surfaces, triples
 
+from feasibility import Search, Task
 from feasibility.cases import CLOSED_FORM_KINDS, Case, builtin_cases, load_case
 from feasibility.cases.case import CaseError
 from feasibility.cases.patch_keys import MOST_CELLS
 from feasibility.cases.robot_table import RobotPart
 from feasibility.cases.surface_table import SurfacePart
-from feasibility.search import Search
-from feasibility.task import Task
 
 # Table II: position and cone; Table I by name; Table III by kind.
 PAPER = {

@@ -14,6 +14,7 @@ from small_cases import small_case, small_verdict
 from surface_files import MESH, NET, POINTS, cube, mesh_case, net_case, sheet, write_stl
 
 import surfaces
+from feasibility import check
 from feasibility.cases import (
     CLOSED_FORM_KINDS,
     OWN_KEYS,
@@ -28,18 +29,23 @@ from feasibility.cases.mesh_keys import MOST_MESH_CELLS
 from feasibility.cases.patch_keys import PATCHES, STEEPEST
 from feasibility.cases.piecewise_keys import MOST_PIECES
 from feasibility.cases.table_reader import BuildError
-from feasibility.checking import check
 from feasibility.results import load_result, save_result
 from feasibility.results.result_file import ResultError
-from surfaces.meshes import cut_box, cut_plane, faces_within_cone, mesh, take_faces
+from surfaces import (
+    bspline,
+    cone,
+    cut_box,
+    cut_plane,
+    ellipsoid,
+    faces_within_cone,
+    mesh,
+    piecewise,
+    plane,
+    revolution,
+    take_faces,
+    torus,
+)
 from surfaces.meshes.files import read_mesh
-from surfaces.patches import plane
-from surfaces.patches.cone import cone
-from surfaces.patches.ellipsoid import ellipsoid
-from surfaces.patches.nurbs.bspline import bspline
-from surfaces.patches.revolution import revolution
-from surfaces.patches.torus import torus
-from surfaces.piecewise import piecewise
 
 POSE = {"position": (0.1, -0.2, 0.3), "rpy_deg": (10.0, 20.0, -30.0)}
 POSED = "position = [0.1, -0.2, 0.3]\nrpy_deg = [10, 20, -30]\n"

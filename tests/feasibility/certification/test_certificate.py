@@ -15,13 +15,10 @@ from arm_urdfs import joint
 from random_arms import QUESTIONS, between, deviation, planar_arm, question, robot_of, tools
 
 import feasibility
+from feasibility import Task, check
 from feasibility.certification import replay
-from feasibility.checking import check
-from feasibility.task import Task
 from feasibility.verdict import Walk
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
+from surfaces import cylinder, plane, sphere
 
 SIMPLE = ("puma, tube", "ur5, plate")
 SEARCH = ("compiled", "roadmap", "paper", "checking")

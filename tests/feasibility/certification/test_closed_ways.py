@@ -8,11 +8,10 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from feasibility import Task
 from feasibility.target_curves import blocked_curves, target_curves
-from feasibility.task import Task
+from surfaces import plane, sphere
 from surfaces.meshes import TriangleMesh, mesh
-from surfaces.patches import plane
-from surfaces.patches.sphere import sphere
 
 
 def zigzag(*turns_deg: float) -> TriangleMesh:

@@ -13,9 +13,7 @@ import trimesh
 from dense_replay import tools
 from trimesh.triangles import closest_point
 
-from feasibility.checking import check
-from feasibility.task import Task
-from feasibility.verdict import Answer
+from feasibility import Answer, Task, check
 from robots import load_robot
 from surfaces.meshes import TriangleMesh, mesh
 

@@ -8,11 +8,9 @@ import math
 import numpy as np
 import pytest
 
-from feasibility.checking import check
-from feasibility.search import Search
-from feasibility.task import Task
+from feasibility import Search, Task, check
 from robots import load_robot
-from surfaces.patches import plane
+from surfaces import plane
 
 BAD_TASK = {
     "standoff": (-0.1, math.nan, math.inf, "0.1", None, True, np.zeros(1)),

@@ -6,15 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from feasibility import Search, Task, check
 from feasibility.certification import replay
-from feasibility.checking import check
 from feasibility.roadmap.diagnosis import UNPROVED, decimals
-from feasibility.search import Search
-from feasibility.task import Task
 from robots import Kinematics, Robot, load_robot
+from surfaces import hyperboloid, sphere
 from surfaces.patches import GridCells, plane
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
 
 CENTRE = np.array([0.5, 0.1, 0.4])
 RADIUS, STANDOFF, TOLERANCE = 0.02, 0.002, 5e-3

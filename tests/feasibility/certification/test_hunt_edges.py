@@ -7,11 +7,10 @@ import pytest
 from dense_replay import tools
 from test_creases import PER_SEGMENT, nearest, roof
 
-from feasibility.checking import check
+from feasibility import Task, check
 from feasibility.target_curves import beside_facets
-from feasibility.task import Task
 from robots import load_robot
-from surfaces.meshes import mesh
+from surfaces import mesh
 
 CASES = {
     "sharp, near": (roof(120), Task(0.02, 45, 3e-4), 20),

@@ -15,12 +15,10 @@ import pytest
 from dense_replay import angles, tools
 from scipy.spatial import cKDTree
 
-from feasibility.checking import check
-from feasibility.task import Task
+from feasibility import Task, check
 from robots import load_robot
-from surfaces import rotation_from_rpy
+from surfaces import cylinder, rotation_from_rpy
 from surfaces.meshes import TriangleMesh, mesh
-from surfaces.patches.cylinder import cylinder
 
 PER_SEGMENT = 10
 SETTLED = 1e-7  # m, how far the last turn may move a foot

@@ -23,13 +23,13 @@ from schema import CHECK, conforms
 from small_cases import TEXTS, small_case, small_verdict
 
 import feasibility.checking
+from feasibility import Answer, Evidence, Verdict
 from feasibility.cases import builtin_cases
 from feasibility.cli import check_command as commands
 from feasibility.cli import console
 from feasibility.cli import main as cli
 from feasibility.notices import NOTICE, compiling_notice
 from feasibility.results import load_result, save_result
-from feasibility.verdict import Answer, Evidence, Verdict
 from feasibility.version import version
 from robots import list_robots
 

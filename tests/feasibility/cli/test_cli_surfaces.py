@@ -14,7 +14,7 @@ from surface_files import cube, mesh_case, net_case, sheet, write_stl
 from feasibility.cli import main as cli
 from feasibility.notices import NOTICE
 from feasibility.results import load_result
-from surfaces.patches import plane
+from surfaces import plane
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -17,9 +17,9 @@ from oracle_build import built
 from random_arms import planar_arm
 from random_cases import draw, draw_ur5
 
+from feasibility import Search, Task, check
 from feasibility.cases import CaseError, load_case
 from feasibility.certification import replay
-from feasibility.checking import check
 from feasibility.cli.path_divide_explain import divide as run
 from feasibility.division import Division, Plan, divide
 from feasibility.division.components import table_of, tie
@@ -29,14 +29,10 @@ from feasibility.division.plans import plan_of
 from feasibility.division.reconfiguration import AS_GOOD, itinerary
 from feasibility.reports.division import STATUS, answer_of, as_json, as_text
 from feasibility.roadmap import Exploration, explore, links_of, patch_walk, problem_of
-from feasibility.search import Search
-from feasibility.task import Task
 from feasibility.verdict import CauseKind, Walk
 from robots import Robot, load_robot
+from surfaces import cylinder, plane, sphere
 from surfaces.meshes import TriangleMesh, mesh
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
 
 
 def assert_plan(plan: Plan, division: Division) -> None:

@@ -13,7 +13,7 @@ from feasibility.division.connected_cover import connected_cover
 from feasibility.division.connected_labels import Labels, count_of, pieces_of
 from feasibility.division.partition import Cover, Partition, fewest_patches
 from feasibility.division.separator_cuts import fewest_labels
-from surfaces.patches import plane
+from surfaces import plane
 
 
 def random_table(seed: int) -> tuple[np.ndarray, np.ndarray]:

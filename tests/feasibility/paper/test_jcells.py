@@ -10,18 +10,13 @@ import networkx as nx
 import numpy as np
 import pytest
 
+from feasibility import Answer, CauseKind, Evidence, Search, Task
 from feasibility.paper import greedy_check
 from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace, Outcome, continuity
 from feasibility.paper.jcell_steps import Steps
-from feasibility.search import Search
-from feasibility.task import Task
-from feasibility.verdict import Answer, CauseKind, Evidence
 from robots import Kinematics, Robot, load_robot
-from surfaces import Cells
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
+from surfaces import Cells, cylinder, plane, sphere
 
 
 def urdf(joints: str, links: int) -> str:

@@ -8,15 +8,13 @@ import io
 import numpy as np
 import pytest
 
+from feasibility import Search, Task, Verdict
 from feasibility.paper import greedy_check, tree_walk
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_replay import Borders, tool_poses
 from feasibility.reports import witness_csv
-from feasibility.search import Search
-from feasibility.task import Task
-from feasibility.verdict import Verdict
 from robots import load_robot
-from surfaces.patches.sphere import sphere
+from surfaces import sphere
 
 PUMA = load_robot("puma560", limits="set-1")
 DOME = sphere(1.0, (10, 90), (10, 180), side="inside").cells(5, 6)

@@ -13,8 +13,8 @@ from dense_replay import assert_motion, assert_over
 from path_cases import BEST, FEASIBLE, PATCHES, path_of, verdict_of
 from small_cases import paper_verdict, small_case, small_verdict
 
+from feasibility import Task, check
 from feasibility.certification import replay
-from feasibility.checking import check
 from feasibility.paths import PathError, coverage_path
 from feasibility.paths import ladder as joint_routes
 from feasibility.paths.ladder import joint_route, walk_of
@@ -24,10 +24,9 @@ from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.paths.windings import turned, whole_turns
 from feasibility.results import load_result, save_result
 from feasibility.roadmap import problem_of, work_for
-from feasibility.task import Task
 from feasibility.verdict import Answer, Walk
 from robots import Kinematics, load_robot
-from surfaces.patches.cylinder import cylinder
+from surfaces import cylinder
 
 NAMES = (*FEASIBLE, *PATCHES)
 

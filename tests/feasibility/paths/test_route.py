@@ -24,10 +24,7 @@ from feasibility.paths.order import (
     step_lengths,
 )
 from feasibility.paths.two_opt import improved, tour_length
-from surfaces.meshes import mesh
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
+from surfaces import cylinder, mesh, plane, sphere
 
 SHAPES = [(rows, columns) for rows in range(1, 7) for columns in range(1, 7)]
 

@@ -17,8 +17,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from placement_cases import TEXTS, moved_away, placement_case, region_about
 
+from feasibility import Answer, CauseKind, Evidence, Search, check
 from feasibility.certification import replay
-from feasibility.checking import check
 from feasibility.cli.place import run_place
 from feasibility.placement import (
     AXES,
@@ -51,15 +51,10 @@ from feasibility.roadmap import (
     project_onto_cell,
 )
 from feasibility.safe_files import FileError
-from feasibility.search import Search
 from feasibility.studies import Store, open_workers
-from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.viewer import plot_map
-from surfaces import rotation_from_rpy
-from surfaces.meshes import mesh
+from surfaces import mesh, plane, rotation_from_rpy, sphere
 from surfaces.meshes.mesh_surface import TriangleMesh
-from surfaces.patches import plane
-from surfaces.patches.sphere import sphere
 
 MOVED = [
     ("puma560 pipe", 2),

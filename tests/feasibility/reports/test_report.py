@@ -11,8 +11,8 @@ import pytest
 from schema import CHECK, conforms
 from small_cases import TEXTS, paper_verdict, small_case, small_verdict
 
+from feasibility import check
 from feasibility.cases import load_case
-from feasibility.checking import check
 from feasibility.reports.verdict import as_json, as_text, witness_csv
 from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
 from robots import Robot, load_robot

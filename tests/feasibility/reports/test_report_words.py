@@ -7,14 +7,14 @@ import itertools
 import numpy as np
 import pytest
 
+from feasibility import Task
 from feasibility.cli.main import main
 from feasibility.division import Reconfiguration
 from feasibility.placement.reach_bound import Reach
 from feasibility.reports.study import groups_of, short
 from feasibility.studies import Row, Study
-from feasibility.task import Task
 from robots import load_robot
-from surfaces.patches.sphere import sphere
+from surfaces import sphere
 
 
 @pytest.mark.parametrize(("n", "most"), list(itertools.product(range(1, 8), (1, 2, 3))))

@@ -8,14 +8,9 @@ import re
 import numpy as np
 from dense_replay import tools
 
-from feasibility.checking import check
-from feasibility.search import Search
-from feasibility.task import Task
-from feasibility.verdict import CauseKind, Evidence, Verdict
+from feasibility import CauseKind, Evidence, Search, Task, Verdict, check
 from robots import load_robot
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
+from surfaces import cylinder, plane, sphere
 
 PUMA = load_robot("puma560", limits="set-1")
 ELBOW = math.hypot(0.1, 0.7)  # [m] from elbow to wrist centre

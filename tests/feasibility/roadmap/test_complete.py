@@ -8,16 +8,9 @@ import numpy as np
 import pytest
 from dense_replay import assert_witness, tools
 
-from feasibility.checking import check
-from feasibility.search import Search
-from feasibility.task import Task
-from feasibility.verdict import Answer, CauseKind, Evidence, Verdict
+from feasibility import Answer, CauseKind, Evidence, Search, Task, Verdict, check
 from robots import Robot, load_robot
-from surfaces import Surface
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import Surface, cylinder, hyperboloid, plane, sphere
 
 PUMA = load_robot("puma560", limits="set-1")
 UR5 = load_robot("ur5")

@@ -7,13 +7,12 @@ import pytest
 from arm_urdfs import FREE, joint
 from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
 
+from feasibility import Task, check
 from feasibility.certification import replay
-from feasibility.checking import check
 from feasibility.roadmap import Exploration, connect, margin_shares, problem_of, work_for
 from feasibility.roadmap.self_motion import settle
-from feasibility.task import Task
 from feasibility.verdict import Walk
-from surfaces.patches import plane
+from surfaces import plane
 
 
 @pytest.fixture(params=QUESTIONS)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from random_arms import QUESTIONS, finite_limits, planar_arm, question, tools
 
+from feasibility import Task
 from feasibility.roadmap import look_at, place, problem_of, project, work_for
-from feasibility.task import Task
-from surfaces.patches import plane
+from surfaces import plane
 
 SLACK = 1e-6  # [1] share of the cone kept free
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -19,6 +19,7 @@ from random_arms import (
     turn_onto,
 )
 
+from feasibility import Task
 from feasibility.roadmap import (
     Exploration,
     Ruling,
@@ -28,9 +29,8 @@ from feasibility.roadmap import (
     rule,
     work_for,
 )
-from feasibility.task import Task
 from robots import load_robot
-from surfaces.patches import plane
+from surfaces import plane
 
 BOXES = 2000
 

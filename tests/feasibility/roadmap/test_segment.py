@@ -18,13 +18,12 @@ from random_arms import (
     turn_onto,
 )
 
+from feasibility import Task
 from feasibility.roadmap import look_at, place, problem_of, project, segment_holds, work_for
 from feasibility.roadmap.problem import aim, bounds_between
 from feasibility.roadmap.segment_bound import peak, spread
-from feasibility.task import Task
+from surfaces import cylinder, sphere
 from surfaces.patches import GridCells, plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
 
 ROUNDING = 1e-12
 KINDS = ["sphere", "cylinder", "hyperboloid", "plane"]

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from random_arms import QUESTIONS, planar_arm, question
 
+from feasibility import Task
 from feasibility.roadmap import (
     NODES,
     Exploration,
@@ -28,8 +29,7 @@ from feasibility.roadmap.graph import (
     empty_roadmap,
     grown,
 )
-from feasibility.task import Task
-from surfaces.patches import plane
+from surfaces import plane
 
 
 def roadmap_of(graph, cells, cell_of=None, rng=None):

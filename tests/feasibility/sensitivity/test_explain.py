@@ -12,18 +12,13 @@ import numpy as np
 import pytest
 from paper_cases import PAPER_CASES
 
-from feasibility.checking import check
+from feasibility import Answer, Evidence, Search, Task, Verdict, check
 from feasibility.reports.explanation import as_json, as_text, shown
-from feasibility.search import Search
 from feasibility.sensitivity import Explanation, Kind, Quantity, Threshold, explain
 from feasibility.sensitivity.parameters import Setup
 from feasibility.sensitivity.probes import Prober
-from feasibility.task import Task
-from feasibility.verdict import Answer, Evidence, Verdict
 from robots import load_robot
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
+from surfaces import cylinder, plane, sphere
 
 PUMA = load_robot("puma560", limits="set-1")
 UR5 = load_robot("ur5")

@@ -12,18 +12,16 @@ from arm_builds import bare, built, on_a_base
 from dense_replay import tools
 from paper_cases import PAPER_CASES
 
+from feasibility import Task
 from feasibility.roadmap import Ruling, problem_of
 from feasibility.sensitivity import Kind, Quantity, last_true
 from feasibility.sensitivity.parameters import Setup, quantities, shifted
 from feasibility.sensitivity.probes import LEAST_BOXES, Prober, apart
 from feasibility.sensitivity.threshold_search import Turning
 from feasibility.sensitivity.warm_start import NO_CELL, Carrying, follow_all
-from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence, Walk
 from robots import load_robot
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
+from surfaces import cylinder, plane, sphere
 
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
 SMALL = Setup(load_robot("ur5"), PLATE.cells(3, 3), Task(standoff=0.02, cone_deg=30))

@@ -15,9 +15,9 @@ import pytest
 import study_works
 from small_cases import TEXTS, small_case
 
+from feasibility import check
 from feasibility.cases import Case
 from feasibility.cases.case import CaseError
-from feasibility.checking import check
 from feasibility.cli.main import main
 from feasibility.cli.study_compare import compare as compare_command
 from feasibility.cli.study_compare import study as study_command

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from small_cases import TEXTS
 
+from feasibility import check
 from feasibility.cases import load_case
-from feasibility.checking import check
 from feasibility.cli.main import main
 from feasibility.placement import Pose
 from feasibility.reports.placement import settings_of

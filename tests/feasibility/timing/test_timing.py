@@ -21,10 +21,9 @@ from path_cases import (
 from random_arms import question
 from small_cases import small_verdict
 
+from feasibility import Task, check
 from feasibility.certification import replay
-from feasibility.checking import check
 from feasibility.paths import PathError, coverage_path
-from feasibility.task import Task
 from feasibility.timing import Trajectory, motion_limits, trajectory, used
 from feasibility.timing.controller_interpolation import (
     KINDS,
@@ -41,7 +40,7 @@ from feasibility.timing.time_optimal import acceleration_excess
 from feasibility.timing.timed_curve import samples, timed_curve
 from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
-from surfaces.meshes import mesh
+from surfaces import mesh
 
 NAMES = (*FEASIBLE, *PATCHES)
 ROUNDING = 1.0 + 1e-9

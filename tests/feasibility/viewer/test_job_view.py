@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from feasibility import check
 from feasibility.cases import load_case
-from feasibility.checking import check
 from feasibility.division import divide
 from feasibility.paths import coverage_path
 from feasibility.viewer import view_division, view_path

@@ -18,7 +18,7 @@ from feasibility.viewer.decimated_mesh import make_skin
 from feasibility.viewer.paper_figures import plot_causes, plot_graph, plot_transition
 from feasibility.viewer.scene import edge_lines, patch_layers
 from robots import load_robot
-from surfaces.meshes import mesh
+from surfaces import mesh
 from surfaces.meshes.cells import MeshCells
 
 COUNT = 24

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 from surface_files import cube, sheet, write_stl
 from test_viewer import Tags, numbers, objects, unpacked, vertices
 
+from feasibility import Answer, Evidence, Search, Task, check
 from feasibility.cases import Case
-from feasibility.checking import check
 from feasibility.placement import (
     Placements,
     Pose,
@@ -28,11 +28,8 @@ from feasibility.placement import (
 from feasibility.placement.stations import stations_of
 from feasibility.placement.trial import Margins
 from feasibility.reports.placement import as_text
-from feasibility.search import Search
 from feasibility.studies import Row, bits_of, open_workers, run_tasks
 from feasibility.studies.file import read_study
-from feasibility.task import Task
-from feasibility.verdict import Answer, Evidence
 from feasibility.viewer import pose_layers, view_placements, view_study
 from feasibility.viewer.outline import MOST, outline
 from feasibility.viewer.placements import NEARER, same_frame
@@ -50,11 +47,7 @@ from feasibility.viewer.pose_layers import (
 from feasibility.viewer.threejs import hex_colour, pack
 from feasibility.viewer.viewer import FRAMED
 from robots import load_robot
-from surfaces.meshes import mesh
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
-from surfaces.patches.torus import torus
+from surfaces import cylinder, mesh, plane, sphere, torus
 
 PLATE = plane((-0.15, 0.15), (-0.1, 0.1), position=(0.5, 0, 0.2), side="outside")
 CELLS = PLATE.cells(3, 2)

@@ -9,7 +9,7 @@ from fabricated import DOME, STEPS, every_cause, verdict_on
 from matplotlib.collections import LineCollection, PathCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
-from feasibility.verdict import CauseKind
+from feasibility import CauseKind
 from feasibility.viewer.paper_figures import (
     cells_below,
     plot_causes,
@@ -19,7 +19,7 @@ from feasibility.viewer.paper_figures import (
 )
 from feasibility.viewer.scene import CAUSES, MISSED
 from robots import load_robot
-from surfaces.patches.cylinder import cylinder
+from surfaces import cylinder
 
 LOST = {5, 6, 13, 14, 15, 22}
 

@@ -22,7 +22,7 @@ import umsgpack
 from fabricated import DOME, STEPS, TASK, every_cause, verdict_on
 from scipy.spatial.transform import Rotation
 
-from feasibility.verdict import CauseKind
+from feasibility import CauseKind
 from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import playback as motion
 from feasibility.viewer import scene, threejs, view
@@ -30,7 +30,7 @@ from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.robot import joint_paths, pose
 from feasibility.viewer.viewer import show
 from robots import Kinematics, load_robot
-from surfaces.patches.cylinder import cylinder
+from surfaces import cylinder
 
 MISSED = {5, 6, 13, 14, 15, 22, 29}
 BROWSER = next(filter(None, map(shutil.which, ["chromium", "chromium-browser", "chrome"])), None)

@@ -8,11 +8,9 @@ import mesh_patches
 import numpy as np
 import pytest
 
-from surfaces import SurfaceError
+from surfaces import SurfaceError, cylinder, sphere
 from surfaces.meshes import TriangleMesh, mesh
 from surfaces.meshes.cells import MeshCells
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
 
 NAMES = ["sheet", "dome", "shell", "horn", "hood", "blade", "box", "holed", "slivers", "scattered"]
 SMOOTH = ["sheet", "dome", "shell", "horn", "hood", "holed", "slivers"]

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from surfaces import SurfaceError
-from surfaces.meshes import cut_box, cut_plane, faces_within_cone, take_faces
+from surfaces import SurfaceError, cut_box, cut_plane, faces_within_cone, take_faces
 from surfaces.meshes.repair import clean
 
 

@@ -5,11 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
+from surfaces import cylinder, hyperboloid, plane, sphere
 from surfaces.patches.normal_bounds import CurvatureSlices, normal_bounds
-from surfaces.patches.sphere import sphere
 
 
 def measured(surface, height, slack, count=20_000, seed=0):

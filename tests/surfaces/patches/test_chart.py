@@ -7,10 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from surfaces import cylinder, sphere
 from surfaces.patches import cell_at, closest_on_patch, plane
 from surfaces.patches.closed_form_kernels import wrap
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.sphere import sphere
 
 
 def test_foot_equals_closest_to_the_last_bit(patch, samples):

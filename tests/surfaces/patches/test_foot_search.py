@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from smooth_probes import least_distance
 
+from surfaces import cylinder, sphere
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
-from surfaces.patches.cylinder import cylinder
 from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch
-from surfaces.patches.sphere import sphere
 
 
 def sphere_jet(radius, x):

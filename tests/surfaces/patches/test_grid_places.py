@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
-from surfaces import SurfaceError
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.nurbs.bspline import bspline
-from surfaces.patches.sphere import sphere
-from surfaces.patches.torus import torus
+from surfaces import SurfaceError, bspline, cylinder, plane, sphere, torus
 
 
 def pipe():

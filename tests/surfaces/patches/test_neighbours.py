@@ -7,11 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from surfaces import cylinder, hyperboloid, plane, sphere
 from surfaces.adjacency import grid_neighbours
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
 
 
 def lists(found):

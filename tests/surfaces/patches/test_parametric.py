@@ -7,11 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from surfaces import Surface, SurfaceError
-from surfaces.patches import plane
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.hyperboloid import hyperboloid
-from surfaces.patches.sphere import sphere
+from surfaces import Surface, SurfaceError, cylinder, hyperboloid, plane, sphere
 
 
 def tangents(surface, u, v, step=1e-6):

@@ -15,9 +15,7 @@ from smooth_probes import (
     tangents,
 )
 
-from surfaces import SurfaceError
-from surfaces.patches.cone import cone
-from surfaces.patches.revolution import revolution
+from surfaces import SurfaceError, cone, revolution
 from surfaces.patches.revolution_profile import Profile
 
 VASE = [(0.2, 0.0), (0.35, 0.2), (0.15, 0.5), (0.25, 0.7)]

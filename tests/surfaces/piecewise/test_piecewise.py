@@ -11,13 +11,7 @@ import pytest
 from smooth_probes import POSE, least_distance
 from spline_nets import hood, quarter_turn, turned
 
-from surfaces import SurfaceError
-from surfaces.patches import plane
-from surfaces.patches.cone import cone
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.nurbs.bspline import bspline
-from surfaces.patches.sphere import sphere
-from surfaces.piecewise import Piecewise, piecewise
+from surfaces import Piecewise, SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
 
 
 def split_hood(*cuts, **pose):

@@ -52,7 +52,7 @@ import resource
 resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
 from pathlib import Path
 from surfaces.meshes.files import read_mesh
-from surfaces.surface import SurfaceError
+from surfaces import SurfaceError
 for path in sorted(Path({str(tmp_path)!r}).iterdir()):
     try:
         read_mesh(path)

@@ -9,8 +9,7 @@ import pytest
 from smooth_probes import same_surface
 from spline_nets import hood
 
-from surfaces import SurfaceError
-from surfaces.patches.nurbs.bspline import bspline
+from surfaces import SurfaceError, bspline
 from surfaces.patches.nurbs.control_net_file import MOST_BYTES, read_net
 
 RNG = np.random.default_rng(3)

@@ -16,11 +16,7 @@ from smooth_probes import (
 )
 from spline_nets import TURN_KNOTS, full_turn, hood, meridian, quarter_turn, turned
 
-from surfaces import SurfaceError
-from surfaces.patches.cylinder import cylinder
-from surfaces.patches.nurbs.bspline import bspline
-from surfaces.patches.sphere import sphere
-from surfaces.patches.torus import torus
+from surfaces import SurfaceError, bspline, cylinder, sphere, torus
 
 RNG = np.random.default_rng(12)
 WEIGHTS = RNG.uniform(0.5, 2.0, (6, 7))
