@@ -72,6 +72,7 @@ def robot_from_urdf(
         # Pinocchio's own limits are not asked: it loses those of continuous joints.
         lower=np.array([_range(joint)[0] for joint in free]),
         upper=np.array([_range(joint)[1] for joint in free]),
+        max_velocity=np.array([joint.max_velocity or math.nan for joint in free]),
         limit_sets={
             title: np.array([rows[joint.name] for joint in free])
             for title, rows in (limit_sets or {}).items()

@@ -47,6 +47,8 @@ class Robot:
     """(n,) rad or m; -inf where the joint turns freely."""
     upper: NDArray[np.float64]
     """(n,) rad or m; +inf where the joint turns freely."""
+    max_velocity: NDArray[np.float64] = field(default_factory=lambda: np.array(np.nan))
+    """(n,) rad/s or m/s, or one for all; nan where no velocity limit is known."""
     limit_sets: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
     """Named limits, each (n, 2) rad or m, that `with_limits` knows."""
     urdf: str | None = None
@@ -70,6 +72,13 @@ class Robot:
             if np.isnan(array).any():
                 raise RobotError(f"robot {self.name!r}: {name} holds NaN")
             object.__setattr__(self, name, array)
+        speeds = _numbers(self.max_velocity, f"robot {self.name!r}: max_velocity")
+        if speeds.shape not in ((), (n,)) or (speeds <= 0.0).any():
+            raise RobotError(
+                f"robot {self.name!r}: max_velocity must be {n} positive numbers (rad/s or m/s), "
+                f"nan where unknown; got {speeds.tolist()}"
+            )
+        object.__setattr__(self, "max_velocity", np.broadcast_to(speeds, n))  # read-only
         length = float(np.linalg.norm(self.approach_axis))
         if not (np.isfinite(length) and length > 1e-9):
             raise RobotError(
@@ -116,8 +125,8 @@ class Robot:
             Robot,
             (
                 self.name, self.model, self.tool_frame, self.approach_axis, self.joint_names,
-                self.joint_kinds, self.lower, self.upper, dict(self.limit_sets), self.urdf,
-                self.package_dirs, dict(self.locked), self.notes,
+                self.joint_kinds, self.lower, self.upper, self.max_velocity, dict(self.limit_sets),
+                self.urdf, self.package_dirs, dict(self.locked), self.notes,
             ),
         )  # fmt: skip
 

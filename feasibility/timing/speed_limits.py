@@ -18,7 +18,6 @@ from scipy.interpolate import BSpline
 
 from feasibility.certification import placements
 from feasibility.paths import PathError
-from feasibility.timing.joint_velocities import joint_velocities
 from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
@@ -80,7 +79,7 @@ def motion_limits(
         )
     fastest, fault = _per_joint(robot, "velocity", "rad/s or m/s", velocity)
     if velocity is None:
-        fastest = joint_velocities(robot)
+        fastest = robot.max_velocity
         bad = ~((fastest > 0.0) & (fastest <= MOST))
         names = [name for name, none in zip(robot.joint_names, bad, strict=True) if none]
         fault = (

@@ -1,5 +1,3 @@
-from .attributes import BadValue as BadValue
-from .attributes import numbers as numbers
 from .checked_urdf import CheckedUrdf as CheckedUrdf
 from .checked_urdf import JointInfo as JointInfo
 from .checked_urdf import check_urdf as check_urdf
@@ -10,5 +8,3 @@ from .visuals import MeshFile as MeshFile
 from .visuals import Sphere as Sphere
 from .visuals import Visual as Visual
 from .xml import UrdfError as UrdfError
-from .xml import parse_xml as parse_xml
-from .xml import read_bytes as read_bytes

@@ -57,6 +57,8 @@ class JointInfo:
     """rad or m; -inf for a continuous joint; None where `fault` says why there is none."""
     upper: float | None
     """rad or m; +inf for a continuous joint; None where `fault` says why there is none."""
+    max_velocity: float | None
+    """rad/s or m/s; None where the file states no positive one."""
     mimic: Mimic | None
     """What it follows, if anything."""
     fault: str | None
@@ -108,12 +110,13 @@ def read_joint(node: Node, faults: Faults) -> JointInfo | None:
     axis = _axis(axis_node, owner, faults)
     if len(faults.errors) > before or name is None or ends[0] is None or ends[1] is None:
         return None
-    reach = _range(node, limit, kind, owner, faults)
+    limits = _range(node, limit, kind, owner, faults)
     mimic, mimic_fault = _mimic(mimic_node)
-    fault = reach.fault or mimic_fault
+    fault = limits.fault or mimic_fault
     return JointInfo(
-        name, reach.kind, ends[0], ends[1], xyz, rpy, axis, reach.lower, reach.upper, mimic,
-        f"line {node.line}: {owner} {fault}" if fault else None, node.line,
+        name, limits.kind, ends[0], ends[1], xyz, rpy, axis, limits.lower, limits.upper,
+        _max_velocity(limit), mimic, f"line {node.line}: {owner} {fault}" if fault else None,
+        node.line,
     )  # fmt: skip
 
 
@@ -260,6 +263,17 @@ def _range(node: Node, limit: Node | None, kind: str, owner: str, faults: Faults
     if _has_narrower_soft_limits(node, lower, upper):
         faults.soft_limits.append(owner.removeprefix("joint "))
     return _Range(kind, lower, upper)
+
+
+def _max_velocity(limit: Node | None) -> float | None:
+    """The velocity limit; one that makes no sense counts as missing: only timing needs it."""
+    if limit is None or "velocity" not in limit.attributes:
+        return None
+    try:
+        (value,) = numbers(limit, "velocity", 1, bound=math.inf)
+    except BadValue:
+        return None
+    return value if value > 0.0 else None
 
 
 def _has_narrower_soft_limits(node: Node, lower: float, upper: float) -> bool:

@@ -61,6 +61,8 @@ def test_limits_are_the_urdfs_and_held_joints_stand_inside_theirs(robot):
         assert (kind, low, high) == (joints[name].kind, joints[name].lower, joints[name].upper)
         assert np.isfinite([low, high]).all() == (kind != "continuous")
         assert low < high
+    speeds = [joints[name].max_velocity for name in robot.joint_names]
+    np.testing.assert_array_equal(robot.max_velocity, speeds)
     for name, value in robot.locked.items():
         if joints[name].lower is not None:
             assert joints[name].lower <= value <= joints[name].upper
@@ -191,6 +193,13 @@ def test_limits_can_be_given_for_a_joint_that_has_none(tmp_path):
     assert load_text(tmp_path, text, lock={"j2": 40.0}).locked == {"j2": 40.0}
     with pytest.raises(RobotError, match="has no <limit>"):
         load_text(tmp_path, text, limits={"j1": (-1, 2)})
+
+
+def test_velocity_limits_are_those_of_the_file(tmp_path):
+    assert load_robot("ur5").max_velocity.tolist() == [3.15, 3.15, 3.15, 3.2, 3.2, 3.2]
+    assert load_robot("panda").max_velocity.tolist() == [2.175] * 4 + [2.61] * 3
+    text = arm([joint(1, "continuous"), joint(2)])
+    np.testing.assert_array_equal(load_text(tmp_path, text).max_velocity, [np.nan, 1.0])
 
 
 def test_limit_sets_follow_the_free_joints():

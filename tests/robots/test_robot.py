@@ -46,6 +46,8 @@ def test_the_approach_axis_is_brought_to_length_one(puma):
         ({"upper": np.full(6, np.nan)}, "upper holds NaN"),
         ({"upper": np.full(6, -9.0)}, "'joint1' has limits .* 'joint6' has limits"),
         ({"lower": np.full(6, np.inf), "upper": np.full(6, np.inf)}, "limits inf .. inf"),
+        ({"max_velocity": np.zeros(6)}, "max_velocity must be 6 positive numbers"),
+        ({"max_velocity": np.ones(5)}, "max_velocity must be 6 positive numbers"),
         ({"joint_kinds": ("revolute",) * 5 + ("screw",)}, "'joint6' is 'screw', not one of"),
         ({"joint_kinds": ("revolute",) * 5}, "6 joint names and 5 kinds"),
         ({"limit_sets": {"odd": np.zeros((5, 2))}}, r"limit set 'odd' has shape \(5, 2\)"),
@@ -100,7 +102,7 @@ def test_pickle_round_trip(info):
     copy = pickle.loads(data)
     for name in ("name", "tool_frame", "joint_names", "joint_kinds", "urdf", "package_dirs"):
         assert getattr(copy, name) == getattr(robot, name)
-    for name in ("approach_axis", "lower", "upper"):
+    for name in ("approach_axis", "lower", "upper", "max_velocity"):
         np.testing.assert_array_equal(getattr(copy, name), getattr(robot, name))
     assert copy.locked == robot.locked
     assert copy.limit_sets.keys() == robot.limit_sets.keys()

@@ -33,7 +33,6 @@ from feasibility.timing.controller_interpolation import (
     past_limits,
     values,
 )
-from feasibility.timing.joint_velocities import joint_velocities
 from feasibility.timing.smoothing import Curve, blended, control_points, graded, without_slivers
 from feasibility.timing.speed_limits import fine_grid, squared_speeds, tool_slopes
 from feasibility.timing.time_optimal import acceleration_excess
@@ -394,29 +393,17 @@ def test_bounds_on_the_speed_hold_on_whole_pieces(name):
     assert max(tool.max() / 0.2, (np.abs(slope) * rate[:, None] / limits.velocity).max()) > 0.9
 
 
-def test_velocities_are_those_of_the_file():
-    assert joint_velocities(load_robot("puma560")).tolist() == [3.0] * 6
-    assert joint_velocities(load_robot("ur5")).tolist() == [3.15, 3.15, 3.15, 3.2, 3.2, 3.2]
-
-
-def test_velocities_of_a_model_come_first():
-    robot = load_robot("puma560")
-    model = robot.model.copy()
-    model.velocityLimit = np.array([1.0, 0.0, np.inf, 2.0, 0.0, 0.0])
-    found = joint_velocities(replace(robot, model=model))
-    assert found.tolist() == [1.0, 3.0, 3.0, 2.0, 3.0, 3.0]
-
-
 # -- what cannot be asked -----------------------------------------------------------------------
 
 
 def test_an_arm_without_velocities_needs_some():
-    robot = replace(load_robot("puma560"), urdf=None)
+    robot = replace(load_robot("puma560"), max_velocity=np.nan)
     with pytest.raises(PathError, match=r"no velocity limit for joint1, .*give velocity"):
         motion_limits(robot, 0.1)
     assert motion_limits(robot, 0.1, velocity=2.0).acceleration.tolist() == [4.0] * 6
-    with pytest.raises(PathError, match="no velocity limit"):
-        motion_limits(replace(robot, urdf="/nowhere/arm.urdf"), 0.1)
+    some = replace(robot, max_velocity=[1.0, np.nan, 1.0, np.inf, 1.0, 1.0])
+    with pytest.raises(PathError, match="no velocity limit for joint2, joint4; give"):
+        motion_limits(some, 0.1)
 
 
 @pytest.mark.parametrize("speed", [0.0, -0.1, np.nan, np.inf, "fast", None, True])

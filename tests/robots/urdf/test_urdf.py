@@ -242,6 +242,7 @@ def test_what_is_read_of_a_joint() -> None:
     )  # fmt: skip
     assert (elbow.xyz, elbow.rpy, elbow.axis) == ((1, 2, 3), (0.1, 0.2, 0.3), (0, 0.6, 0.8))
     assert (elbow.lower, elbow.upper, elbow.fault, elbow.line) == (-0.5, 0.25, None, 5)
+    assert elbow.max_velocity == 9
     assert elbow.mimic is not None
     assert (elbow.mimic.joint, elbow.mimic.multiplier, elbow.mimic.offset) == ("wrist", -2, 0.5)
     assert wrist.mimic is None
@@ -252,6 +253,13 @@ def test_what_is_read_of_a_joint() -> None:
     assert checked.path_to("base") == ()
     with pytest.raises(UrdfError, match="no link 'claw'; its leaves are: hand"):
         checked.path_to("claw")
+
+
+@pytest.mark.parametrize("text", ['velocity="0"', 'velocity="-2"', 'velocity="fast"', ""])
+def test_a_velocity_limit_that_makes_no_sense_counts_as_missing(text: str) -> None:
+    limit = f'<limit lower="-0.5" upper="0.25" {text}/>'
+    elbow = check_urdf_text(arm(limit)).joints[0]
+    assert (elbow.max_velocity, elbow.fault) == (None, None)
 
 
 def test_joints_come_parents_first_whatever_the_order_in_the_file() -> None:
