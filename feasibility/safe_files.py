@@ -9,6 +9,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
+import coverable_files
+from coverable_files import reason
+
 
 class FileError(ValueError):
     """A file that cannot be read or written: which one, why, and what would do."""
@@ -17,38 +20,15 @@ class FileError(ValueError):
 def read_regular(path: str | os.PathLike[str], cap: int, what: str) -> bytes:
     """Read a regular file of at most `cap` bytes.
 
-    Pipes and devices are refused without waiting for them.
-
-    Args:
-        path: the file.
-        cap: largest size, bytes.
-        what: what the file should be, for the messages ("a case file").
+    See `coverable_files.read_regular` for the arguments.
 
     Raises:
         FileError: there is no such file, it is not a regular one, or it is too large.
     """
-    name = shown_path(path)
     try:
-        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_CLOEXEC", 0))
-    except FileNotFoundError as error:
-        raise FileError(f"{name}: there is no such file; expected {what}") from error
-    except (OSError, ValueError) as error:  # ValueError: a NUL byte in the name
-        raise FileError(f"{name}: cannot be opened: {reason(error)}") from error
-    try:
-        mode = os.fstat(handle).st_mode
-        if stat.S_ISDIR(mode):
-            raise FileError(f"{name}: is a folder; expected {what}")
-        if not stat.S_ISREG(mode):
-            raise FileError(f"{name}: is not a regular file; expected {what}")
-        with open(handle, "rb", closefd=False) as stream:
-            data = stream.read(cap + 1)
-    except OSError as error:
-        raise FileError(f"{name}: cannot be read: {reason(error)}") from error
-    finally:
-        os.close(handle)
-    if len(data) > cap:
-        raise FileError(f"{name}: is larger than {size(cap)}, too large for {what}")
-    return data
+        return coverable_files.read_regular(path, cap, what)
+    except coverable_files.FileFault as error:
+        raise FileError(f"{shown_path(path)}: {error}") from error
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -136,21 +116,8 @@ def _mode(file: Path) -> int:
     return 0o666 & ~mask
 
 
-def reason(error: Exception) -> str:
-    """What an error says, without its number and file name."""
-    return (getattr(error, "strerror", None) or str(error) or type(error).__name__).lower()
-
-
 def shown_path(path: str | os.PathLike[str]) -> str:
     """A path for a message, on one line: as it is, or quoted where it holds odd characters."""
     text = os.fspath(path)
     short = text if len(text) <= 200 else text[:90] + "..." + text[-90:]
     return short if short.isprintable() and short else repr(short)
-
-
-def size(count: int) -> str:
-    """A number of bytes for people."""
-    for unit, name in ((1 << 30, "GB"), (1 << 20, "MB"), (1 << 10, "kB")):
-        if count >= unit:
-            return f"{count / unit:.3g} {name}"
-    return f"{count} bytes"

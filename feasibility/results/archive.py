@@ -18,7 +18,8 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.safe_files import FileError, read_regular, shown_path, size, write_whole
+from coverable_files import size
+from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
 
 TEXT_MEMBER = "meta.json"
 LARGEST_FILE = 512 << 20  # bytes, as it lies on the disk

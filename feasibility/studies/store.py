@@ -15,7 +15,8 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Any, Literal, Self
 
-from feasibility.safe_files import FileError, check_writable, reason, shown_path
+from coverable_files import reason
+from feasibility.safe_files import FileError, check_writable, shown_path
 
 APPLICATION = 0x434F5642  # "COVB", in the header of every store
 SCHEMA = 1

@@ -8,12 +8,11 @@ ever followed: what is not in the bytes given is not read.
 from __future__ import annotations
 
 import difflib
-import os
-import stat
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+from coverable_files import FileFault, read_regular, too_large
 from robots.robot import RobotError
 
 MAX_BYTES = 8 * 2**20  # the largest URDF in example-robot-data has 0.2 MB
@@ -21,6 +20,7 @@ MAX_ELEMENTS = 50_000  # the same file has 3,900
 MAX_ATTRIBUTES = 64  # in one element; URDF needs 6
 MAX_DEPTH = 64  # URDF needs 6
 MAX_SHOWN = 20  # faults in one message; `faults` has them all
+_IF_LARGER = "keep links and joints in it, and meshes in files of their own"
 
 
 class UrdfError(RobotError):
@@ -81,40 +81,9 @@ def read_bytes(path: str) -> bytes:
         UrdfError: it is missing, unreadable, empty, too big or not a regular file.
     """
     try:
-        _check_regular(path, os.stat(path))
-        # Without O_NONBLOCK, a pipe put in its place since would hang the open.
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-        with open(descriptor, "rb") as stream:
-            _check_regular(path, os.fstat(descriptor))
-            data = stream.read(MAX_BYTES + 1)
-    except UrdfError:  # a ValueError too
-        raise
-    except FileNotFoundError:
-        raise UrdfError(path, ("there is no such file; give the path of a URDF file",)) from None
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise UrdfError(path, (f"cannot be read: {reason}; check its permissions",)) from None
-    except ValueError as error:  # a NUL in the path
-        raise UrdfError(shown(path), (f"is not a file's path: {error}",)) from None
-    if len(data) > MAX_BYTES:
-        raise UrdfError(path, (_too_big(len(data)),))
-    return data
-
-
-def _check_regular(path: str, status: os.stat_result) -> None:
-    if stat.S_ISDIR(status.st_mode):
-        raise UrdfError(path, ("is a folder; give the path of the URDF file in it",))
-    if not stat.S_ISREG(status.st_mode):
-        raise UrdfError(path, ("is a pipe, socket or device; save the URDF to a regular file",))
-    if status.st_size > MAX_BYTES:
-        raise UrdfError(path, (_too_big(status.st_size),))
-
-
-def _too_big(size: int) -> str:
-    return (
-        f"has {size:,} bytes or more, and a URDF may have {MAX_BYTES:,}; "
-        "keep links and joints in it, and meshes in files of their own"
-    )
+        return read_regular(path, MAX_BYTES, "a URDF file", _IF_LARGER)
+    except FileFault as fault:
+        raise UrdfError(path if path.isprintable() else shown(path), (str(fault),)) from None
 
 
 def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
@@ -129,7 +98,7 @@ def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
         UrdfError: not well-formed, a DOCTYPE, or over a cap.
     """
     if len(data) > MAX_BYTES:
-        raise UrdfError(path, (_too_big(len(data)),))
+        raise UrdfError(path, (too_large(MAX_BYTES, "a URDF file", _IF_LARGER),))
     hint = _foreign(data)
     if hint:
         raise UrdfError(path, (f"{hint}; a URDF is XML that starts with <robot name=...>",))

@@ -7,13 +7,13 @@ number and index before it is used, and only the one file is opened, whatever it
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
 
+from coverable_files import FileFault, open_regular, reason
 from surfaces.arguments import real
 from surfaces.meshes.files.glb import read_glb
 from surfaces.meshes.files.obj import read_obj
@@ -89,7 +89,7 @@ def read_mesh(
         if scale is not None:
             return mesh
         return _with_likely_unit(mesh)
-    except SurfaceError as error:
+    except (FileFault, SurfaceError) as error:
         raise SurfaceError(f"{name}: {error}") from error
 
 
@@ -112,30 +112,15 @@ def metres_per_unit(scale: float | None, name: str) -> float:
 
 def _read(path: str | os.PathLike[str]) -> RawMesh:
     """Open a regular file, look at how it begins, and read it."""
-    try:
-        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_CLOEXEC", 0))
-    except FileNotFoundError as error:
-        raise SurfaceError(f"there is no such file; expected a mesh as {FORMATS}") from error
-    except (OSError, ValueError) as error:  # ValueError: a NUL byte in the name
-        why = getattr(error, "strerror", None) or str(error)
-        raise SurfaceError(f"cannot be opened: {why.lower()}") from error
-    status = os.fstat(handle)
-    if not stat.S_ISREG(status.st_mode):
-        os.close(handle)
-        raise SurfaceError(f"is not a regular file; expected a mesh as {FORMATS}")
-    with open(handle, "rb") as stream:
-        if status.st_size > LARGEST_FILE:
-            raise SurfaceError(
-                f"has {status.st_size:,} bytes, more than the {LARGEST_FILE:,} that are read; "
-                "thin the mesh, or save it as binary STL"
-            )
+    advice = "thin the mesh, or save it as binary STL"
+    with open_regular(path, LARGEST_FILE, f"a mesh as {FORMATS}", advice) as stream:
         suffix = Path(os.fsdecode(path)).suffix.lower()
         try:
             _check_start(stream.read(80), suffix)
             stream.seek(0)
-            return _READERS[suffix](stream, status.st_size)
+            return _READERS[suffix](stream, os.fstat(stream.fileno()).st_size)
         except OSError as error:
-            raise SurfaceError(f"cannot be read: {error.strerror}") from error
+            raise SurfaceError(f"cannot be read: {reason(error)}") from error
 
 
 def _check_start(head: bytes, suffix: str) -> None:

@@ -7,14 +7,14 @@ import io
 import json
 import math
 import os
-import stat
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from coverable_files import read_regular
 from surfaces.patches.nurbs.nurbs_checks import MOST_POINTS
 from surfaces.surface import SurfaceError
 
-MOST_BYTES = 16_000_000
+MOST_BYTES = 16 << 20
 _KEYS = ("points", "degree", "knots", "weights")
 _COLUMNS = ["row", "column", "x", "y", "z"]
 
@@ -51,32 +51,15 @@ def read_net(path: str | os.PathLike[str]) -> NetFile:
     if suffix not in (".json", ".csv"):
         raise SurfaceError(f"{name}: a control net must be a .json or a .csv file")
     try:
-        text = _read(path).decode("utf-8-sig")
+        data = read_regular(path, MOST_BYTES, "a control net (.json or .csv)")
+        text = data.decode("utf-8-sig")
         return _from_json(text) if suffix == ".json" else _from_csv(text)
     except UnicodeDecodeError as error:
         raise SurfaceError(f"{name}: is not text in UTF-8, at byte {error.start}") from error
     except RecursionError as error:
         raise SurfaceError(f"{name}: is nested too deep for a control net") from error
-    except OSError as error:
-        why = (error.strerror or type(error).__name__).lower()
-        raise SurfaceError(f"{name}: cannot be read: {why}") from error
     except (ValueError, csv.Error) as error:
         raise SurfaceError(f"{name}: {error}") from error
-
-
-def _read(path: str | os.PathLike[str]) -> bytes:
-    """The bytes of a regular file; pipes and devices are refused without waiting for them."""
-    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | getattr(os, "O_CLOEXEC", 0))
-    try:
-        if not stat.S_ISREG(os.fstat(handle).st_mode):
-            raise ValueError("is not a regular file")
-        with open(handle, "rb", closefd=False) as stream:
-            data = stream.read(MOST_BYTES + 1)
-    finally:
-        os.close(handle)
-    if len(data) > MOST_BYTES:
-        raise ValueError(f"is larger than {MOST_BYTES // 1_000_000} MB, too large for a net")
-    return data
 
 
 def _from_json(text: str) -> NetFile:

@@ -315,7 +315,7 @@ BAD_CASES = {
     "missing net": Bad(
         surface('kind = "bspline"\nfile = "no/net.json"\ncells = [3, 4]'),
         "surface.file",
-        ("no/net.json: cannot be read: no such file",),
+        ("no/net.json: there is no such file; expected a control net",),
     ),
     "net of a strange kind": Bad(
         surface('kind = "bspline"\nfile = "net.npy"\ncells = [3, 4]'),
@@ -366,7 +366,7 @@ BAD_CASES = {
             'kind = "piecewise"\npieces = [{ kind = "bspline", file = "n.json", cells = [1, 1] }]'
         ),
         "surface.pieces[0].file",
-        ("n.json: cannot be read",),
+        ("n.json: there is no such file",),
     ),
     "piece beyond the pole": Bad(
         surface(

@@ -203,17 +203,17 @@ def test_files_that_are_no_files(tmp_path: Path) -> None:
         tmp_path: "folder",
         tmp_path / "pipe.urdf": "pipe",
         Path("/dev/zero"): "device",
-        tmp_path / "huge.urdf": "200,000,000 bytes",
+        tmp_path / "huge.urdf": "larger than 8 MB",
         tmp_path / "missing.urdf": "no such file",
         tmp_path / "dangling.urdf": "no such file",
-        tmp_path / "loop.urdf": "cannot be read",
-        tmp_path / ("x" * 5000): "cannot be read",
+        tmp_path / "loop.urdf": "cannot be opened",
+        tmp_path / ("x" * 5000): "cannot be opened",
         tmp_path / "missing.urdf" / "below": "no such file",
     }
     for path, fragment in cases.items():
         with pytest.raises(UrdfError, match=fragment):
             check_urdf(path)
-    with pytest.raises(UrdfError, match="not a file's path"):
+    with pytest.raises(UrdfError, match="cannot be opened: .*null"):
         check_urdf("a\0b")
 
 
@@ -224,7 +224,7 @@ def test_a_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr(os, "open", refuse)  # the superuser may read anything
-    with pytest.raises(UrdfError, match="Permission denied; check its permissions"):
+    with pytest.raises(UrdfError, match="cannot be opened: permission denied"):
         check_urdf(path)
 
 
