@@ -10,8 +10,10 @@ import os
 import stat
 from typing import BinaryIO
 
+from coverable_errors import CoverableError
 
-class FileFault(ValueError):
+
+class FileFault(CoverableError):
     """What is wrong with a file, without its name."""
 
 

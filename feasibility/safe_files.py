@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import IO
 
 import coverable_files
+from coverable_errors import CoverableError
 from coverable_files import reason
 
 
-class FileError(ValueError):
+class FileError(CoverableError):
     """A file that cannot be read or written: which one, why, and what would do."""
 
 
@@ -28,7 +29,7 @@ def read_regular(path: str | os.PathLike[str], cap: int, what: str) -> bytes:
     try:
         return coverable_files.read_regular(path, cap, what)
     except coverable_files.FileFault as error:
-        raise FileError(f"{shown_path(path)}: {error}") from error
+        raise FileError(error.faults, shown_path(path)) from error
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
@@ -40,22 +41,22 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     file, name = Path(path), shown_path(path)
     try:
         if file.is_dir():
-            raise FileError(f"{name}: is a folder; give the name of a file to write")
+            raise FileError("is a folder; give the name of a file to write", name)
         folder = file.parent
         if not folder.is_dir():
             raise FileError(
-                f"{name}: there is no folder {shown_path(folder)}; make it first, or choose another"
+                f"there is no folder {shown_path(folder)}; make it first, or choose another", name
             )
     except (OSError, ValueError) as error:
         if isinstance(error, FileError):
             raise
-        raise FileError(f"{name}: cannot be written: {reason(error)}") from error
+        raise FileError(f"cannot be written: {reason(error)}", name) from error
     if _is_special(file):
         if not os.access(file, os.W_OK):
-            raise FileError(f"{name}: cannot be written to")
+            raise FileError("cannot be written to", name)
         return
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise FileError(f"{name}: the folder {shown_path(folder)} cannot be written to")
+        raise FileError(f"the folder {shown_path(folder)} cannot be written to", name)
 
 
 def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> Path:
@@ -85,7 +86,7 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
         os.chmod(temporary, _mode(file))
         os.replace(temporary, file)
     except OSError as error:
-        raise FileError(f"{shown_path(path)}: cannot be written: {reason(error)}") from error
+        raise FileError(f"cannot be written: {reason(error)}", shown_path(path)) from error
     finally:
         if temporary and os.path.exists(temporary):
             os.unlink(temporary)
@@ -103,7 +104,7 @@ def _write_through(file: Path, write: Callable[[IO[bytes]], object]) -> Path:
         with open(file, "wb") as stream:
             write(stream)
     except OSError as error:
-        raise FileError(f"{shown_path(file)}: cannot be written: {reason(error)}") from error
+        raise FileError(f"cannot be written: {reason(error)}", shown_path(file)) from error
     return file
 
 

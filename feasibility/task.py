@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from numbers import Real
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import Checks
 from surfaces import Cells
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
@@ -32,11 +32,11 @@ class Task:
         >>> task = Task(standoff=0.005, cone_deg=45)
         >>> round(task.cone, 4)
         0.7854
-        >>> task.leeway
+        >>> task.effective_tolerance
         0.001
 
     Raises:
-        ValueError: standoff or tolerance is negative or not finite, or the cone is outside
+        ArgumentError: standoff or tolerance is negative or not finite, or the cone is outside
             0 to 180 degrees; all that is wrong is named.
     """
 
@@ -50,16 +50,22 @@ class Task:
     verdict states what was used."""
 
     def __post_init__(self) -> None:
-        """Refuse numbers that describe no task."""
-        tolerance, faults = self.tolerance, list[str]()
-        if not 0.0 <= _number(self.standoff) < math.inf:
-            faults.append(f"standoff must be a finite number >= 0 (metres), got {self.standoff!r}")
-        if not 0.0 <= _number(self.cone_deg) <= 180.0:
-            faults.append(f"cone_deg must lie in 0 .. 180 (degrees), got {self.cone_deg!r}")
-        if tolerance is not None and not 0.0 < _number(tolerance) < math.inf:
-            faults.append(f"tolerance must be a finite number > 0 (metres), got {tolerance!r}")
-        if faults:
-            raise ValueError("; ".join(faults))
+        """Refuse numbers that describe no task; keep them as plain floats."""
+        checks = Checks("task")
+        kept: dict[str, float | None] = {
+            "standoff": checks.number(
+                "standoff", self.standoff, "must be a finite number >= 0 (metres)", low=0.0
+            ),
+            "cone_deg": checks.number(
+                "cone_deg", self.cone_deg, "must lie in 0 .. 180 (degrees)", 0.0, 180.0
+            ),
+            "tolerance": None
+            if self.tolerance is None
+            else checks.positive("tolerance", self.tolerance),
+        }
+        checks.done()
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
 
     @property
     def cone(self) -> float:
@@ -83,8 +89,3 @@ class Task:
             points=cells.centres + sign * self.standoff * cells.normals,
             approaches=-sign * cells.normals,
         )
-
-
-def _number(value: object) -> float:
-    """A number as it is; NaN for anything else, which no comparison accepts."""
-    return float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
 
+from coverable_errors import ArgumentError
+
 PUMA560_URDF = Path(__file__).with_name("puma560") / "puma560.urdf"
 
 
@@ -69,15 +71,15 @@ def dh_urdf(
         colours: red, green, blue and alpha in 0 .. 1 of each colour that `shapes` names.
 
     Raises:
-        ValueError: the number of limits is not the number of rows, or a shape names a link or
+        ArgumentError: the number of limits is not the number of rows, or a shape names a link or
             colour that does not exist.
     """
     palette = colours or {}
     if len(limits_deg) != len(rows):
-        raise ValueError(f"{len(rows)} DH rows need as many limits, got {len(limits_deg)}")
+        raise ArgumentError(f"{len(rows)} DH rows need as many limits, got {len(limits_deg)}")
     for shape in shapes:
         if not 0 <= shape.link <= len(rows) or shape.colour not in palette:
-            raise ValueError(
+            raise ArgumentError(
                 f"{shape} must name a link in 0 .. {len(rows)} and a colour of {sorted(palette)}"
             )
     lines = [

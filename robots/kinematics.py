@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import ArgumentError
 from robots.robot import Robot
 
 
@@ -39,7 +40,7 @@ class Kinematics:
         """Pinocchio's configuration vector (nq,) for n real joint values (rad or m)."""
         values = np.ascontiguousarray(q, dtype=float)
         if values.shape != (self.robot.n,):
-            raise ValueError(f"q must have shape ({self.robot.n},), got {values.shape}")
+            raise ArgumentError(f"q must have shape ({self.robot.n},), got {values.shape}")
         return values if self._plain else pin.integrate(self._model, self._neutral, values)
 
     def tool(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -68,11 +69,11 @@ class Kinematics:
         In m/s in the frame of the URDF's root link, when dq is in rad/s or m/s.
 
         Raises:
-            ValueError: q or dq does not have the shape (m, n), or they differ in m.
+            ArgumentError: q or dq does not have the shape (m, n), or they differ in m.
         """
         places, rates = (np.ascontiguousarray(rows, dtype=float) for rows in (q, dq))
         if places.ndim != 2 or places.shape[1] != self.robot.n or rates.shape != places.shape:
-            raise ValueError(
+            raise ArgumentError(
                 f"q and dq must both have shape (m, {self.robot.n}), got {places.shape} and "
                 f"{rates.shape}"
             )

@@ -134,7 +134,7 @@ def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> N
                 f"{low:g} .. {high:g} {unit}"
             )
     if faults:
-        raise RobotError(f"robot {name!r}: " + "; ".join(faults))
+        raise RobotError(faults, f"robot {name!r}")
 
 
 def _range(joint: JointInfo) -> tuple[float, float]:
@@ -192,7 +192,7 @@ def _check_free(
             if not (gets_limits and joint.lower is None and joint.mimic is None):
                 faults.append(joint.fault)
     if faults:
-        raise RobotError(f"robot {name!r}, {checked.path}: " + "; ".join(faults))
+        raise RobotError(faults, f"robot {name!r}, {checked.path}")
 
 
 def _locked_values(

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import CoverableError
+
 if TYPE_CHECKING:
     import pinocchio as pin
 
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 KINDS = ("revolute", "continuous", "prismatic")
 
 
-class RobotError(ValueError):
+class RobotError(CoverableError):
     """A robot that cannot be used as asked: what was wrong, where, and what would do."""
 
 
@@ -117,7 +119,7 @@ class Robot:
                     "above the upper one (rad or m)"
                 )
         if faults:
-            raise RobotError(f"robot {self.name!r}: " + "; ".join(faults))
+            raise RobotError(faults, f"robot {self.name!r}")
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle as a call of the constructor (mapping proxies do not pickle)."""

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import ArgumentError, CoverableError
+
 if TYPE_CHECKING:
     from surfaces.cells import Cells
 
@@ -17,7 +19,7 @@ Side = Literal["inside", "outside"]
 TURN_TOLERANCE = 1e-9  # [rad]: a range this close to a full turn is one
 
 
-class SurfaceError(ValueError):
+class SurfaceError(CoverableError):
     """A surface that cannot be built as asked: what was wrong, where, and what would do."""
 
 
@@ -90,7 +92,7 @@ class Surface(ABC):
         """The feet of `points` (..., 3) m on the surface; see `ClosestPoint`.
 
         Raises:
-            ValueError: `points` does not end in an axis of length 3.
+            ArgumentError: `points` does not end in an axis of length 3.
         """
 
     @abstractmethod
@@ -148,11 +150,11 @@ def points_of(points: ArrayLike) -> NDArray[np.float64]:
     """Points as an array (..., 3).
 
     Raises:
-        ValueError: they do not end in an axis of length 3.
+        ArgumentError: they do not end in an axis of length 3.
     """
     array = np.asarray(points, dtype=float)
     if array.shape[-1:] != (3,):
-        raise ValueError(f"points must have shape (..., 3), got {array.shape}")
+        raise ArgumentError(f"points must have shape (..., 3), got {array.shape}")
     return array
 
 

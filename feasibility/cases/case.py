@@ -19,7 +19,6 @@ from feasibility.cases.surface_table import (
     read_surface,
 )
 from feasibility.cases.table_reader import (
-    BuildError,
     CaseError,
     Fault,
     alternatives,
@@ -89,10 +88,10 @@ class Case:
             faults.append(Fault("robot", str(error)))
         try:
             cells = self.surface.cut()
-        except BuildError as error:
-            faults.append(error.fault)
+        except CaseError as error:
+            faults += error.faults
         if robot is None or cells is None:
-            raise CaseError(self.name, faults)
+            raise CaseError(faults, self.name)
         return Setup(robot, cells, self.task, self.search)
 
     def to_tables(self) -> Tables:
@@ -136,7 +135,7 @@ class Case:
         try:
             tables = parse_toml(text)
         except TomlError as error:
-            raise CaseError(name, [Fault("", str(error))]) from error
+            raise CaseError(str(error), name) from error
         make_absolute(tables, base_dir)
         return _from_tables(tables, name, overrides)
 
@@ -172,24 +171,18 @@ def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = (
         guess = close(name, known)
         hint = f"did you mean {guess}? " if guess else ""
         raise CaseError(
+            f"is neither a built-in case nor a file; {hint}`coverable cases` lists the built-in "
+            "ones",
             shown_path(name),
-            [
-                Fault(
-                    "",
-                    f"is neither a built-in case nor a file; {hint}`coverable cases` lists the "
-                    "built-in ones",
-                )
-            ],
         )
     try:
         data = read_regular(name, LARGEST_FILE, "a case file (TOML)")
         text = data.decode("utf-8-sig")
     except FileError as error:
-        source, _, message = str(error).partition(": ")
-        raise CaseError(source, [Fault("", message)]) from error
+        raise CaseError(error.faults, error.source) from error
     except UnicodeDecodeError as error:
         message = f"is not UTF-8 text (byte {error.start}); expected a case file (TOML)"
-        raise CaseError(shown_path(name), [Fault("", message)]) from error
+        raise CaseError(message, shown_path(name)) from error
     return Case.from_toml(text, os.path.dirname(os.path.abspath(name)), shown_path(name), overrides)
 
 
@@ -236,7 +229,7 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
         part = surface or named_file(tables["surface"])
         faults += faults_of_building(part) if part is not None else []
     if faults or robot is None or surface is None or task is None or search is None:
-        raise CaseError(name, faults)
+        raise CaseError(faults, name)
     return Case(robot, surface, task, search, name)
 
 

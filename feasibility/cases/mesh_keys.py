@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from feasibility.cases.patch_keys import of_file
-from feasibility.cases.table_reader import BuildError, Fault, Section, is_number, shown
+from feasibility.cases.table_reader import CaseError, Fault, Section, is_number, shown
 
 if TYPE_CHECKING:
     from surfaces.meshes import MeshSurface, TriangleMesh
@@ -70,7 +70,7 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
         pose: `side`, `position` and `rpy_deg`.
 
     Raises:
-        BuildError: the file cannot be used, or nothing is left of it.
+        CaseError: the file cannot be used, or nothing is left of it.
     """
     from surfaces import SurfaceError
     from surfaces.meshes import mesh
@@ -80,7 +80,7 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
     try:
         triangles = read_mesh(file, values.get("scale"))
     except SurfaceError as error:
-        raise BuildError(Fault("surface.file", of_file(file, str(error)))) from error
+        raise CaseError(Fault("surface.file", of_file(file, str(error)))) from error
     for key, take in _parts().items():
         if key in values:
             with _faults_of(key):
@@ -93,7 +93,7 @@ def cut_mesh(surface: MeshSurface, count: int | None, size: float | None) -> Mes
     """Cut a mesh into cells, by their number or their size (m).
 
     Raises:
-        BuildError: it cannot be cut so.
+        CaseError: it cannot be cut so.
     """
     with _faults_of("cells" if size is None else "cell_size"):
         return surface.cells(count=count, size=size)
@@ -121,7 +121,7 @@ def _faults_of(key: str) -> Iterator[None]:
     """Turn a fault of a surface into one of a key of the case, in the words of the case.
 
     Raises:
-        BuildError: what happens inside is a fault.
+        CaseError: what happens inside is a fault.
     """
     from surfaces import SurfaceError
 
@@ -130,7 +130,7 @@ def _faults_of(key: str) -> Iterator[None]:
     except SurfaceError as error:
         message = re.sub(r"\bsize\b(?= = )", "cell_size", str(error))
         message = re.sub(r"\bcount\b(?= = )", "cells", message)
-        raise BuildError(Fault(f"surface.{key}" if key else "surface", message)) from error
+        raise CaseError(Fault(f"surface.{key}" if key else "surface", message)) from error
 
 
 def _scale(section: Section) -> float | None:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from feasibility.cases.table_reader import DEG, METRES, BuildError, Fault, Pair, Section, shown
+from feasibility.cases.table_reader import DEG, METRES, CaseError, Fault, Pair, Section, shown
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -226,7 +226,7 @@ def build_patch(
         place: where in the case, for messages.
 
     Raises:
-        BuildError: the values describe no patch; its message speaks of the case's keys.
+        CaseError: the values describe no patch; its message speaks of the case's keys.
     """
     import surfaces
 
@@ -242,11 +242,11 @@ def build_patch(
     except surfaces.SurfaceError as error:
         message = str(error).removeprefix(f"{kind}: ")
         if file is not None:
-            raise BuildError(Fault(f"{place}.file", of_file(file, message))) from error
+            raise CaseError(Fault(f"{place}.file", of_file(file, message))) from error
         for key, entry in keys.items():
             if entry.argument != key:
                 message = re.sub(rf"\b{entry.argument}\b", key, message)
-        raise BuildError(Fault(place, message)) from error
+        raise CaseError(Fault(place, message)) from error
     return made
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from feasibility.cases.patch_keys import MOST_CELLS, PATCHES, build_patch, read_grid, read_patch
 from feasibility.cases.surface_kinds import OWN_KEYS, foreign_keys
-from feasibility.cases.table_reader import ORIGIN, BuildError, Fault, Section, Triple
+from feasibility.cases.table_reader import ORIGIN, CaseError, Fault, Section, Triple
 
 if TYPE_CHECKING:
     from surfaces.patches import Patch
@@ -42,7 +42,7 @@ class PiecePart:
             place: of the entry in the case, for messages.
 
         Raises:
-            BuildError: the values describe no patch.
+            CaseError: the values describe no patch.
         """
         pose = {"position": self.position, "rpy_deg": self.rpy_deg}
         return build_patch(self.kind, self.values, pose, place)
@@ -79,7 +79,7 @@ def build_pieces(values: Mapping[str, Any], pose: Mapping[str, Any]) -> Piecewis
         pose: `side`, `position` and `rpy_deg`.
 
     Raises:
-        BuildError: a piece cannot be built, or they cannot be joined.
+        CaseError: a piece cannot be built, or they cannot be joined.
     """
     from surfaces import SurfaceError
     from surfaces.piecewise import piecewise
@@ -92,21 +92,21 @@ def build_pieces(values: Mapping[str, Any], pose: Mapping[str, Any]) -> Piecewis
         return piecewise(patches, gap=values.get("gap"), **pose)
     except SurfaceError as error:
         message = str(error).removeprefix("piecewise: ")
-        raise BuildError(Fault("surface", message)) from error
+        raise CaseError(Fault("surface", message)) from error
 
 
 def cut_pieces(surface: Piecewise, values: Mapping[str, Any]) -> PieceCells:
     """Cut each piece into its grid.
 
     Raises:
-        BuildError: they cannot be cut so.
+        CaseError: they cannot be cut so.
     """
     from surfaces import SurfaceError
 
     try:
         return surface.cells([piece.cells for piece in values["pieces"]])
     except SurfaceError as error:
-        raise BuildError(Fault("surface.pieces", str(error))) from error
+        raise CaseError(Fault("surface.pieces", str(error))) from error
 
 
 def _piece(whole: Section, k: int, entry: Any) -> PiecePart | None:
@@ -135,7 +135,7 @@ def _piece(whole: Section, k: int, entry: Any) -> PiecePart | None:
     if "file" not in values:
         try:
             part.build(place)
-        except BuildError as error:
-            whole.faults.append(error.fault)
+        except CaseError as error:
+            whole.faults += error.faults
             return None
     return part

@@ -11,7 +11,7 @@ from feasibility.cases.mesh_keys import build_mesh, cut_mesh, read_count, read_m
 from feasibility.cases.patch_keys import PATCHES, build_patch, read_grid, read_patch
 from feasibility.cases.piecewise_keys import PiecePart, build_pieces, cut_pieces, read_pieces
 from feasibility.cases.surface_kinds import OWN_KEYS, foreign_keys
-from feasibility.cases.table_reader import ORIGIN, BuildError, Fault, Section, Triple
+from feasibility.cases.table_reader import ORIGIN, CaseError, Fault, Section, Triple
 
 if TYPE_CHECKING:
     from surfaces import Cells, Surface
@@ -61,7 +61,7 @@ class SurfacePart:
         """Build the surface; its file, if it has one, is read.
 
         Raises:
-            BuildError: the numbers or the file describe no surface.
+            CaseError: the numbers or the file describe no surface.
         """
         pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
         if self.kind == "mesh":
@@ -74,7 +74,7 @@ class SurfacePart:
         """Build the surface and cut it into its cells.
 
         Raises:
-            BuildError: there is no such surface, or it cannot be cut so.
+            CaseError: there is no such surface, or it cannot be cut so.
         """
         surface = self.build()
         if self.kind == "mesh":
@@ -120,8 +120,8 @@ def faults_of_building(part: SurfacePart) -> list[Fault]:
     """What building the surface would say."""
     try:
         part.build()
-    except BuildError as error:
-        return [error.fault]
+    except CaseError as error:
+        return list(error.faults)
     return []
 
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
-MOST_SHOWN = 50  # faults in one message
+from coverable_errors import CoverableError, Fault, alternatives, close, is_number, shown
+
 MOST_GUESSES = 20  # unknown keys for which a known one is looked up
 LARGEST_WHOLE = 2**63 - 1
 DEG = "degrees"
@@ -16,76 +15,15 @@ METRES = "metres"
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 
+Made = TypeVar("Made")
+
 ORIGIN: Triple = (0.0, 0.0, 0.0)
 
 
-class Fault(NamedTuple):
-    """One thing that is wrong with a case."""
+class CaseError(CoverableError):
+    """A case that cannot be used: all that is wrong with it, together, each with its key."""
 
-    key: str
-    """Where: `table.key`, or the table; empty for the file as a whole."""
-    message: str
-    """What was expected, and what was found."""
-
-
-class CaseError(ValueError):
-    """A case that cannot be used: all that is wrong with it, together.
-
-    Attributes:
-        source: the file or name of the case.
-        faults: what is wrong, each with its key.
-    """
-
-    def __init__(self, source: str, faults: Iterable[Fault]) -> None:
-        """All faults of the case that came from `source`."""
-        self.source = source
-        self.faults = tuple(faults)
-        lines = [f"{key}: {message}" if key else message for key, message in self.faults]
-        if len(lines) > MOST_SHOWN:
-            lines[MOST_SHOWN:] = [f"... and {len(lines) - MOST_SHOWN} more"]
-        if len(lines) == 1:
-            super().__init__(f"{source}: {lines[0]}")
-        else:
-            rows = "".join(f"\n  {line}" for line in lines)
-            super().__init__(f"{source}: {len(self.faults)} faults:{rows}")
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor."""
-        return (CaseError, (self.source, self.faults))
-
-
-class BuildError(ValueError):
-    """One thing that came to light only when a part of a case was built, with its key."""
-
-    def __init__(self, fault: Fault) -> None:
-        """An error that carries `fault`."""
-        self.fault = fault
-        super().__init__(f"{fault.key}: {fault.message}")
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor."""
-        return (BuildError, (self.fault,))
-
-
-def shown(value: Any) -> str:
-    """A value for a message: on one line, and short."""
-    if isinstance(value, bool):
-        return str(value).lower()  # as TOML writes it
-    try:
-        text = repr(value)
-    except ValueError:  # more digits than Python prints
-        return "a whole number of thousands of digits"
-    return text if len(text) <= 80 else text[:60] + "..." + text[-15:]
-
-
-def is_number(value: Any) -> bool:
-    """True for a finite real number; truth values are none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    try:
-        return math.isfinite(float(value))
-    except OverflowError:
-        return False
+    after_key = ": "
 
 
 class Section:
@@ -130,6 +68,31 @@ class Section:
     def wrong(self, key: str, expected: str) -> None:
         """Keep the fault that the value of `key` is not what is expected."""
         self.fault(key, f"must be {expected}, got {shown(self.table[key])}")
+
+    def take(self, *keys: str) -> dict[str, Any]:
+        """The values of some keys as they are written, without those that are not there."""
+        return {key: self.table[key] for key in keys if self.has(key)}
+
+    def make(
+        self,
+        build: Callable[..., Made],
+        arguments: Mapping[str, Any],
+        names: Mapping[str, str] = {},
+    ) -> Made | None:
+        """What a constructor makes of the values; None after faults, which get this table's keys.
+
+        Args:
+            build: raises a `CoverableError` with everything that is wrong with its arguments.
+            arguments: of the constructor.
+            names: the key of each argument, where it differs.
+        """
+        if not self.is_table:
+            return None
+        try:
+            return build(**arguments)
+        except CoverableError as error:
+            self.faults += [fault.renamed(names, self.name) for fault in error.faults]
+            return None
 
     def number(self, key: str, expected: str, *, required: bool = False) -> float | None:
         """A finite number."""
@@ -247,18 +210,3 @@ def is_text(value: Any) -> bool:
 def printable(key: str) -> str:
     """A key for a message."""
     return key if key.isprintable() and 0 < len(key) <= 60 else shown(key)
-
-
-def close(value: Any, options: Sequence[str]) -> str:
-    """The option that `value` is most like, quoted; empty where none is."""
-    if not isinstance(value, str) or len(value) > 60:
-        return ""
-    same = [option for option in options if option.lower() == value.lower()]
-    found = same or difflib.get_close_matches(value, options, n=1, cutoff=0.6)
-    return f'"{found[0]}"' if found else ""
-
-
-def alternatives(options: Sequence[str]) -> str:
-    """'a, b or c'."""
-    *front, last = options
-    return f"{', '.join(front)} or {last}" if front else last

@@ -8,11 +8,13 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from coverable_errors import CoverableError
+
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
 _ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
-class TomlError(ValueError):
+class TomlError(CoverableError):
     """Text that is not the TOML it should be."""
 
 

@@ -68,7 +68,7 @@ def check_outputs(outputs: Mapping[str, str | None]) -> None:
             faults.append(f"{flag} {shown_path(path)}: is the file of {taken[place]} too")
         taken[place] = flag
     if faults:
-        raise FileError("\n  ".join(faults))
+        raise FileError(faults)
 
 
 def write_view(drawn: View, path: str) -> None:

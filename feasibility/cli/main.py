@@ -13,6 +13,7 @@ import time
 from collections.abc import Sequence
 from typing import NoReturn
 
+from coverable_errors import CoverableError
 from feasibility.cli import check_command as commands
 from feasibility.cli.arguments import add_case, add_jobs, add_studies
 from feasibility.cli.console import prepare, say, tell
@@ -131,7 +132,7 @@ def _failed(error: Exception) -> int:
         import traceback
 
         tell("".join(traceback.format_exception(error)))
-    if isinstance(error, _expected()):
+    if isinstance(error, CoverableError):
         tell(f"coverable: {error}")
     elif isinstance(error, MemoryError):
         tell("coverable: there is not enough memory; use fewer cells")
@@ -156,26 +157,6 @@ def _failed(error: Exception) -> int:
             f"Run the command again with {TRACEBACK}=1, and report what it prints."
         )
     return commands.BAD_INPUT
-
-
-def _expected() -> tuple[type[Exception], ...]:
-    """The errors that say what is wrong with the input."""
-    from feasibility.safe_files import FileError
-
-    found: list[type[Exception]] = [FileError]
-    # An error of a module that was never imported cannot have been raised.
-    for module, name in (
-        ("feasibility.cases.table_reader", "CaseError"),
-        ("feasibility.paths.order", "PathError"),
-        ("feasibility.placement.region", "PlacementError"),
-        ("feasibility.studies.workers", "WorkersError"),
-        ("feasibility.results.result_file", "ResultError"),
-        ("robots.robot", "RobotError"),
-        ("surfaces.surface", "SurfaceError"),
-    ):
-        if module in sys.modules:
-            found.append(getattr(sys.modules[module], name))
-    return tuple(found)
 
 
 def _say_nothing(_: sys.UnraisableHookArgs) -> None:

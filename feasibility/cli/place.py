@@ -9,6 +9,7 @@ import time
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from coverable_errors import Fault
 from feasibility.cli.check_command import write_view
 from feasibility.cli.console import Bar, interruptible, say, tell
 from feasibility.cli.study_compare import check_files
@@ -114,11 +115,11 @@ def _reporting(bar: Bar, settle: Any) -> Progress:
 
 def _check_outputs(given: str, outputs: Mapping[str, str | None]) -> None:
     """Refuse outputs that could not be written, before the search and not after it."""
-    faults = []
+    faults = list[str | Fault]()
     try:
         check_files(given, outputs)
     except FileError as error:
-        faults.append(str(error))
+        faults += error.faults
     picture = outputs["--map"]
     if picture is not None and not picture.lower().endswith(PICTURES):
         faults.append(
@@ -126,7 +127,7 @@ def _check_outputs(given: str, outputs: Mapping[str, str | None]) -> None:
             f"{', '.join(PICTURES)}"
         )
     if faults:
-        raise FileError("\n  ".join(faults))
+        raise FileError(faults)
 
 
 def _say(

@@ -59,7 +59,7 @@ def asked(
         if check_first is not None:
             check_first()
         if only_complete and case.search.method != "complete":
-            raise CaseError(case.name, [Fault("search.method", only_complete)])
+            raise CaseError(Fault("search.method", only_complete), case.name)
         with compiling_notice():  # cutting a mesh has kernels of its own
             setup = case.build()
         settle()

@@ -96,7 +96,7 @@ def check_files(given: str, outputs: Mapping[str, str | None]) -> None:
         if path is not None and both_exist and os.path.samefile(given, path):
             faults.append(f"{flag} {shown_path(path)}: is what is read; give another name")
     if faults:
-        raise FileError("\n  ".join(faults))
+        raise FileError(faults)
 
 
 def _page(asked: Study, rows: tuple[Row, ...]) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.division.division import Division, Plan
 from feasibility.search import Progress, Search
 from feasibility.task import Task
@@ -43,7 +44,7 @@ def divide(
         progress: called as progress(done, total, text) some times a second.
 
     Raises:
-        ValueError: the search is the greedy one, which keeps a single tree of motions.
+        ArgumentError: the search is the greedy one, which keeps a single tree of motions.
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
@@ -56,7 +57,7 @@ def divide(
     """
     search = Search() if search is None else search
     if search.method != "complete":
-        raise ValueError(
+        raise ArgumentError(
             f"a division needs search.method 'complete', got {search.method!r}: the greedy search "
             "keeps one tree of motions, not all components"
         )

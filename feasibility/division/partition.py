@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.division.connected_cover import connected_cover
 from feasibility.division.connected_labels import Bools, Ints, Labels, pieces_of
 from feasibility.division.set_covering import set_cover
@@ -72,7 +73,7 @@ def fewest_patches(
         Both answers. Cells that are needed but that nothing covers are left out.
 
     Raises:
-        ValueError: the shapes do not fit together, or a pair names a cell that does not exist.
+        ArgumentError: the shapes do not fit together, or a pair names a cell that does not exist.
 
     Example:
         >>> covers = np.array([[1, 1, 0], [0, 1, 1]], dtype=bool)
@@ -83,11 +84,11 @@ def fewest_patches(
     covers, needed = np.asarray(covers, dtype=bool), np.asarray(needed, dtype=bool)
     pairs = np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
     if covers.ndim != 2 or needed.shape != covers.shape[1:]:
-        raise ValueError(
+        raise ArgumentError(
             f"covers must be (K, N) and needed (N,), got {covers.shape} and {needed.shape}"
         )
     if not ((pairs >= 0) & (pairs < len(needed))).all():
-        raise ValueError(f"pairs must name cells 0 .. {len(needed) - 1}")
+        raise ArgumentError(f"pairs must name cells 0 .. {len(needed) - 1}")
     now = time.monotonic()
     left_out = needed & ~covers.any(axis=0)
     covers = covers & needed

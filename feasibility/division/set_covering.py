@@ -17,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
+
 ROUNDING = 1e-6  # how far HiGHS's numbers may be off a whole one
 
 
@@ -54,11 +56,11 @@ def set_cover(covers: NDArray[np.bool_], time_limit: float) -> Chosen:
         time_limit: s; running out leaves a gap between the number of rows and the bound.
 
     Raises:
-        ValueError: an element is in no set.
+        ArgumentError: an element is in no set.
     """
     if not covers.any(axis=0).all():
         missing = np.flatnonzero(~covers.any(axis=0))
-        raise ValueError(f"element {missing[0]} (of {len(missing)}) is in no set")
+        raise ArgumentError(f"element {missing[0]} (of {len(missing)}) is in no set")
     if covers.shape[1] == 0:
         return Chosen((), 0)
     kept = undominated(covers)

@@ -10,6 +10,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.paper import algorithm_1 as jcells
 from feasibility.paper.jcell_grid import Grid, cell_of, place_tool
 from feasibility.paper.jcell_steps import Steps
@@ -93,7 +94,9 @@ class JSpace:
         search = Search(method="greedy") if search is None else search
         origin = np.array(start, dtype=float)
         if origin.shape != (robot.n,) or not np.isfinite(origin).all():
-            raise ValueError(f"start must be {robot.n} finite joint values, got {origin.tolist()}")
+            raise ArgumentError(
+                f"start must be {robot.n} finite joint values, got {origin.tolist()}"
+            )
         self.start = origin
         self.steps = Steps.of(robot, cells.closed_form, task, search) if steps is None else steps
         size = self.steps.size
@@ -208,15 +211,15 @@ def continuity(
         search: step, moves, cap and time limit.
 
     Raises:
-        ValueError: q is not a feasible configuration over one of the cells, or the target is no
+        ArgumentError: q is not a feasible configuration over one of the cells, or the target is no
             cell.
     """
     space = JSpace(robot, cells, task, q, search)
     here = np.zeros(robot.n, dtype=np.int32)
     if not 0 <= target_cell < len(cells):
-        raise ValueError(f"target_cell must be 0 to {len(cells) - 1}, got {target_cell}")
+        raise ArgumentError(f"target_cell must be 0 to {len(cells) - 1}, got {target_cell}")
     if space.cell_of(here) < 0:
-        raise ValueError("q must satisfy limits, cone and tolerance over one of the cells")
+        raise ArgumentError("q must satisfy limits, cone and tolerance over one of the cells")
     limit = math.inf if search is None or search.time_limit is None else search.time_limit
     return space.continuity(here, target_cell, time.perf_counter() + limit)
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.notices import compiling_notice
 from feasibility.paper.algorithm_2 import Tree, tree_search
 from feasibility.paper.continuity import JSpace
@@ -91,7 +92,7 @@ def greedy_check(
             are searched over the middle cell, or the next that has some; one for each branch.
 
     Raises:
-        ValueError: `start` is not a feasible configuration over one of the cells.
+        ArgumentError: `start` is not a feasible configuration over one of the cells.
     """
     search = Search(method="greedy") if search is None else search
     called = time.perf_counter()
@@ -107,7 +108,9 @@ def greedy_check(
         if at >= 0:
             run.add(tree_search(space, cells, at, deadline, progress))
         elif start is not None:
-            raise ValueError("start must satisfy limits, cone and tolerance over one of the cells")
+            raise ArgumentError(
+                "start must satisfy limits, cone and tolerance over one of the cells"
+            )
         if _touches_all(run, cells) or not run.complete:
             break
     touched_all = _touches_all(run, cells)

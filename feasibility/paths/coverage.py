@@ -150,7 +150,7 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
             f"cell {_listed(missed)} cannot be reached by the motion that covers most; leave it out"
         )
     if faults:
-        raise PathError("; ".join(faults))
+        raise PathError(faults)
     needed = np.zeros(total, dtype=bool)
     needed[within] = True
     return needed

@@ -16,6 +16,7 @@ from scipy.sparse.csgraph import dijkstra, minimum_spanning_tree
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist, squareform
 
+from coverable_errors import CoverableError
 from feasibility.paths.two_opt import improved, tour_length
 from surfaces import Cells
 
@@ -29,7 +30,7 @@ MOST_SPANNED = 3000  # cells whose smallest spanning tree is found; beyond, the 
 TIE = 1e-9  # [1], share of a length below which two lengths are alike
 
 
-class PathError(ValueError):
+class PathError(CoverableError):
     """A path or a trajectory that cannot be made as asked: why, and what would do."""
 
 

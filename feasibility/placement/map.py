@@ -77,7 +77,7 @@ def placement_map(
     if len(counts) != len(names) or min(counts, default=0) < 1:
         faults.append(f"shape: expected {len(names)} whole numbers >= 1, got {counts}")
     if faults:
-        raise PlacementError("map: " + "; ".join(faults))
+        raise PlacementError(faults, "map")
     if len(names) == 1:
         other = next(name for name in AXES if name not in names)
         names, counts = (*names, other), [*counts, 1]

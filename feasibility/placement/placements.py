@@ -201,7 +201,7 @@ def _check_settings(
     if time_limit is not None and not 0.0 < time_limit < np.inf:
         faults.append(f"time_limit: expected a finite number > 0 (s), got {time_limit}")
     if faults:
-        raise PlacementError("; ".join(faults))
+        raise PlacementError(faults)
 
 
 def _beyond(

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import CoverableError
 from surfaces import Cells, Surface, rotation_from_rpy
 from surfaces.patches import GridCells
 
@@ -22,7 +23,7 @@ DIGITS = 6  # of the numbers of a pose that is tried
 UPRIGHT = 1e-9  # [1], cosine of the pitch below which roll and yaw turn about one axis
 
 
-class PlacementError(ValueError):
+class PlacementError(CoverableError):
     """A region, or a question about it, that makes no sense: what was wrong, and what would do."""
 
 
@@ -103,7 +104,7 @@ class Region:
         if not faults and not self.varies:
             faults.append(f"nothing varies; give a range of {', '.join(AXES)} whose ends differ")
         if faults:
-            raise PlacementError("region: " + "; ".join(faults))
+            raise PlacementError(faults, "region")
 
     @staticmethod
     def around(pose: Pose, ranges: Mapping[str, Any]) -> Region:
@@ -129,7 +130,7 @@ class Region:
                 continue
             held[name] = (low, high)
         if faults:
-            raise PlacementError("region: " + "; ".join(faults))
+            raise PlacementError(faults, "region")
         return Region(tuple(held[name] for name in AXES))
 
     @property

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.division import set_cover
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
@@ -72,7 +73,7 @@ def fewest_stations(
         time_limit: s, for the proof of the optimum.
 
     Raises:
-        ValueError: the tables do not fit together.
+        ArgumentError: the tables do not fit together.
 
     Example:
         >>> table = [[1, 1, 0, 0], [0, 0, 1, 0], [0, 1, 1, 1]]
@@ -82,7 +83,7 @@ def fewest_stations(
     """
     table = np.asarray(covers, dtype=bool)
     if table.ndim != 2:
-        raise ValueError(f"covers must have shape (K, N), got {table.shape}")
+        raise ArgumentError(f"covers must have shape (K, N), got {table.shape}")
     owners = [(row, 0) for row in range(len(table))]
     return _chosen(table, owners, needed, time_limit)
 
@@ -102,7 +103,7 @@ def stations_of(
         time_limit: s, for the proof of the optimum.
 
     Raises:
-        ValueError: the outcomes are of surfaces with different numbers of cells, or damaged.
+        ArgumentError: the outcomes are of surfaces with different numbers of cells, or damaged.
     """
     from feasibility.studies import cells_of
 
@@ -116,7 +117,7 @@ def stations_of(
             owners.append((row, component))
     if len(counts) > 1:
         listed = ", ".join(str(count) for count in sorted(counts))
-        raise ValueError(f"the outcomes are of different surfaces: they have {listed} cells")
+        raise ArgumentError(f"the outcomes are of different surfaces: they have {listed} cells")
     n = counts.pop() if counts else (0 if needed is None else len(np.asarray(needed)))
     return _chosen(np.array(rows, dtype=bool).reshape(len(rows), n), owners, needed, time_limit)
 
@@ -131,7 +132,9 @@ def _chosen(
     n = table.shape[1]
     wanted = np.ones(n, dtype=bool) if needed is None else np.asarray(needed, dtype=bool)
     if wanted.shape != (n,):
-        raise ValueError(f"needed must have shape ({n},) as covers has cells, got {wanted.shape}")
+        raise ArgumentError(
+            f"needed must have shape ({n},) as covers has cells, got {wanted.shape}"
+        )
     can = wanted & table.any(axis=0)
     found = set_cover(table[:, can], time_limit)
     rows = sorted(found.rows, key=lambda row: (-int((table[row] & can).sum()), row))

@@ -18,6 +18,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import CoverableError
 from coverable_files import size
 from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
 
@@ -30,7 +31,7 @@ MOST_MEMBERS = 64
 Dtype = type[np.float64] | type[np.int64]
 
 
-class ArchiveError(ValueError):
+class ArchiveError(CoverableError):
     """A file that does not hold what it should."""
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError, CoverableError, worded
 from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, shown
 from feasibility.results.archive import Archive, ArchiveError, write_archive
 from feasibility.results.result_fields import Fields
@@ -33,7 +34,7 @@ FORMAT = "coverable-result"
 FORMAT_VERSION = 2  # 1 had no `places`, and the kinds `CLOSED_FORM_KINDS` alone
 
 
-class ResultError(ValueError):
+class ResultError(CoverableError):
     """A result file that cannot be written or read: which one, why, and what would do."""
 
 
@@ -228,10 +229,9 @@ def _task(fields: Fields) -> Task:
     tolerance = None if fields.entries.get("tolerance") is None else fields.number("tolerance")
     try:
         return Task(fields.number("standoff"), fields.number("cone_deg"), tolerance)
-    except ArchiveError:
-        raise
-    except ValueError as error:
-        raise fields.archive.error(f"meta.json: task.{error}") from error
+    except ArgumentError as error:
+        text = "; ".join(worded(fault.renamed({}, "task")) for fault in error.faults)
+        raise fields.archive.error(f"meta.json: {text}") from error
 
 
 def _causes(fields: Fields, count: int) -> tuple[Cause, ...]:

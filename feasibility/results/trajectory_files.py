@@ -62,9 +62,9 @@ def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     try:
         return read(data.decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise FileError(f"{shown_path(path)}: is not text: {error.reason}") from error
+        raise FileError(f"is not text: {error.reason}", shown_path(path)) from error
     except ValueError as error:
-        raise FileError(f"{shown_path(path)}: {error}") from error
+        raise FileError(str(error), shown_path(path)) from error
 
 
 def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.checking import check
 from feasibility.search import Progress, Search
 from feasibility.sensitivity.parameters import Quantity, Setup, quantities
@@ -97,7 +98,7 @@ def explain(
         The verdict of the case as it stands, and the thresholds.
 
     Raises:
-        ValueError: the method is the greedy one, whose "no" does not depend on the case alone.
+        ArgumentError: the method is the greedy one, whose "no" does not depend on the case alone.
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
@@ -110,7 +111,7 @@ def explain(
     """
     search = Search() if search is None else search
     if search.method != "complete":
-        raise ValueError(
+        raise ArgumentError(
             f"explain asks the complete search: method must be 'complete', got {search.method!r}"
         )
 

@@ -75,11 +75,10 @@ def load_study(path: str | os.PathLike[str]) -> Study:
     try:
         text = read_regular(path, LARGEST_FILE, "a study file (TOML)").decode("utf-8-sig")
     except FileError as error:
-        source, _, message = str(error).partition(": ")
-        raise CaseError(source, [Fault("", message)]) from error
+        raise CaseError(error.faults, error.source) from error
     except UnicodeDecodeError as error:
         message = f"is not UTF-8 text (byte {error.start}); expected a study file (TOML)"
-        raise CaseError(name, [Fault("", message)]) from error
+        raise CaseError(message, name) from error
     return read_study(text, os.path.dirname(os.path.abspath(path)), name)
 
 
@@ -108,11 +107,11 @@ def read_study(
     try:
         document = parse_toml(text)
     except TomlError as error:
-        raise CaseError(name, [Fault("", str(error))]) from error
+        raise CaseError(str(error), name) from error
     faults: list[Fault] = []
     _no_dates("", document, faults)
     if faults:  # nothing else of such a document can be written down again
-        raise CaseError(name, faults)
+        raise CaseError(faults, name)
     description = document.get("description", "")
     if not isinstance(description, str):
         faults.append(Fault("description", f"must be a sentence, got {shown(description)}"))
@@ -128,7 +127,7 @@ def read_study(
     base = _read_base(document["base"], base_dir, faults) if "base" in document else None
     varied = read_variation(document["vary"], faults) if "vary" in document else None
     if base is None or varied is None:
-        raise CaseError(name, faults)
+        raise CaseError(faults, name)
     varied = _absolute(varied, base_dir)
     if varied.size > MOST_TASKS:
         faults.append(Fault("vary", f"makes {varied.size} tasks; at most {MOST_TASKS} will do"))
@@ -138,10 +137,10 @@ def read_study(
     else:
         _check(base, varied, faults)
     if faults:
-        raise CaseError(name, faults)
+        raise CaseError(faults, name)
     tasks = tuple(Frames(base, varied).tasks(faults))
     if faults:
-        raise CaseError(name, faults)
+        raise CaseError(faults, name)
     labels = (*(axis.label for axis in varied.axes), *(span.label for span in varied.ranges))
     return Study(name, description, tasks, labels)
 
@@ -174,7 +173,7 @@ def _read_base(
             case = load_case(path if is_file else name)
             tables = as_read(case.to_tables())
         except CaseError as error:
-            faults += [Fault(_join("base.case", key), message) for key, message in error.faults]
+            faults += [fault._replace(key=_join("base.case", fault.key)) for fault in error.faults]
     own = {}
     for title in TITLES:
         if section.has(title) and isinstance(section.table[title], Mapping):
@@ -231,15 +230,16 @@ def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
         return faults_of(tables)
 
     known = tried(-1, None)
-    for key, message in known:
+    for key, message in ((fault.key, fault.message) for fault in known):
         places = [f"{e.place}[0]" for e, _ in entries if _covers(e.path, key)]
         faults.append(Fault(_join(places[0], key) if places else f"base.{key}", message))
     for n, (entry, values) in enumerate(entries):
         alike: dict[tuple[str, str], list[int]] = {}
         for k, value in enumerate(values[1:], start=1):
-            for key, message in tried(n, value):
-                if (key, message) in known:
+            for fault in tried(n, value):
+                if fault in known:
                     continue
+                key, message = fault.key, fault.message
                 same = alike.setdefault((key, cause_of(message)), [])
                 same.append(k)
                 if len(same) <= MOST_ALIKE:

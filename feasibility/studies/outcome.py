@@ -71,7 +71,7 @@ def cut_of(case: Case) -> Cells:
     """The cells of a case; a mesh is read and cut once, and then placed.
 
     Raises:
-        BuildError: there is no such surface, or it cannot be cut so.
+        CaseError: there is no such surface, or it cannot be cut so.
     """
     from surfaces import rotation_from_rpy
     from surfaces.meshes.cells import MeshCells

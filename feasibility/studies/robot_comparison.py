@@ -164,13 +164,13 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
             case_here = Case.from_toml(toml_document(tables))
             arm_of(case_here)
         except CaseError as error:
-            faults += [Fault(f"{place}: {key}", text) for key, text in error.faults]
+            faults += [fault._replace(key=f"{place}: {fault.key}") for fault in error.faults]
         except ValueError as error:  # RobotError
             faults.append(Fault(place, str(error)))
         else:
             made.append({**tables, "robot": {**tables["robot"], "name": name}})
     if faults:
-        raise CaseError(case.name, faults)
+        raise CaseError(faults, case.name)
     return made
 
 

@@ -15,6 +15,7 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
+from coverable_errors import CoverableError
 from feasibility.notices import compiling_notice, notify
 from feasibility.roadmap import SharedLock, warm_up, warm_up_in_turn
 
@@ -22,7 +23,7 @@ ATTEMPTS = 3  # to start worker processes anew
 LOST = "the connection to the workers was lost; what was finished is kept, run again to continue"
 
 
-class WorkersError(ValueError):
+class WorkersError(CoverableError):
     """Workers that cannot be had, or were lost for good; what would do."""
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.verdict import Walk
 
 Array = NDArray[np.float64]
@@ -17,7 +18,7 @@ class Trajectory:
     """k samples of a motion of n joints, from rest to rest.
 
     Raises:
-        ValueError: the arrays do not fit together, a number is not finite, or the times do not
+        ArgumentError: the arrays do not fit together, a number is not finite, or the times do not
             rise from 0 or later.
     """
 
@@ -45,7 +46,7 @@ class Trajectory:
             object.__setattr__(self, name, array)
         faults = self._faults()
         if faults:
-            raise ValueError("; ".join(faults))
+            raise ArgumentError(faults, "trajectory")
 
     def _faults(self) -> list[str]:
         """All that is wrong with the arrays."""

@@ -93,7 +93,7 @@ def motion_limits(
         quickest = fastest / ACCELERATION_TIME
     faults += [text for text in (fault, second if acceleration is not None else "") if text]
     if faults:
-        raise PathError("; ".join(faults))
+        raise PathError(faults)
     return MotionLimits(fastest, quickest, speed)
 
 

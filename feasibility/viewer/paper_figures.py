@@ -13,6 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer.scene import CAUSES, CENTRES, EDGES, MISSED, START, missed_by_cause
 from robots import Kinematics
@@ -111,7 +112,7 @@ def plot_transition(verdict: Verdict, edge: tuple[int, int] | None = None) -> Pl
         edge: two neighbouring cells; default is the edge that moves a second joint most.
 
     Raises:
-        ValueError: there is no such edge, or it has no motion.
+        ArgumentError: there is no such edge, or it has no motion.
     """
     a, b = _edge(verdict, edge)
     motion = np.asarray(verdict.graph.edges[a, b]["motion"], dtype=float)
@@ -220,11 +221,13 @@ def _edge(verdict: Verdict, edge: tuple[int, int] | None) -> tuple[int, int]:
     }
     if edge is None:
         if not edges:
-            raise ValueError("the verdict's graph has no edge with a motion to draw")
+            raise ArgumentError("the verdict's graph has no edge with a motion to draw")
         return max(edges, key=lambda key: float(np.sort(np.ptp(edges[key], axis=0))[-2:].min()))
     key = (min(edge), max(edge))
     if key not in edges:
-        raise ValueError(f"G has no edge between the cells {edge[0]} and {edge[1]} with a motion")
+        raise ArgumentError(
+            f"G has no edge between the cells {edge[0]} and {edge[1]} with a motion"
+        )
     return key
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.search import Progress, Search
 from feasibility.viewer import robot as robot_visuals
@@ -128,13 +129,13 @@ def view_study(
         at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
 
     Raises:
-        ValueError: there are no rows, or not one for each task.
+        ArgumentError: there are no rows, or not one for each task.
     """
     from feasibility.reports import merit
     from feasibility.studies import arm_of, case_of, cells_of, cut_of
 
     if len(rows) == 0 or len(tasks) != len(rows):
-        raise ValueError(f"expected a row for each task, got {len(rows)} for {len(tasks)} tasks")
+        raise ArgumentError(f"expected a row for each task, got {len(rows)} for {len(tasks)} tasks")
     best = min(range(len(rows)), key=lambda k: merit(rows[k]))
     drawn = sorted(same_frame(tasks, best), key=lambda k: merit(rows[k]))
     case = case_of(dict(tasks[best].tables))

@@ -11,6 +11,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.robot import joint_paths, joint_placements
@@ -47,7 +48,7 @@ def motion_of(verdict: Verdict) -> Motion | None:
     furthest.
 
     Raises:
-        ValueError: two motions of a tree path do not join, so the verdict contradicts itself.
+        ArgumentError: two motions of a tree path do not join, so the verdict contradicts itself.
     """
     if verdict.witness is not None and len(verdict.witness.q) > 1:
         return paced(verdict.robot, verdict.witness.q, False, "covering motion")
@@ -85,7 +86,7 @@ def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
     """The motions of successive edges, each turned the way it is gone, as one walk (m, n).
 
     Raises:
-        ValueError: an edge has no motion, or a motion starts where the one before it did not end.
+        ArgumentError: an edge has no motion, or a motion starts where the one before it did not end.
     """
     rows: list[NDArray[np.float64]] = []
     for a, b in itertools.pairwise(cells):
@@ -94,7 +95,7 @@ def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
         if rows:
             gap = float(np.abs(rows[-1][-1] - motion[0]).max())
             if not gap <= JOINED:
-                raise ValueError(
+                raise ArgumentError(
                     f"the motion from cell {a} to cell {b} starts {gap:.3g} rad or m away from "
                     "where the one before it ends; the tree of this verdict is no continuous motion"
                 )

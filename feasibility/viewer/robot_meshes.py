@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import CoverableError
 from feasibility.viewer.threejs import Colour
 
 LARGEST_FILE = 200_000_000  # [byte]
@@ -17,7 +18,7 @@ CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
 GREY: Colour = (0.72, 0.74, 0.77)
 
 
-class MeshError(ValueError):
+class MeshError(CoverableError):
     """A mesh file that cannot be drawn, and why."""
 
 

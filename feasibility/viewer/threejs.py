@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import ArgumentError
+
 Command = dict[str, Any]
 Colour = tuple[float, float, float]
 """Red, green, blue, each 0 to 1."""
@@ -198,7 +200,7 @@ def _positions(points: ArrayLike) -> dict[str, Any]:
     """Points (k, 3) as a vertex attribute."""
     values = np.asarray(points, dtype=float)
     if not np.isfinite(values).all():
-        raise ValueError("points to draw must be finite; got NaN or infinity")
+        raise ArgumentError("points to draw must be finite; got NaN or infinity")
     return _array(np.round(values * _GRID) / _GRID, 3, "float32")
 
 

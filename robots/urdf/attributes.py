@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 
+from coverable_errors import CoverableError, Fault
 from robots.urdf.xml import Node, shown
 
 MAX_LENGTH = 1e4  # [m] and [rad]: nothing in a robot is larger; beyond it, numbers lose digits
@@ -21,21 +22,21 @@ class Faults:
 
     def __init__(self) -> None:
         """Start with none."""
-        self.errors: list[str] = []
+        self.errors: list[str | Fault] = []
         self.warnings: list[str] = []
         self.soft_limits: list[str] = []
         """Names of joints whose controller would stop earlier than the limits do."""
 
     def error(self, node: Node, what: str) -> None:
         """Note something that makes the robot unusable."""
-        self.errors.append(f"line {node.line}: {what}")
+        self.errors.append(Fault("", what, f"line {node.line}"))
 
     def warn(self, node: Node, what: str) -> None:
         """Note something that leaves the robot correct."""
         self.warnings.append(f"line {node.line}: {what}")
 
 
-class BadValue(ValueError):
+class BadValue(CoverableError):
     """An attribute that does not hold what it should; the message says what would do."""
 
 

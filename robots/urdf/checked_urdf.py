@@ -72,8 +72,8 @@ class CheckedUrdf:
         """
         if link not in self.links:
             raise UrdfError(
+                f"has no link {shown(link)}; its leaves are: {', '.join(self.leaves[:20])}",
                 self.path,
-                (f"has no link {shown(link)}; its leaves are: {', '.join(self.leaves[:20])}",),
             )
         above = {joint.child: joint for joint in self.joints}
         path: list[JointInfo] = []
@@ -134,7 +134,7 @@ def check_urdf_text(
     try:
         data = text.encode()
     except UnicodeEncodeError as error:
-        raise UrdfError(name, (f"is no text: {error.reason} at {error.start}",)) from None
+        raise UrdfError(f"is no text: {error.reason} at {error.start}", name) from None
     root = parse_xml(data, name, encoding="utf-8")
     return _check(root, name, os.fsdecode(base_dir) if base_dir is not None else None, package_dirs)
 
@@ -153,7 +153,7 @@ def _check(
     links = read_links(robot, faults)
     joints = read_tree(robot, links, faults)
     if faults.errors:
-        raise UrdfError(path, tuple(faults.errors))
+        raise UrdfError(faults.errors, path)
     visuals = read_visuals(robot, MeshFolders(base_dir, folders), faults)
     parents = {joint.parent for joint in joints}
     root = next(iter(set(links) - {joint.child for joint in joints}))

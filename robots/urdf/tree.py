@@ -33,9 +33,7 @@ def refuse_other_formats(robot: Node, path: str) -> None:
     """
     if robot.tag != "robot":
         what = OTHER_FORMATS.get(robot.tag, "not a URDF, which starts with <robot name=...>")
-        raise UrdfError(
-            path, (f"line {robot.line}: its first element is <{robot.tag[:60]}>: {what}",)
-        )
+        raise UrdfError(f"line {robot.line}: its first element is <{robot.tag[:60]}>: {what}", path)
     for node in _walk(robot):
         values = " ".join(node.attributes.values())
         if node.tag.startswith("xacro:") or "${" in values or "$(" in values:
@@ -44,7 +42,7 @@ def refuse_other_formats(robot: Node, path: str) -> None:
             what = "would include another file, which is not done; write one URDF with every link"
         else:
             continue
-        raise UrdfError(path, (f"line {node.line}: <{node.tag[:60]}> {what}",))
+        raise UrdfError(f"line {node.line}: <{node.tag[:60]}> {what}", path)
 
 
 def _walk(robot: Node) -> Iterator[Node]:

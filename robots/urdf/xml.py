@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
+from coverable_errors import Fault
 from coverable_files import FileFault, read_regular, too_large
 from robots.robot import RobotError
 
@@ -19,29 +20,11 @@ MAX_BYTES = 8 * 2**20  # the largest URDF in example-robot-data has 0.2 MB
 MAX_ELEMENTS = 50_000  # the same file has 3,900
 MAX_ATTRIBUTES = 64  # in one element; URDF needs 6
 MAX_DEPTH = 64  # URDF needs 6
-MAX_SHOWN = 20  # faults in one message; `faults` has them all
 _IF_LARGER = "keep links and joints in it, and meshes in files of their own"
 
 
 class UrdfError(RobotError):
     """A URDF that cannot be used: every fault that was found, each with what would do."""
-
-    def __init__(self, path: str, faults: tuple[str, ...]) -> None:
-        """Make the message from `path` and the list of `faults`."""
-        self.path = path
-        self.faults = faults
-        if len(faults) == 1:
-            message = f"{path}: {faults[0]}"
-        else:
-            lines = [f"{path}: {len(faults)} faults", *faults[:MAX_SHOWN]]
-            if len(faults) > MAX_SHOWN:
-                lines.append(f"... and {len(faults) - MAX_SHOWN} more")
-            message = "\n  ".join(lines)
-        super().__init__(message)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor, so that workers can report it."""
-        return (UrdfError, (self.path, self.faults))
 
 
 @dataclass(eq=False, slots=True)
@@ -82,8 +65,8 @@ def read_bytes(path: str) -> bytes:
     """
     try:
         return read_regular(path, MAX_BYTES, "a URDF file", _IF_LARGER)
-    except FileFault as fault:
-        raise UrdfError(path if path.isprintable() else shown(path), (str(fault),)) from None
+    except FileFault as error:
+        raise UrdfError(error.faults, path if path.isprintable() else shown(path)) from None
 
 
 def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
@@ -98,10 +81,10 @@ def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
         UrdfError: not well-formed, a DOCTYPE, or over a cap.
     """
     if len(data) > MAX_BYTES:
-        raise UrdfError(path, (too_large(MAX_BYTES, "a URDF file", _IF_LARGER),))
+        raise UrdfError(too_large(MAX_BYTES, "a URDF file", _IF_LARGER), path)
     hint = _foreign(data)
     if hint:
-        raise UrdfError(path, (f"{hint}; a URDF is XML that starts with <robot name=...>",))
+        raise UrdfError(f"{hint}; a URDF is XML that starts with <robot name=...>", path)
     parser = expat.ParserCreate(encoding)
     builder = _Builder(parser, path)
     try:
@@ -111,15 +94,14 @@ def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
     except expat.ExpatError as error:
         what = expat.ErrorString(error.code) or "not XML"
         raise UrdfError(
-            path,
-            (f"line {error.lineno}: broken XML ({what}); mend the file or export it again",),
+            f"line {error.lineno}: broken XML ({what}); mend the file or export it again", path
         ) from None
     except (LookupError, ValueError) as error:
         raise UrdfError(
-            path, (f"line 1: its encoding cannot be read ({error}); save it as UTF-8",)
+            f"line 1: its encoding cannot be read ({error}); save it as UTF-8", path
         ) from None
     if builder.root is None:
-        raise UrdfError(path, ("holds no XML element; a URDF starts with <robot name=...>",))
+        raise UrdfError("holds no XML element; a URDF starts with <robot name=...>", path)
     return builder.root
 
 
@@ -152,7 +134,8 @@ class _Builder:
         parser.EntityDeclHandler = self.doctype
 
     def refuse(self, what: str) -> None:
-        raise UrdfError(self.path, (f"line {self.parser.CurrentLineNumber}: {what}",))
+        place = f"line {self.parser.CurrentLineNumber}"
+        raise UrdfError(Fault("", what, place), self.path)
 
     def doctype(self, *_: object) -> None:
         self.refuse(

@@ -103,7 +103,7 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
     elif numbers.dtype.kind not in "iu":
         faults.append(f"faces must be whole numbers (indices of vertices), got {numbers.dtype}")
     if faults:
-        raise SurfaceError("; ".join(faults))
+        raise SurfaceError(faults)
     outside = ((numbers < 0) | (numbers >= len(points))).any(axis=1)
     if outside.any():
         first = int(outside.argmax())

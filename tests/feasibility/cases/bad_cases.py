@@ -223,7 +223,7 @@ BAD_CASES = {
     "key of another kind": added("surface", "flare = 1.0", "surface.flare", "belongs to a hyper"),
     "radius missing": changed("radius = 1.0\n", "", "surface.radius", "is missing", "metres"),
     "radius zero": changed("radius = 1.0", "radius = 0", "surface.radius", "> 0"),
-    "radius true": changed("radius = 1.0", "radius = true", "surface.radius", "got true"),
+    "radius true": changed("radius = 1.0", "radius = true", "surface.radius", "got True"),
     "radius NaN": changed("radius = 1.0", "radius = nan", "surface.radius", "got nan"),
     "radius infinite": changed("radius = 1.0", "radius = inf", "surface.radius", "got inf"),
     "radius too large a whole number": changed(
@@ -406,7 +406,7 @@ BAD_CASES = {
     "cells of a mesh missing": wrong("mesh", "cells = 12\n", "", "cells", "or cell_size = 0.05"),
     "no cell": wrong("mesh", "12", "0", "cells", "1 .. 20,000"),
     "too many cells of a mesh": wrong("mesh", "12", "20_001", "cells", "1 .. 20,000"),
-    "cells of a mesh true": wrong("mesh", "12", "true", "cells", "got true"),
+    "cells of a mesh true": wrong("mesh", "12", "true", "cells", "got True"),
     "cells and their size": more("mesh", "cell_size = 0.1", "cells", "contradicts"),
     "size of cells zero": wrong("mesh", "cells = 12", "cell_size = 0", "cell_size", "> 0"),
     "scale zero": more("mesh", "scale = 0", "scale", "0.001 for millimetres"),
@@ -455,7 +455,7 @@ BAD_CASES = {
     "time limit infinite": added("search", "time_limit = inf", "search.time_limit", "> 0"),
     "step": added("search", "step_deg = 0", "search.step_deg", "0.0001 .. 30"),
     "moves": added("search", "moves = 1", "search.moves", "must be"),
-    "starts": added("search", 'starts = "some"', "search.starts", '"all" or a whole number'),
+    "starts": added("search", 'starts = "some"', "search.starts", "'all' or a whole number"),
     "starts zero": added("search", "starts = 0", "search.starts", ">= 1"),
     "cap": added("search", "cap = 1e5", "search.cap", "a whole number >= 1"),
 }

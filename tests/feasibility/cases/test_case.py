@@ -201,7 +201,7 @@ def test_all_faults_come_together():
     ]
     message = str(caught.value)
     assert message.startswith("case: 13 faults:\n  ")
-    for words in ('"cells"', '"single"', "'puma560'", "the wrong way round", "got true"):
+    for words in ('"cells"', '"single"', "'puma560'", "the wrong way round", "got True"):
         assert words in message
     again = pickle.loads(pickle.dumps(caught.value))
     assert (str(again), again.faults) == (message, caught.value.faults)
@@ -212,8 +212,8 @@ def test_many_faults_stay_readable():
     with pytest.raises(CaseError) as caught:
         Case.from_toml(GOOD + rows)
     assert len(caught.value.faults) == 3000
-    assert len(str(caught.value).splitlines()) == 52
-    assert str(caught.value).endswith("... and 2950 more")
+    assert len(str(caught.value).splitlines()) == 22
+    assert str(caught.value).endswith("... and 2980 more")
 
 
 def test_overrides_replace_add_and_remove_keys():
@@ -247,7 +247,7 @@ def test_overrides_replace_add_and_remove_keys():
         ("task.cone=5", 'did you mean "cone_deg"?'),
         ("task.cone_deg=ten", "got 'ten'"),
         ("task.cone_deg=nan", "got nan"),
-        ("task.cone_deg=true", "got true"),
+        ("task.cone_deg=true", "got True"),
         ("surface.cells=[2000, 2000]", "coarser grid"),
         ("task.standoff=", "is missing"),
     ],

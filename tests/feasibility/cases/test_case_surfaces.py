@@ -28,7 +28,6 @@ from feasibility.cases.case import CaseError
 from feasibility.cases.mesh_keys import MOST_MESH_CELLS
 from feasibility.cases.patch_keys import PATCHES, STEEPEST
 from feasibility.cases.piecewise_keys import MOST_PIECES
-from feasibility.cases.table_reader import BuildError
 from feasibility.results import load_result, save_result
 from feasibility.results.result_file import ResultError
 from surfaces import (
@@ -286,7 +285,7 @@ def test_faults_of_the_file_come_with_all_others(tmp_path):
     with pytest.raises(CaseError) as caught:
         load_case(write(tmp_path, MESH.replace('"ur5"', '"ur55"'))).build()
     assert sorted(fault.key for fault in caught.value.faults) == ["robot", "surface.file"]
-    error = BuildError(Fault("surface.file", "is gone"))
+    error = CaseError(Fault("surface.file", "is gone"))
     assert str(error) == "surface.file: is gone"
 
 

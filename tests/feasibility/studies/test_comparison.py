@@ -133,7 +133,7 @@ def test_arms_that_cannot_be_compared(strip) -> None:
     with open_workers(0) as workers:
         with pytest.raises(CaseError) as caught:
             compare(strip, ["ur55", "ur5", "ur5", "robby"], workers)
-        places = [key for key, _ in caught.value.faults]
+        places = [fault.key for fault in caught.value.faults]
         assert places == ["--robots[0]", "--robots[2]", "--robots[3]"]
         with pytest.raises(CaseError, match="is empty"):
             compare(strip, [], workers)

@@ -9,6 +9,7 @@ import math
 import numpy as np
 import pytest
 
+from coverable_errors import worded
 from feasibility.cases import Case, as_read, load_case, toml_document
 from feasibility.cases.case import CaseError
 from feasibility.studies import load_study
@@ -251,9 +252,9 @@ def test_every_fault_is_told_with_its_place(text: str) -> None:
     faults = caught.value.faults
     for place, word in FAULTY[text].items():
         told = [
-            message
-            for key, message in faults
-            if key.split(": ")[0] == place and word in f"{key}: {message}"
+            fault
+            for fault in faults
+            if fault.key.split(": ")[0] == place and word in worded(fault, ": ")
         ]
         assert told, f"nothing about {place} with {word!r} in {faults}"
 
@@ -278,7 +279,7 @@ def test_a_cause_is_told_once_for_all_combinations_that_have_it() -> None:
             'vary.robots = ["puma560", "ur5"]\n"vary"."task.cone_deg" = [20, 30, 45]\n'
             f'vary."robot.limits_deg" = [{whole}, {{ joint1 = [-90, 90] }}, {{ joint2 = [0, 9] }}]'
         )
-    faults = [tuple(fault) for fault in caught.value.faults]
+    faults = [(fault.key, fault.message) for fault in caught.value.faults]
     assert len(faults) == 2
     for joint, (key, message) in zip(("joint1", "joint2"), faults, strict=True):
         assert key.startswith(f"vary: with robot = 'ur5', robot.limits_deg = {{'{joint}'")
@@ -293,7 +294,7 @@ def test_values_that_are_wrong_alike_are_counted() -> None:
             'base.case = "paper/4a"\nvary."task.standoff" = [0.1, -1, -2]\n'
             'vary."task.cone_deg" = { from = 170, to = 200, steps = 31 }'
         )
-    told = dict(caught.value.faults)
+    told = {fault.key: fault.message for fault in caught.value.faults}
     assert [key.split(":")[0] for key in told] == [
         *(f"vary.task.standoff[{k}]" for k in (1, 2)),
         *(f"vary.task.cone_deg[{k}]" for k in (11, 12, 13)),
@@ -339,4 +340,4 @@ def test_junk_is_refused_in_one_piece() -> None:
             assert study.tasks
             assert all(math.isfinite(task.tables["task"]["cone_deg"]) for task in study.tasks)
     assert good > 5
-    assert all(faults and all(message for _, message in faults) for faults in told)
+    assert all(faults and all(fault.message for fault in faults) for faults in told)

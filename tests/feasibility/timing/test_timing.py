@@ -457,7 +457,7 @@ def test_a_trajectory_checks_its_arrays():
         with pytest.raises(ValueError, match=r"\w"):
             Trajectory(**good | {name: value})
     with pytest.raises(
-        ValueError, match=r"name twice.*q must have.*dq must hold.*times must.*cells"
+        ValueError, match=r"(?s)name twice.*q must have.*dq must hold.*times must.*cells"
     ):
         Trajectory(**good | bad)
 

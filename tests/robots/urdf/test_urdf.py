@@ -117,9 +117,9 @@ def test_a_bad_file_is_one_clear_error(name: str, tmp_path: Path) -> None:
     message = str(caught.value)
     assert message.startswith(f"{path}: ")
     assert [fragment for fragment in fragments if fragment not in message] == []
-    assert caught.value.path == str(path)
+    assert caught.value.source == str(path)
     assert caught.value.faults
-    assert all(len(fault) < 1000 and "\n" not in fault for fault in caught.value.faults)
+    assert all(len(fault.fault) < 1000 and "\n" not in fault.fault for fault in caught.value.faults)
     if isinstance(content, str):
         with pytest.raises(UrdfError) as of_text:
             check_urdf_text(content)
@@ -179,10 +179,10 @@ def test_all_faults_of_a_file_are_reported_together() -> None:
         check_urdf_text(text, name="many.urdf")
     faults = caught.value.faults
     assert len(faults) == 4
-    assert [fault.split(":")[0] for fault in faults] == ["line 4", "line 5", "line 5", "line 6"]
-    assert str(caught.value).startswith("many.urdf: 4 faults\n")
+    assert [fault.place for fault in faults] == ["line 4", "line 5", "line 5", "line 6"]
+    assert str(caught.value).startswith("many.urdf: 4 faults:\n")
     again = pickle.loads(pickle.dumps(caught.value))
-    assert (again.path, again.faults, str(again)) == ("many.urdf", faults, str(caught.value))
+    assert (again.source, again.faults, str(again)) == ("many.urdf", faults, str(caught.value))
 
 
 def test_a_thousand_faults_make_a_message_of_one_screen() -> None:
@@ -213,7 +213,7 @@ def test_files_that_are_no_files(tmp_path: Path) -> None:
     for path, fragment in cases.items():
         with pytest.raises(UrdfError, match=fragment):
             check_urdf(path)
-    with pytest.raises(UrdfError, match="cannot be opened: .*null"):
+    with pytest.raises(UrdfError, match=r"cannot be opened: .*null"):
         check_urdf("a\0b")
 
 

@@ -1,0 +1,247 @@
+"""The family of errors: what is wrong with an input, as facts, and the one message they make."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from functools import partial
+from numbers import Integral, Real
+from typing import Any, Final, NamedTuple, TypeVar
+
+MOST_SHOWN = 20  # faults in one message; `faults` has them all
+LONGEST_SHOWN = 80  # characters of a value in a message
+LARGEST_WHOLE = 2**63 - 1
+
+Word = TypeVar("Word", bound=str)
+
+
+class Fault(NamedTuple):
+    """One thing that is wrong with an input.
+
+    Example:
+        >>> fault = Fault("polar_deg", "got -3", expected="must lie in 0 .. 180 (degrees)")
+        >>> worded(fault)
+        'polar_deg must lie in 0 .. 180 (degrees), got -3'
+        >>> worded(fault.renamed({"polar_deg": "u_deg"}, "surface"), ": ")
+        'surface.u_deg: must lie in 0 .. 180 (degrees), got -3'
+    """
+
+    key: str
+    """The argument's name in Python, the key in a file; empty for the input as one."""
+    fault: str
+    """What was wrong, with the value."""
+    place: str = ""
+    """File, line or table, where there is one."""
+    expected: str = ""
+    """What would do: "must ...", or a remedy."""
+
+    @property
+    def message(self) -> str:
+        """The sentence without key and place."""
+        if self.expected.startswith("must "):
+            return f"{self.expected}, {self.fault}"
+        return f"{self.fault}; {self.expected}" if self.expected else self.fault
+
+    def renamed(self, names: Mapping[str, str], table: str = "") -> Fault:
+        """The fault with its argument called as a table of a file calls it.
+
+        Args:
+            names: the key of each argument, where it differs.
+            table: what stands before the key.
+        """
+        argument, rest = re.fullmatch(r"([^.\[]*)(.*)", self.key, re.DOTALL).groups()  # type: ignore[union-attr]
+        key = names.get(argument, argument) + rest
+        return self._replace(key=".".join(part for part in (table, key) if part))
+
+
+def worded(fault: Fault, after_key: str = " ") -> str:
+    """A fault as one sentence: its place, its key, what was expected and what was found."""
+    sentence = f"{fault.key}{after_key}{fault.message}" if fault.key else fault.message
+    return f"{fault.place}: {sentence}" if fault.place else sentence
+
+
+class CoverableError(ValueError):
+    """An input that cannot be used: everything that is wrong with it, and what would do.
+
+    Attributes:
+        faults: what is wrong.
+        source: what the faults are of: a file, a case, a kind of surface; empty where one message
+            says it all.
+    """
+
+    after_key = " "
+    """What stands between key and message."""
+
+    def __init__(
+        self, faults: str | Fault | Iterable[str | Fault], source: str | None = None
+    ) -> None:
+        """An error with these faults; a text is a fault of the input as one."""
+        given = (faults,) if isinstance(faults, (str, Fault)) else faults
+        self.faults = tuple(Fault("", one) if isinstance(one, str) else one for one in given)
+        self.source = source or ""
+        lines = [worded(fault, self.after_key) for fault in self.faults[:MOST_SHOWN]]
+        if len(self.faults) > MOST_SHOWN:
+            lines.append(f"... and {len(self.faults) - MOST_SHOWN} more")
+        if len(lines) > 1:
+            lines.insert(0, f"{len(self.faults)} faults:")
+        text = "\n  ".join(lines)
+        super().__init__(f"{self.source}: {text}" if self.source else text)
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle as a call of the constructor, so that workers can report it."""
+        return (partial(type(self), source=self.source), (self.faults,))
+
+
+class ArgumentError(CoverableError):
+    """Arguments of a call that make no sense."""
+
+
+class Missing:
+    """Stands for an argument that a file leaves out and that has no default."""
+
+    def __repr__(self) -> str:
+        """As in a message."""
+        return "nothing"
+
+
+MISSING: Final = Missing()
+
+
+class Checks:
+    """Reads arguments one by one, keeps what is wrong, and raises once at the end.
+
+    After a fault a value that does no harm is returned, so that the next argument can be read.
+
+    Example:
+        >>> checks = Checks("a task")
+        >>> checks.number("cone_deg", "steep", "must lie in 0 .. 180 (degrees)", 0.0, 180.0)
+        0.0
+        >>> checks.done()
+        Traceback (most recent call last):
+        coverable_errors.ArgumentError: a task: cone_deg must lie in 0 .. 180 (degrees), got 'steep'
+    """
+
+    def __init__(self, source: str = "", error: type[CoverableError] = ArgumentError) -> None:
+        """Start with no faults.
+
+        Args:
+            source: what the arguments are of.
+            error: what `done` raises.
+        """
+        self.source = source
+        self.error = error
+        self.faults: list[Fault] = []
+
+    def wrong(self, key: str, value: object, expected: str) -> None:
+        """Keep the fault that `value` is not as it must be.
+
+        Args:
+            key: the argument.
+            value: what was given; `MISSING` where nothing was.
+            expected: "must be ...".
+        """
+        self.faults.append(wrong(key, value, expected))
+
+    def number(
+        self, key: str, value: object, expected: str, low: float = -math.inf, high: float = math.inf
+    ) -> float:
+        """A finite number, `low` .. `high`."""
+        number = real(value)
+        if math.isfinite(number) and low <= number <= high:
+            return number
+        self.wrong(key, value, expected)
+        return low if math.isfinite(low) else 0.0
+
+    def positive(self, key: str, value: object, unit: str = "metres") -> float:
+        """A finite number > 0."""
+        number = real(value)
+        if 0.0 < number < math.inf:
+            return number
+        self.wrong(key, value, f"must be a finite number > 0 ({unit})")
+        return 1.0
+
+    def whole(
+        self, key: str, value: object, low: int, high: int = LARGEST_WHOLE, or_word: str = ""
+    ) -> int:
+        """A whole number, `low` .. `high`; `or_word` is what else would have done."""
+        if (
+            isinstance(value, Integral)
+            and not isinstance(value, bool)
+            and low <= int(value) <= high
+        ):
+            return int(value)
+        some = f">= {low}" if high == LARGEST_WHOLE else f"in {low} .. {high:,}"
+        either = f"{or_word} or " if or_word else ""
+        self.wrong(key, value, f"must be {either}a whole number {some}")
+        return low
+
+    def choice(self, key: str, value: object, options: Sequence[Word]) -> Word:
+        """One of some words."""
+        for option in options:
+            if isinstance(value, str) and value == option:
+                return option
+        expected = f"must be {alternatives([repr(option) for option in options])}"
+        self.wrong(key, value, expected)
+        guess = close(value, options)
+        if guess:
+            last = self.faults[-1]
+            self.faults[-1] = last._replace(fault=f"{last.fault}; did you mean {guess}?")
+        return options[0]
+
+    def done(self) -> None:
+        """Raise if anything was wrong.
+
+        Raises:
+            CoverableError: of the kind given to the constructor, with every fault found.
+        """
+        if self.faults:
+            raise self.error(self.faults, self.source)
+
+
+def wrong(key: str, value: object, expected: str) -> Fault:
+    """The fault that an argument is not as it must be, or that it is `MISSING`."""
+    if value is MISSING:
+        return Fault(key, "is missing", expected=f"it {expected}")
+    return Fault(key, f"got {shown(value)}", expected=expected)
+
+
+def real(value: object) -> float:
+    """The value as a float, or NaN if it is not a real number; truth values are none."""
+    if isinstance(value, Real) and not isinstance(value, bool):
+        try:
+            return float(value)
+        except OverflowError:
+            return math.inf
+    return math.nan
+
+
+def is_number(value: object) -> bool:
+    """True for a finite real number; truth values are none."""
+    return math.isfinite(real(value))
+
+
+def shown(value: object) -> str:
+    """A value for a message: on one line, and short."""
+    try:
+        text = repr(value)
+    except ValueError:  # more digits than Python prints
+        return "a whole number of thousands of digits"
+    text = text if text.isprintable() else " ".join(text.split())
+    return text if len(text) <= LONGEST_SHOWN else text[:60] + "..." + text[-15:]
+
+
+def close(value: Any, options: Sequence[str]) -> str:
+    """The option that `value` is most like, quoted; empty where none is."""
+    if not isinstance(value, str) or len(value) > 60:
+        return ""
+    same = [option for option in options if option.lower() == value.lower()]
+    found = same or get_close_matches(value, options, n=1, cutoff=0.6)
+    return f'"{found[0]}"' if found else ""
+
+
+def alternatives(options: Sequence[str]) -> str:
+    """'a, b or c'."""
+    *front, last = options
+    return f"{', '.join(front)} or {last}" if front else last
