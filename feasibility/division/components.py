@@ -25,7 +25,7 @@ COVER_SECONDS = 2.0  # for the cover of one round, which need not be the best
 ELSEWHERE = 2  # state of a pair of cells that is not to be joined
 
 
-def table_of(exploration: Exploration) -> tuple[list[int], NDArray[np.bool_]]:
+def cover_table(exploration: Exploration) -> tuple[list[int], NDArray[np.bool_]]:
     """The root components, and (K, N) the cells that each covers."""
     roots = [r for r in exploration.roots() if exploration.roadmap.size[r] > 0]
     return roots, exploration.roadmap.cover[roots].astype(bool)
@@ -52,7 +52,7 @@ def gather(exploration: Exploration) -> None:
 
 def _chosen(exploration: Exploration) -> list[int]:
     """Components of a least cover of all reached cells."""
-    roots, covers = table_of(exploration)
+    roots, covers = cover_table(exploration)
     left = min(COVER_SECONDS, exploration.deadline - time.monotonic())
     return [roots[row] for row in set_cover(covers[:, exploration.reached], left).rows]
 
@@ -82,7 +82,7 @@ def _round(exploration: Exploration, chosen: list[int]) -> None:
                 exploration.explore_self_motions(int(rng.choice(shared)))
 
 
-def tie(exploration: Exploration, component: int, wanted: NDArray[np.bool_]) -> None:
+def connect_pairs(exploration: Exploration, component: int, wanted: NDArray[np.bool_]) -> None:
     """Look for a motion of a component between every two neighbouring cells that are wanted."""
     pairs = exploration.cells.pairs
     state = np.zeros(len(pairs) + 1, dtype=np.int64)

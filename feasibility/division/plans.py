@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification import replay
-from feasibility.division.components import table_of, tie
+from feasibility.division.components import connect_pairs, cover_table
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.partition import Partition, fewest_patches
@@ -29,7 +29,7 @@ MOST_NEAR = 3  # starts of one component's walks that are near other patches
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Option:
-    """One way of holding the arm over one patch."""
+    """A component that covers one patch, and where walks over the patch may begin."""
 
     patch: int
     wanted: NDArray[np.bool_]
@@ -43,7 +43,7 @@ class _Option:
 
 def plans(exploration: Exploration, task: Task) -> tuple[Plan, Plan]:
     """The plan with the fewest motions, and the one with connected patches (maybe the same)."""
-    roots, covers = table_of(exploration)
+    roots, covers = cover_table(exploration)
     cover = fewest_patches(
         covers, np.ones(len(exploration.cells), dtype=bool), exploration.cells.pairs
     )
@@ -63,7 +63,7 @@ def plan_of(
     """Walks for every patch, in the best order, each replayed.
 
     Args:
-        explorer: the search.
+        exploration: the search.
         task: the task.
         partition: the patches.
         roots: the K components that `partition.rows` counts.
@@ -104,26 +104,27 @@ def _choices(
         most = MOST_COMPONENTS if len(wanted) > 1 else 1
         fitting.append([roots[row] for row in rows[:most].tolist()])
         for component in fitting[-1]:
-            tie(exploration, component, mine)
+            connect_pairs(exploration, component, mine)
     roadmap = exploration.roadmap
     links = {root: links_of(roadmap, root) for root in {r for own in fitting for r in own}}
     options = []
     for p, (mine, own) in enumerate(zip(wanted, fitting, strict=True)):
         for component in own:
-            nodes = links[component].nodes
+            nodes = np.flatnonzero(links[component].inside)
             nodes = nodes[mine[roadmap.cell[nodes]]]
             options.append(_Option(p, mine, links[component], nodes, roadmap.q[nodes]))
     choices: list[list[Walk]] = [[] for _ in wanted]
     for option, starts in zip(options, _starts(options), strict=True):
-        for start in starts:
-            choices[option.patch].append(patch_walk(option.links, option.wanted, start))
+        choices[option.patch] += [
+            patch_walk(roadmap, option.links, option.wanted, start) for start in starts
+        ]
     return choices
 
 
 def _starts(options: Sequence[_Option]) -> list[list[int]]:
     """Nodes that are worth starting the walks of each option from.
 
-    One is a node with the fewest ways on, because corners are best begun with. The others come
+    One is a node with the fewest edges, because corners are best begun with. The others come
     nearest to a node of another patch, so that the arm need not move far from one to the next.
     """
     from scipy.spatial import cKDTree
@@ -131,7 +132,7 @@ def _starts(options: Sequence[_Option]) -> list[list[int]]:
     trees = [cKDTree(option.q) for option in options]
     result = []
     for option in options:
-        degrees = [len(option.links.steps[x]) for x in option.nodes.tolist()]
+        degrees = np.diff(option.links.indptr)[option.nodes]
         starts = [int(option.nodes[np.argmin(degrees)])]
         near = []
         for other, tree in zip(options, trees, strict=True):

@@ -2,33 +2,35 @@
 
 A patch can be painted by several walks, each from either end, and a walk may be done a full turn
 of a joint further on where the limits allow it. The order and the ends are chosen so that the
-largest move of a joint is the least there is (a bottleneck travelling salesman, by dynamic
-programming over subsets of patches; Held and Karp 1962). What comes within 2 per cent of that is
-taken for as good, and of it the least sum over all joints.
+largest move of a joint is the least there is (a bottleneck travelling salesman, by trying all
+orders of a few patches). What comes within 2 per cent of that is taken for as good, and of it the
+least sum over all joints.
 
 The moves are straight lines in joint space, away from the surface. They stay inside the limits,
-because limits are convex; nothing else is said of them.
+because limits are convex; collisions are not checked along them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, permutations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.paths import improved
 from feasibility.verdict import Walk
 from robots import Robot
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 TURN = 2.0 * np.pi
-MOST_EXACT = 12  # patches up to which the best order is found; beyond, the nearest comes next
+MOST_EXACT = 7  # patches up to which all orders are tried; beyond, one is improved by 2-opt
 AS_GOOD = 1.02  # how much larger than the least the largest move may be
 SLACK = 1e-9  # [rad] rounding in sums of turns
-LEAST_TOLD = 0.05  # [deg], [0.1 mm]: smaller moves are not named
+LEAST_NAMED = 0.05  # [deg], [0.1 mm]: smaller moves are not named
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,7 +59,7 @@ class Reconfiguration:
         shown = np.where(self.prismatic, 1e4 * self.moves, np.degrees(self.moves))
         parts = []
         for j in np.argsort(-np.abs(shown), kind="stable").tolist():
-            if abs(shown[j]) >= LEAST_TOLD:
+            if abs(shown[j]) >= LEAST_NAMED:
                 value, unit = (0.1 * shown[j], "mm") if self.prismatic[j] else (shown[j], "deg")
                 parts.append(f"{self.joint_names[j]} by {value:+.1f} {unit}")
         if most is not None and len(parts) > most + 1:
@@ -85,20 +87,16 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
         choices: for each patch the walks that paint it, one at least.
     """
     options = [
-        (p, Walk(walk.q[::way], walk.cell[::way]))
+        (p, Walk(walk.q[::direction], walk.cell[::direction]))
         for p, walks in enumerate(choices)
         for walk in walks
-        for way in (1, -1)
+        for direction in (1, -1)
     ]
     group = np.array([p for p, _ in options], dtype=np.int64)
     costs = _costs(robot, [walk for _, walk in options], _joint_scale(robot))
-    if len(choices) <= MOST_EXACT:
-        path = _least_path(costs.largest, group, np.maximum)
-        most = max((costs.largest[a, b] for a, b in pairwise(path)), default=0.0)
-        allowed = costs.largest <= AS_GOOD * most + SLACK
-        path = _least_path(np.where(allowed, costs.total, np.inf), group, np.add)
-    else:
-        path = _nearest_path(costs.largest, group)
+    own = [np.flatnonzero(group == p) for p in range(len(choices))]
+    orders = [[own[p] for p in order] for order in _orders(costs.largest, own)]
+    path = _least_path(costs, orders, AS_GOOD)
     walks = _unwound(robot, [options[k][1] for k in path])
     moves = tuple(
         Reconfiguration(robot.joint_names, robot.prismatic, a.q[-1], b.q[0])
@@ -143,41 +141,47 @@ def _costs(robot: Robot, walks: Sequence[Walk], scale: Floats) -> _Costs:
     return _Costs(np.max(moves, axis=2, initial=0.0), moves.sum(axis=2))
 
 
-def _least_path(
-    cost: Floats, group: NDArray[np.int64], combine: Callable[[Floats, Floats], Floats]
-) -> list[int]:
-    """One option of each group, in the order that has the least combined cost."""
-    count = int(group.max()) + 1
-    size = len(group)
-    best = np.full((1 << count, size), np.inf)
-    came = np.full((1 << count, size), -1, dtype=np.int64)
-    best[1 << group, np.arange(size)] = 0.0
-    for done in range(1, 1 << count):
-        for p in range(count):
-            rest = done & ~(1 << p)
-            if rest == done or rest == 0:
-                continue
-            own = np.flatnonzero(group == p)
-            total = combine(best[rest][:, None], cost[:, own])
-            came[done, own] = np.argmin(total, axis=0)
-            best[done, own] = total[came[done, own], np.arange(len(own))]
-    done = (1 << count) - 1
-    k = int(np.argmin(best[done]))
-    path = [k]
-    while came[done, k] >= 0:
-        done, k = done & ~(1 << int(group[k])), int(came[done, k])
-        path.append(k)
-    return path[::-1]
+def _orders(largest: Floats, own: Sequence[Ints]) -> list[tuple[int, ...]]:
+    """Orders of patches that are worth trying: all of them, or one that 2-opt has improved.
+
+    Args:
+        largest: (S, S) see `_Costs`.
+        own: the options of each patch.
+    """
+    if len(own) <= MOST_EXACT:  # of two opposite orders one will do: walks go either way
+        return [order for order in permutations(range(len(own))) if order[0] >= order[-1]]
+    apart = np.array([[largest[np.ix_(a, b)].min() for b in own] for a in own])
+    return [tuple(improved(apart, np.arange(len(own))).tolist())]
 
 
-def _nearest_path(cost: Floats, group: NDArray[np.int64]) -> list[int]:
-    """From the first option always to the nearest one of a group that is not done."""
-    path = [0]
-    left = group != group[0]
-    while left.any():
-        path.append(int(np.argmin(np.where(left, cost[path[-1]], np.inf))))
-        left &= group != group[path[-1]]
-    return path
+def _least_path(costs: _Costs, orders: Sequence[Sequence[Ints]], as_good: float) -> list[int]:
+    """One option of each layer: the least sum, of those whose largest move is about the least.
+
+    Args:
+        costs: of the move from each option to each other.
+        orders: layers of options, in each order to be tried.
+        as_good: how many times the least the largest move may be.
+    """
+    most = min(_through(costs.largest, layers, np.maximum)[0] for layers in orders)
+    allowed = np.where(costs.largest <= as_good * most + SLACK, costs.total, np.inf)
+    return min(_through(allowed, layers, np.add) for layers in orders)[1]
+
+
+def _through(
+    cost: Floats, layers: Sequence[Ints], combine: Callable[[Floats, Floats], Floats]
+) -> tuple[float, list[int]]:
+    """The least combined cost of a path with one option of each layer in turn, and that path."""
+    best, came = np.zeros(len(layers[0])), []
+    for before, after in pairwise(layers):
+        total = combine(best[:, None], cost[np.ix_(before, after)])
+        came.append(np.argmin(total, axis=0))
+        best = total.min(axis=0)
+    path = [int(np.argmin(best))]
+    for choice in reversed(came):
+        path.append(int(choice[path[-1]]))
+    return float(best.min()), [
+        int(layer[k]) for layer, k in zip(layers, reversed(path), strict=True)
+    ]
 
 
 def _unwound(robot: Robot, walks: Sequence[Walk]) -> list[Walk]:
@@ -185,32 +189,25 @@ def _unwound(robot: Robot, walks: Sequence[Walk]) -> list[Walk]:
 
     Joints are independent of each other, and so are their turns.
     """
-    most = len(walks)
+    count = len(walks)
     low, high = (np.array(side) for side in zip(*(_turns(robot, w) for w in walks), strict=True))
-    turns = np.zeros((len(walks), robot.n))
+    # A joint without limits never has to go further than this.
+    low, high = np.maximum(low, -count), np.minimum(high, count)
+    starts, ends = np.array([w.q[0] for w in walks]), np.array([w.q[-1] for w in walks])
+    turns = np.zeros((count, robot.n))
     for j in range(robot.n):
-        # A joint without limits never has to go further than this.
-        ks = [
-            np.arange(max(low[i, j], -most), min(high[i, j], most) + 1) for i in range(len(walks))
+        options = [
+            (i, k)
+            for i in range(count)
+            for k in sorted(range(int(low[i, j]), int(high[i, j]) + 1), key=abs)
         ]
-        total = [(0.0, abs(float(k)) * SLACK) for k in ks[0]]
-        came: list[list[int]] = []
-        for i in range(1, len(walks)):
-            gap = walks[i].q[0, j] - walks[i - 1].q[-1, j]
-            move = np.abs(gap + TURN * (ks[i][None] - ks[i - 1][:, None]))
-            ranked = [
-                min(
-                    (max(t[0], m), t[1] + m, a)
-                    for a, (t, m) in enumerate(zip(total, column, strict=True))
-                )
-                for column in move.T.tolist()
-            ]
-            came.append([a for _, _, a in ranked])
-            total = [(worst, path) for worst, path, _ in ranked]
-        k = min(range(len(total)), key=lambda k: total[k])
-        for i in range(len(walks) - 1, -1, -1):
-            turns[i, j] = ks[i][k]
-            k = came[i - 1][k] if i else k
+        walk, turn = np.array(options).T
+        move = np.abs(
+            (starts[walk, j] + TURN * turn)[None] - (ends[walk, j] + TURN * turn)[:, None]
+        )
+        fewest = move + SLACK * np.abs(turn)[:, None]  # of equal moves those with the fewest turns
+        layers = [np.flatnonzero(walk == i) for i in range(count)]
+        turns[:, j] = turn[_least_path(_Costs(move, fewest), [layers], 1.0)]
     # Rounding must not carry a joint over its limit.
     return [
         Walk(np.clip(w.q + TURN * t, robot.lower, robot.upper) if t.any() else w.q, w.cell)

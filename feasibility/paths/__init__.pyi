@@ -3,3 +3,4 @@ from .coverage import coverage_path as coverage_path
 from .metrics import PathFigures as PathFigures
 from .order import Order as Order
 from .order import PathError as PathError
+from .two_opt import improved as improved

@@ -11,9 +11,6 @@ from .exploration import OutOfTime as OutOfTime
 from .exploration import wound as wound
 from .graph import NODES as NODES
 from .graph import root_of as root_of
-from .patch_walk import Links as Links
-from .patch_walk import links_of as links_of
-from .patch_walk import patch_walk as patch_walk
 from .problem import HERE as HERE
 from .problem import NEXT as NEXT
 from .problem import Problem as Problem
@@ -40,8 +37,11 @@ from .self_motion import margin_objective as margin_objective
 from .self_motion import margin_shares as margin_shares
 from .tracking import MOST_STEPS as MOST_STEPS
 from .tracking import track as track
+from .walk import Links as Links
 from .walk import covering_walk as covering_walk
 from .walk import edge_motion as edge_motion
+from .walk import links_of as links_of
+from .walk import patch_walk as patch_walk
 from .warmup import SharedLock as SharedLock
 from .warmup import warm_up as warm_up
 from .warmup import warm_up_in_turn as warm_up_in_turn

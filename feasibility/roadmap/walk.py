@@ -1,6 +1,8 @@
-"""A covering walk: edges of one component strung together into one continuous motion."""
+"""Walks: edges of one component strung together into one continuous motion over its cells."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +14,20 @@ from feasibility.verdict import Walk
 ZERO, NONE = np.int64(0), np.int64(-1)
 
 
+class Links(NamedTuple):
+    """The motions of one component, in CSR form."""
+
+    inside: NDArray[np.bool_]
+    """(nodes,) which nodes are the component's."""
+    indptr: NDArray[np.int64]
+    """(nodes + 1,) the steps from node x are rows indptr[x] to indptr[x + 1]."""
+    steps: NDArray[np.int64]
+    """(2 edges, 2) the node that a step leads to, and its edge + 1, negative if run backwards."""
+
+
 @kernel
 def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
-    """CSR lists of (node, edge + 1, negative when walked backwards) for one component."""
+    """The arrays of `Links`."""
     nodes = roadmap.counters[NODES]
     edges = roadmap.counters[EDGES]
     inside = np.empty(nodes, dtype=np.bool_)
@@ -29,17 +42,17 @@ def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
         indptr[x + 1] += indptr[x]
     fill = np.empty(nodes, dtype=np.int64)
     put(fill, indptr)
-    links = np.empty((indptr[nodes], 2), dtype=np.int64)
+    steps = np.empty((indptr[nodes], 2), dtype=np.int64)
     for e in range(edges):
         x, y = roadmap.ends[e, 0], roadmap.ends[e, 1]
         if inside[x]:
-            links[fill[x], 0] = y
-            links[fill[x], 1] = e + 1
+            steps[fill[x], 0] = y
+            steps[fill[x], 1] = e + 1
             fill[x] += 1
-            links[fill[y], 0] = x
-            links[fill[y], 1] = -(e + 1)
+            steps[fill[y], 0] = x
+            steps[fill[y], 1] = -(e + 1)
             fill[y] += 1
-    return inside, indptr, links
+    return inside, indptr, steps
 
 
 @kernel
@@ -52,73 +65,71 @@ def _filled(size, value):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _appended(route, length, links):  # type: ignore[no-untyped-def]
-    """The route with more signed edges behind its first `length`, in an array with room for it."""
-    more = links.shape[0]
+def _appended(route, length, path):  # type: ignore[no-untyped-def]
+    """The route with more signed edges behind its first `length`, in an array that holds them."""
+    more = path.shape[0]
     if length + more > route.shape[0]:
         wider = np.empty(2 * (length + more), dtype=np.int64)
         for k in range(length):
             wider[k] = route[k]
         route = wider
     for k in range(more):
-        route[length + k] = links[k]
+        route[length + k] = path[k]
     return route
 
 
 @kernel
-def _next_node(roadmap, indptr, links, seen, here):  # type: ignore[no-untyped-def]
-    """The link to the neighbour over an unseen cell that has fewest unseen ones itself; or -1.
-
-    Warnsdorff's rule: so that corners are not left behind.
-    """
-    best, fewest = -1, 1 << 60
-    for k in range(indptr[here], indptr[here + 1]):
-        y = links[k, 0]
-        if seen[roadmap.cell[y]]:
-            continue
-        open_ends = 0
-        for i in range(indptr[y], indptr[y + 1]):
-            if not seen[roadmap.cell[links[i, 0]]]:
-                open_ends += 1
-        if open_ends < fewest:
-            best, fewest = k, open_ends
-    return best
+def _open_ends(roadmap, links, wanted, node):  # type: ignore[no-untyped-def]
+    """How many steps lead from a node to wanted cells."""
+    count = 0
+    for k in range(links.indptr[node], links.indptr[node + 1]):
+        if wanted[roadmap.cell[links.steps[k, 0]]]:
+            count += 1
+    return count
 
 
 @kernel
-def _to_nearest_unseen(roadmap, indptr, links, seen, here, turn, search):  # type: ignore[no-untyped-def]
-    """Signed edges of a shortest path to a node over an unseen cell, and that node.
+def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ignore[no-untyped-def]
+    """Signed edges of a shortest path to a node over a wanted cell, and that node.
+
+    Of several as near, the one with the fewest steps to wanted cells is taken (Warnsdorff's rule,
+    so that corners are not left behind).
 
     Args:
         roadmap: the `Roadmap`.
-        indptr: see `_adjacency`.
-        links: the same.
-        seen: (N,) cells.
+        links: the motions of the component.
+        wanted: (N,) cells.
         here: where the path begins.
         turn: another number for each search, from 1 on.
-        search: (nodes, 4) for each node the last search that met it, zero at first, the link by
+        search: (nodes, 4) for each node the last search that met it, zero at first, the step by
             which it was met and the node before it; and the queue.
+        first: whether the first one is taken, more than one edge away.
 
     Returns:
         No edges and -1 where there is no such node.
     """
     stamp, came, before, queue = search[:, 0], search[:, 1], search[:, 2], search[:, 3]
-    head, tail, found = 0, 1, -1
+    head, tail, ring = 0, 1, 1
+    found, fewest = -1, 1 << 60
     queue[0] = here
     stamp[here] = turn
-    while head < tail and found < 0:
+    while head < tail:
+        if head == ring:  # all nodes up to the same distance have been met
+            if found >= 0:
+                break
+            ring = tail
         x = queue[head]
         head += 1
-        for k in range(indptr[x], indptr[x + 1]):
-            y = links[k, 0]
+        for k in range(links.indptr[x], links.indptr[x + 1]):
+            y = links.steps[k, 0]
             if stamp[y] == turn:
                 continue
-            stamp[y], came[y], before[y] = turn, k, x
-            if not seen[roadmap.cell[y]]:
-                found = y
-                break
-            queue[tail] = y
+            stamp[y], came[y], before[y], queue[tail] = turn, k, x, y
             tail += 1
+            if wanted[roadmap.cell[y]]:
+                open_ends = -1 if first and x != here else _open_ends(roadmap, links, wanted, y)
+                if open_ends < fewest:
+                    found, fewest = y, open_ends
     steps = 0
     x = found
     while found >= 0 and x != here:
@@ -127,52 +138,35 @@ def _to_nearest_unseen(roadmap, indptr, links, seen, here, turn, search):  # typ
     path = np.empty(steps, dtype=np.int64)
     x = found
     for k in range(steps):
-        path[steps - 1 - k] = links[came[x], 1]
+        path[steps - 1 - k] = links.steps[came[x], 1]
         x = before[x]
     return path, found
 
 
 @kernel
-def _route(roadmap, component):  # type: ignore[no-untyped-def]
-    """Signed edges of a walk that visits every cell of a component, and the node it starts at.
+def _route(roadmap, links, wanted, start, first):  # type: ignore[no-untyped-def]
+    """Signed edges of a walk from a node through the wanted cells, always to the nearest one.
 
-    Steps to a neighbour over an unvisited cell while there is one; from a dead end, along a
-    shortest path to the nearest node over such a cell.
+    `wanted` (N,) is cleared where the walk passes; what no motion leads to stays.
     """
-    inside, indptr, links = _adjacency(roadmap, component)
-    nodes = inside.shape[0]
-    seen = np.empty(roadmap.first_node.shape[0], dtype=np.bool_)
+    nodes = links.inside.shape[0]
     remaining = 0
-    for k in range(seen.shape[0]):
-        seen[k] = not roadmap.cover[component, k]
-        if not seen[k]:
-            remaining += 1
-    # Start where there is least room: at a node of smallest degree.
-    start, fewest = -1, 1 << 60
-    for x in range(nodes):
-        if inside[x] and indptr[x + 1] - indptr[x] < fewest:
-            start, fewest = x, indptr[x + 1] - indptr[x]
+    for k in range(wanted.shape[0]):
+        remaining += wanted[k]
     search = np.zeros((nodes, 4), dtype=np.int64)
     route, length = np.empty(4 * nodes + 16, dtype=np.int64), 0
     here = start
-    seen[roadmap.cell[here]] = True
-    remaining -= 1
-    while remaining > 0:
-        link = _next_node(roadmap, indptr, links, seen, here)
-        if link >= 0:
-            route = _appended(route, length, links[link : link + 1, 1])
-            length += 1
-            here = links[link, 0]
-        else:
-            # The cells left are another number each time.
-            path, here = _to_nearest_unseen(roadmap, indptr, links, seen, here, remaining, search)
-            if here < 0:
-                return start, route[:0]  # not connected: an error of the caller's
-            route = _appended(route, length, path)
-            length += path.shape[0]
-        seen[roadmap.cell[here]] = True
-        remaining -= 1
-    return start, route[:length]
+    while here >= 0:
+        if wanted[roadmap.cell[here]]:
+            wanted[roadmap.cell[here]] = False
+            remaining -= 1
+        if remaining == 0:
+            break
+        # The cells left are another number each time.
+        path, here = _to_nearest(roadmap, links, wanted, here, remaining, search, first)
+        route = _appended(route, length, path)
+        length += path.shape[0]
+    return route[:length]
 
 
 @kernel
@@ -204,6 +198,11 @@ def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
     return q, cell
 
 
+def links_of(roadmap: Roadmap, component: int) -> Links:
+    """The motions inside a root component."""
+    return Links(*_adjacency(roadmap, component))
+
+
 def covering_walk(roadmap: Roadmap, component: int) -> Walk:
     """One continuous motion through every cell that a component covers.
 
@@ -214,9 +213,35 @@ def covering_walk(roadmap: Roadmap, component: int) -> Walk:
     Returns:
         The walk; consecutive waypoints lie on certified segments of the roadmap's edges.
     """
-    start, route = _route(roadmap, component)
-    q, cell = _string(roadmap, start, route)
-    return Walk(q=q, cell=cell)
+    links = links_of(roadmap, component)
+    # From a node with the fewest steps, because corners are best begun with.
+    start = int(np.argmin(np.where(links.inside, np.diff(links.indptr), len(links.steps) + 1)))
+    wanted = roadmap.cover[component].astype(bool)
+    return Walk(*_string(roadmap, start, _route(roadmap, links, wanted, start, True)))
+
+
+def patch_walk(roadmap: Roadmap, links: Links, wanted: NDArray[np.bool_], start: int) -> Walk:
+    """One continuous motion through the wanted cells: the motion that paints one patch.
+
+    It may lead over any cell of the component; only the wanted ones have to be visited.
+
+    Args:
+        roadmap: the roadmap.
+        links: the motions of the component.
+        wanted: (N,) cells to visit; the component covers them.
+        start: a node of the component over a wanted cell.
+
+    Returns:
+        The walk; consecutive waypoints lie on certified segments of the roadmap's edges.
+
+    Raises:
+        ValueError: the component does not reach a wanted cell.
+    """
+    left = np.array(wanted)
+    route = _route(roadmap, links, left, start, False)
+    if left.any():
+        raise ValueError(f"no motion of the component leads to cell {int(np.argmax(left))}")
+    return Walk(*_string(roadmap, start, route))
 
 
 def edge_motion(roadmap: Roadmap, edge: int) -> NDArray[np.float64]:

@@ -22,7 +22,7 @@ from feasibility.cases import CaseError, load_case
 from feasibility.certification import replay
 from feasibility.cli.path_divide_explain import divide as run
 from feasibility.division import Division, Plan, divide
-from feasibility.division.components import table_of, tie
+from feasibility.division.components import connect_pairs, cover_table
 from feasibility.division.connected_labels import count_of
 from feasibility.division.partition import Partition
 from feasibility.division.plans import plan_of
@@ -216,11 +216,12 @@ def test_walks_over_random_parts_of_a_component(seed: int) -> None:
     assert exploration.complete
     wanted = rng.random(len(cells)) < rng.uniform(0.03, 0.9)
     wanted[rng.integers(len(cells))] = True
-    tie(exploration, exploration.best, wanted)
+    connect_pairs(exploration, exploration.best, wanted)
     links = links_of(exploration.roadmap, exploration.best)
-    inside = links.nodes[wanted[exploration.roadmap.cell[links.nodes]]]
+    inside = np.flatnonzero(links.inside)
+    inside = inside[wanted[exploration.roadmap.cell[inside]]]
     start = int(rng.choice(inside))
-    walk = patch_walk(links, wanted, start)
+    walk = patch_walk(exploration.roadmap, links, wanted, start)
     assert replay(robot, cells, task, walk, wanted).accepted
     assert (walk.q[0] == exploration.roadmap.q[start]).all()
     assert wanted[walk.cell[-1]]
@@ -233,9 +234,10 @@ def test_a_cell_that_the_component_misses_is_an_error() -> None:
     explore(exploration)
     links = links_of(exploration.roadmap, exploration.best)
     wanted = np.zeros(90, dtype=bool)
-    wanted[[int(exploration.roadmap.cell[links.nodes[0]]), 89]] = True
+    start = int(np.flatnonzero(links.inside)[0])
+    wanted[[int(exploration.roadmap.cell[start]), 89]] = True
     with pytest.raises(ValueError, match="leads to cell 89"):
-        patch_walk(links, wanted, int(links.nodes[0]))
+        patch_walk(exploration.roadmap, links, wanted, start)
 
 
 # order and ends
@@ -409,7 +411,7 @@ def test_a_plan_of_connected_patches_beside_the_fewest() -> None:
     explore(exploration)
     third = np.arange(90) // 30
     made = Partition(rows=np.zeros(3), patch=third, pieces=3, bound=2)
-    roots, covers = table_of(exploration)
+    roots, covers = cover_table(exploration)
     plan = plan_of(exploration, division.task, made, roots, covers)
     assert (len(plan.patches), plan.optimal) == (3, False)
     both = replace(division, connected=plan)
