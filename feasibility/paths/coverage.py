@@ -1,8 +1,8 @@
 """A coverage path: one continuous motion over all cells in a chosen order, as one would run it.
 
 The witness of a verdict shows that there is a covering motion; this one is made to be run. The
-cells are put in order (`route`), a configuration is chosen over each (`joint_route`), the motion is
-replayed like any witness, and measured (`path_figures`).
+cells are put in order (`order`), a configuration is chosen over each (`ladder`), the motion is
+replayed like any witness, and measured (`metrics`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification import replay
-from feasibility.paths.ladder import JointRoute, walk_of
+from feasibility.paths.ladder import JointRoute
 from feasibility.paths.metrics import PathFigures, figures_of
-from feasibility.paths.motion_graph import net_of
+from feasibility.paths.motion_graph import motion_graph_of
 from feasibility.paths.order import ORDERS, Order, PathError
-from feasibility.paths.starting_corner import laid
+from feasibility.paths.start_selection import least_revisiting
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
 from robots import Robot
@@ -70,8 +70,8 @@ def coverage_path(
     Args:
         verdict: of the complete search.
         order: "rows" runs along the grid's rows (v), back and forth, "columns" along its columns
-            (u), "spiral" from the rim to the middle; "shortest" is the shortest order found, and
-            the only one for cells that are no grid.
+            (u), "spiral" from outside to the middle; "shortest" is the shortest order found, and the
+            only one for cells that are no grid.
         only: flat indices of the cells to visit; all by default. They may be cells that the best
             motion of an infeasible verdict covers.
 
@@ -97,8 +97,9 @@ def coverage_path(
     if order not in ORDERS:
         raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
     needed = _needed(verdict, only)
-    net = net_of(verdict)
-    return _replayed(verdict, order, needed, laid(net, verdict.cells, order, needed))
+    graph = motion_graph_of(verdict)
+    found = least_revisiting(graph, verdict.cells, order, needed)
+    return _replayed(verdict, order, needed, found)
 
 
 def _replayed(
@@ -106,7 +107,7 @@ def _replayed(
 ) -> CoveragePath:
     """The path along a motion, once the replay has accepted it."""
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
-    walk = walk_of(found.net, found.nodes)
+    walk = found.graph.walk(found.nodes)
     replayed = replay(robot, cells, task, walk, needed)
     if not replayed.accepted:
         raise PathError(f"the independent replay refuses the path: {replayed.refusal}")
@@ -116,7 +117,11 @@ def _replayed(
 
 
 def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
-    """(N,) the cells to visit, once it is clear that a motion can."""
+    """(N,) the cells to visit.
+
+    Raises:
+        PathError: some of them cannot be visited by one motion.
+    """
     total = len(verdict.cells)
     if verdict.method != "complete":
         raise PathError(
@@ -134,14 +139,14 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
             raise PathError("there are no cells to cover")
         return np.ones(total, dtype=bool)
     try:
-        asked = np.array(sorted({operator.index(cell) for cell in only}), dtype=np.int64)
+        named = np.array(sorted({operator.index(cell) for cell in only}), dtype=np.int64)
     except (TypeError, OverflowError) as error:
         raise PathError("cells to visit must be whole numbers, their flat indices") from error
-    beyond = asked[(asked < 0) | (asked >= total)]
-    within = asked[(asked >= 0) & (asked < total)]
+    beyond = named[(named < 0) | (named >= total)]
+    within = named[(named >= 0) & (named < total)]
     missed = within[~verdict.covered[within]]
     faults = []
-    if len(asked) == 0:
+    if len(named) == 0:
         faults.append("no cells are named; name at least one")
     if len(beyond):
         faults.append(f"there is no cell {_listed(beyond)}; cells are 0 to {total - 1}")

@@ -1,4 +1,4 @@
-"""The figures of a path: lengths on the surface, travel of the joints, and what it keeps free."""
+"""The figures of a path: lengths on the surface, travel of the joints, and margins."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ class PathFigures:
     """What a path does, measured along it."""
 
     length: float
-    """m, way of the tool's foot on the surface."""
+    """m, length of the tool point's path, projected onto the surface."""
     revisited: float
     """m, the part of it that leads to cells visited before."""
     least_length: float
-    """m, no path through all the centres is shorter; see `route.least_length`."""
+    """m, no path through all the centres is shorter; see `order.least_length`."""
     travel: NDArray[np.float64]
-    """(n,) rad or m, way of each joint, back and forth."""
+    """(n,) rad or m, travel of each joint, back and forth."""
     turn_margin: float
     """rad, smallest distance of a turning joint from its limits; inf without such limits."""
     slide_margin: float
     """m, the same for sliding joints."""
     cone_margin: float
-    """rad, what the cone leaves free at least, between waypoints too."""
+    """rad, smallest margin to the cone, between waypoints too."""
     singular_value: float
     """Smallest singular value along the path of the Jacobian of tool point (over the arm's reach)
     and approach axis: 0 where the tool cannot be moved in some direction. For arms of fewer than
@@ -49,7 +49,7 @@ class PathFigures:
 
     @property
     def covered(self) -> float:
-        """m, the way that leads to cells not visited before."""
+        """m, the part of the length that leads to cells not visited before."""
         return self.length - self.revisited
 
     @property
@@ -85,12 +85,12 @@ def figures_of(
     points = placements(robot, along).points
     closest_point = cells.surface.closest(points)
     places = points - closest_point.height[:, None] * closest_point.normal
-    way = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     margins = np.minimum(walk.q - robot.lower, robot.upper - walk.q)
     turns, slides = margins[:, ~robot.prismatic], margins[:, robot.prismatic]
     return PathFigures(
-        length=float(way.sum()),
-        revisited=float(way[again(walk)[owner]].sum()),
+        length=float(steps.sum()),
+        revisited=float(steps[revisiting(walk)[owner]].sum()),
         least_length=least_length(cells.centres[needed]),
         travel=np.abs(np.diff(walk.q, axis=0)).sum(axis=0),
         turn_margin=float(turns.min(initial=np.inf)),
@@ -100,7 +100,7 @@ def figures_of(
     )
 
 
-def again(walk: Walk) -> NDArray[np.bool_]:
+def revisiting(walk: Walk) -> NDArray[np.bool_]:
     """(m - 1,) segments of a walk that lead to a cell visited before.
 
     The segments from one marked waypoint to the next lead to the cell of the latter.

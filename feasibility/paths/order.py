@@ -2,7 +2,7 @@
 
 Only cells and the steps between them are known here, nothing of an arm. A step between two cells
 that touch costs the distance of their centres; cells that do not touch are joined by the shortest
-way over others, which are then visited again.
+path over others, which are then visited again.
 """
 
 from __future__ import annotations
@@ -39,17 +39,17 @@ def grid_order(
     rows: int,
     columns: int,
     begin: tuple[int, int] = (0, 0),
-    turned: tuple[bool, bool] = (False, False),
+    flipped: tuple[bool, bool] = (False, False),
 ) -> NDArray[np.int64]:
     """Flat indices of rows x columns cells in the order of a path.
 
     Args:
         order: "rows" runs along each row (v) and back along the next, "columns" along each column
-            (u), "spiral" from the rim to the middle.
+            (u), "spiral" from the outside to the middle.
         rows: number of rows (u).
         columns: number of columns (v).
         begin: row and column that count as the first ones, where a grid closes on itself.
-        turned: whether rows, and whether columns, are taken from the last to the first.
+        flipped: whether rows, and whether columns, are taken from the last to the first.
 
     Example:
         >>> grid_order("rows", 2, 3).tolist(), grid_order("columns", 2, 3).tolist()
@@ -61,7 +61,7 @@ def grid_order(
     """
     table = np.arange(rows * columns, dtype=np.int64).reshape(rows, columns)
     table = np.roll(table, (-begin[0], -begin[1]), axis=(0, 1))
-    table = table[:: -1 if turned[0] else 1, :: -1 if turned[1] else 1]
+    table = table[:: -1 if flipped[0] else 1, :: -1 if flipped[1] else 1]
     if order == "spiral":
         parts = []
         while table.size:
@@ -149,7 +149,7 @@ def step_lengths(cells: Cells, pairs: NDArray[np.int64]) -> csr_array:
 
 
 def route_length(steps: csr_array, order: NDArray[np.int64]) -> float:
-    """m, length of the shortest way that visits cells in this order; inf where there is none."""
+    """m, length of the shortest path that visits cells in this order; inf where there is none."""
     if len(order) < 2:
         return 0.0
     direct = np.asarray(steps[order[:-1], order[1:]]).reshape(-1)
@@ -199,7 +199,7 @@ def _greedy(steps: csr_array, wanted: NDArray[np.bool_]) -> NDArray[np.int64]:
             here = int(near[np.lexsort((away, open_ends))[0]])
         else:
             away = np.where(left, dijkstra(steps, indices=here), np.inf)
-            # Where no way leads any further, go on elsewhere; it is not this function's to judge.
+            # Where no step leads any further, go on elsewhere: the caller reports it.
             here = int(np.argmin(away)) if np.isfinite(away).any() else int(np.argmax(left))
         found.append(here)
         left[here] = False
@@ -211,7 +211,7 @@ def least_length(centres: NDArray[np.float64]) -> float:
 
     A path through all points is a tree that spans them, so it is at least as long as the smallest
     such tree, with straight lines between the points. For very many points a smaller bound is
-    taken: each step of a path is at least as long as the way from where it begins to the nearest
+    taken: each step of a path is at least as long as from where it begins to the nearest
     other point, and all points but the last begin one.
 
     Args:

@@ -17,11 +17,11 @@ from feasibility import Task, check
 from feasibility.certification import replay
 from feasibility.paths import PathError, coverage_path
 from feasibility.paths import ladder as joint_routes
-from feasibility.paths.ladder import joint_route, walk_of
-from feasibility.paths.metrics import again
-from feasibility.paths.motion_graph import MotionNet, joint_length, net_of
+from feasibility.paths.ladder import joint_route
+from feasibility.paths.metrics import revisiting
+from feasibility.paths.motion_graph import MotionGraph, joint_length, motion_graph_of
+from feasibility.paths.motion_links import windings, wound
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
-from feasibility.paths.windings import turned, whole_turns
 from feasibility.results import load_result, save_result
 from feasibility.roadmap import problem_of, work_for
 from feasibility.verdict import Answer, Walk
@@ -105,13 +105,13 @@ def test_a_closed_surface_is_not_gone_over_twice(name, order):
         assert firsts in [visits.tolist() for visits in beginnings(verdict.cells, order)]
 
 
-def test_a_motion_turned_by_whole_turns_is_the_same_work():
+def test_a_motion_in_another_winding_is_the_same_work():
     verdict = tube("ur5 around")
     path = coverage_path(verdict, "rows")
-    net = net_of(verdict)
-    nodes = joint_route(net, verdict.cells, np.arange(3)).nodes
-    walk = walk_of(net, nodes)
-    found = whole_turns(net, nodes)
+    graph = motion_graph_of(verdict)
+    nodes = joint_route(graph, verdict.cells, np.arange(3)).nodes
+    walk = graph.walk(nodes)
+    found = windings(graph, nodes)
     lower, upper = verdict.robot.lower, verdict.robot.upper
     for joint, times in product(range(6), (-2, -1, 1, 2)):
         turn = 2 * np.pi * times * np.eye(6)[joint]
@@ -121,7 +121,7 @@ def test_a_motion_turned_by_whole_turns_is_the_same_work():
     assert path.figures.revisited == 0.0
     needed = np.isin(np.arange(len(verdict.cells)), [0, 1, 2])
     for turn in found:
-        moved = walk_of(net, turned(net, nodes, turn))
+        moved = graph.walk(wound(graph, nodes, turn))
         assert np.array_equal(moved.cell, walk.cell)
         assert moved.q == pytest.approx(walk.q + turn, abs=1e-12)
         assert replay(verdict.robot, verdict.cells, verdict.task, moved, needed).accepted
@@ -131,14 +131,14 @@ def test_a_path_is_given_up_when_it_revisits_too_much(stored_motions_only):
     rng, cells = np.random.default_rng(3), small_verdict("plate").cells
     given_up = 0
     for _ in range(20):
-        net, order = hand_made(rng, 6, 3, 0.6), rng.permutation(6)
-        whole = joint_route(net.copy(), cells, order, turns=False)
+        graph, order = hand_made(rng, 6, 3, 0.6), rng.permutation(6)
+        whole = joint_route(graph.copy(), cells, order, wind=False)
         most = whole.revisited * (1 + 1e-9)
-        same = joint_route(net.copy(), cells, order, turns=False, most_revisited=most)
+        same = joint_route(graph.copy(), cells, order, wind=False, most_revisited=most)
         assert same.nodes == whole.nodes
         if whole.revisited > 0.0:
             half = 0.5 * whole.revisited
-            less = joint_route(net.copy(), cells, order, turns=False, most_revisited=half)
+            less = joint_route(graph.copy(), cells, order, wind=False, most_revisited=half)
             assert (less.nodes, less.revisited) == ([], np.inf)
             assert less.stuck == whole.stuck[: len(less.stuck)] != []
             given_up += 1
@@ -193,7 +193,7 @@ def _singular_value(robot, q, step=1e-6):
 def test_segments_that_lead_to_a_known_cell():
     cell = np.array([0, -1, 1, -1, 0, 0, -1, 2])
     walk = Walk(q=np.zeros((8, 2)), cell=cell)
-    assert again(walk).tolist() == [False, False, True, True, True, False, False]
+    assert revisiting(walk).tolist() == [False, False, True, True, True, False, False]
 
 
 def test_cells_of_an_infeasible_surface_that_one_motion_covers():
@@ -228,17 +228,17 @@ def test_the_same_question_has_the_same_path():
 
 
 def hand_made(rng, cells, nodes, density):
-    """A net over cells in a row: some nodes over each, random motions between neighbours."""
+    """A graph over cells in a row: some nodes over each, random motions between neighbours."""
     verdict = small_verdict("plate")
     problem = problem_of(verdict.robot, verdict.cells, verdict.task)
-    net = MotionNet(problem, work_for(2), {(k, k + 1): k for k in range(cells - 1)})
+    graph = MotionGraph(problem, work_for(2), {(k, k + 1): k for k in range(cells - 1)})
     for cell in range(cells):
         for _ in range(nodes):
-            net.node(cell, rng.random(2))
+            graph.node(cell, rng.random(2))
     for a, b in product(range(cells * nodes), repeat=2):
-        if abs(net.cell[a] - net.cell[b]) <= 1 and a < b and rng.random() < density:
-            net.link(a, b, np.vstack([net.q[a], rng.random((1, 2)), net.q[b]]))
-    return net
+        if abs(graph.cell[a] - graph.cell[b]) <= 1 and a < b and rng.random() < density:
+            graph.join(a, b, np.vstack([graph.q[a], rng.random((1, 2)), graph.q[b]]))
+    return graph
 
 
 @pytest.fixture
@@ -247,21 +247,21 @@ def stored_motions_only(monkeypatch):
     monkeypatch.setattr(
         joint_routes,
         "step_to",
-        lambda net, x, cell: [y for y in net.links[x] if net.cell[y] == cell],
+        lambda graph, x, cell: [y for y in graph.edges[x] if graph.cell[y] == cell],
     )
-    monkeypatch.setattr(joint_routes, "turn_at", lambda net, x: None)
+    monkeypatch.setattr(joint_routes, "join_self_motions", lambda graph, x: None)
     monkeypatch.setattr(joint_routes, "APART", 0.0)  # no node is a copy of another
 
 
 @pytest.mark.parametrize("seed", range(30))
 def test_nodes_are_chosen_for_the_least_travel(seed, stored_motions_only):
-    net = hand_made(np.random.default_rng(seed), cells=5, nodes=3, density=1.0)
+    graph = hand_made(np.random.default_rng(seed), cells=5, nodes=3, density=1.0)
     cells = small_verdict("plate").cells
-    nodes = joint_route(net, cells, np.arange(5), turns=False).nodes
-    assert [net.cell[x] for x in nodes] == list(range(5))
-    travel = sum(joint_length(net.links[x][y]) for x, y in pairwise(nodes))
-    choices = product(*(net.over[cell] for cell in range(5)))
-    least = min(sum(joint_length(net.links[x][y]) for x, y in pairwise(c)) for c in choices)
+    nodes = joint_route(graph, cells, np.arange(5), wind=False).nodes
+    assert [graph.cell[x] for x in nodes] == list(range(5))
+    travel = sum(graph.length(x, y) for x, y in pairwise(nodes))
+    choices = product(*(graph.over[cell] for cell in range(5)))
+    least = min(sum(graph.length(x, y) for x, y in pairwise(c)) for c in choices)
     assert travel == pytest.approx(least, rel=1e-12)
 
 
@@ -270,23 +270,21 @@ def test_detours_go_through_known_motions_to_every_cell(stored_motions_only):
     cells = small_verdict("plate").cells
     reached = refused = 0
     while reached < 30 or refused < 10:
-        net = hand_made(rng, cells=6, nodes=3, density=float(rng.choice([0.2, 0.4, 0.6])))
+        graph = hand_made(rng, cells=6, nodes=3, density=float(rng.choice([0.2, 0.4, 0.6])))
         order = rng.permutation(6)
-        graph = nx.Graph([(x, y) for x, near in enumerate(net.links) for y in near])
-        graph.add_nodes_from(range(len(net.cell)))
-        joined = [{net.cell[x] for x in part} for part in nx.connected_components(graph)]
+        joined = [{graph.cell[x] for x in part} for part in nx.connected_components(graph.edges)]
         if not any(len(part) == 6 for part in joined):
             with pytest.raises(PathError, match="no known motion leads from"):
-                joint_route(net, cells, order, turns=False)
+                joint_route(graph, cells, order, wind=False)
             refused += 1
         elif all(len(part) == 6 for part in joined):
-            nodes = joint_route(net, cells, order, turns=False).nodes
-            assert {net.cell[x] for x in nodes} == set(range(6))
-            assert net.cell[nodes[0]] == order[0]
-            assert all(y in net.links[x] for x, y in pairwise(nodes))
-            walk = walk_of(net, nodes)
-            assert walk.cell[walk.cell >= 0].tolist() == [net.cell[x] for x in nodes]
-            assert np.array_equal(walk.q[walk.cell >= 0], [net.q[x] for x in nodes])
+            nodes = joint_route(graph, cells, order, wind=False).nodes
+            assert {graph.cell[x] for x in nodes} == set(range(6))
+            assert graph.cell[nodes[0]] == order[0]
+            assert all(graph.edges.has_edge(x, y) for x, y in pairwise(nodes))
+            walk = graph.walk(nodes)
+            assert walk.cell[walk.cell >= 0].tolist() == [graph.cell[x] for x in nodes]
+            assert np.array_equal(walk.q[walk.cell >= 0], [graph.q[x] for x in nodes])
             reached += 1
 
 
@@ -294,24 +292,25 @@ def test_a_detour_is_the_cheapest(stored_motions_only):
     rng = np.random.default_rng(5)
     cells = small_verdict("plate").cells
     for _ in range(40):
-        net = hand_made(rng, cells=5, nodes=2, density=0.5)
-        graph = nx.Graph()
-        for x, near in enumerate(net.links):
-            for y, motion in near.items():
-                apart = np.linalg.norm(cells.centres[net.cell[x]] - cells.centres[net.cell[y]])
-                cost = joint_length(motion) + joint_routes.REVISIT * apart / net.problem.scale
-                graph.add_edge(x, y, weight=cost)
-        graph.add_nodes_from(range(len(net.cell)))
-        ways = [
-            nx.dijkstra_path_length(graph, x, y)
-            for x in net.over[0]
-            for y in net.over[4]
-            if nx.has_path(graph, x, y)
+        graph = hand_made(rng, cells=5, nodes=2, density=0.5)
+        weighted = nx.Graph()
+        weighted.add_nodes_from(range(len(graph.cell)))
+        for x, y in graph.edges.edges:
+            apart = np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]])
+            cost = joint_length(graph.motion(x, y))
+            cost += joint_routes.REVISIT * apart / graph.problem.scale
+            weighted.add_edge(x, y, weight=cost)
+        lengths = [
+            nx.dijkstra_path_length(weighted, x, y)
+            for x in graph.over[0]
+            for y in graph.over[4]
+            if nx.has_path(weighted, x, y)
         ]
-        if not ways:
+        if not lengths:
             continue
-        nodes = joint_route(net, cells, np.array([0, 4]), turns=False).nodes
-        assert nx.path_weight(graph, nodes, "weight") == pytest.approx(min(ways), rel=1e-12)
+        nodes = joint_route(graph, cells, np.array([0, 4]), wind=False).nodes
+        length = nx.path_weight(weighted, nodes, "weight")
+        assert length == pytest.approx(min(lengths), rel=1e-12)
 
 
 # -- what cannot be asked -----------------------------------------------------------------------

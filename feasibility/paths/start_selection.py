@@ -1,4 +1,4 @@
-"""Laying a path in an order: from where it begins, so that it revisits least.
+"""Where a path in some order begins, so that it revisits least.
 
 Rows may be followed from any corner of a grid, and where the surface closes on itself from any row.
 An arm whose joint has to turn with the surface cannot always go on over its seam: where a path gets
@@ -14,20 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.paths.ladder import JointRoute, joint_route
-from feasibility.paths.motion_graph import MotionNet
+from feasibility.paths.motion_graph import MotionGraph
 from feasibility.paths.order import GRID_ORDERS, Order, PathError, closed_sides, grid_order, route
 from surfaces import Cells
 
 MOST_CELLS = 6000  # cells that are passed in all attempts together, so that large grids end too
 MOST_TRIED = 24  # attempts at one order
-TURNED = ((False, False), (True, True), (True, False), (False, True))  # corners to begin at
+FLIPS = ((False, False), (True, True), (True, False), (False, True))  # corners to begin at
 
 
-def laid(net: MotionNet, cells: Cells, order: Order, needed: NDArray[np.bool_]) -> JointRoute:
+def least_revisiting(
+    graph: MotionGraph, cells: Cells, order: Order, needed: NDArray[np.bool_]
+) -> JointRoute:
     """The motion over cells in an order that revisits least, of those that are tried.
 
     Args:
-        net: the known motions.
+        graph: the known motions.
         cells: the cells.
         order: one of `ORDERS`.
         needed: (N,) cells to visit.
@@ -35,12 +37,12 @@ def laid(net: MotionNet, cells: Cells, order: Order, needed: NDArray[np.bool_]) 
     Raises:
         PathError: no such order, or no motion leads from cell to cell.
     """
-    attempts = _Attempts(net, cells, needed)
+    attempts = _Attempts(graph, cells, needed)
     if order != "shortest":
         route(cells, order, needed)  # it refuses orders that these cells do not have
         attempts.along_grid(order)
         return attempts.best()
-    attempts.along(route(cells, order, needed, net.linked_pairs()))
+    attempts.along(route(cells, order, needed, graph.joined_cells()))
     if attempts.left() and len(cells.shape) == 2:
         for grid in GRID_ORDERS:
             attempts.along_grid(grid)
@@ -51,7 +53,7 @@ def laid(net: MotionNet, cells: Cells, order: Order, needed: NDArray[np.bool_]) 
 class _Attempts:
     """Motions that have been tried, of which the best is kept."""
 
-    net: MotionNet
+    graph: MotionGraph
     cells: Cells
     needed: NDArray[np.bool_]
     found: JointRoute | None = None
@@ -69,11 +71,11 @@ class _Attempts:
 
     def along(self, visits: NDArray[np.int64]) -> list[int]:
         """Try an order; the cells at which it got stuck."""
-        for turns in (True, False):
+        for wind in (True, False):
             most = math.inf if self.found is None else self.found.revisited
             try:
                 found = joint_route(
-                    self.net.copy(), self.cells, visits, turns=turns, most_revisited=most
+                    self.graph.copy(), self.cells, visits, wind=wind, most_revisited=most
                 )
             except PathError as error:
                 self.fault = self.fault or error
@@ -90,11 +92,11 @@ class _Attempts:
         left = max(1, min(MOST_TRIED, MOST_CELLS // max(1, int(self.needed.sum()))))
         begins = [(0, 0)]
         for begin in begins:  # grows
-            for turned in TURNED:
+            for flipped in FLIPS:
                 if left <= 0:
                     return
                 left -= 1
-                visits = grid_order(order, rows, columns, begin, turned)
+                visits = grid_order(order, rows, columns, begin, flipped)
                 stuck = self.along(visits[self.needed[visits]])
                 if not self.left():
                     return
