@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Executor, Future, wait
+from concurrent.futures import Executor, Future, wait
+from contextlib import suppress
 from typing import Any
 
 from feasibility.notices import slow_notice
 from feasibility.roadmap import warm_up
-from feasibility.studies.workers import LOST, WorkersError
+from feasibility.studies.workers import BREAKS, WorkersError
 
 CONNECT = 10.0  # [s] for a Dask scheduler to answer
-GATHER = 60.0  # [s] for its first worker to be there
+FIRST_WORKER = 60.0  # [s] for its first worker to be there
 ASK = 2.0  # [s] between two questions about how many workers there are
 
 
@@ -20,7 +21,7 @@ class DaskWorkers:
     """The workers of a Dask cluster. Each needs coverable installed; one thread each is best."""
 
     patience = 1  # Dask has tried several workers before it gives a task up
-    shared_fate = False
+    breaks: tuple[type[BaseException], ...] = BREAKS
 
     def __init__(self, address: str, warm: bool) -> None:
         """Connect; see `open_workers`.
@@ -29,12 +30,20 @@ class DaskWorkers:
             WorkersError: Dask is not installed, or nothing useful answers there.
         """
         try:
-            from distributed import Client, KilledWorker
+            from distributed import KilledWorker
         except ImportError as error:
             raise WorkersError(
                 "--dask needs the library distributed: pip install 'coverable[dask]'"
             ) from error
-        self.losses: tuple[type[BaseException], ...] = (KilledWorker,)
+        self.deaths: tuple[type[BaseException], ...] = (KilledWorker,)
+        self._address, self._warm = address, warm
+        self._connect()
+
+    def _connect(self) -> None:
+        """Find the scheduler, and wait for its first worker."""
+        from distributed import Client
+
+        address = self._address
         try:
             self._client = Client(address, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError
@@ -43,31 +52,29 @@ class DaskWorkers:
                 "tcp://127.0.0.1:8786"
             ) from error
         try:
-            self._client.wait_for_workers(1, timeout=GATHER)
+            self._client.wait_for_workers(1, timeout=FIRST_WORKER)
         except TimeoutError as error:
             self._client.close()
             raise WorkersError(
                 f"the Dask scheduler at {address!r} has no workers; start some with `dask worker`"
             ) from error
-        self._warm, self._width, self._asked = warm, 1, -ASK
+        self._width, self._asked = 1, -ASK
         # Not pure: a task that is submitted again is run again.
         self._pool: Executor = self._client.get_executor(pure=False)
 
     @property
     def width(self) -> int:
-        """Threads of all workers, as of late; at least 1, for while they are replaced.
-
-        Raises:
-            WorkersError: the scheduler is gone.
-        """
+        """Threads of all workers, as of late; at least 1, for while they are replaced."""
         now = time.monotonic()
         if now > self._asked + ASK:
-            try:
-                self._width = max(sum(self._client.nthreads().values()), 1)
-            except OSError as error:
-                raise WorkersError(LOST) from error
+            self._width = max(sum(self._client.nthreads().values()), 1)
             self._asked = now
         return self._width
+
+    @property
+    def broken(self) -> bool:
+        """Is the connection closed?"""
+        return self._client.status in ("closing", "closed")
 
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Run it on the cluster."""
@@ -77,33 +84,36 @@ class DaskWorkers:
         return self._pool.submit(work, *arguments)
 
     def _load(self) -> None:
-        """Have one worker of each machine load the kernels, so that the others need not compile.
+        """Have one worker of each machine load the kernels, so that the others need not compile."""
+        from distributed.comm import get_address_host
+
+        machines = {get_address_host(name): name for name in self._client.nthreads()}
+        with slow_notice():
+            # Another one will do, should the one that is named die meanwhile.
+            pools = [
+                self._client.get_executor(pure=False, workers=[name], allow_other_workers=True)
+                for name in machines.values()
+            ]
+            wait([pool.submit(warm_up) for pool in pools])
+
+    def renew(self) -> None:
+        """Connect again; Dask replaces workers by itself.
 
         Raises:
             WorkersError: the scheduler is gone.
         """
-        from distributed.comm import get_address_host
-
+        self.close(at_once=True)
         try:
-            machines = {get_address_host(name): name for name in self._client.nthreads()}
-        except OSError as error:
-            raise WorkersError(LOST) from error
-        with slow_notice():
-            # Another one will do, should the one that is named die meanwhile.
-            ways = [
-                self._client.get_executor(pure=False, workers=[name], allow_other_workers=True)
-                for name in machines.values()
-            ]
-            wait([way.submit(warm_up) for way in ways])
-
-    def renew(self) -> None:
-        """Dask replaces its workers by itself."""
+            self._connect()
+        except WorkersError as error:
+            raise WorkersError(
+                "the connection to the workers was lost; what was finished is kept, run again to "
+                "continue"
+            ) from error
 
     def close(self, at_once: bool) -> None:
         """Leave the cluster; it goes on without us."""
-        try:
+        with suppress(*self.breaks):  # perhaps nobody is there any more
             self._pool.shutdown(wait=not at_once)
-        except (CancelledError, OSError):  # nobody is there to be told
-            pass
-        finally:
+        with suppress(*self.breaks):
             self._client.close()

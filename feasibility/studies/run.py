@@ -13,7 +13,7 @@ from typing import Any
 
 from feasibility.search import Progress
 from feasibility.studies.outcome import evaluate
-from feasibility.studies.scheduling import Answer, Tables, Work, deal
+from feasibility.studies.scheduling import Answer, Tables, Work, schedule
 from feasibility.studies.store import Record, Status, Store
 from feasibility.studies.workers import Workers
 from feasibility.version import version
@@ -107,7 +107,7 @@ def run_tasks(
         for work in dict.fromkeys(task.work for task in missing):
             part = [k for k, task in enumerate(missing) if task.work is work]
             keeper.begin(part)
-            deal(work, [missing[k].tables for k in part], workers, keeper.receive)
+            schedule(work, [missing[k].tables for k in part], workers, keeper.receive)
     finally:
         keeper.flush()
     rows = [(task, found[task.key]) for task in tasks]

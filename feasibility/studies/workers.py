@@ -1,7 +1,8 @@
 """Where the tasks of a study run: this process, processes of this machine, or a Dask cluster.
 
 All of them are a `concurrent.futures.Executor` with what is needed around it: how wide it is, how
-the loss of a worker shows, and how it is made ready again.
+the loss of a worker shows, and how it is made ready again. Whatever a pool raises when it
+breaks is one event: the tasks that are not finished are done again, in a new pool.
 """
 
 from __future__ import annotations
@@ -10,8 +11,8 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
-from contextlib import contextmanager
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any, Protocol
 
@@ -20,7 +21,9 @@ from feasibility.notices import compiling_notice, notify
 from feasibility.roadmap import SharedLock, warm_up, warm_up_in_turn
 
 ATTEMPTS = 3  # to start worker processes anew
-LOST = "the connection to the workers was lost; what was finished is kept, run again to continue"
+BREAKS = (BrokenExecutor, CancelledError, EOFError, OSError, RuntimeError, ValueError)
+"""What a pool that is breaking raises, at submitting or as the outcome of a future, besides
+BrokenExecutor: its pipes may be closed already while it does not yet know that a worker died."""
 
 
 class WorkersError(CoverableError):
@@ -30,22 +33,26 @@ class WorkersError(CoverableError):
 class Workers(Protocol):
     """Where tasks run."""
 
-    losses: tuple[type[BaseException], ...]
-    """What a future raises when a worker died on it."""
+    breaks: tuple[type[BaseException], ...]
+    """What `submit` or a future raises when the pool is of no more use, and has to be renewed."""
+    deaths: tuple[type[BaseException], ...]
+    """What a future raises when a worker died with it."""
     patience: int
-    """How often a task may lose the worker that it has for itself before it is given up."""
-    shared_fate: bool
-    """Does the death of one worker end all that is in flight?"""
+    """How many workers may die with a task alone in flight before it is given up."""
 
     @property
     def width(self) -> int:
         """How many tasks run at the same time."""
 
+    @property
+    def broken(self) -> bool:
+        """Is the pool of no more use? Its futures then may never end."""
+
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Run something; arguments and result are pickled on their way."""
 
     def renew(self) -> None:
-        """Make ready again after a loss."""
+        """Start anew after a break; the old pool's futures end no more."""
 
     def close(self, at_once: bool) -> None:
         """End the workers: after what they are doing, or at once."""
@@ -103,10 +110,11 @@ def processors() -> int:
 class Here:
     """This process itself: one task after the other."""
 
-    losses: tuple[type[BaseException], ...] = ()
+    breaks: tuple[type[BaseException], ...] = ()
+    deaths: tuple[type[BaseException], ...] = ()
     patience = 1
-    shared_fate = False
     width = 1
+    broken = False
 
     def __init__(self, warm: bool) -> None:
         """Nothing is done yet; see `open_workers`."""
@@ -126,7 +134,7 @@ class Here:
         return future
 
     def renew(self) -> None:
-        """Nothing can be lost."""
+        """Nothing can break."""
 
     def close(self, at_once: bool) -> None:
         """Nothing is open."""
@@ -139,9 +147,9 @@ class Processes:
     is their leash: when this process dies, however it dies, its end closes and they end too.
     """
 
-    losses: tuple[type[BaseException], ...] = (BrokenExecutor,)
+    breaks: tuple[type[BaseException], ...] = BREAKS
+    deaths: tuple[type[BaseException], ...] = BREAKS
     patience = 3
-    shared_fate = True
 
     def __init__(self, count: int, warm: bool) -> None:
         """Start `count` processes, as they are needed; see `open_workers`."""
@@ -166,6 +174,11 @@ class Processes:
             initargs=(self._end, self._word, gate),
         )
 
+    @property
+    def broken(self) -> bool:
+        """Has a process died? Python 3.11 forgets tasks that are submitted at that moment."""
+        return bool(getattr(self._pool, "_broken", False))
+
     def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Run it in one of the processes."""
         # A process that is started here must never see a Ctrl-C, which a terminal sends to all:
@@ -184,12 +197,10 @@ class Processes:
         """
         for _ in range(ATTEMPTS):
             self.close(at_once=True)
-            self._start()
-            try:
+            with suppress(*self.breaks):
+                self._start()
                 self.submit(os.getpid).result()
                 return
-            except BrokenExecutor:
-                continue
         raise WorkersError(
             f"the worker processes died while starting, {ATTEMPTS} times; what was finished is "
             "kept: see that there is enough memory, or use fewer workers"
@@ -199,7 +210,8 @@ class Processes:
         """End the processes."""
         if at_once:
             self._leash.close()
-        self._pool.shutdown(wait=True, cancel_futures=True)
+        with suppress(*self.breaks):
+            self._pool.shutdown(wait=True, cancel_futures=True)
         self._leash.close()
         self._end.close()
         self._word.close()

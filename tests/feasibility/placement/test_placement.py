@@ -433,8 +433,8 @@ class Refusing:
     """Workers that take nothing."""
 
     def __init__(self, workers) -> None:
-        self.losses, self.patience = workers.losses, workers.patience
-        self.shared_fate, self.width = workers.shared_fate, workers.width
+        self.breaks, self.deaths = workers.breaks, workers.deaths
+        self.patience, self.width, self.broken = workers.patience, workers.width, workers.broken
 
     def submit(self, *arguments: object) -> None:
         raise AssertionError("everything is in the store")

@@ -312,7 +312,7 @@ def test_study_from_the_command_line(tmp_path, capsys, monkeypatch) -> None:
     def refuse(*_):
         raise AssertionError("a case that is known is decided again")
 
-    monkeypatch.setattr("feasibility.studies.scheduling.work_through", refuse)
+    monkeypatch.setattr("feasibility.studies.scheduling.run_one", refuse)
     assert study_command(arguments(file=args.file, out=out, csv=str(table)), 0.0) == 0
     assert table.read_bytes() == first
     text, err = capsys.readouterr()
@@ -328,7 +328,7 @@ def test_interrupted_studies_say_what_is_kept(tmp_path, capsys, monkeypatch) -> 
     def interrupt(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("feasibility.studies.scheduling.work_through", interrupt)
+    monkeypatch.setattr("feasibility.studies.scheduling.run_one", interrupt)
     args = arguments(file=str(tmp_path / "s.toml"), out=str(tmp_path / "s.study"))
     with pytest.raises(KeyboardInterrupt):
         study_command(args, 0.0)

@@ -100,26 +100,26 @@ def test_a_study_goes_on_from_what_is_kept(folder, capsys, monkeypatch) -> None:
     """A second run decides the new cases alone, and prints the same rows as a fresh one."""
     (folder / "first.toml").write_text(STUDY.replace(", 2.0]", "]"), encoding="utf-8")
     assert run(capsys, "study", "first.toml", "--out", "run.study", *HERE)[0] == 0
-    from feasibility.studies import scheduling as study_dealing
+    from feasibility.studies import scheduling
 
-    dealt = []
-    through = study_dealing.work_through
+    submitted = []
+    run_one = scheduling.run_one
 
     def counted(work, tables):
-        dealt.extend(tables)
-        return through(work, tables)
+        submitted.append(tables)
+        return run_one(work, tables)
 
-    monkeypatch.setattr(study_dealing, "work_through", counted)
+    monkeypatch.setattr(scheduling, "run_one", counted)
     status, out, err = run(
         capsys, "study", "study.toml", "--out", "run.study", "--csv", "a.csv", "--json", *HERE
     )
     assert status == 0
     assert "4 finished cases" in err
-    assert [t["surface"]["position"][0] for t in dealt] == [2.0, 2.0]
+    assert [t["surface"]["position"][0] for t in submitted] == [2.0, 2.0]
     assert object_in(out)["tasks"] == 6
     fresh = run(capsys, "study", "study.toml", "--out", "new.study", "--csv", "b.csv", *HERE)
     assert fresh[0] == 0
-    assert len(dealt) == 2 + 6
+    assert len(submitted) == 2 + 6
     assert (folder / "a.csv").read_bytes() == (folder / "b.csv").read_bytes()
     assert "6 cases" in fresh[1]
 
@@ -513,7 +513,7 @@ def test_outputs_that_clash_are_refused_before_anything_is_tried(
     def refuse(*_):
         raise AssertionError("something was tried")
 
-    monkeypatch.setattr("feasibility.studies.scheduling.work_through", refuse)
+    monkeypatch.setattr("feasibility.studies.scheduling.run_one", refuse)
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     assert_refused(run(capsys, *argv, *HERE), words)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
