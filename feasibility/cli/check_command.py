@@ -1,38 +1,66 @@
-"""What the subcommands of `coverable` do; each returns its exit status."""
+"""`coverable check`, which decides one case, and `coverable show`, which opens a saved result."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import os
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
 
+from feasibility.cli.arguments import add_case, add_command, add_html
 from feasibility.cli.console import say, tell
-from feasibility.cli.session import asked
-from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
+from feasibility.cli.outputs import STATUS, json_text, write_text
+from feasibility.cli.session import open_case
+from feasibility.safe_files import check_writable, shown_path
 
-if TYPE_CHECKING:
-    from feasibility.viewer import View
+STATUSES = """exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input,
+130 interrupted"""
 
-STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
-BAD_INPUT = 2
+
+def add(subcommands: argparse._SubParsersAction) -> None:
+    """Add both commands."""
+    parser = add_command(
+        subcommands,
+        "check",
+        check,
+        help="decide one case",
+        description="Decide one case, and report the evidence for the answer.",
+        epilog=STATUSES,
+    )
+    add_case(parser)
+    add_html(parser)
+    parser.add_argument(
+        "--witness", metavar="FILE", help="write the covering motion as CSV (feasible only)"
+    )
+    parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
+
+    parser = subcommands.add_parser(
+        "show",
+        help="look at a result that `check --save` wrote",
+        description="Open the view of a result in a browser window; Ctrl-C ends it.",
+        allow_abbrev=False,
+    )
+    parser.set_defaults(run=show)
+    parser.add_argument("result", metavar="RESULT", help="a file that `check --save` wrote")
+    add_html(parser, "the view to a file instead")
+    parser.add_argument(
+        "--no-browser",
+        dest="browser",
+        action="store_false",
+        help="only print the address of the view",
+    )
 
 
 def check(args: argparse.Namespace, began: float) -> int:
-    """`coverable check CASE`: run the search, say the verdict, write what was asked for."""
+    """`coverable check CASE`: run the search, print the verdict, write the files asked for."""
     outputs = {"--save": args.save, "--html": args.html, "--witness": args.witness}
-    with asked(args, began, check_first=lambda: check_outputs(outputs)) as question:
+    with open_case(args, began, outputs) as opened:
         from feasibility.checking import check as run
         from feasibility.reports import verdict as report
 
-        case, loaded = question.case, question.so_far()
-        verdict = run(*question.setup, progress=question.progress)
-    say(
-        json_text(report.as_json(verdict, loaded))
-        if args.json
-        else report.as_text(verdict, case, loaded)
-    )
+        case, loaded = opened.case, opened.so_far()
+        verdict = run(*opened.setup, progress=opened.progress)
+    if args.json:
+        say(json_text(report.as_json(verdict, loaded)))
+    else:
+        say(report.as_text(verdict, case, loaded))
     if args.save is not None:
         from feasibility.results import save_result
 
@@ -41,41 +69,15 @@ def check(args: argparse.Namespace, began: float) -> int:
     if args.html is not None:
         from feasibility.viewer import view
 
-        write_view(view(verdict, case.name), args.html)
+        write_text(args.html, view(verdict, case.name).html(), "view")
     if args.witness is not None:
-        walk = report.witness_csv(verdict)
-        if walk is None:
-            what = "has no stored motion" if verdict.feasible else f"is {verdict.answer}"
-            tell(f"--witness: nothing written to {shown_path(args.witness)}: this case {what}")
+        motion = report.as_csv(verdict)
+        if motion is None:
+            why = "has no stored motion" if verdict.feasible else f"is {verdict.answer}"
+            tell(f"--witness: nothing written to {shown_path(args.witness)}: this case {why}")
         else:
-            write_whole(args.witness, lambda stream: stream.write(walk.encode()))
-            tell(f"witness: {shown_path(args.witness)}")
+            write_text(args.witness, motion, "witness")
     return STATUS[str(verdict.answer)]
-
-
-def check_outputs(outputs: Mapping[str, str | None]) -> None:
-    """Refuse outputs that could not be written, before the search and not after it."""
-    faults, taken = [], dict[str, str]()
-    for flag, path in outputs.items():
-        if path is None:
-            continue
-        try:
-            check_writable(path)
-        except FileError as error:
-            faults.append(f"{flag} {error}")
-        place = os.path.realpath(path)
-        if place in taken and os.path.realpath(os.devnull) != place:
-            faults.append(f"{flag} {shown_path(path)}: is the file of {taken[place]} too")
-        taken[place] = flag
-    if faults:
-        raise FileError(faults)
-
-
-def write_view(drawn: View, path: str) -> None:
-    """Write a view as one self-contained page."""
-    page = drawn.html()
-    write_whole(path, lambda stream: stream.write(page.encode()))
-    tell(f"view: {shown_path(path)}")
 
 
 def show(args: argparse.Namespace, began: float) -> int:
@@ -88,36 +90,14 @@ def show(args: argparse.Namespace, began: float) -> int:
     say(f"{result.case.name}: {result.verdict!r}")
     from feasibility.viewer import view
 
+    drawn = view(result.verdict, result.case.name)
     if args.html is not None:
-        write_view(view(result.verdict, result.case.name), args.html)
+        write_text(args.html, drawn.html(), "view")
         return 0
-    with view(result.verdict, result.case.name).show(open_browser=args.browser) as live:
+    with drawn.show(open_browser=args.browser) as live:
         tell(f"view: {live.url} (served until Ctrl-C)")
         try:
             live.wait()
         except KeyboardInterrupt:
             tell("")
     return 0
-
-
-def cases(args: argparse.Namespace, began: float) -> int:
-    """`coverable cases`: the built-in cases."""
-    from feasibility.cli.listing import case_rows, cases_table
-
-    rows = case_rows()
-    say(json_text({"cases": rows}) if args.json else cases_table(rows))
-    return 0
-
-
-def robots(args: argparse.Namespace, began: float) -> int:
-    """`coverable robots`: the robots that a case can name."""
-    from feasibility.cli.listing import robot_rows, robots_table
-
-    rows = robot_rows()
-    say(json_text({"robots": rows}) if args.json else robots_table(rows))
-    return 0
-
-
-def json_text(value: dict[str, Any]) -> str:
-    """One JSON object without NaN."""
-    return json.dumps(value, allow_nan=False, indent=2)

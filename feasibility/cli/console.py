@@ -110,28 +110,37 @@ def _importing(frame: FrameType | None) -> bool:
     return False
 
 
+@contextmanager
+def progress_bar() -> Iterator[Bar]:
+    """A progress bar, and a Ctrl-C that is never lost: at the latest it is raised at the end."""
+    with interruptible() as settle, Bar(settle) as bar:
+        yield bar
+        settle()
+
+
 class Bar:
     """A progress bar on a terminal's stderr; nothing at all elsewhere.
 
-    Use it as a context and pass `callback` on; it appears with the first report.
+    It is what a search reports to, and appears with the first report.
     """
 
-    def __init__(self) -> None:
-        """Look whether there is a terminal."""
+    def __init__(self, settle: Callable[[], None] = lambda: None) -> None:
+        """Look whether there is a terminal.
+
+        Args:
+            settle: called at each report, see `interruptible`.
+        """
+        self.settle = settle
+        self.shown = sys.stderr is not None and sys.stderr.isatty()
         self._bar: Any = None
         self._task: Any = None
         self._last = -1.0
-        self.shown = sys.stderr is not None and sys.stderr.isatty()
-
-    @property
-    def callback(self) -> Bar | None:
-        """What a search reports to; None without a terminal, so that it need not report."""
-        return self if self.shown else None
 
     def __call__(self, done: int, total: int | None, text: str) -> None:
         """Show that `done` of `total` parts (None: unknown how many) are done."""
+        self.settle()
         now = time.monotonic()
-        if now - self._last < PAUSE and done != total:
+        if not self.shown or (now - self._last < PAUSE and done != total):
             return
         self._last = now
         if self._bar is None:

@@ -1,18 +1,43 @@
-"""What can be named on the command line: the built-in cases and the robots."""
+"""`coverable cases` and `coverable robots`: what a case file can name."""
 
 from __future__ import annotations
 
+import argparse
 import math
 from collections.abc import Sequence
 from typing import Any
 
-from feasibility.cases import builtin_cases
+from feasibility.cli.arguments import add_command
+from feasibility.cli.console import say
+from feasibility.cli.outputs import json_text
 
 WIDE = 240  # columns, where nothing shall be wrapped
 
 
+def add(subcommands: argparse._SubParsersAction) -> None:
+    """Add both commands."""
+    add_command(subcommands, "cases", cases, help="list the built-in cases")
+    add_command(subcommands, "robots", robots, help="list the robots by name")
+
+
+def cases(args: argparse.Namespace, began: float) -> int:
+    """`coverable cases`: the built-in cases."""
+    rows = case_rows()
+    say(json_text({"cases": rows}) if args.json else cases_table(rows))
+    return 0
+
+
+def robots(args: argparse.Namespace, began: float) -> int:
+    """`coverable robots`: the robots that a case can name."""
+    rows = robot_rows()
+    say(json_text({"robots": rows}) if args.json else robots_table(rows))
+    return 0
+
+
 def case_rows() -> list[dict[str, Any]]:
     """The built-in cases, one object each."""
+    from feasibility.cases import builtin_cases
+
     return [
         {
             "name": name,

@@ -14,16 +14,13 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from coverable_errors import CoverableError
-from feasibility.cli import check_command as commands
-from feasibility.cli.arguments import add_case, add_jobs, add_studies
+from feasibility.cli import check_command, listing, path_divide_explain, place, study_compare
 from feasibility.cli.console import prepare, say, tell
+from feasibility.cli.outputs import BAD_INPUT
 
 INTERRUPTED = 130
 TRACEBACK = "COVERABLE_TRACEBACK"
 NO_CACHE = "cannot cache function"  # numba's words
-
-STATUSES = """exit status of check: 0 feasible, 1 infeasible, 3 undecided, 2 bad input,
-130 interrupted"""
 
 
 class _Parser(argparse.ArgumentParser):
@@ -32,7 +29,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and leave with status 2."""
         tell(f"{self.prog}: {message}; see `{self.prog} --help`")
-        raise SystemExit(commands.BAD_INPUT)
+        raise SystemExit(BAD_INPUT)
 
 
 class _Version(argparse.Action):
@@ -57,50 +54,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     subcommands = parser.add_subparsers(metavar="COMMAND", required=True)
-    _add_check(subcommands)
-    add_jobs(subcommands)
-    add_studies(subcommands, add_case)
-
-    listing = subcommands.add_parser("cases", help="list the built-in cases", allow_abbrev=False)
-    listing.set_defaults(run=commands.cases)
-    robots = subcommands.add_parser("robots", help="list the robots by name", allow_abbrev=False)
-    robots.set_defaults(run=commands.robots)
-    for sub in (listing, robots):
-        sub.add_argument("--json", action="store_true", help="print one JSON object")
-
-    show = subcommands.add_parser(
-        "show",
-        help="look at a result that `check --save` wrote",
-        description="Open the view of a result in a browser window; Ctrl-C ends it.",
-        allow_abbrev=False,
-    )
-    show.add_argument("result", metavar="RESULT", help="a file that `check --save` wrote")
-    show.add_argument("--html", metavar="FILE", help="write the view to a file instead")
-    show.add_argument(
-        "--no-browser",
-        dest="browser",
-        action="store_false",
-        help="only print the address of the view",
-    )
-    show.set_defaults(run=commands.show)
+    for commands in (check_command, path_divide_explain, study_compare, place, listing):
+        commands.add(subcommands)
     return parser
-
-
-def _add_check(subcommands: argparse._SubParsersAction) -> None:
-    """The arguments of `coverable check`."""
-    check = subcommands.add_parser(
-        "check",
-        help="decide one case",
-        description="Decide one case and say on what the answer rests.",
-        epilog=STATUSES,
-        allow_abbrev=False,
-    )
-    add_case(check)
-    check.add_argument(
-        "--witness", metavar="FILE", help="write the covering motion as CSV (feasible only)"
-    )
-    check.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
-    check.set_defaults(run=commands.check)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -156,7 +112,7 @@ def _failed(error: Exception) -> int:
             f"coverable: this is a bug in coverable: {type(error).__name__}: {text}\n"
             f"Run the command again with {TRACEBACK}=1, and report what it prints."
         )
-    return commands.BAD_INPUT
+    return BAD_INPUT
 
 
 def _say_nothing(_: sys.UnraisableHookArgs) -> None:
@@ -176,7 +132,3 @@ def run() -> NoReturn:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             stream.flush()
     os._exit(status)
-
-
-if __name__ == "__main__":
-    run()

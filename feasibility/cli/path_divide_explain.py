@@ -1,4 +1,4 @@
-"""From verdict to work, on the command line: `path`, `divide` and `explain`."""
+"""`coverable path`, `divide` and `explain`: what follows from the verdict on one case."""
 
 from __future__ import annotations
 
@@ -6,9 +6,10 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from feasibility.cli.check_command import STATUS, check_outputs, json_text, write_view
+from feasibility.cli.arguments import add_case, add_command, add_html, positive
 from feasibility.cli.console import say, tell
-from feasibility.cli.session import asked
+from feasibility.cli.outputs import STATUS, json_text, write_text
+from feasibility.cli.session import open_case
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -17,41 +18,104 @@ if TYPE_CHECKING:
     from feasibility.verdict import Verdict
     from feasibility.viewer import View
 
+ORDERS = ("rows", "columns", "spiral", "shortest")
+STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a patch, 1 cells are
+left out, 3 undecided"""
 WHY_COMPLETE = {
-    "path": "a path needs 'complete', because the greedy search does not visit the cells' centres",
-    "divide": "a division needs 'complete', because the greedy search keeps one motion only",
-    "explain": "thresholds need 'complete', because the greedy search's no depends on its start",
+    "path": "a path needs 'complete': the greedy search does not visit the cells' centres",
+    "divide": "a division needs 'complete': the greedy search keeps one motion only",
+    "explain": "thresholds need 'complete': a greedy search that fails depends on its start",
 }
+
+
+def add(subcommands: argparse._SubParsersAction) -> None:
+    """Add the three commands."""
+    parser = add_command(
+        subcommands,
+        "path",
+        path,
+        help="a coverage motion that an arm can run",
+        description="Plan a path over every cell in a chosen order, time it within the limits of "
+        "joints and tool, and write it as a trajectory.",
+        epilog=STATUSES,
+    )
+    add_case(parser)
+    add_html(parser)
+    _add_timing(parser)
+    parser = add_command(
+        subcommands,
+        "divide",
+        divide,
+        help="the fewest sub-patches, each covered by one continuous motion",
+        description="Divide a surface that one motion cannot cover into the fewest patches, and "
+        "report how the joints move from one to the next.",
+        epilog=STATUSES,
+    )
+    add_case(parser)
+    add_html(parser)
+    parser = add_command(
+        subcommands,
+        "explain",
+        explain,
+        help="what would make a case feasible, and the margins of a feasible one",
+        description="Find the thresholds at which the verdict changes: cone, joint limits, "
+        "standoff, position of the surface, cells to drop.",
+        epilog=STATUSES,
+    )
+    add_case(parser)
+    add_html(parser)
+
+
+def _add_timing(parser: argparse.ArgumentParser) -> None:
+    """How a path is ordered, timed and written."""
+    parser.add_argument(
+        "--order", choices=ORDERS, help="default: rows on a grid of cells, shortest on others"
+    )
+    parser.add_argument(
+        "--speed", type=positive, default=0.1, metavar="M_PER_S",
+        help="maximum speed of the tool point, m/s (default 0.1)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--velocity", type=positive, metavar="RAD_PER_S",
+        help="maximum velocity of every joint, rad/s or m/s (default: the URDF's limits)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--acceleration", type=positive, metavar="RAD_PER_S2",
+        help="maximum acceleration of every joint, rad/s^2 or m/s^2 (default: what takes a joint "
+        "to its maximum velocity in half a second)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--period", type=positive, default=0.02, metavar="S",
+        help="time between samples, seconds (default 0.02)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", metavar="FILE", action="append", default=[],
+        help="write the trajectory; .csv, .json, or .yaml like a ROS JointTrajectory; can be "
+        "repeated",
+    )  # fmt: skip
 
 
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
-
-    def check_first() -> None:
-        from feasibility.results import check_ending
-
-        check_outputs(outputs)
-        for out in args.out:
-            check_ending(out)
-
-    with asked(
-        args, began, check_first=check_first, only_complete=WHY_COMPLETE["path"]
-    ) as question:
+    with open_case(args, began, outputs, WHY_COMPLETE["path"]) as opened:
         from feasibility.checking import check
         from feasibility.paths import coverage_path
         from feasibility.reports import path as report
+        from feasibility.results import check_ending
         from feasibility.timing import motion_limits, trajectory
 
-        robot, loaded = question.setup.robot, question.so_far()
+        for out in args.out:
+            check_ending(out)
+        robot, loaded = opened.setup.robot, opened.so_far()
         limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
-        verdict = check(*question.setup, progress=question.progress)
+        verdict = check(*opened.setup, progress=opened.progress)
         if not verdict.feasible:
-            return _no_path(args, question.case.name, verdict, loaded)
-        question.progress(0, None, "laying the path")
+            return _no_path(args, opened.case.name, verdict, loaded)
+        opened.progress(0, None, "planning the path")
         order: Order = args.order or ("rows" if len(verdict.cells.shape) == 2 else "shortest")
         found = coverage_path(verdict, order)
-        question.progress(0, None, "timing the path")
+        opened.progress(0, None, "timing the path")
         run = trajectory(
             found,
             args.speed,
@@ -59,11 +123,10 @@ def path(args: argparse.Namespace, began: float) -> int:
             acceleration=args.acceleration,
             period=args.period,
         )
-    say(
-        json_text(report.as_json(found, run, limits))
-        if args.json
-        else report.as_text(found, run, limits)
-    )
+    if args.json:
+        say(json_text(report.as_json(found, run, limits)))
+    else:
+        say(report.as_text(found, run, limits))
     for out in args.out:
         from feasibility.results import save_trajectory
 
@@ -72,83 +135,71 @@ def path(args: argparse.Namespace, began: float) -> int:
     if args.html is not None:
         from feasibility.viewer import view_path
 
-        write_view(view_path(found, run, question.case.name), args.html)
+        write_text(args.html, view_path(found, run, opened.case.name).html(), "view")
     return 0
 
 
 def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: float) -> int:
     """Say why there is no path; the exit status is the verdict's."""
-    from feasibility.reports import no_path_json
+    from feasibility.reports import path as report
 
     reason = f"no path over this surface is known. {verdict!r}"
     tell(f"coverable path: {name}: {reason}")
     if str(verdict.answer) == "undecided" and "time limit" in verdict.message:
         tell("`--set search.time_limit=...` gives the search more time.")
-    tell("`coverable explain` says what would help, `coverable divide` how to split it.")
+    tell("`coverable explain` finds what would help, `coverable divide` splits the surface.")
     for flag, files in (("--out", args.out), ("--html", [args.html])):
         for file in files:
             if file is not None:
                 tell(f"{flag}: nothing written to {shown_path(file)}")
     if args.json:
-        say(json_text(no_path_json(verdict, reason, loaded)))
+        say(json_text(report.no_path_json(verdict, reason, loaded)))
     return STATUS[str(verdict.answer)]
 
 
 def divide(args: argparse.Namespace, began: float) -> int:
     """`coverable divide CASE`: the fewest sub-patches, each covered by one continuous motion."""
-    with asked(
-        args,
-        began,
-        check_first=lambda: check_outputs({"--html": args.html}),
-        only_complete=WHY_COMPLETE["divide"],
-    ) as question:
+    with open_case(args, began, {"--html": args.html}, WHY_COMPLETE["divide"]) as opened:
         from feasibility.division import divide as run
-        from feasibility.reports import STATUS as DIVIDED
         from feasibility.reports import division as report
 
-        loaded = question.so_far()
-        division = run(*question.setup, progress=question.progress)
+        loaded = opened.so_far()
+        division = run(*opened.setup, progress=opened.progress)
     if args.json:
         say(json_text(report.as_json(division, loaded)))
     else:
-        say(report.as_text(division, question.case.name, loaded))
+        say(report.as_text(division, opened.case.name, loaded))
     if args.html is not None:
         from feasibility.viewer import view_division
 
-        write_view(view_division(division, question.case.name), args.html)
-    return DIVIDED[report.answer_of(division)]
+        write_text(args.html, view_division(division, opened.case.name).html(), "view")
+    return report.STATUS[report.answer_of(division)]
 
 
 def explain(args: argparse.Namespace, began: float) -> int:
-    """`coverable explain CASE`: what would make it feasible, or how far it may be tightened."""
-    with asked(
-        args,
-        began,
-        check_first=lambda: check_outputs({"--html": args.html}),
-        only_complete=WHY_COMPLETE["explain"],
-    ) as question:
+    """`coverable explain CASE`: what would make it feasible, or how far it can be tightened."""
+    with open_case(args, began, {"--html": args.html}, WHY_COMPLETE["explain"]) as opened:
         from feasibility.reports import explanation as report
         from feasibility.sensitivity import explain as run
 
-        explanation = run(*question.setup, progress=question.progress)
-    name = question.case.name
-    say(
-        json_text(report.as_json(explanation, name))
-        if args.json
-        else report.as_text(explanation, name)
-    )
+        explanation = run(*opened.setup, progress=opened.progress)
+    name = opened.case.name
+    if args.json:
+        say(json_text(report.as_json(explanation, name)))
+    else:
+        say(report.as_text(explanation, name))
     if args.html is not None:
-        write_view(_explained(explanation, name), args.html)
+        write_text(args.html, _explained(explanation, name).html(), "view")
     return STATUS[str(explanation.verdict.answer)]
 
 
 def _explained(explanation: Explanation, name: str) -> View:
-    """The verdict's picture, with what helps beside it."""
-    from feasibility.reports import sentence
+    """The verdict's view, with the thresholds in its legend."""
+    from feasibility.reports import explanation as report
     from feasibility.viewer import view
 
     drawn = view(explanation.verdict, name)
     feasible = explanation.verdict.feasible
-    helps = [sentence(t, feasible) for t in explanation.thresholds if t.feasible is not None]
+    helps = [report.sentence(t, feasible) for t in explanation.thresholds if t.feasible is not None]
     text = " · ".join([drawn.legend.text, *helps])
     return replace(drawn, legend=replace(drawn.legend, text=text))

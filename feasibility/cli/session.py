@@ -1,78 +1,70 @@
-"""What the commands that search have in common: the case, its notes, progress and Ctrl-C."""
+"""One case on the command line: loading it, its notes, progress, and Ctrl-C."""
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from feasibility.cli.console import Bar, interruptible, tell
+from feasibility.cli.console import Bar, progress_bar, tell
+from feasibility.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
     from feasibility.cases import Case, Setup
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
-    """A case that is being asked about."""
+class OpenCase:
+    """A case that a command works on."""
 
     case: Case
     setup: Setup
-    progress: Callable[[int, int | None, str], None]
+    progress: Bar
     """To be called as progress(done, total, text)."""
     began: float
     """`time.perf_counter()` when the command began."""
 
     def so_far(self) -> float:
-        """Seconds since then: ask before the search, and it is what loading took."""
+        """Seconds since then: called before the search, the time that loading took."""
         return time.perf_counter() - self.began
 
 
 @contextmanager
-def asked(
+def open_case(
     args: argparse.Namespace,
     began: float,
-    *,
-    check_first: Callable[[], None] | None = None,
+    outputs: Mapping[str, str | None],
     only_complete: str = "",
-) -> Iterator[Asked]:
-    """Load `args.case` with `args.settings`, say its notes, and show progress meanwhile.
+) -> Iterator[OpenCase]:
+    """Load `args.case` with `args.settings`, print its notes, and show progress meanwhile.
 
     Args:
         args: arguments of the command.
         began: `time.perf_counter()` when the command began.
-        check_first: called when the case is read, before anything is built.
-        only_complete: why the greedy search will not do; empty where it does.
+        outputs: files by their flag, see `check_outputs`; checked before anything is built.
+        only_complete: why the command refuses the greedy search; empty where it does not.
 
     Raises:
         CaseError: the case cannot be used.
+        FileError: an output cannot be written.
     """
-    with interruptible() as settle:
+    with progress_bar() as progress:
         from feasibility.cases import CaseError, Fault, load_case
         from feasibility.notices import compiling_notice
 
-        settle()
+        progress.settle()
         case = load_case(args.case, args.settings)
-        if check_first is not None:
-            check_first()
+        check_outputs(outputs, args.case)
         if only_complete and case.search.method != "complete":
             raise CaseError(Fault("search.method", only_complete), case.name)
-        with compiling_notice():  # cutting a mesh has kernels of its own
+        with compiling_notice():  # cutting a mesh into cells has kernels of its own
             setup = case.build()
-        settle()
+        progress.settle()
         for note in setup.robot.notes:
             tell(f"note: {setup.robot.name}: {note}")
         for note in setup.cells.notes:
             tell(f"note: {case.surface.label}: {note}")
-        with Bar() as bar:
-
-            def progress(done: int, total: int | None, text: str) -> None:
-                settle()  # stop even if Python has dropped the Ctrl-C
-                if bar.callback is not None:
-                    bar(done, total, text)
-
-            yield Asked(case, setup, progress, began)
-        settle()
+        yield OpenCase(case, setup, progress, began)

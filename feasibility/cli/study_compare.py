@@ -1,27 +1,59 @@
-"""Many cases on the command line: `study` and `compare`."""
+"""`coverable study` and `coverable compare`: many cases on many processes."""
 
 from __future__ import annotations
 
 import argparse
-import os
 import time
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from feasibility.cli.check_command import check_outputs, json_text
-from feasibility.cli.console import Bar, interruptible, say, tell
-from feasibility.safe_files import FileError, shown_path, write_whole
+from feasibility.cli.arguments import add_case, add_command, add_csv, add_html, add_workers
+from feasibility.cli.console import Bar, progress_bar, say, tell
+from feasibility.cli.outputs import STATUS, check_outputs, json_text, write_text
+from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.search import Progress
     from feasibility.studies import Row, Study
+    from feasibility.viewer import View
 
-UNDECIDED = 3
+
+def add(subcommands: argparse._SubParsersAction) -> None:
+    """Add both commands."""
+    parser = add_command(
+        subcommands,
+        "study",
+        study,
+        help="many cases in parallel, each stored when it is finished",
+        description="Decide every case of a study file. Finished cases are stored in one file; "
+        "after an interruption, run the command again to continue.",
+        epilog="exit status: 0; 3 where some cases failed; 2 bad input, 130 interrupted",
+    )
+    parser.add_argument("file", metavar="FILE", help="a study file (TOML)")
+    parser.add_argument("--out", metavar="FILE", required=True, help="stores the finished cases")
+    add_csv(parser)
+    add_html(parser, "one page with tables, charts and poses")
+    add_workers(parser)
+    parser = add_command(
+        subcommands,
+        "compare",
+        compare,
+        help="one case, several arms side by side",
+        description="Decide the same case for several arms.",
+    )
+    add_case(parser)
+    add_html(parser)
+    parser.add_argument(
+        "--robots", metavar="NAMES", required=True, help="names of arms, such as ur5,panda,kinova"
+    )
+    parser.add_argument(
+        "--critical", action="store_true", help="also find the smallest cone of each arm (slow)"
+    )
+    add_csv(parser)
+    add_workers(parser)
 
 
 def study(args: argparse.Namespace, began: float) -> int:
-    """`coverable study FILE --out OUT`: every case of a study, kept as they come.
+    """`coverable study FILE --out OUT`: every case of a study, stored as they finish.
 
     Args:
         args: file, out, workers, dask, json, csv, html.
@@ -34,23 +66,29 @@ def study(args: argparse.Namespace, began: float) -> int:
     from feasibility.studies import Store, load_study, open_workers, run_tasks
 
     outputs = {"--out": args.out, "--csv": args.csv, "--html": args.html}
-    check_files(args.file, outputs)
-    asked = load_study(args.file)
+    check_outputs(outputs, args.file)
+    loaded = load_study(args.file)
     with Store(args.out) as store:
         before = len(store)
         if before:
-            tell(f"{shown_path(args.out)} holds {before} finished cases; going on from there")
+            tell(f"{shown_path(args.out)} holds {before} finished cases; continuing from there")
         try:
-            with _shown("deciding cases") as progress, open_workers(args.workers, args.dask) as by:
-                rows = run_tasks(asked.tasks, by, store, progress)
+            with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
+                rows = run_tasks(loaded.tasks, workers, store, _with_rate(bar, "deciding cases"))
         except KeyboardInterrupt:
-            tell(f"{len(store)} cases are kept in {shown_path(args.out)}; run again to go on")
+            tell(f"{len(store)} cases are stored in {shown_path(args.out)}; run again to continue")
             raise
-    say(json_text(report.as_json(asked, rows)) if args.json else report.as_text(asked, rows))
-    _write(args.csv, report.as_csv(asked, rows), "table")
+    if args.json:
+        say(json_text(report.as_json(loaded, rows)))
+    else:
+        say(report.as_text(loaded, rows))
+    if args.csv is not None:
+        write_text(args.csv, report.as_csv(loaded, rows), "table")
     if args.html is not None:
-        _write(args.html, _page(asked, rows), "page")
-    return UNDECIDED if any(row.status == "failed" for row in rows) else 0
+        page = report.as_html(loaded, rows, _poses(loaded, rows))
+        write_text(args.html, page, "page")
+    failed = any(row.status == "failed" for row in rows)
+    return STATUS["undecided"] if failed else 0
 
 
 def compare(args: argparse.Namespace, began: float) -> int:
@@ -65,78 +103,43 @@ def compare(args: argparse.Namespace, began: float) -> int:
     from feasibility.studies import compare as run
     from feasibility.studies import open_workers
 
-    check_files(args.case, {"--csv": args.csv, "--html": args.html})
+    check_outputs({"--csv": args.csv, "--html": args.html}, args.case)
     case = load_case(args.case, args.settings)
     robots = [name.strip() for name in args.robots.split(",") if name.strip()]
-    with _shown("comparing robots") as progress, open_workers(args.workers, args.dask) as by:
-        found = run(case, robots, by, critical=args.critical, progress=progress)
+    with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
+        progress = _with_rate(bar, "comparing robots")
+        found = run(case, robots, workers, critical=args.critical, progress=progress)
     say(json_text(report.as_json(found)) if args.json else report.as_text(found))
-    _write(args.csv, report.as_csv(found), "table")
-    _write(args.html, report.as_html(found), "page")
+    if args.csv is not None:
+        write_text(args.csv, report.as_csv(found), "table")
+    if args.html is not None:
+        write_text(args.html, report.as_html(found), "page")
     return 0
 
 
-def check_files(given: str, outputs: Mapping[str, str | None]) -> None:
-    """Refuse outputs that could not be written, or are what is read, before the work.
-
-    Args:
-        given: the study or the case, a file or the name of a built-in one.
-        outputs: files by their flag, None where there is none.
-
-    Raises:
-        FileError: with everything that is wrong.
-    """
-    faults = []
-    try:
-        check_outputs(outputs)
-    except FileError as error:
-        faults.append(str(error))
-    for flag, path in outputs.items():
-        both_exist = path is not None and os.path.isfile(given) and os.path.exists(path)
-        if path is not None and both_exist and os.path.samefile(given, path):
-            faults.append(f"{flag} {shown_path(path)}: is what is read; give another name")
-    if faults:
-        raise FileError(faults)
-
-
-def _page(asked: Study, rows: tuple[Row, ...]) -> str:
-    """A study as one page, with the poses of the surface where they vary."""
-    from feasibility.reports import study_page
+def _poses(study: Study, rows: tuple[Row, ...]) -> View | None:
+    """The poses of the surface, where a study varies them."""
     from feasibility.viewer import view_study
 
-    drawn = None
-    if any(label.startswith(("surface.position", "surface.rpy_deg")) for label in asked.labels):
-        with interruptible() as settle, Bar() as bar:
-            drawn = view_study(asked.tasks, rows, asked.name, progress=bar.callback)
-            settle()
-    return study_page.as_html(asked, rows, drawn)
+    if not any(label.startswith(("surface.position", "surface.rpy_deg")) for label in study.labels):
+        return None
+    with progress_bar() as bar:
+        return view_study(study.tasks, rows, study.name, progress=bar)
 
 
-def _write(path: str | None, text: str, what: str) -> None:
-    """Write a file that was asked for, and say so."""
-    if path is not None:
-        write_whole(path, lambda stream: stream.write(text.encode()))
-        tell(f"{what}: {shown_path(path)}")
-
-
-@contextmanager
-def _shown(what: str) -> Iterator[Progress]:
-    """A progress bar with rate and time left, and a Ctrl-C that is never lost."""
+def _with_rate(bar: Bar, what: str) -> Progress:
+    """Progress in cases, with rate and time left."""
     began, first = time.monotonic(), -1
-    with interruptible() as settle, Bar() as bar:
 
-        def report(done: int, total: int | None, text: str) -> None:
-            nonlocal first
-            settle()
-            first = done if first < 0 else first  # what an earlier run has done says no rate
-            if bar.callback is not None:
-                bar(done, total, f"{what}{_pace(done - first, done, total, began)}")
+    def report(done: int, total: int | None, text: str) -> None:
+        nonlocal first
+        first = done if first < 0 else first  # what an earlier run has done has no rate
+        bar(done, total, f"{what}{_rate(done - first, done, total, began)}")
 
-        yield report
-        settle()
+    return report
 
 
-def _pace(here: int, done: int, total: int | None, began: float) -> str:
+def _rate(here: int, done: int, total: int | None, began: float) -> str:
     """', 12.3/s, 2 min left'; empty until something is done."""
     took = time.monotonic() - began
     if here <= 0 or total is None or took <= 0.0:

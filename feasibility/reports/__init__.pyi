@@ -4,10 +4,4 @@ from . import explanation as explanation
 from . import path as path
 from . import placement as placement
 from . import study as study
-from . import study_page as study_page
 from . import verdict as verdict
-from .division import STATUS as STATUS
-from .explanation import sentence as sentence
-from .path import no_path_json as no_path_json
-from .study import merit as merit
-from .verdict import witness_csv as witness_csv

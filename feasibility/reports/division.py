@@ -9,17 +9,19 @@ from typing import Any
 import numpy as np
 
 from feasibility.division import Division, Plan, Reconfiguration, SubPatch
-from feasibility.reports.text import filled
+from feasibility.reports.objects import causes_json, certificate_json, rounded, seconds
+from feasibility.reports.text import counted, filled, summary
 from feasibility.reports.verdict import causes_listed
 from feasibility.results import plain
 from feasibility.version import version
 from surfaces import Cells
 
+PHASES = ("search_s", "divide_s")
 STATUS = {"complete": 0, "partial": 1, "undecided": 3}
 SENTENCES = {
     "complete": "divided: every cell is in a patch that one continuous motion covers.",
     "partial": "divided in part: the patches cover all cells that can be covered.",
-    "undecided": "undecided: the division is the best known, or could not be certified.",
+    "undecided": "undecided: this division is the best one found, or could not be certified.",
 }
 NOTHING = "not divided: no cell can be covered."
 
@@ -46,18 +48,10 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         "ended": division.ended,
         **_plan_json(fewest, division),
         "connected": None if connected is fewest else _plan_json(connected, division),
-        "left_out": [
-            {
-                "cell": list(cells.unravel(cause.cell)),
-                "cause": str(cause.kind),
-                "proved": bool(cause.proved),
-                "detail": cause.detail,
-            }
-            for cause in division.left_out
-        ],
+        "left_out": causes_json(division.left_out, cells),
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
         "message": division.message,
-        "timing": {key: round(value, 6) for key, value in _seconds(division, before_s).items()},
+        "timing": rounded(seconds(division.timing, PHASES, before_s)),
         "robot": division.robot.name,
         "seed": int(division.seed),
         "version": version(),
@@ -76,8 +70,7 @@ def _plan_json(plan: Plan, division: Division) -> dict[str, Any]:
 
 
 def _patch_json(patch: SubPatch, cells: Cells) -> dict[str, Any]:
-    """One patch; figures that the replay could not measure are null."""
-    found = patch.certificate
+    """One patch; values that the replay could not measure are null."""
     return {
         "cells": [list(cells.unravel(k)) for k in patch.cells.tolist()],
         "area_m2": plain(patch.area),
@@ -85,10 +78,8 @@ def _patch_json(patch: SubPatch, cells: Cells) -> dict[str, Any]:
         "accepted": patch.accepted,
         "refusal": patch.refusal or None,
         "certificate": {
-            "waypoints": int(found.waypoints),
-            "max_position_error_m": plain(float(found.max_position_error)),
-            "max_angle_deg": plain(math.degrees(found.max_angle)),
-            "min_limit_margin": plain(float(found.min_limit_margin)),
+            **certificate_json(patch.certificate),
+            "min_limit_margin": plain(float(patch.certificate.min_limit_margin)),
         },
     }
 
@@ -109,13 +100,6 @@ def _move_json(move: Reconfiguration, k: int) -> dict[str, Any]:
     }
 
 
-def _seconds(division: Division, before_s: float) -> dict[str, float]:
-    """The four times of a division."""
-    keys = ("load_s", "search_s", "divide_s", "total_s")
-    seconds = {key: float(division.timing.get(key, 0.0)) for key in keys}
-    return seconds | {key: seconds[key] + before_s for key in ("load_s", "total_s")}
-
-
 def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     """The division for people: the answer, the patches and moves in order, what is left out.
 
@@ -127,7 +111,7 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     head = SENTENCES[answer_of(division)]
     if division.decided and not division.patches and len(division.cells):
         head = NOTHING
-    seconds = _seconds(division, before_s)
+    times = seconds(division.timing, PHASES, before_s)
     rows = [
         ("case", title),
         (
@@ -137,11 +121,11 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
         ("found", division.message),
         (
             "time",
-            f"{seconds['total_s']:.2f} s (loading {seconds['load_s']:.2f}, search "
-            f"{seconds['search_s']:.3f}, division {seconds['divide_s']:.3f})",
+            f"{times['total_s']:.2f} s (loading {times['load_s']:.2f}, search "
+            f"{times['search_s']:.3f}, division {times['divide_s']:.3f})",
         ),
     ]
-    lines = [head, "", *(filled(f"  {name:<12}", text) for name, text in rows)]
+    lines = summary(head, rows)
     if division.patches:
         lines += ["", "In this order:", *_steps(division.fewest, division)]
     if division.connected is not division.fewest:
@@ -150,32 +134,28 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     if division.left_out:
         lines += ["", "Left out:", *causes_listed(division.left_out, division.cells)]
     if len(division.unsettled):
-        open_cells = f"{len(division.unsettled):,} cells: the time limit ran out before they were"
-        lines += ["", "Not settled:", f"  {open_cells}"]
+        unsettled = counted(len(division.unsettled), "cell")
+        lines += ["", "Not decided:", f"  {unsettled}: the time limit ran out first"]
     return "\n".join(lines)
 
 
 def _motions(division: Division) -> str:
-    """How many motions, and how sure that is."""
-    number = len(division.patches)
-    what = f"{number} motion{'' if number == 1 else 's'}"
-    if division.optimal or not number:
-        return what
-    return f"{what} (the fewest known)"
+    """How many motions, and whether fewer are known to be impossible."""
+    motions = counted(len(division.patches), "motion")
+    proved = division.optimal or not division.patches
+    return motions if proved else f"{motions} (the fewest found)"
 
 
 def _steps(plan: Plan, division: Division) -> Iterator[str]:
     """Patches and the moves between them, a line each."""
     for k, patch in enumerate(plan.patches):
-        number = len(patch.cells)
+        pieces = f", in {patch.pieces} pieces" if patch.pieces > 1 else ""
+        replayed = f"refused: {patch.refusal}" if patch.refusal else "accepted by the replay"
         text = (
-            f"{number:,} cell{'' if number == 1 else 's'} ({patch.area:.3g} m2"
-            + (f", in {patch.pieces} pieces" if patch.pieces > 1 else "")
-            + f"), around cell {_middle(patch, division.cells)}; "
+            f"{counted(len(patch.cells), 'cell')} ({patch.area:.3g} m2{pieces}), around cell "
+            f"{_middle(patch, division.cells)}; "
+            f"{counted(patch.certificate.waypoints, 'waypoint')}, {replayed}"
         )
-        waypoints = patch.certificate.waypoints
-        text += f"{waypoints:,} waypoint{'' if waypoints == 1 else 's'}, "
-        text += f"refused: {patch.refusal}" if patch.refusal else "accepted by the replay"
         yield filled(f"  {f'patch {k + 1}':<12}", text)
         if k < len(plan.moves):
             yield filled(f"  {'move':<12}", plan.moves[k].described())

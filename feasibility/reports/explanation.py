@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 from feasibility.reports.text import filled
@@ -12,9 +11,9 @@ from feasibility.verdict import Answer, Evidence
 from feasibility.version import version
 
 HEADS = {
-    Answer.FEASIBLE: "feasible. How far it can be tightened, one thing at a time:",
-    Answer.INFEASIBLE: "infeasible. What would make it feasible, one thing at a time:",
-    Answer.UNDECIDED: "undecided. What was found to make it feasible, one thing at a time:",
+    Answer.FEASIBLE: "feasible. How far it can be tightened, one parameter at a time:",
+    Answer.INFEASIBLE: "infeasible. What would make it feasible, one change at a time:",
+    Answer.UNDECIDED: "undecided. What was found to make it feasible, one change at a time:",
 }
 
 
@@ -33,9 +32,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
     for threshold in helps:
         lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
     if not helps and others:
-        lines.append(
-            filled("  ", "No single change that was looked at was found to make it feasible.")
-        )
+        lines.append(filled("  ", "No single change that was tried was found to make it feasible."))
     if others:
         lines += ["", "What does not help alone:"]
         ruled_out = [_helpless_label(t.quantity) for t in others if t.ruled_out]
@@ -54,7 +51,7 @@ def _unknown(explanation: Explanation) -> str:
     """Which thresholds the time limit left no time for."""
     names, number = ", ".join(explanation.left_out), len(explanation.left_out)
     if not explanation.thresholds:
-        return f"The time limit ran out before any threshold was looked for: unknown are {names}."
+        return f"The time limit ran out before any threshold was searched; unknown: {names}."
     return f"The time limit ran out; {number} thresholds are unknown: {names}."
 
 
@@ -68,10 +65,10 @@ def _dropped(explanation: Explanation, dropped: Dropped) -> str:
 
 
 def _effort(threshold: Threshold) -> float:
-    """How far along its range a change has to go: the smallest is told first."""
+    """The share of its range that a change needs; the smallest is listed first."""
     quantity, found = threshold.quantity, threshold.feasible
-    way = abs(quantity.end - quantity.given)
-    return abs(found.value - quantity.given) / way if found is not None and way > 0.0 else 1.0
+    span = abs(quantity.end - quantity.given)
+    return abs(found.value - quantity.given) / span if found is not None and span > 0.0 else 1.0
 
 
 def sentence(threshold: Threshold, tightened: bool) -> str:
@@ -93,7 +90,7 @@ def sentence(threshold: Threshold, tightened: bool) -> str:
     if threshold.other is not None:
         text += f"; {_against(quantity, threshold.other)}"
     elif tightened and found.value == quantity.end:
-        text += ", the furthest that was looked at"
+        text += ", the furthest value tried"
     return text + "."
 
 
@@ -114,12 +111,11 @@ def _remedy(quantity: Quantity, value: str, now: str) -> str:
         return f"feasible from alpha = {value} on ({now} now)"
     if quantity.kind in (Kind.LOWER, Kind.UPPER):
         joint, side, _ = quantity.name.rsplit(" ", 2)
-        way = "down" if side == "lower" else "up"
-        return f"{joint} would need {way} to {value}; it stops at {now}"
+        direction = "down" if side == "lower" else "up"
+        return f"{joint} would need {direction} to {value}; it stops at {now}"
     if quantity.kind is Kind.STANDOFF:
         return f"feasible when the standoff {_change(quantity)}s to {value} ({now} now)"
-    way = quantity.name.removeprefix("shift ")
-    return f"feasible when the surface shifts by {value} {way}"
+    return f"feasible when the surface shifts by {value} {quantity.name.removeprefix('shift ')}"
 
 
 def _helpless(threshold: Threshold) -> str:
@@ -134,7 +130,7 @@ def _helpless(threshold: Threshold) -> str:
 
 
 def _helpless_label(quantity: Quantity) -> str:
-    """A quantity and how far it was looked at."""
+    """A quantity and the range that was searched."""
     end = shown(quantity, quantity.end)
     return {
         Kind.CONE: f"a wider cone, up to {end}",
@@ -151,19 +147,19 @@ def _change(quantity: Quantity) -> str:
 
 
 def _against(quantity: Quantity, other: Finding) -> str:
-    """What speaks against a value."""
+    """Why a value is not feasible."""
     if other.value == quantity.given and (
         other.evidence is not Evidence.PROOF or other.cell is None
     ):
-        return f"{other.answer} as it is, at {shown(quantity, other.value)}"
+        return f"{other.answer} at the given {shown(quantity, other.value)}"
     return f"at {shown(quantity, other.value, False)} {other.detail}"
 
 
 def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str:
     """A value with its unit: degrees or millimetres, to two digits.
 
-    A limit or a cone that is said to be feasible is rounded to where it allows more, and one that
-    is not to where it allows less, so that what was found holds for the number printed too.
+    A feasible limit or cone is rounded to where it allows more, one that is not to where it allows
+    less, so that what was found holds for the printed number too.
     """
     value, unit = (math.degrees(value), "deg") if quantity.unit == "rad" else (1e3 * value, "mm")
     if feasible is None or not quantity.monotone:
@@ -178,16 +174,13 @@ def dropping(dropped: Dropped, cells: int) -> str:
     number, percent = len(dropped.cells), f"{100.0 * dropped.share:.3g} % of the area"
     if number == cells:
         return f"No cell is covered; all {cells} would have to be dropped."
-    one = number == 1
-    which = f"the cell that the best motion misses ({percent})"
-    if not one:
-        which = f"the {number:,} cells that the best motion misses ({percent})"
+    cells_missed = "cell" if number == 1 else f"{number:,} cells"
+    which = f"the {cells_missed} that the best motion misses ({percent})"
     if dropped.waypoints is None:
         return f"Dropping {which} may leave one motion, but none was certified."
-    rest = cells - number
     return (
-        f"Dropping {which} leaves one motion over the other {rest:,}, of {dropped.waypoints:,} "
-        "waypoints, replayed."
+        f"Dropping {which} leaves one motion over the other {cells - number:,}: "
+        f"{dropped.waypoints:,} waypoints, replayed."
     )
 
 
@@ -222,10 +215,10 @@ def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
 def _threshold(threshold: Threshold, tightened: bool) -> dict[str, Any]:
     """One threshold as an object; keys say the unit."""
     quantity, span = threshold.quantity, threshold.span
-    found = dict(_numbers(quantity, "given", quantity.given))
-    found |= _numbers(quantity, "furthest", quantity.end)
+    found = _number(quantity, "given", quantity.given)
+    found |= _number(quantity, "furthest", quantity.end)
     if threshold.resolution is not None:
-        found |= _numbers(quantity, "resolution", threshold.resolution)
+        found |= _number(quantity, "resolution", threshold.resolution)
     return {
         "quantity": quantity.name,
         "kind": str(quantity.kind),
@@ -248,16 +241,15 @@ def _finding(quantity: Quantity, finding: Finding | None) -> dict[str, Any] | No
     if finding is None:
         return None
     return {
-        **dict(_numbers(quantity, "value", finding.value)),
+        **_number(quantity, "value", finding.value),
         "verdict": str(finding.answer),
         "evidence": str(finding.evidence),
         "detail": finding.detail,
     }
 
 
-def _numbers(quantity: Quantity, name: str, value: float) -> Iterator[tuple[str, float]]:
-    """A number under a key with its unit, free of the dust of conversions."""
+def _number(quantity: Quantity, name: str, value: float) -> dict[str, float]:
+    """A number under a key with its unit, without the rounding errors of conversions."""
     if quantity.unit == "rad":
-        yield f"{name}_deg", round(math.degrees(value), 6)
-    else:
-        yield f"{name}_m", round(value, 9)
+        return {f"{name}_deg": round(math.degrees(value), 6)}
+    return {f"{name}_m": round(value, 9)}

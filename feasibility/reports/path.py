@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from feasibility.paths import CoveragePath, PathFigures
-from feasibility.reports.text import filled
+from feasibility.reports.objects import certificate_json
+from feasibility.reports.text import counted, summary
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results import plain
 from feasibility.timing import MotionLimits, Trajectory, used
@@ -23,12 +24,12 @@ def as_json(
 ) -> dict[str, Any]:
     """The object that `coverable path --json` prints, without NaN.
 
-    Units stand in the keys; velocities and accelerations are in rad or m, and seconds.
+    Units are in the keys; velocities and accelerations are in rad or m, and seconds.
 
     Args:
         path: the path.
         trajectory: its timing, if it was asked for.
-        limits: what the timing keeps to.
+        limits: of the timing.
     """
     figures = path.figures
     sliding = path.robot.prismatic
@@ -44,8 +45,8 @@ def as_json(
         "least_length_m": figures.least_length,
         "length_ratio": plain(figures.ratio),
         "joint_travel": {
-            name: {"travel_m": float(way)} if slides else {"travel_deg": math.degrees(way)}
-            for name, way, slides in zip(
+            name: {"travel_m": travel} if slides else {"travel_deg": math.degrees(travel)}
+            for name, travel, slides in zip(
                 path.robot.joint_names, figures.travel.tolist(), sliding.tolist(), strict=True
             )
         },
@@ -55,11 +56,7 @@ def as_json(
             "cone_deg": plain(math.degrees(figures.cone_margin)),
             "singular_value": plain(figures.singular_value),
         },
-        "certificate": {
-            "waypoints": int(path.certificate.waypoints),
-            "max_position_error_m": plain(float(path.certificate.max_position_error)),
-            "max_angle_deg": plain(math.degrees(path.certificate.max_angle)),
-        },
+        "certificate": certificate_json(path.certificate),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
         "robot": path.robot.name,
         "version": version(),
@@ -72,7 +69,7 @@ def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[s
     Args:
         verdict: infeasible or undecided.
         reason: one sentence.
-        before_s: as in `report.as_json`.
+        before_s: as in the verdict's `as_json`.
     """
     return verdict_json(verdict, before_s) | {"message": reason, "trajectory": None}
 
@@ -107,9 +104,9 @@ def _rounded(value: float, digits: int, rounding: str) -> str:
 def _timing(
     path: CoveragePath, trajectory: Trajectory, limits: MotionLimits | None
 ) -> dict[str, Any]:
-    """Duration and the largest of everything, with the limits where they are known.
+    """Duration and maxima, with the limits where they are known.
 
-    With limits the largest is over all that a controller may make of the samples.
+    With limits the maxima hold for every interpolation of the samples that a controller may use.
     """
     names = path.robot.joint_names
     fastest, quickest = np.abs(trajectory.dq).max(axis=0), np.abs(trajectory.ddq).max(axis=0)
@@ -139,16 +136,16 @@ def _timing(
 def as_text(
     path: CoveragePath, trajectory: Trajectory | None = None, limits: MotionLimits | None = None
 ) -> str:
-    """The path for people: how long it is and what it is compared with, margins, and times.
+    """The path for people: its length compared with the least possible, margins, and times.
 
     Args:
         path: the path.
         trajectory: its timing, if it was asked for.
-        limits: what the timing keeps to.
+        limits: of the timing.
     """
     count, figures = int(path.needed.sum()), path.figures
     rows = [
-        ("order", f"{path.order}, {count:,} cells, {len(path.visits):,} centres passed"),
+        ("order", f"{path.order}, {counted(count, 'cell')}, {len(path.visits):,} centres passed"),
         ("length", _length_text(figures)),
         ("joint travel", _travel_text(path)),
         ("margins", _margins_text(figures)),
@@ -168,16 +165,16 @@ def as_text(
             )
         )
         rows += _limit_rows(path.robot, trajectory, limits)
-    head = f"path: one continuous motion over {count:,} cell{'s' if count > 1 else ''}."
-    return "\n".join([head, "", *(filled(f"  {name:<14}", text) for name, text in rows)])
+    head = f"path: one continuous motion over {counted(count, 'cell')}."
+    return "\n".join(summary(head, rows, 14))
 
 
 def _length_text(figures: PathFigures) -> str:
-    """Length, what is gone over again, and the least there could be."""
+    """Length, the part that is covered again, and the lower bound."""
     text = f"{figures.length:.4g} m on the surface"
     if figures.revisited > 0.0:
         share = f"{100 * figures.revisited_share:.2g} % of the rest"
-        text += f", {figures.revisited:.3g} m of it again ({share})"
+        text += f", {figures.revisited:.3g} m of it revisited ({share})"
     if figures.least_length > 0.0:
         text += (
             f"; no path through all centres is shorter than {at_least(figures.least_length, 4)} m "
@@ -189,21 +186,22 @@ def _length_text(figures: PathFigures) -> str:
 def _travel_text(path: CoveragePath) -> str:
     """How far each joint travels."""
     parts = []
-    for name, way, slides in zip(
+    for name, travel, slides in zip(
         path.robot.joint_names, path.figures.travel, path.robot.prismatic, strict=True
     ):
-        parts.append(f"{name} {way:.3g} m" if slides else f"{name} {math.degrees(way):.0f} deg")
+        amount = f"{travel:.3g} m" if slides else f"{math.degrees(travel):.0f} deg"
+        parts.append(f"{name} {amount}")
     return ", ".join(parts)
 
 
 def _margins_text(figures: PathFigures) -> str:
-    """What the path keeps free."""
+    """Distances from the limits, the boundary of the cone, and singularities."""
     parts = []
     if math.isfinite(figures.turn_margin):
-        parts.append(f"{at_least(math.degrees(figures.turn_margin), 3)} deg to a limit")
+        parts.append(f"{at_least(math.degrees(figures.turn_margin), 3)} deg from a joint limit")
     if math.isfinite(figures.slide_margin):
-        parts.append(f"{at_least(1e3 * figures.slide_margin, 3)} mm to a limit")
-    parts.append(f"{at_least(math.degrees(figures.cone_margin), 3)} deg of the cone")
+        parts.append(f"{at_least(1e3 * figures.slide_margin, 3)} mm from a joint limit")
+    parts.append(f"{at_least(math.degrees(figures.cone_margin), 3)} deg inside the cone")
     parts.append(f"smallest singular value {at_least(figures.singular_value, 3)}")
     return ", ".join(parts)
 
@@ -211,7 +209,7 @@ def _margins_text(figures: PathFigures) -> str:
 def _limit_rows(
     robot: Robot, trajectory: Trajectory, limits: MotionLimits | None
 ) -> list[tuple[str, str]]:
-    """How much of its limits a trajectory uses, between samples too."""
+    """The share of its limits that a trajectory uses, between samples too."""
     if limits is None:
         return []
     most = used(robot, trajectory, limits)

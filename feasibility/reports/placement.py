@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from typing import Any
 
+from numpy.typing import NDArray
+
 from feasibility.placement import (
     AXES,
+    Array,
     PlacementMap,
     Placements,
     Pose,
@@ -17,13 +18,14 @@ from feasibility.placement import (
     Trial,
     trial_table,
 )
-from feasibility.reports.text import filled
+from feasibility.reports.objects import rounded
+from feasibility.reports.text import aligned, counted, csv_text, percent, summary
 from feasibility.reports.verdict import CAUSES, EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version
 
 SENTENCES = {
-    Answer.FEASIBLE: "feasible: the surface can be covered in one motion from placements below.",
+    Answer.FEASIBLE: "feasible: the surface can be covered in one motion at the placements below.",
     Answer.INFEASIBLE: "none in the region: no placement there was found to be feasible.",
     Answer.UNDECIDED: "undecided: the search for a placement was stopped.",
 }
@@ -33,7 +35,7 @@ COLUMNS = (*AXES, "stage", "in_reach", "probed", "share", "margin", "limits", "c
 
 
 def settings_of(pose: Pose) -> list[str]:
-    """What `--set` takes to put a case's surface there."""
+    """The values of `--set` that put a case's surface there."""
     position, rpy = (", ".join(repr(v) for v in part) for part in pose)
     return [f"surface.position=[{position}]", f"surface.rpy_deg=[{rpy}]"]
 
@@ -47,8 +49,8 @@ def as_json(
 
     Args:
         placements: the answer.
-        plan: the fewest stations, where that was asked.
-        chart: the map, where that was asked.
+        plan: the fewest stations, where they were asked for.
+        chart: the map, where it was asked for.
     """
     best = placements.best
     return {
@@ -66,7 +68,7 @@ def as_json(
         "stations": None if plan is None else _stations_json(plan),
         "map": None if chart is None else _map_json(chart),
         "statistics": dict(placements.statistics),
-        "timing": {key: round(value, 6) for key, value in placements.timing.items()},
+        "timing": rounded(placements.timing),
         "robot": placements.robot.name,
         "version": version(),
     }
@@ -103,20 +105,19 @@ def _stations_json(plan: StationPlan) -> dict[str, Any]:
 
 def _map_json(chart: PlacementMap) -> dict[str, Any]:
     """The map; null where no search was run."""
-    nothing = ~chart.known
     return {
         "axes": list(chart.axes),
         "ticks": [ticks.tolist() for ticks in chart.ticks],
         "held": dict(zip(AXES, chart.held.values.tolist(), strict=True)),
-        "share": _nulled(chart.share, nothing),
-        "margin": _nulled(chart.margin, nothing),
+        "share": _nulled(chart.share, ~chart.known),
+        "margin": _nulled(chart.margin, ~chart.known),
     }
 
 
-def _nulled(values: Any, nothing: Any) -> Any:
-    """Nested lists with None where there is nothing."""
+def _nulled(values: Array, unknown: NDArray[Any]) -> Any:
+    """Nested lists with None where a value is unknown."""
     plain = values.astype(object)
-    plain[nothing] = None
+    plain[unknown] = None
     return plain.tolist()
 
 
@@ -125,7 +126,7 @@ def as_text(
     case: str = "",
     plan: StationPlan | None = None,
 ) -> str:
-    """Placements for people: the answer, where the surface may stand, or what stands against it."""
+    """Placements for people: the answer, where the surface can stand, or why it cannot."""
     proved = placements.answer is Answer.INFEASIBLE and placements.evidence == "proof"
     ranges = [
         f"{name.removesuffix('_deg')} {low:g} .. {high:g} {'deg' if name.endswith('_deg') else 'm'}"
@@ -137,7 +138,7 @@ def as_text(
         evidence = (
             "the reach bound, over the whole region"
             if proved
-            else "placements spread over the region and refined; one between them may do"
+            else "placements sampled over the region and refined; one between them may be feasible"
         )
     rows = [
         ("case", case),
@@ -150,8 +151,7 @@ def as_text(
         ("check", "" if placements.found else _checked_text(placements)),
         ("time", _time_text(placements)),
     ]
-    lines = [PROVED if proved else SENTENCES[placements.answer], ""]
-    lines += [filled(f"  {name:<10}", text) for name, text in rows if text]
+    lines = summary(PROVED if proved else SENTENCES[placements.answer], rows, 10)
     if placements.found:
         lines += ["", *_table(placements.found)]
         put = " ".join(f"--set '{setting}'" for setting in settings_of(placements.found[0].pose))
@@ -164,9 +164,9 @@ def as_text(
 
 
 def _time_text(placements: Placements) -> str:
-    """Seconds of the search, and those of the whole command where it did more."""
-    whole = placements.timing.get("command_s")
-    more = "" if whole is None else f" ({whole:.2f} s with all that was asked for beside it)"
+    """Seconds of the search, and of the command, which may do more."""
+    command = placements.timing.get("command_s")
+    more = "" if command is None else f" ({command:.2f} s with loading, stations, map and view)"
     return f"{placements.timing['total_s']:.2f} s{more}"
 
 
@@ -176,33 +176,33 @@ def _searched(trial: Trial | None) -> bool:
 
 
 def _found_text(placements: Placements) -> str:
-    """What was found; of placements that were not searched no share is told."""
+    """What was found; no share is given for placements that were not searched."""
     if _searched(placements.best) or placements.evidence is Evidence.PROOF:
         return placements.message
     number = placements.statistics
     return (
         f"None found in the region: of {number['drawn']} placements {number['bound']} have a "
         f"target out of reach, {number['probe']} failed a few Newton starts, and none was searched"
-        + ("; the search was stopped before." if placements.answer is Answer.UNDECIDED else ".")
+        + ("; the search was stopped first." if placements.answer is Answer.UNDECIDED else ".")
     )
 
 
 def _unsearched_text(placements: Placements) -> str:
     """Why it is not known what share could be covered."""
     if placements.evidence is Evidence.PROOF:
-        return "not known: what the bound rules out is not searched"
+        return "not known: placements that the reach bound rules out are not searched"
     return "not known: no placement was searched"
 
 
 def _checked_text(placements: Placements) -> str:
-    """What the full search says of the best placement."""
+    """The message of the full search at the best placement."""
     return next((f"of the best: {t.message}" for t in placements.trials[:1] if t.message), "")
 
 
 def _causes_text(placements: Placements) -> str:
     """Missed cells of the best placement by cause."""
     return "; ".join(
-        f"{count} cell{'s' if count > 1 else ''}: {CAUSES[CauseKind(kind)]}"
+        f"{counted(count, 'cell')}: {CAUSES[CauseKind(kind)]}"
         for kind, count in placements.causes.items()
     )
 
@@ -214,17 +214,13 @@ def _table(trials: Sequence[Trial]) -> list[str]:
     rows = [heads + (["margin", "limits", "cone", "reach"] if with_margins else [])]
     for trial in trials:
         row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
-        row.append(f"{100.0 * trial.share:.1f} %")
+        row.append(percent(trial.share))
         margins = trial.margins
         if margins is not None:
             shares = (margins.least, margins.limits, margins.cone, margins.reach)
             row += [f"{v:.3f}" for v in shares]
         rows.append(row + ["-"] * (len(rows[0]) - len(row)))
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  " + "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        for row in rows
-    ]
+    return [f"  {line}" for line in aligned(rows, ">")]
 
 
 def _stations_text(plan: StationPlan) -> list[str]:
@@ -232,11 +228,12 @@ def _stations_text(plan: StationPlan) -> list[str]:
     stations, number = plan.stations, len(plan.stations)
     if number == 0:
         return ["no stations: no motion found covers any cell"]
-    plural = "" if number == 1 else "s"
-    proof = "proved fewest of what was found" if stations.optimal else f"at least {stations.bound}"
+    proof = f"at least {stations.bound} are needed"
+    if stations.optimal:
+        proof = "proved to be the fewest among the motions found"
     poses = len({trial.pose for trial in plan.trials})
-    where = f", at {poses} placement{'' if poses == 1 else 's'}" if poses < number else ""
-    lines = [f"{number} station{plural}{where} ({proof}):"]
+    where = f", at {counted(poses, 'placement')}" if poses < number else ""
+    lines = [f"{counted(number, 'station')}{where} ({proof}):"]
     for station, trial, refusal in zip(stations.stations, plan.trials, plan.refusals, strict=True):
         lines.append(
             f"  {len(station.cells):5d} cell{'' if len(station.cells) == 1 else 's'} at "
@@ -245,22 +242,18 @@ def _stations_text(plan: StationPlan) -> list[str]:
             + (f" (not certified: {refusal})" if refusal else "")
         )
     if len(stations.left_out):
-        lines.append(f"  {len(stations.left_out):5d} cells are covered from no placement tried")
+        lines.append(
+            f"  {len(stations.left_out):5d} cells are covered at no placement that was tried"
+        )
     return lines
 
 
 def as_csv(placements: Placements) -> str:
     """All placements tried, the best first; m and degrees."""
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(COLUMNS)
+    rows: list[tuple[Any, ...]] = [COLUMNS]
     for trial in placements.trials:
         margins = trial.margins
         shares = ("", "", "") if margins is None else (margins.limits, margins.cone, margins.reach)
-        writer.writerow(
-            [
-                *trial.pose.values.tolist(), trial.stage, trial.in_reach, trial.probed,
-                trial.share, trial.margin, *shares, trial.answer or "",
-            ]
-        )  # fmt: skip
-    return stream.getvalue()
+        tried = (trial.stage, trial.in_reach, trial.probed, trial.share, trial.margin)
+        rows.append((*trial.pose.values.tolist(), *tried, *shares, trial.answer or ""))
+    return csv_text(rows)

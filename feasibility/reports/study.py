@@ -1,21 +1,38 @@
-"""A study's table as text for people, as one JSON object, and as CSV."""
+"""A study's table as text for people, as one JSON object, as CSV, and as one page."""
 
 from __future__ import annotations
 
-import csv
-import io
+import html
 import json
-from collections import Counter
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from feasibility.reports.page import COLOURS, page, table
+from feasibility.reports.study_plot import charts, worded
+from feasibility.reports.study_tables import (
+    best_rows,
+    best_share,
+    causes,
+    counts,
+    dominant,
+    failures,
+    group_table,
+    groups_of,
+    headline,
+    verdicts_text,
+)
+from feasibility.reports.text import aligned, csv_text
 from feasibility.studies import Row, Study
 from feasibility.version import version
 
-BEST = 10  # rows of the text
-VERDICTS = ("feasible", "infeasible", "undecided")
+if TYPE_CHECKING:
+    from feasibility.viewer import View
+
 COLUMNS = ("verdict", "evidence", "cells", "covered", "share", "edges", "pairs")
 MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m")
+BAR = 640  # px
+NOTE = """Share: of the area, in one continuous motion. "Feasible" is said only with a motion
+that an independent replay accepted."""
 
 
 def as_json(study: Study, rows: Sequence[Row]) -> dict[str, Any]:
@@ -41,144 +58,118 @@ def as_json(study: Study, rows: Sequence[Row]) -> dict[str, Any]:
 
 
 def as_csv(study: Study, rows: Sequence[Row]) -> str:
-    """One line for each task: its parameters, then what came of it; empty where there is nothing.
+    """One line for each task: its parameters, then its outcome; empty where there is nothing.
 
-    It says nothing that depends on the run, so the same study always gives the same text.
+    No column depends on the run, so the same study always gives the same text.
     """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    table.writerow([*study.labels, *COLUMNS, *(f"margin_{name}" for name in MARGINS), "cause"])
+    heads = [*study.labels, *COLUMNS, *(f"margin_{name}" for name in MARGINS), "cause"]
+    lines = [heads]
     for row in rows:
         margins = row.result.get("margins") or {}
-        table.writerow(
-            [
-                *(_cell(row.parameters[label]) for label in study.labels),
-                *(_cell(row.result.get(name)) for name in COLUMNS),
-                *(_cell(margins.get(name)) for name in MARGINS),
-                dominant(row) or "",
-            ]
-        )
-    return text.getvalue()
+        values = [row.parameters[label] for label in study.labels]
+        values += [row.result.get(name) for name in COLUMNS]
+        values += [margins.get(name) for name in MARGINS]
+        lines.append([_field(value) for value in [*values, dominant(row)]])
+    return csv_text(lines)
 
 
-def _cell(value: Any) -> Any:
-    """A value for CSV: numbers in full, tables as JSON."""
-    if value is None:
-        return ""
+def _field(value: Any) -> Any:
+    """A value for CSV: tables as JSON."""
     return json.dumps(value) if isinstance(value, (dict, list)) else value
 
 
 def as_text(study: Study, rows: Sequence[Row]) -> str:
-    """What came of the study: verdicts, by value where there are few, and the best rows."""
-    lines = [headline(study, rows)]
-    if study.description:
-        lines.insert(0, study.description)
-    causes = Counter(cause for row in rows if (cause := dominant(row)))
-    if causes:
-        told = ", ".join(f"{name.replace('_', ' ')} in {n}" for name, n in causes.most_common())
-        lines.append(f"  why cells are missed, mostly: {told}.")
-    failed = [row for row in rows if row.status == "failed"]
-    if failed:
-        lines.append(f"  {len(failed)} failed; the first: {failed[0].result['message']}")
+    """The outcome of the study: verdicts, by value where there are few, and the best rows."""
+    lines = [study.description] if study.description else []
+    lines.append(headline(study, rows))
+    if found := causes(rows):
+        listed = ", ".join(f"{cause} in {number}" for cause, number in found)
+        lines.append(f"  most frequent cause of missed cells: {listed}.")
+    if failed := failures(rows):
+        lines.append(f"  {failed}")
+    best = [["verdict", "share", "from limits", *study.labels], *best_rows(study, rows)]
     for label, groups in groups_of(study, rows).items():
-        lines += ["", *_aligned(group_table(label, groups))]
-    lines += ["", "the best:", *_aligned(_best_table(study, rows))]
+        lines += ["", *_indented(group_table(label, groups))]
+    lines += ["", "the best:", *_indented(best)]
     return "\n".join(lines)
 
 
-def headline(study: Study, rows: Sequence[Row]) -> str:
-    """What a person would say of it."""
-    cases = "1 case" if len(rows) == 1 else f"{len(rows)} cases"
-    return f"{study.name}: {cases}: {counted(counts(rows))}."
+def _indented(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows with columns of equal width."""
+    return [f"  {line}".rstrip() for line in aligned(rows)]
 
 
-def counts(rows: Sequence[Row]) -> dict[str, int]:
-    """How many rows have each verdict."""
-    found = Counter(str(row.result["verdict"]) for row in rows)
-    return {verdict: found.get(verdict, 0) for verdict in VERDICTS}
+def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str:
+    """One page that fetches nothing.
 
-
-def counted(found: dict[str, int]) -> str:
-    """'3 feasible, 1 infeasible'."""
-    return ", ".join(f"{count} {name}" for name, count in found.items() if count) or "none"
-
-
-def dominant(row: Row) -> str | None:
-    """The cause of most of the missed cells."""
-    return next(iter(row.result.get("causes") or {}), None)
-
-
-def merit(row: Row) -> tuple[bool, float, float]:
-    """Smaller is better: feasible, then the covered share, then the least margin to the limits."""
-    margins = row.result.get("margins") or {}
-    limit = margins.get("limit_deg")
-    room = 0.0 if not margins else 360.0 if limit is None else float(limit)
-    share = float(row.result.get("share", -1.0))  # unknown is worse than nothing
-    return row.result["verdict"] != "feasible", -share, -room
-
-
-def best_share(rows: Sequence[Row]) -> float | None:
-    """The largest share of the area covered in one motion, 0..1; None where all failed."""
-    return max((float(row.result["share"]) for row in rows if "share" in row.result), default=None)
-
-
-def share_text(row: Row) -> str:
-    """The share of a row; a failed one has none."""
-    return f"{100.0 * float(row.result['share']):.1f} %" if "share" in row.result else "-"
-
-
-def groups_of(study: Study, rows: Sequence[Row]) -> dict[str, dict[str, list[Row]]]:
-    """Rows by value, for each key that takes a few values; numbers in their order."""
-    found: dict[str, dict[str, list[Row]]] = {}
-    for label in study.labels:
-        groups: dict[str, list[Row]] = {}
-        values = [row.parameters[label] for row in rows]
-        numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
-        order = sorted(range(len(rows)), key=values.__getitem__) if numbers else range(len(rows))
-        for k in order:
-            groups.setdefault(short(values[k]), []).append(rows[k])
-        if 2 <= len(groups) <= BEST:
-            found[label] = groups
-    return found
-
-
-def short(value: Any) -> str:
-    """A value in few characters."""
-    if isinstance(value, float):
-        return f"{value:.4g}"
-    return value if isinstance(value, str) else json.dumps(value)
-
-
-def group_table(label: str, groups: dict[str, list[Row]]) -> list[list[str]]:
-    """One line for each value of a key, below the names of the columns."""
-    table = [[f"by {label}:", *VERDICTS, "best share"]]
-    for value, group in groups.items():
-        best = best_share(group)
-        numbers = [str(number) for number in counts(group).values()]
-        table.append([value, *numbers, "-" if best is None else f"{100.0 * best:.1f} %"])
-    used = [
-        k for k, head in enumerate(table[0])
-        if head not in VERDICTS or any(line[k] != "0" for line in table[1:])
-    ]  # fmt: skip
-    return [[line[k] for k in used] for line in table]
-
-
-def _best_table(study: Study, rows: Sequence[Row]) -> list[list[str]]:
-    """The best rows, below the names of the columns."""
-    ranked = sorted(rows, key=merit)[:BEST]
-    limits = [(row.result.get("margins") or {}).get("limit_deg") for row in ranked]
-    far = ["-" if limit is None else f"{limit:.1f} deg" for limit in limits]
-    table = [["verdict", "share", "from limits", *study.labels]]
-    for row, limit in zip(ranked, far, strict=True):
-        values = [short(row.parameters[label]) for label in study.labels]
-        table.append([str(row.result["verdict"]), share_text(row), limit, *values])
-    return table
-
-
-def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
-    """Columns of equal width."""
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return [
-        "  " + "  ".join(f"{cell:<{w}}" for cell, w in zip(line, widths, strict=True)).rstrip()
-        for line in table
+    Args:
+        study: what was asked.
+        rows: their outcomes.
+        poses: a view of the surface's poses, where they vary; see `viewer.view_study`.
+    """
+    parts = [f"<p>{html.escape(study.description)}</p>\n"] if study.description else []
+    parts += [f"<p>{html.escape(headline(study, rows))}</p>\n", _verdict_bar(rows)]
+    if found := causes(rows):
+        lines = [[html.escape(cause), str(n), _bar(n / len(rows))] for cause, n in found]
+        parts.append("<h2>Why cells are missed</h2>\n")
+        parts.append(table(["cause of most missed cells", "cases", ""], lines))
+    if failed := failures(rows):
+        parts.append(f"<p>{html.escape(failed)}</p>\n")
+    heads = ["verdict", "covered", "from limits", *map(worded, study.labels)]
+    parts.append(f"<h2>The best of {len(rows)}</h2>\n")
+    parts.append(table(map(html.escape, heads), map(_escaped, best_rows(study, rows))))
+    parts += [_by_value(label, groups) for label, groups in groups_of(study, rows).items()]
+    pictures = charts(study.labels, rows)
+    figures = [
+        f"<figure>{chart.svg}<figcaption>{html.escape(chart.caption)}</figcaption></figure>\n"
+        for chart in pictures.drawn
     ]
+    if figures:
+        parts.append(f'<h2>Covered share</h2>\n<div class="charts">{"".join(figures)}</div>\n')
+    if pictures.left_out:
+        parts.append(f"<p>Pairs of numbers without a map: {pictures.left_out}.</p>\n")
+    if poses is not None:
+        inner = html.escape(poses.html(), quote=True)
+        parts.append(f'<h2>Poses</h2>\n<iframe srcdoc="{inner}" loading="lazy"></iframe>\n')
+    return page(f"Study: {study.name}", "".join(parts), NOTE)
+
+
+def _verdict_bar(rows: Sequence[Row]) -> str:
+    """How many cases have each verdict, as one bar."""
+    parts, keys, x = [], [], 0.0
+    for verdict, number in counts(rows).items():
+        width = BAR * number / max(len(rows), 1)
+        if number:
+            parts.append(
+                f'<rect x="{x:.2f}" y="0" width="{width:.2f}" height="22" '
+                f'fill="{COLOURS[verdict]}"><title>{number} {verdict}</title></rect>'
+            )
+            colour = f"background: {COLOURS[verdict]}"
+            keys.append(f'<span><i style="{colour}"></i>{number} {verdict}</span>')
+        x += width
+    return (
+        f'<svg role="img" aria-label="{html.escape(verdicts_text(rows))}" '
+        f'viewBox="0 0 {BAR} 22" width="{BAR}" height="22">{"".join(parts)}</svg>\n'
+        f'<p class="keys">{"".join(keys)}</p>\n'
+    )
+
+
+def _by_value(label: str, groups: dict[str, list[Row]]) -> str:
+    """One line for each value of a key."""
+    (_, *heads), *lines = group_table(label, groups)
+    bars = [_bar(best_share(group) or 0.0) for group in groups.values()]
+    rows = [[*_escaped(line), bar] for line, bar in zip(lines, bars, strict=True)]
+    name = html.escape(worded(label))
+    return f"<h2>By {name}</h2>\n" + table([name, *heads, ""], rows)
+
+
+def _escaped(cells: Sequence[str]) -> list[str]:
+    """Plain texts as HTML."""
+    return [html.escape(cell) for cell in cells]
+
+
+def _bar(share: float) -> str:
+    """A share of 1 as a bar."""
+    return (
+        f'<span class="bar"><b style="width: {100.0 * min(max(share, 0.0), 1.0):.1f}%"></b></span>'
+    )

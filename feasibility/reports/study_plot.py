@@ -1,4 +1,4 @@
-"""Flat pictures of a study: the covered share over what varies, as SVG for a page."""
+"""Charts of a study: the covered share over what varies, as SVG for a page."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.reports.comparison import COLOURS
+from feasibility.reports.page import COLOURS
+from feasibility.reports.study_tables import are_numbers, short
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,10 +21,10 @@ if TYPE_CHECKING:
 
 MAPS = 6  # at most
 PANELS = 4  # values of a key that is no number, each with a map of its own
-RASTER = 40  # values of a number, up to which a map has one field for each pair of values
-WRITTEN = 80  # fields of a map, up to which their shares are written into them
+RASTER = 40  # values of a number up to which a map has one field for each pair of values
+WRITTEN = 80  # fields of a map up to which their shares are written into them
 MOST_TICKS = 8
-CRISP = 2_000  # dots that are drawn as such; more become a picture within the picture
+CRISP = 2_000  # dots that are drawn as vectors; more are rasterized
 WIDTH, HEIGHT = 4.6, 3.3  # inches
 UNKNOWN = "0.85"
 ROUNDING = 1e-6  # [%]: shares are written rounded down, so that 100 means all
@@ -54,7 +55,7 @@ def charts(labels: Sequence[str], rows: Sequence[Row]) -> Charts:
         rows: of the study; those without a share, which failed, are left out.
     """
     known = [row for row in rows if "share" in row.result]
-    axes = numbers_of(labels, known)
+    axes = _numbers(labels, known)
     made = [_share_chart(label, axes[label], known) for label in axes]
     pairs = list(itertools.combinations(axes, 2))
     groups = _panels(labels, axes, known)
@@ -67,12 +68,12 @@ def charts(labels: Sequence[str], rows: Sequence[Row]) -> Charts:
     return Charts(made, len(pairs) - len(chosen))
 
 
-def numbers_of(labels: Sequence[str], rows: Sequence[Row]) -> dict[str, NDArray[np.float64]]:
+def _numbers(labels: Sequence[str], rows: Sequence[Row]) -> dict[str, NDArray[np.float64]]:
     """The values (R,) of what varies and is a number, of those that take two values or more."""
     found = {}
     for label in labels:
         values = [row.parameters[label] for row in rows]
-        if all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values):
+        if are_numbers(values):
             array = np.array(values, dtype=float)
             if len(np.unique(array)) > 1:
                 found[label] = array
@@ -92,7 +93,7 @@ def worded(label: str) -> str:
     return label
 
 
-def shares_of(rows: Sequence[Row]) -> NDArray[np.float64]:
+def _shares(rows: Sequence[Row]) -> NDArray[np.float64]:
     """(R,) covered shares of the area in percent."""
     return np.array([100.0 * float(row.result["share"]) for row in rows])
 
@@ -101,9 +102,7 @@ def _panels(
     labels: Sequence[str], axes: Mapping[str, Any], rows: Sequence[Row]
 ) -> list[tuple[str, NDArray[np.bool_], NDArray[np.float64]]]:
     """Rows that share a map: by the first key that is no number, if it has few values."""
-    from feasibility.reports.study import short
-
-    share = shares_of(rows)
+    share = _shares(rows)
     for label in labels:
         words = np.array([short(row.parameters[label]) for row in rows], dtype=object)
         values = list(dict.fromkeys(words.tolist()))
@@ -116,7 +115,7 @@ def _panels(
 
 def _share_chart(label: str, values: NDArray[np.float64], rows: Sequence[Row]) -> Chart:
     """The share of every row over one number, and the best and the mean share at each value."""
-    share = shares_of(rows)
+    share = _shares(rows)
     verdicts = np.array([str(row.result["verdict"]) for row in rows])
     figure, ends = _figure(), np.unique(values)
     axes = figure.add_subplot(xlabel=worded(label), ylabel="covered in one motion (%)")
@@ -163,14 +162,9 @@ def _map_chart(
             if np.isfinite(value):
                 colour = "black" if value > 60 else "white"
                 axes.text(
-                    i,
-                    j,
-                    f"{int(value + ROUNDING)}",
-                    ha="center",
-                    va="center",
-                    color=colour,
+                    i, j, f"{int(value + ROUNDING)}", ha="center", va="center", color=colour,
                     fontsize=8,
-                )
+                )  # fmt: skip
         caption = f"Best covered share {caption}"
     else:
         order = np.argsort(share, kind="stable")  # the best on top

@@ -6,6 +6,7 @@ from .outcome import arm_of as arm_of
 from .outcome import bits_of as bits_of
 from .outcome import cells_of as cells_of
 from .outcome import cut_of as cut_of
+from .outcome import merit as merit
 from .robot_comparison import Arm as Arm
 from .robot_comparison import Comparison as Comparison
 from .robot_comparison import compare as compare

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
@@ -135,6 +136,19 @@ def outcome_of(verdict: Verdict) -> Outcome:
         "certificate": _certificate(verdict),
         "fk": int(verdict.statistics.get("fk", 0)),
     }
+
+
+def merit(outcome: Mapping[str, Any]) -> tuple[bool, float, float]:
+    """A key that sorts the best first: feasible, by covered share, by margin to the limits.
+
+    Args:
+        outcome: with `verdict`, `share` (absent where the task failed) and `margins`.
+    """
+    margins = outcome.get("margins") or {}
+    limit = margins.get("limit_deg")
+    margin = 0.0 if not margins else 360.0 if limit is None else float(limit)
+    share = float(outcome.get("share", -1.0))  # unknown is worse than nothing
+    return outcome["verdict"] != "feasible", -share, -margin
 
 
 def margins_of(verdict: Verdict) -> dict[str, float | None] | None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from feasibility.cases import Case, CaseError, Fault, as_read, toml_document
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
-from feasibility.studies.outcome import arm_of, cut_of, finite, outcome_of
+from feasibility.studies.outcome import arm_of, cut_of, finite, merit, outcome_of
 from feasibility.studies.run import StudyTask, run_tasks
 
 if TYPE_CHECKING:
@@ -83,14 +83,7 @@ class Comparison:
     @property
     def ranked(self) -> tuple[Arm, ...]:
         """The best first: feasible ones by their margin to the limits, the others by share."""
-        return tuple(sorted(self.arms, key=_merit))
-
-
-def _merit(arm: Arm) -> tuple[bool, float, float]:
-    """Smaller is better; the order of equal ones stays."""
-    margin = (arm.margins or {}).get("limit_deg")
-    room = 360.0 if margin is None else margin
-    return arm.verdict != "feasible", -arm.share, -room if arm.margins else 0.0
+        return tuple(sorted(self.arms, key=lambda arm: merit(asdict(arm))))
 
 
 def compare(

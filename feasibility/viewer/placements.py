@@ -131,13 +131,12 @@ def view_study(
     Raises:
         ArgumentError: there are no rows, or not one for each task.
     """
-    from feasibility.reports import merit
-    from feasibility.studies import arm_of, case_of, cells_of, cut_of
+    from feasibility.studies import arm_of, case_of, cells_of, cut_of, merit
 
     if len(rows) == 0 or len(tasks) != len(rows):
         raise ArgumentError(f"expected a row for each task, got {len(rows)} for {len(tasks)} tasks")
-    best = min(range(len(rows)), key=lambda k: merit(rows[k]))
-    drawn = sorted(same_frame(tasks, best), key=lambda k: merit(rows[k]))
+    best = min(range(len(rows)), key=lambda k: merit(rows[k].result))
+    drawn = sorted(same_frame(tasks, best), key=lambda k: merit(rows[k].result))
     case = case_of(dict(tasks[best].tables))
     asked = Question(arm_of(case), cut_of(case), case.task, case.search)
     tried = []

@@ -162,7 +162,7 @@ def grid_rows(fk_us: float) -> list[dict[str, object]]:
 
 def process_row(fk_us: float, repeats: int) -> dict[str, object]:
     """`coverable check paper/4a` as a whole process."""
-    command = [sys.executable, "-m", "feasibility.cli.main", "check", "paper/4a"]
+    command = [sys.executable, "-m", "feasibility.cli", "check", "paper/4a"]
 
     def ask() -> None:
         subprocess.run(command, cwd=ROOT, env={**os.environ}, check=True, capture_output=True)

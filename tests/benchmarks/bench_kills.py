@@ -31,7 +31,7 @@ def command(folder: Path, name: str, how: Sequence[str]) -> subprocess.Popen[byt
     """`coverable study`, started."""
     files = ["--out", f"{name}.study", "--csv", f"{name}.csv"]
     return subprocess.Popen(
-        [sys.executable, "-m", "feasibility.cli.main", "study", "study.toml", *files, *how],
+        [sys.executable, "-m", "feasibility.cli", "study", "study.toml", *files, *how],
         cwd=folder,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.DEVNULL,

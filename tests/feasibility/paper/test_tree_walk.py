@@ -12,7 +12,7 @@ from feasibility import Search, Task, Verdict
 from feasibility.paper import greedy_check, tree_walk
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_replay import Borders, tool_poses
-from feasibility.reports import witness_csv
+from feasibility.reports.verdict import as_csv
 from robots import load_robot
 from surfaces import sphere
 
@@ -26,7 +26,7 @@ def test_its_csv_is_one_motion_that_enters_every_cell(moves: str, step: float) -
     search = Search(method="greedy", moves=moves, step_deg=step)
     verdict = greedy_check(PUMA, DOME, TASK, search)
     assert verdict.feasible
-    text = witness_csv(verdict)
+    text = as_csv(verdict)
     assert text is not None
     header, *rows = csv.reader(io.StringIO(text))
     assert header == ["cell", *PUMA.joint_names]
@@ -79,4 +79,4 @@ def test_what_is_not_feasible_has_no_motion() -> None:
     arm = PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])})
     verdict: Verdict = greedy_check(arm, DOME, TASK, Search(method="greedy", step_deg=0.2))
     assert not verdict.feasible
-    assert witness_csv(verdict) is None
+    assert as_csv(verdict) is None

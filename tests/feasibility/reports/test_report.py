@@ -13,7 +13,7 @@ from small_cases import TEXTS, paper_verdict, small_case, small_verdict
 
 from feasibility import check
 from feasibility.cases import load_case
-from feasibility.reports.verdict import as_json, as_text, witness_csv
+from feasibility.reports.verdict import as_csv, as_json, as_text
 from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
 from robots import Robot, load_robot
 from surfaces import Cells
@@ -196,7 +196,7 @@ def rows_of(text):
 @pytest.mark.parametrize("name", ["4a", "5f"])
 def test_the_csv_is_one_motion_over_every_cell_centre(name):
     verdict = paper_verdict(name)
-    text = witness_csv(verdict)
+    text = as_csv(verdict)
     header, at, q = rows_of(text)
     robot: Robot = load_robot("puma560", limits="set-1")
     cells: Cells = load_case(f"paper/{name}").build().cells
@@ -220,4 +220,4 @@ def test_the_csv_is_one_motion_over_every_cell_centre(name):
 
 @pytest.mark.parametrize("name", ["long plate", "no cells"])
 def test_there_is_no_csv_without_a_motion(name):
-    assert witness_csv(small_verdict(name)) is None
+    assert as_csv(small_verdict(name)) is None

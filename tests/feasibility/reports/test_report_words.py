@@ -11,13 +11,13 @@ from feasibility import Task
 from feasibility.cli.main import main
 from feasibility.division import Reconfiguration
 from feasibility.placement.reach_bound import Reach
-from feasibility.reports.study import groups_of, short
+from feasibility.reports.study_tables import groups_of, short
 from feasibility.studies import Row, Study
 from robots import load_robot
 from surfaces import sphere
 
 
-@pytest.mark.parametrize(("n", "most"), list(itertools.product(range(1, 8), (1, 2, 3))))
+@pytest.mark.parametrize(("n", "most"), [(1, 1), (3, 2), (4, 2), (7, 3)])
 def test_a_long_move_names_its_largest_parts_and_counts_the_rest(n: int, most: int) -> None:
     rng = np.random.default_rng(10 * n + most)
     end = rng.permutation(np.arange(1, n + 1)) * np.where(rng.random(n) < 0.5, -0.3, 0.3)
@@ -35,7 +35,7 @@ def test_a_long_move_names_its_largest_parts_and_counts_the_rest(n: int, most: i
 def test_a_share_is_never_more_than_all() -> None:
     arm, task = load_robot("ur10"), Task(standoff=0.05, cone_deg=30)
     pose = np.array([[0.4, 0.1, 0.2, 0.0, 0.0, 10.0]])
-    for nu, nv in itertools.product(range(2, 14), range(2, 14)):
+    for nu, nv in itertools.product((2, 5, 13), (2, 7, 13)):
         cells = sphere(0.2, (10, 170), (0, 300), side="outside").cells(nu, nv)
         reach = Reach.of(arm, cells, task)
         assert reach.within(pose).all()

@@ -237,7 +237,7 @@ def test_nothing_helps_a_plate_that_leaves_the_room() -> None:
         assert found.other is not None
         assert (found.other.answer, found.other.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
     text = as_text(explanation, "long plate")
-    assert "No single change that was looked at was found to make it feasible." in text
+    assert "No single change that was tried was found to make it feasible." in text
     dropped = explanation.dropped
     assert dropped is not None
     missed = np.flatnonzero(~explanation.verdict.covered)

@@ -332,7 +332,7 @@ def test_interrupted_studies_say_what_is_kept(tmp_path, capsys, monkeypatch) -> 
     args = arguments(file=str(tmp_path / "s.toml"), out=str(tmp_path / "s.study"))
     with pytest.raises(KeyboardInterrupt):
         study_command(args, 0.0)
-    assert "0 cases are kept" in capsys.readouterr().err
+    assert "0 cases are stored" in capsys.readouterr().err
 
 
 def test_a_study_with_failures_says_so() -> None:

@@ -1,0 +1,5 @@
+"""`python -m feasibility.cli`: the command `coverable`."""
+
+from feasibility.cli.main import run
+
+run()
