@@ -7,13 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from surfaces.meshes.files.raw_mesh import (
-    MOST_SIDES,
-    RawMesh,
-    no_triangles,
-    refuse_large,
-    triangulated,
-)
+from surfaces.meshes.files.raw_mesh import MOST_SIDES, Polygons, RawMesh, refuse_large
 from surfaces.meshes.files.text import Lines, shown
 
 _FREEFORM = {b"cstype", b"deg", b"surf", b"curv", b"curv2", b"parm", b"trim", b"hole", b"end"}
@@ -30,7 +24,7 @@ def read_obj(stream: BinaryIO, size: int) -> RawMesh:
         SurfaceError: not an OBJ, damaged, too large, or of curved patches.
     """
     lines = Lines(stream, b"#")
-    numbers, corners, sides, triangles = array("d"), array("q"), array("q"), 0
+    numbers, polygons = array("d"), Polygons()
     objects: set[bytes] = set()
     name = b""
     for words in lines:
@@ -47,10 +41,7 @@ def read_obj(stream: BinaryIO, size: int) -> RawMesh:
                 raise lines.error(
                     f"should be a face of 3 .. {MOST_SIDES} corners, got {len(words) - 1}"
                 )
-            corners.extend(_corners(lines, words[1:], len(numbers) // 3))
-            sides.append(len(words) - 1)
-            triangles += len(words) - 3
-            refuse_large(triangles)
+            polygons.add(_corners(lines, words[1:], len(numbers) // 3))
             objects.add(name)
         elif word == b"o":
             name = b" ".join(words[1:])
@@ -58,10 +49,7 @@ def read_obj(stream: BinaryIO, size: int) -> RawMesh:
             raise lines.error(f"starts a curved patch ({shown(word)}); export it as triangles")
         elif word not in _IGNORED:
             raise lines.error(f"starts with {shown(word)}, which no OBJ line does")
-    if not sides:
-        raise no_triangles()
-    vertices = np.array(numbers).reshape(-1, 3)
-    mesh = triangulated(vertices, np.array(corners, np.int64), np.array(sides, np.int64))
+    mesh = polygons.mesh(np.array(numbers).reshape(-1, 3))
     several = (f"{len(objects)} objects of the file were joined",) * (len(objects) > 1)
     return RawMesh(mesh.vertices, mesh.faces, several + mesh.notes)
 

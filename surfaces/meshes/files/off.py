@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from surfaces.meshes.files.raw_mesh import MOST_SIDES, RawMesh, refuse_large, triangulated
+from surfaces.meshes.files.raw_mesh import MOST_SIDES, Polygons, RawMesh, refuse_large
 from surfaces.meshes.files.text import Lines, shown
 from surfaces.surface import SurfaceError
 
@@ -36,7 +36,7 @@ def read_off(stream: BinaryIO, size: int) -> RawMesh:
             f"announces {vertex_count} vertices and {face_count} faces, which {size} bytes cannot "
             "hold; it was cut short"
         )
-    numbers, corners, sides, triangles = array("d"), array("q"), array("q"), 0
+    numbers, polygons = array("d"), Polygons()
     for k in range(vertex_count):
         words = lines.next(f"vertex {k} of {vertex_count}")
         if len(words) < 3:
@@ -50,9 +50,5 @@ def read_off(stream: BinaryIO, size: int) -> RawMesh:
                 f"should be a face: a count of 3 .. {MOST_SIDES} corners and as many indices, "
                 f"got {shown(b' '.join(words))}"
             )
-        triangles += count - 2
-        refuse_large(triangles)
-        sides.append(count)
-        corners.extend([lines.whole(word) for word in words[1 : 1 + count]])
-    vertices = np.array(numbers).reshape(-1, 3)
-    return triangulated(vertices, np.array(corners, np.int64), np.array(sides, np.int64))
+        polygons.add([lines.whole(word) for word in words[1 : 1 + count]])
+    return polygons.mesh(np.array(numbers).reshape(-1, 3))

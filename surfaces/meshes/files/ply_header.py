@@ -21,6 +21,7 @@ TYPES = {
 }
 _FORMATS = {b"ascii": "", b"binary_little_endian": "<", b"binary_big_endian": ">"}
 _MOST_LINES = 1000
+_FACE_LISTS = ("vertex_indices", "vertex_index")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,27 @@ class Element:
     def least_row(self) -> int:
         """Bytes of the shortest binary row."""
         return sum(int((item.count_type or item.type)[1]) for item in self.properties)
+
+    @property
+    def wanted(self) -> tuple[int, ...]:
+        """Which properties are read: x, y and z of a vertex, the list of corners of a face.
+
+        Raises:
+            SurfaceError: they are missing, or of a type that they cannot have.
+        """
+        names = [item.name for item in self.properties]
+        if self.name == "vertex":
+            if {"x", "y", "z"} <= set(names) and not any(i.count_type for i in self.properties):
+                return tuple(names.index(name) for name in ("x", "y", "z"))
+            raise SurfaceError(f"its vertices need x, y and z, and no lists; they have {names}")
+        if self.name != "face":
+            return ()
+        for k, item in enumerate(self.properties):
+            if item.name in _FACE_LISTS and item.count_type and item.type[0] != "f":
+                return (k,)
+        raise SurfaceError(
+            f"its faces need a list 'vertex_indices' of whole numbers; they have {names}"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -51,6 +52,46 @@ def no_triangles() -> SurfaceError:
     )
 
 
+class Polygons:
+    """Collects the corners of faces, and refuses too many before there is memory for them."""
+
+    def __init__(self) -> None:
+        """Begin without faces."""
+        self.corners = array("q")
+        self.sides = array("q")
+        self.triangles = 0
+
+    def add(self, corners: Sequence[int]) -> None:
+        """One face more.
+
+        Raises:
+            SurfaceError: its corners are too few or too many, or the faces are too many.
+        """
+        refuse_sides(len(self.sides), len(corners))
+        self.triangles += len(corners) - 2
+        refuse_large(self.triangles)
+        self.corners.extend(corners)
+        self.sides.append(len(corners))
+
+    def mesh(self, vertices: Floats) -> RawMesh:
+        """The faces cut into triangles, see `triangulated`."""
+        corners, sides = np.array(self.corners, np.int64), np.array(self.sides, np.int64)
+        return triangulated(vertices, corners, sides)
+
+
+def refuse_sides(face: int, count: int) -> None:
+    """Refuse a face that is no polygon, or one of too many corners.
+
+    Raises:
+        SurfaceError: `count` is not in 3 .. `MOST_SIDES`.
+    """
+    if not 3 <= count <= MOST_SIDES:
+        raise SurfaceError(
+            f"face {face} (counted from 0) has {count} corners, where 3 .. {MOST_SIDES} are "
+            "taken; export the mesh as triangles"
+        )
+
+
 def triangulated(vertices: Floats, corners: Ints, sides: Ints) -> RawMesh:
     """Cut polygons into triangles.
 
@@ -60,20 +101,13 @@ def triangulated(vertices: Floats, corners: Ints, sides: Ints) -> RawMesh:
     Args:
         vertices: (V, 3).
         corners: the polygons' vertices, one polygon after the other.
-        sides: (N,) how many corners each polygon has.
+        sides: (N,) how many corners each polygon has, 3 .. `MOST_SIDES`.
 
     Raises:
-        SurfaceError: a polygon with fewer than 3 corners or too many, or one without such a fan.
+        SurfaceError: no polygon at all, too many, or one without such a fan.
     """
     if not len(sides):
         raise no_triangles()
-    for bad, why in ((sides < 3, "fewer than 3"), (sides > MOST_SIDES, f"over {MOST_SIDES}")):
-        if bad.any():
-            first = int(bad.argmax())
-            raise SurfaceError(
-                f"face {first} (counted from 0) has {sides[first]} corners, {why}; "
-                "export the mesh as triangles"
-            )
     refuse_large(int((sides - 2).sum()))
     begins = np.cumsum(sides) - sides
     places = np.cumsum(sides - 2) - (sides - 2)

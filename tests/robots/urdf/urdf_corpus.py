@@ -194,7 +194,10 @@ REFUSED: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         urdf("<a " + " ".join(f'a{i}=""' for i in range(500_000)) + "/>"),
         ("500,000 attributes", "64"),
     ),
-    "9 MB of comment": (urdf("<!--" + " " * 9_000_000 + "-->"), ("larger than 8 MB", "meshes in files of their own")),
+    "9 MB of comment": (
+        urdf("<!--" + " " * 9_000_000 + "-->"),
+        ("larger than 8 MB", "meshes in files of their own"),
+    ),
     # entities and other files
     "entity bomb": (BOMB, ("DOCTYPE", "delete it")),
     "external entity": (XXE, ("DOCTYPE", "delete it")),
