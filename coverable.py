@@ -26,11 +26,12 @@ if TYPE_CHECKING:
         Task,
         Verdict,
         check,
+        greedy_check,
     )
     from feasibility.cases import Case, CaseError, builtin_cases, load_case
     from feasibility.certification import replay
     from feasibility.division import Division, divide
-    from feasibility.paper import greedy_check, starts
+    from feasibility.paper import starts
     from feasibility.paths import CoveragePath, PathError, coverage_path
     from feasibility.paths import coverage_path as path
     from feasibility.placement import (

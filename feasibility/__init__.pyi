@@ -1,4 +1,5 @@
 from .checking import check as check
+from .checking import greedy_check as greedy_check
 from .search import Search as Search
 from .task import Task as Task
 from .verdict import Answer as Answer

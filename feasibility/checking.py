@@ -1,28 +1,21 @@
-"""The question asked: `check` runs the method, has its motion replayed, and words the verdict."""
+"""The question asked: `check` runs a search, has its motion replayed, and makes the verdict."""
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import NamedTuple
 
-import numpy as np
+from numpy.typing import ArrayLike
 
+from feasibility.clock import Clock
+from feasibility.found import Found
+from feasibility.problem import Problem, refuse_other_types
 from feasibility.search import Progress, Search
-from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
-from feasibility.verdict import Answer, Evidence, Verdict, Walk, deferred
+from feasibility.verdict import Answer, Evidence, Replay, Verdict, deferred
 from robots import Robot
 from surfaces import Cells
-
-if TYPE_CHECKING:
-    import networkx as nx
-
-    from feasibility.certification import Replay
-    from feasibility.roadmap import Exploration
-
-
-NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
 
 
 def check(
@@ -59,237 +52,126 @@ def check(
         >>> verdict.feasible, verdict.n_covered
         (True, 9)
     """
+    from feasibility.paper import greedy_search
+    from feasibility.roadmap import complete_search
+
     search = Search() if search is None else search
-    _refuse_other_types(robot, cells, task, search)
+    refuse_other_types((search, "search", Search, "a Search, such as Search(seed=1)"))
+    problem = Problem.of(robot, cells, task)
     if search.method == "greedy":
-        from feasibility.paper import greedy_check
-        from surfaces.patches import closed_form_grid
-
-        return greedy_check(robot, closed_form_grid(cells), task, search, progress)
-    return _complete_check(robot, cells, task, search, progress)
+        return _decided(problem, search, progress, greedy_search)
+    return _decided(problem, search, progress, complete_search)
 
 
-def _refuse_other_types(*given: object) -> None:
-    """Refuse what is no robot, cells, task or search, all of it at once."""
-    expected = (
-        ("robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
-        ("cells", Cells, "a surface cut into cells, such as surface.cells(9, 10)"),
-        ("task", Task, "a Task, such as Task(standoff=0.02, cone_deg=20)"),
-        ("search", Search, "a Search, such as Search(seed=1)"),
-    )
-    faults = [
-        f"{name}: expected {words}, got {value!r:.60}"
-        for value, (name, kind, words) in zip(given, expected, strict=True)
-        if not isinstance(value, kind)
-    ]
-    if faults:
-        raise TypeError("; ".join(faults))
+def greedy_check(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    search: Search | None = None,
+    progress: Progress | None = None,
+    start: ArrayLike | None = None,
+) -> Verdict:
+    """The verdict of the paper's search, from one start configuration if one is given.
+
+    Args:
+        robot, cells, task: see `check`; cells of a grid on a closed-form patch.
+        search: step, moves, starts, cap and seed.
+        progress: called as progress(cells touched by the running tree, cells, text).
+        start: (n,) the start configuration over one of the cells, rad or m; without it, `check`.
+
+    Raises:
+        ArgumentError: `start` is not a feasible configuration over one of the cells.
+    """
+    from feasibility.paper import greedy_search
+
+    def from_start(problem: Problem, search: Search, clock: Clock) -> Found:
+        return greedy_search(problem, search, clock, start)
+
+    search = Search(method="greedy") if search is None else search
+    return _decided(Problem.of(robot, cells, task), search, progress, from_start)
 
 
-@dataclass(frozen=True, slots=True)
-class _Attempt:
-    """One search, and the replay of what it found."""
+Method = Callable[[Problem, Search, Clock], Found]
 
-    exploration: Exploration
-    in_time: bool
-    walk: Walk | None
+
+class _Attempt(NamedTuple):
+    """One search, and the replay of the motion that it found."""
+
+    found: Found
     replayed: Replay | None
     search_s: float
     certify_s: float
 
-    @property
-    def accepted(self) -> bool:
-        """Does the replay hold the motion?"""
-        return self.replayed is not None and self.replayed.accepted
 
-    @property
-    def narrowly_refused(self) -> bool:
-        """Does the replay refuse the motion for its numbers, and not as none at all?"""
-        if self.replayed is None or self.replayed.accepted:
-            return False
-        return bool(np.isfinite(self.replayed.certificate.max_position_error))
-
-
-def _complete_check(
-    robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
-) -> Verdict:
-    """Run the complete search, replay its walk, and word the verdict."""
-    from feasibility.notices import compiling_notice
-    from feasibility.roadmap import warm_up
-
+def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> _Attempt:
+    """Search, and have the motion certified."""
     called = time.monotonic()
-    with compiling_notice():
-        from feasibility.roadmap import Exploration, causes_of, problem_of
+    found = method(problem, search, clock)
+    searched = time.monotonic()
+    replayed = None if found.replay is None else found.replay()
+    search_s = searched - max(called, clock.began)
+    return _Attempt(found, replayed, search_s, time.monotonic() - searched)
 
-        warm_up()
-    cells.curves  # noqa: B018 - part of the cells, made once
-    began = time.monotonic()
-    deadline = np.inf if search.time_limit is None else began + search.time_limit
 
-    def attempt(within: Task) -> _Attempt:
-        start = time.monotonic()
-        problem = problem_of(robot, cells, within)
-        exploration = Exploration(robot, cells, problem, search.seed, deadline, progress)
-        return _attempt(exploration, task, start)
-
-    tried = [attempt(task)]
-    if tried[0].narrowly_refused:
-        # The replay measures what strays between its samples, and may find a little more.
-        tried.append(attempt(_narrowed(task)))
-    found = tried[-1] if tried[-1].accepted else tried[0]
-    exploration, walk, replayed = found.exploration, found.walk, found.replayed
-    answer, evidence, message = _answer(exploration, task, replayed, found.in_time)
+def _decided(
+    problem: Problem, search: Search, progress: Progress | None, method: Method
+) -> Verdict:
+    """Search, certify, and make the verdict."""
+    called = time.monotonic()
+    clock = Clock(search.time_limit, progress)
+    tried = [_attempt(problem, search, clock, method)]
+    first = tried[0].replayed
+    if tried[0].found.motion is not None and first is not None and first.narrowly_refused:
+        # The replay measures the deviation between its samples, and may find a little more.
+        tried.append(_attempt(problem.narrowed, search, clock, method))
+    last = tried[-1].replayed
+    chosen = tried[-1] if last is not None and last.accepted else tried[0]
+    found, replayed = chosen.found, chosen.replayed
+    answer, evidence, message = _answer(problem, found, replayed)
     feasible = answer is Answer.FEASIBLE
-    exploration.deadline, exploration.progress = np.inf, None
     return Verdict(
         answer=answer,
         evidence=evidence,
         message=message,
-        robot=robot,
-        cells=cells,
-        task=task,
-        method="complete",
+        robot=problem.robot,
+        cells=problem.cells,
+        task=problem.task,
+        method=search.method,
         seed=search.seed,
-        graph=deferred(lambda: graph_of(exploration)),
-        covered=exploration.covered,
-        causes=deferred(lambda: causes_of(exploration)),
-        components=tuple(np.flatnonzero(exploration.covers(root)) for root in exploration.roots()),
-        start=int(walk.cell[0]) if walk is not None else None,
-        witness=walk if feasible else None,
+        graph=deferred(found.make_graph),
+        covered=found.covered,
+        causes=deferred(found.make_causes),
+        components=found.components,
+        tree=deferred(found.make_tree),
+        start=found.start,
+        witness=found.motion if feasible else None,
         certificate=replayed.certificate if feasible and replayed is not None else None,
         timing={
-            "load_s": began - called,
+            "load_s": clock.began - called,
             "search_s": sum(one.search_s for one in tried),
             "certify_s": sum(one.certify_s for one in tried),
             "total_s": time.monotonic() - called,
         },
-        n_edges=exploration.n_edges,
-        statistics={
-            "fk": sum(int(one.exploration.work.counts[0]) for one in tried),
-            "nodes": int(exploration.roadmap.counters[0]),
-            "motions": int(exploration.roadmap.counters[1]),
-            "boxes": exploration.boxes,
-            "rounds": exploration.rounds,
-        },
+        n_edges=found.n_edges,
+        statistics={**found.counts, "fk": sum(one.found.counts["fk"] for one in tried)},
     )
-
-
-def _attempt(exploration: Exploration, task: Task, began: float) -> _Attempt:
-    """Search since `began` (s), and replay the motion found against a task."""
-    from feasibility.certification import replay
-    from feasibility.roadmap import OutOfTime, close, covering_walk, explore
-
-    in_time = True
-    try:
-        explore(exploration)
-        close(exploration)
-    except OutOfTime:
-        in_time = False
-    searched = time.monotonic()
-    walk: Walk | None = None
-    replayed: Replay | None = None
-    robot, cells = exploration.robot, exploration.cells
-    if exploration.complete and len(cells):
-        walk = covering_walk(exploration.roadmap, exploration.best)
-        # Every cell, whatever the search believes that it covers.
-        replayed = replay(robot, cells, task, walk, np.ones(len(cells), dtype=bool))
-    return _Attempt(
-        exploration, in_time, walk, replayed, searched - began, time.monotonic() - searched
-    )
-
-
-def _narrowed(task: Task) -> Task:
-    """A task that leaves the replay some room."""
-    tolerance = task.effective_tolerance
-    return replace(task, tolerance=NARROWER * tolerance, cone_deg=NARROWER * task.cone_deg)
 
 
 def _answer(
-    exploration: Exploration, task: Task, replayed: Replay | None, in_time: bool
+    problem: Problem, found: Found, replayed: Replay | None
 ) -> tuple[Answer, Evidence, str]:
-    """Answer, evidence and the sentences that say what was done."""
-    from feasibility.roadmap import Ruling
-
-    total = len(exploration.cells)
-    covered = int(exploration.covered.sum())
-    tolerance = task.effective_tolerance
-    within = f"within {1e3 * tolerance:g} mm and {task.cone_deg:g} deg"
-    proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
-    if total == 0:
+    """Answer, evidence, and the sentences that say what was done."""
+    if len(problem.cells) == 0:
         return Answer.FEASIBLE, Evidence.WITNESS, "There are no cells to cover."
     if replayed is not None and replayed.accepted:
-        return (
-            Answer.FEASIBLE,
-            Evidence.WITNESS,
-            f"One continuous motion of {replayed.certificate.waypoints} waypoints visits every "
-            f"cell centre; Pinocchio's replay holds it {within}, between waypoints too.",
-        )
+        waypoints = str(replayed.certificate.waypoints)
+        message = found.accepted.replace("{waypoints}", waypoints)
+        return Answer.FEASIBLE, Evidence.WITNESS, message
     if replayed is not None:
-        return (
-            Answer.UNDECIDED,
-            Evidence.BUDGET,
-            f"A motion over every cell was found, but the independent replay refuses it: "
-            f"{replayed.refusal}.",
-        )
-    if proved:
-        return (
-            Answer.INFEASIBLE,
-            Evidence.PROOF,
-            f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {within} "
-            f"(reach bound and branch and bound, {exploration.boxes} boxes); the best single motion "
-            f"covers {covered} of {total}.",
-        )
-    if not in_time:
-        return (
-            Answer.UNDECIDED,
-            Evidence.BUDGET,
-            f"The time limit ran out; the best single motion so far covers {covered} of {total} "
-            f"cells.",
-        )
-    if not exploration.problem.cone_chord > 0.0:
-        return (
-            Answer.UNDECIDED,
-            Evidence.BUDGET,
-            "A cone of 0 degrees leaves a motion no room between samples, so none can be "
-            "certified; allow a small angle.",
-        )
-    closed = blocked_curves(exploration.cells, task)
-    if closed:
-        return (Answer.UNDECIDED, Evidence.BUDGET, closed)
-    missed = int((~exploration.reached).sum())
-    what = (
-        f"{missed} cell{'s were' if missed > 1 else ' was'} never reached, without a proof"
-        if missed
-        else "every cell is reached, but by no single component"
-    )
-    return (
-        Answer.INFEASIBLE,
-        Evidence.EXHAUSTED,
-        f"The search ended without a covering motion {within}: {what}; the best covers {covered} "
-        f"of {total} cells ({exploration.roadmap.counters[0]} nodes, {exploration.rounds} rounds, seed "
-        f"{exploration.seed}).",
-    )
-
-
-def graph_of(exploration: Exploration) -> nx.Graph:
-    """Graph G of the best component: every cell, and one motion for each pair that has any.
-
-    Nodes carry `q` (n,), a configuration over the cell's centre, None for cells that the component
-    misses. Edges carry `motion` (k, n), from the smaller cell index to the larger.
-    """
-    import networkx as nx
-
-    from feasibility.roadmap import NODES, edge_motion, pair_edges, root_of
-
-    roadmap, best = exploration.roadmap, exploration.best
-    graph: nx.Graph = nx.Graph()
-    graph.add_nodes_from(range(len(exploration.cells)), q=None)
-    for x in range(roadmap.counters[NODES] - 1, -1, -1):
-        if root_of(roadmap, roadmap.component[x]) == best:
-            graph.nodes[int(roadmap.cell[x])]["q"] = roadmap.q[x].copy()
-    for (i, j), e in pair_edges(exploration).items():
-        motion = edge_motion(roadmap, e)
-        if roadmap.cell[roadmap.ends[e, 0]] != i:
-            motion = motion[::-1]
-        graph.add_edge(i, j, motion=motion)
-    return graph
+        message = found.refused.replace("{refusal}", replayed.refusal)
+        return Answer.UNDECIDED, Evidence.BUDGET, message
+    if found.proof:
+        return Answer.INFEASIBLE, Evidence.PROOF, found.proof
+    if found.unfinished:
+        return Answer.UNDECIDED, Evidence.BUDGET, found.unfinished
+    return Answer.INFEASIBLE, Evidence.EXHAUSTED, found.exhausted

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -85,6 +86,28 @@ class Certificate:
     """rad or m, smallest distance of a joint from a limit."""
 
 
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """The outcome of a replay."""
+
+    certificate: Certificate
+    refusal: str
+    """Why the motion is refused; empty when it is accepted."""
+
+    @property
+    def accepted(self) -> bool:
+        """True when every constraint holds along the whole motion and every cell is visited."""
+        return not self.refusal
+
+    @property
+    def narrowly_refused(self) -> bool:
+        """Is the motion refused for its numbers, and not as no motion at all?"""
+        return not self.accepted and math.isfinite(self.certificate.max_position_error)
+
+
+DEFERRED = ("graph", "causes", "tree")
+
+
 def deferred(make: Callable[[], Any]) -> Any:
     """Stand-in for a field of `Verdict` that is made when it is first read."""
     return _Deferred(make)
@@ -119,13 +142,12 @@ class Verdict:
     index to the larger. Made when first read."""
     covered: NDArray[np.bool_]
     """(N,) cells that the best single component visits."""
-    causes: tuple[Cause, ...] = field(default_factory=tuple)
+    causes: tuple[Cause, ...] = ()
     """One for each cell that is not covered, in order of index; found when first read."""
     components: tuple[NDArray[np.int64], ...] = ()
     """Cells of each connected component found, the best first; the greedy search keeps its best
     tree only."""
-    # A plain default would be an attribute of the class too, and hide that the field is deferred.
-    tree: nx.DiGraph | None = field(default_factory=lambda: None)
+    tree: nx.DiGraph | None = None
     """Tree T of the paper's search; None for other methods."""
     start: int | None = None
     """Flat index of the cell where the tree (greedy) or the witness (complete) starts."""
@@ -140,20 +162,11 @@ class Verdict:
     statistics: Mapping[str, Any] = field(default_factory=dict)
     """Counts of work done (FK evaluations, calls, proofs), for benchmarks and the curious."""
 
-    def __post_init__(self) -> None:
-        """Set deferred fields aside until they are read."""
-        for name, value in list(vars(self).items()):
-            if isinstance(value, _Deferred):
-                object.__delattr__(self, name)
-                vars(self)["_" + name] = value
-
-    def __getattr__(self, name: str) -> Any:
-        """Make a deferred field; called only while it is missing."""
-        source = vars(self).pop("_" + name, None)
-        if source is None:
-            raise AttributeError(name)
-        vars(self)[name] = source.make()
-        return vars(self)[name]
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled: everything, deferred fields as what they are when read."""
+        for name in DEFERRED:
+            getattr(self, name)
+        return dict(vars(self))
 
     @property
     def feasible(self) -> bool:
@@ -172,3 +185,23 @@ class Verdict:
             f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
             f"{self.n_edges} of {pairs} edges. {self.message}"
         )
+
+
+def _made_when_read(name: str) -> property:
+    """A property in place of a field that may have been given as `deferred`."""
+    kept = f"_{name}"
+
+    def read(verdict: Verdict) -> Any:
+        value = vars(verdict)[kept]
+        if isinstance(value, _Deferred):
+            value = vars(verdict)[kept] = value.make()
+        return value
+
+    def keep(verdict: Verdict, value: Any) -> None:
+        vars(verdict)[kept] = value
+
+    return property(read, keep)
+
+
+for _field in DEFERRED:
+    setattr(Verdict, _field, _made_when_read(_field))

@@ -33,7 +33,7 @@ surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes.cells
 surfaces.meshes: mesh_surface selection
-feasibility: version compiled notices safe_files search task verdict target_curves
+feasibility: clock compiled found notices problem safe_files search target_curves task verdict version
 feasibility.certification
 feasibility.paper
 feasibility.cases
@@ -50,7 +50,7 @@ feasibility.viewer
 feasibility.reports
 feasibility.cli
 coverable
-"""
+"""  # noqa: E501
 
 # `surface.cells(...)` makes the cells, which know their surface: the one import upwards of each.
 FACTORIES = {

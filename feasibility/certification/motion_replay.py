@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.curve_matching import follow
 from feasibility.task import Task
-from feasibility.verdict import Certificate, Walk
+from feasibility.verdict import Certificate, Replay, Walk
 from robots import Kinematics, Robot
 from surfaces import Cells
 
@@ -129,20 +129,6 @@ def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
     if ((walk.cell < -1) | (walk.cell >= len(cells))).any():
         return f"a waypoint is marked with a cell that is not one of the {len(cells)}"
     return ""
-
-
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """The outcome of a replay."""
-
-    certificate: Certificate
-    refusal: str
-    """Why the motion is refused; empty when it is accepted."""
-
-    @property
-    def accepted(self) -> bool:
-        """True when every constraint holds along the whole motion and every cell is visited."""
-        return not self.refusal
 
 
 def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]) -> Replay:

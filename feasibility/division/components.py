@@ -9,8 +9,6 @@ rounds in a row without gain end it.
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,7 +51,7 @@ def gather(exploration: Exploration) -> None:
 def _chosen(exploration: Exploration) -> list[int]:
     """Components of a least cover of all reached cells."""
     roots, covers = cover_table(exploration)
-    left = min(COVER_SECONDS, exploration.deadline - time.monotonic())
+    left = min(COVER_SECONDS, exploration.clock.left)
     return [roots[row] for row in set_cover(covers[:, exploration.reached], left).rows]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.clock import Clock, OutOfTime
 from feasibility.division.division import Division, Plan
 from feasibility.search import Progress, Search
 from feasibility.task import Task
@@ -99,18 +100,18 @@ def _searched(
 ) -> tuple[Exploration, bool]:
     """The search with all components that it found, and whether it ran to its end."""
     from feasibility.division.components import gather
-    from feasibility.roadmap import Exploration, OutOfTime, explore, problem_of
+    from feasibility.roadmap import Exploration, arrays_of, explore
 
-    deadline = np.inf if search.time_limit is None else time.monotonic() + search.time_limit
-    problem = problem_of(robot, cells, task)
-    exploration = Exploration(robot, cells, problem, search.seed, deadline, progress)
+    clock = Clock(search.time_limit, progress).start()
+    arrays = arrays_of(robot, cells, task)
+    exploration = Exploration(robot, cells, arrays, search.seed, clock)
     ended = True
     try:
         explore(exploration)
         gather(exploration)
     except OutOfTime:
         ended = False
-    exploration.deadline = np.inf
+    exploration.clock = Clock()
     return exploration, ended
 
 
@@ -152,7 +153,7 @@ def _causes(exploration: Exploration, missing: NDArray[np.int64], ended: bool) -
 
 def _no_room(exploration: Exploration) -> str:
     """Why no motion at all can be certified; empty where one can."""
-    problem = exploration.problem
+    problem = exploration.arrays
     if not problem.cone_chord > 0.0:
         return (
             "A cone of 0 degrees leaves a motion no room between samples, so none can be "
@@ -176,7 +177,7 @@ def _no_room(exploration: Exploration) -> str:
 
 def _folds(exploration: Exploration) -> NDArray[np.bool_]:
     """Ways from cell to cell on which the offset surface folds, so that no motion follows them."""
-    return np.asarray(np.isinf(exploration.problem.derivative_bounds).any(axis=1), dtype=bool)
+    return np.asarray(np.isinf(exploration.arrays.derivative_bounds).any(axis=1), dtype=bool)
 
 
 def _message(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import time
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -11,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.clock import Clock
 from feasibility.paper import algorithm_1 as jcells
 from feasibility.paper.jcell_grid import Grid, cell_of, place_tool
 from feasibility.paper.jcell_steps import Steps
@@ -144,14 +143,14 @@ class JSpace:
         return int(cell_of(self._patch_kernel, grid.height, grid.tolerance, grid.cone_cosine, tool))
 
     def continuity(
-        self, jcell: ArrayLike, target_cell: int, deadline: float = math.inf
+        self, jcell: ArrayLike, target_cell: int, clock: Clock | None = None
     ) -> Continuity:
         """Algorithm 1: search a path of J-cells from `jcell` into `target_cell`.
 
         Args:
             jcell: (n,) offsets of a feasible J-cell.
             target_cell: flat index of ec_T.
-            deadline: value of `time.perf_counter` at which to give up.
+            clock: when to give up.
         """
         offsets = np.ascontiguousarray(jcell, dtype=np.int32)
         target = self._points[target_cell]
@@ -166,7 +165,7 @@ class JSpace:
                 self._memory = _enlarged(self._memory)
             elif state != jcells.RUNNING:
                 break
-            if time.perf_counter() > deadline:
+            if clock is not None and clock.out_of_time:
                 return self._result(Outcome.OUT_OF_TIME)
         outcomes = {
             jcells.FOUND: Outcome.FOUND,
@@ -220,8 +219,8 @@ def continuity(
         raise ArgumentError(f"target_cell must be 0 to {len(cells) - 1}, got {target_cell}")
     if space.cell_of(here) < 0:
         raise ArgumentError("q must satisfy limits, cone and tolerance over one of the cells")
-    limit = math.inf if search is None or search.time_limit is None else search.time_limit
-    return space.continuity(here, target_cell, time.perf_counter() + limit)
+    clock = Clock(None if search is None else search.time_limit).start()
+    return space.continuity(here, target_cell, clock)
 
 
 def _last_offset(

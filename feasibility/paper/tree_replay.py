@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from feasibility.paper.jcell_steps import Steps
 from feasibility.task import Task
-from feasibility.verdict import Certificate
+from feasibility.verdict import Certificate, Replay
 from robots import Kinematics, Robot
 from surfaces.patches import GridCells
 
@@ -32,16 +32,7 @@ class Path:
     """(k, n) configurations of its J-cells, rad or m."""
 
 
-@dataclass(frozen=True, slots=True)
-class Replay:
-    """What the replay found."""
-
-    certificate: Certificate
-    faults: tuple[str, ...]
-    """One sentence for each thing that does not hold; empty when all does."""
-
-
-def replay(
+def replay_tree(
     robot: Robot, cells: GridCells, task: Task, steps: Steps, paths: Sequence[Path]
 ) -> Replay:
     """Check that each path is what the search says: every J-cell, every step, both end cells.
@@ -96,7 +87,8 @@ def replay(
         faults.append("a path does not begin or end in the cell it claims")
     if not _continuous(paths):
         faults.append("a path does not begin where its cell was entered")
-    return Replay(Certificate(len(q), float(error), float(angle), float(margin)), tuple(faults))
+    certificate = Certificate(len(q), float(error), float(angle), float(margin))
+    return Replay(certificate, "; ".join(faults))
 
 
 def tool_poses(

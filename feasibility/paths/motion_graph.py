@@ -15,7 +15,7 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap import Problem, Work, problem_of, work_for
+from feasibility.roadmap import SearchArrays, Work, arrays_of, work_for
 from feasibility.verdict import Verdict, Walk
 
 Motion = NDArray[np.float64]
@@ -26,7 +26,7 @@ Motion = NDArray[np.float64]
 class MotionGraph:
     """Nodes, and the motions that join them."""
 
-    problem: Problem
+    problem: SearchArrays
     work: Work
     pairs: dict[tuple[int, int], int]
     """Which pair of `cells.pairs` two cells i < j are."""
@@ -104,7 +104,7 @@ def joint_length(motion: Motion) -> float:
 def motion_graph_of(verdict: Verdict) -> MotionGraph:
     """The motions that a verdict holds: those of its graph, and those of its witness."""
     pairs = {(int(i), int(j)): k for k, (i, j) in enumerate(verdict.cells.pairs.tolist())}
-    problem = problem_of(verdict.robot, verdict.cells, verdict.task)
+    problem = arrays_of(verdict.robot, verdict.cells, verdict.task)
     graph = MotionGraph(problem, work_for(verdict.robot.n), pairs)
     for first, last, motion in _motions(verdict):
         graph.join(graph.node(first, motion[0]), graph.node(last, motion[-1]), motion)

@@ -92,7 +92,7 @@ def _make_room(problem, aimed, work, target, approach, q, best):  # type: ignore
 
 def least_room(exploration: Exploration) -> NDArray[np.float64]:
     """(2,) shares of limits and of cone that the best component leaves over every cell."""
-    problem, roadmap, work = exploration.problem, exploration.roadmap, exploration.work
+    problem, roadmap, work = exploration.arrays, exploration.roadmap, exploration.work
     # Steps over a centre head for a cone that is next to nothing, and keep to the task's.
     aimed = problem._replace(
         cone_chord=NARROW * problem.cone_chord if problem.cone_chord < np.inf else np.inf

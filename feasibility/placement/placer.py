@@ -18,7 +18,7 @@ from feasibility.placement.quick_search import MOST_COVERS, covers_of, probe, sk
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
 from feasibility.placement.trial import Margins, Stage, Trial
-from feasibility.roadmap import Exploration, Problem, cause_counts, problem_of
+from feasibility.roadmap import Exploration, SearchArrays, arrays_of, cause_counts
 from feasibility.search import Search
 from feasibility.task import Task
 from robots import Robot
@@ -31,11 +31,11 @@ class Placer:
     def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
         """Gather what all placements share."""
         self.robot, self.cells, self.task, self.search = robot, cells, task, search
-        self.problem = problem_of(robot, cells, task)
+        self.problem = arrays_of(robot, cells, task)
         self.reach = Reach.of(robot, cells, task)
         self.probes = spread_cells(cells)
 
-    def problem_at(self, pose: Pose) -> Problem:
+    def problem_at(self, pose: Pose) -> SearchArrays:
         """The problem with the surface's frame at a pose."""
         here, surface = self.problem, self.cells.surface
         turn = pose.rotation @ surface.rotation.T
@@ -44,7 +44,7 @@ class Placer:
             [here.targets[..., :3] @ turn.T, here.targets[..., 3:] @ turn.T], axis=2
         )
         targets[:, 0, :3] += shift
-        # As `problem_of` has them: for other arrays all kernels would be compiled once more.
+        # As `arrays_of` has them: for other arrays all kernels would be compiled once more.
         targets.flags.writeable = False
         return here._replace(
             points=np.ascontiguousarray(here.points @ turn.T + shift),
@@ -93,7 +93,7 @@ class Placer:
 
         cells = moved_cells(self.cells, trial.pose)
         if trial.stage is Stage.CHECK:
-            problem = problem_of(self.robot, cells, self.task)
+            problem = arrays_of(self.robot, cells, self.task)
             exploration = Exploration(self.robot, cells, problem, self.search.seed)
             explore(exploration)
         else:
@@ -146,7 +146,7 @@ class Placer:
         """The search of `check` again, for the room that its motion leaves."""
         from feasibility.roadmap import explore
 
-        problem = problem_of(self.robot, cells, self.task)
+        problem = arrays_of(self.robot, cells, self.task)
         exploration = Exploration(self.robot, cells, problem, self.search.seed)
         explore(exploration)
         return self.trial_of(exploration, pose, 1.0, 1.0)

@@ -42,7 +42,7 @@ def _probe(problem, work, cells, guesses, hits):  # type: ignore[no-untyped-def]
 def probe(exploration: Exploration, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
     """(k,) whether Newton's method finds a configuration over some cells (k,)."""
     hits = np.zeros(len(cells), dtype=np.int64)
-    _probe(exploration.problem, exploration.work, cells, exploration.guesses(STARTS), hits)
+    _probe(exploration.arrays, exploration.work, cells, exploration.guesses(STARTS), hits)
     return hits.astype(bool)
 
 
@@ -53,7 +53,7 @@ def skim(exploration: Exploration, early: bool) -> None:
     """
     pivot = exploration.cells.middle
     guesses = exploration.guesses(PIVOT_SEEDS)
-    room = margin_shares(exploration.problem, exploration.work, pivot, guesses)
+    room = margin_shares(exploration.arrays, exploration.work, pivot, guesses)
     for k in np.argsort(-room, kind="stable"):
         if room[k] >= 0.0:
             exploration.add_seeds(pivot, guesses[k : k + 1])

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
-from feasibility.roadmap.problem import NEXT, Problem, Work, look_at, place
+from feasibility.roadmap.arrays import NEXT, SearchArrays, Work, look_at, place
 from robots import jacobians
 
 THINNEST = 1e-6  # [rad], [m]: a box with no wider joint that moves the tool is left undecided
@@ -70,11 +70,11 @@ class Boxes(NamedTuple):
     """(2,) boxes waiting; boxes looked at so far."""
 
 
-def root_box(problem: Problem) -> Boxes:
+def root_box(arrays: SearchArrays) -> Boxes:
     """One box that holds every configuration inside the limits, up to full turns."""
-    n = len(problem.lower)
-    low, high = problem.lower.copy(), problem.upper.copy()
-    turns = ~problem.chain.prismatic & (high - low >= 2.0 * np.pi)
+    n = len(arrays.lower)
+    low, high = arrays.lower.copy(), arrays.upper.copy()
+    turns = ~arrays.chain.prismatic & (high - low >= 2.0 * np.pi)
     low[turns], high[turns] = -np.pi, np.pi
     boxes = Boxes(np.empty((STACK, n)), np.empty((STACK, n)), np.zeros(2, dtype=np.int64))
     boxes.low[0], boxes.high[0], boxes.counts[0] = low, high, 1
@@ -122,17 +122,17 @@ def _cut(rows, gap, radius, low, high, direction):  # type: ignore[no-untyped-de
 
 
 @kernel
-def _reach_of_box(problem, work, half, longest, lever, sine):  # type: ignore[no-untyped-def]
+def _reach_of_box(arrays, work, half, longest, lever, sine):  # type: ignore[no-untyped-def]
     """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2)."""
     n = half.shape[0]
     behind, behind_axis, before = 0.0, 0.0, 0.0
     for j in range(n):
-        if not problem.chain.prismatic[j]:
+        if not arrays.chain.prismatic[j]:
             before += half[j]
     first, second, first_axis, second_axis = 0.0, 0.0, 0.0, 0.0
     for j in range(n - 1, -1, -1):
         h = half[j]
-        if problem.chain.prismatic[j]:
+        if arrays.chain.prismatic[j]:
             lever[j], sine[j] = 1.0, 0.0
             first += h
             second += h * before
@@ -158,15 +158,15 @@ def _reach_of_box(problem, work, half, longest, lever, sine):  # type: ignore[no
 
 
 @kernel
-def _static_levers(problem, longest):  # type: ignore[no-untyped-def]
+def _static_levers(arrays, longest):  # type: ignore[no-untyped-def]
     """The longest lever that each joint can ever have: the links behind it, stretched out."""
     total = 0.0
     for j in range(longest.shape[0] - 1, -1, -1):
-        link = problem.chain.translations[j + 1]
+        link = arrays.chain.translations[j + 1]
         total += np.sqrt(link[0] ** 2 + link[1] ** 2 + link[2] ** 2)
         longest[j] = total
-        if problem.chain.prismatic[j]:
-            total += max(abs(problem.lower[j]), abs(problem.upper[j]))
+        if arrays.chain.prismatic[j]:
+            total += max(abs(arrays.lower[j]), abs(arrays.upper[j]))
 
 
 @kernel
@@ -184,7 +184,7 @@ def _cut_all(rows, gap, distance, radius, low, high, directions):  # type: ignor
 
 
 @kernel
-def _shrink(problem, work, low, high, longest, lever, sine, directions):  # type: ignore[no-untyped-def]
+def _shrink(arrays, work, low, high, longest, lever, sine, directions):  # type: ignore[no-untyped-def]
     """Cut one box (in place) to what may still hold a solution.
 
     Returns:
@@ -199,26 +199,26 @@ def _shrink(problem, work, low, high, longest, lever, sine, directions):  # type
         for j in range(n):
             q[j] = 0.5 * (low[j] + high[j])
             half[j] = 0.5 * (high[j] - low[j])
-        place(problem, work, NEXT, q)
+        place(arrays, work, NEXT, q)
         distance, chord = work.error[1, 0], work.error[1, 1]
-        if distance <= problem.tolerance and chord <= problem.cone_chord:
+        if distance <= arrays.tolerance and chord <= arrays.cone_chord:
             return 2, by_point
         first, second, first_axis, second_axis = _reach_of_box(
-            problem, work, half, longest, lever, sine
+            arrays, work, half, longest, lever, sine
         )
-        near = problem.tolerance + min(first, second) + ROUNDING
-        narrow = problem.cone_chord + min(first_axis, second_axis) + ROUNDING
+        near = arrays.tolerance + min(first, second) + ROUNDING
+        narrow = arrays.cone_chord + min(first_axis, second_axis) + ROUNDING
         by_point = distance / near > chord / narrow
         if (
-            distance > problem.tolerance + first + ROUNDING
-            or chord > problem.cone_chord + first_axis + ROUNDING
+            distance > arrays.tolerance + first + ROUNDING
+            or chord > arrays.cone_chord + first_axis + ROUNDING
         ):
             return 1, by_point
         # The second order is of use only where it beats the first.
         if not (second < first or second_axis < first_axis):
             break
         jacobians(
-            problem.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
+            arrays.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
             work.point_rows, work.axis_rows,
         )  # fmt: skip
         for k in range(3):
@@ -246,11 +246,11 @@ def _shrink(problem, work, low, high, longest, lever, sine, directions):  # type
 
 
 @kernel
-def branch_and_bound(problem, work, target, approach, boxes, most, directions, found):  # type: ignore[no-untyped-def]
+def branch_and_bound(arrays, work, target, approach, boxes, most, directions, found):  # type: ignore[no-untyped-def]
     """Look at up to `most` boxes; see `Ruling` for what comes back.
 
     Args:
-        problem: the `Problem`.
+        problem: the `SearchArrays`.
         work: the `Work`.
         target: (3,) target point of the cell.
         approach: (3,) approach direction of the cell.
@@ -263,8 +263,8 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
     n = found.shape[0]
     low, high = np.empty(n), np.empty(n)
     lever, sine, longest = np.empty(n), np.empty(n), np.empty(n)
-    _static_levers(problem, longest)
-    look_at(problem, work, target, approach)
+    _static_levers(arrays, longest)
+    look_at(arrays, work, target, approach)
     for _ in range(most):
         if boxes.counts[0] == 0:
             return 1
@@ -273,7 +273,7 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
         top = boxes.counts[0]
         put(low, boxes.low[top])
         put(high, boxes.high[top])
-        code, by_point = _shrink(problem, work, low, high, longest, lever, sine, directions)
+        code, by_point = _shrink(arrays, work, low, high, longest, lever, sine, directions)
         if code == 2:
             for j in range(n):
                 found[j] = 0.5 * (low[j] + high[j])
@@ -286,7 +286,7 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
         for j in range(n):
             width = high[j] - low[j]
             if width > THINNEST:
-                move = (for_point * lever[j] / problem.scale + for_axis * sine[j]) * width
+                move = (for_point * lever[j] / arrays.scale + for_axis * sine[j]) * width
                 if move > largest:
                     worst, largest = j, move
         if worst < 0 or boxes.counts[0] + 2 > boxes.low.shape[0]:
@@ -307,7 +307,7 @@ def branch_and_bound(problem, work, target, approach, boxes, most, directions, f
 
 
 def rule(
-    problem: Problem, work: Work, cell: int, boxes: Boxes, most: int
+    arrays: SearchArrays, work: Work, cell: int, boxes: Boxes, most: int
 ) -> tuple[Ruling, NDArray[np.float64]]:
     """Look at up to `most` more boxes for one cell.
 
@@ -315,12 +315,12 @@ def rule(
         The ruling, and a configuration (n,) that covers the cell when it is REACHED, or comes
         within a hair of it when it is UNKNOWN.
     """
-    found = np.empty(len(problem.lower))
+    found = np.empty(len(arrays.lower))
     code = branch_and_bound(
-        problem,
+        arrays,
         work,
-        problem.points[cell],
-        problem.approaches[cell],
+        arrays.points[cell],
+        arrays.approaches[cell],
         boxes,
         most,
         _DIRECTIONS,

@@ -12,9 +12,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.roadmap.arrays import SearchArrays, Work, aim
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.graph import NODES, WAYPOINTS, Roadmap, add_edge, root_of, unite
-from feasibility.roadmap.problem import Problem, Work, aim
 from feasibility.roadmap.self_motion import connect
 from feasibility.roadmap.tracking import MOST_STEPS, track
 
@@ -50,7 +50,7 @@ def nearest_pairs(
 
 
 def bridge(
-    problem: Problem, work: Work, room: Room, x: int, y: int, curve: int, share: float
+    arrays: SearchArrays, work: Work, room: Room, x: int, y: int, curve: int, share: float
 ) -> bool:
     """Try to join two nodes over neighbouring cells at a place between their centres.
 
@@ -67,19 +67,19 @@ def bridge(
         True when an edge was added and the components are one now.
     """
     roadmap = room(0)
-    aim(problem, work, curve, share)
+    aim(arrays, work, curve, share)
     place, approach = work.target[0].copy(), work.target[1].copy()
     starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)
     waypoints, ends = [], []
     for node, start in ((x, starts[0]), (y, starts[1])):
         q = roadmap.q[node].copy()
         rows = np.empty((MOST_STEPS + 1, len(q)))
-        count = track(problem, work, curve, start, share, q, q, False, rows, 0)
+        count = track(arrays, work, curve, start, share, q, q, False, rows, 0)
         if count < 0:
             return False
         waypoints.append(rows[:count])
         ends.append(q)
-    turn = _self_motion(problem, work, place, approach, ends)
+    turn = _self_motion(arrays, work, place, approach, ends)
     if turn is None:
         return False
     # From x to the place, the self-motion, and back along the way from y.
@@ -93,7 +93,7 @@ def bridge(
 
 
 def _self_motion(
-    problem: Problem,
+    arrays: SearchArrays,
     work: Work,
     place: NDArray[np.float64],
     approach: NDArray[np.float64],
@@ -103,7 +103,7 @@ def _self_motion(
     rows = np.empty((CONNECT_STEPS + 1, len(ends[0])))
     for a, b in ((0, 1), (1, 0)):
         q = ends[a].copy()
-        count, reached = connect(problem, work, place, approach, q, ends[b], rows, 0, CONNECT_STEPS)
+        count, reached = connect(arrays, work, place, approach, q, ends[b], rows, 0, CONNECT_STEPS)
         if reached and a == 0:
             return rows[:count]
         if reached:

@@ -33,9 +33,9 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if verdict.method == "greedy":
         kinds = [str(cause.kind) for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
+    from feasibility.roadmap.arrays import arrays_of
     from feasibility.roadmap.diagnosis import diagnose
     from feasibility.roadmap.exploration import Exploration
-    from feasibility.roadmap.problem import problem_of
 
     reached = np.zeros(len(verdict.cells), dtype=bool)
     for cells in verdict.components:
@@ -45,8 +45,8 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if len(lost) == 0:
         return CauseCounts(_counted(kinds), 0)
     # A fresh explorer: what is asked of it are Newton's method and random starts alone.
-    problem = problem_of(verdict.robot, verdict.cells, verdict.task)
-    exploration = Exploration(verdict.robot, verdict.cells, problem, verdict.seed)
+    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
+    exploration = Exploration(verdict.robot, verdict.cells, arrays, verdict.seed)
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
     examined = [diagnose(exploration, int(cell)) for cell in few]
     centres = verdict.cells.centres

@@ -21,22 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
-from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.expansion import CONNECT_STEPS
-from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import root_of
-from feasibility.roadmap.problem import (
+from feasibility.roadmap.arrays import (
     CONE,
     FOLD,
     LIMIT,
     LONG,
     NEXT,
     SINGULAR,
-    Problem,
+    SearchArrays,
     Work,
     look_at,
     place,
 )
+from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.expansion import CONNECT_STEPS
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.graph import root_of
 from feasibility.roadmap.projection import PROJECTION_STEPS, cholesky_solve, project_onto_cell
 from feasibility.roadmap.search import evenly
 from feasibility.roadmap.self_motion import connect
@@ -51,14 +51,14 @@ MOST_DECIMALS = 6
 
 
 def _solve(
-    problem: Problem, work: Work, cell: int, guesses: NDArray[np.float64],
+    arrays: SearchArrays, work: Work, cell: int, guesses: NDArray[np.float64],
     solutions: NDArray[np.float64],
 ) -> int:  # fmt: skip
     """Fill `solutions` with configurations of a relaxed problem over one cell; returns how many."""
     found = 0
     for guess in guesses:
         solutions[found] = guess
-        if project_onto_cell(problem, work, cell, solutions[found], PROJECTION_STEPS):
+        if project_onto_cell(arrays, work, cell, solutions[found], PROJECTION_STEPS):
             found += 1
             if found == len(solutions):
                 break
@@ -66,21 +66,21 @@ def _solve(
 
 
 @kernel
-def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def]
+def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
     """Smallest distance of the tool point from the target, by damped descent from guesses."""
     n = guesses.shape[1]
     best = np.inf
     q, step = np.empty(n), np.empty(n)
     square, pull = np.empty((4, 4)), np.empty(4)
-    look_at(problem, work, problem.points[cell], problem.approaches[cell])
+    look_at(arrays, work, arrays.points[cell], arrays.approaches[cell])
     for g in range(guesses.shape[0]):
         put(q, guesses[g])
         damping = 0.1
-        place(problem, work, NEXT, q)
+        place(arrays, work, NEXT, q)
         error = work.error[1, 0]
         for _ in range(80):
             jacobians(
-                problem.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
+                arrays.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
                 work.point_rows, work.axis_rows,
             )  # fmt: skip
             trace = 0.0
@@ -100,27 +100,27 @@ def _nearest_point(problem, work, cell, guesses):  # type: ignore[no-untyped-def
                 step[j] = q[j]
                 for k in range(3):
                     step[j] += work.point_rows[k, j] * pull[k]
-                step[j] = min(max(step[j], problem.lower[j]), problem.upper[j])
-            place(problem, work, NEXT, step)
+                step[j] = min(max(step[j], arrays.lower[j]), arrays.upper[j])
+            place(arrays, work, NEXT, step)
             if work.error[1, 0] < error:
                 gain = error - work.error[1, 0]
                 error = work.error[1, 0]
                 put(q, step)
                 damping *= 0.5
-                if gain < 1e-7 * problem.scale:
+                if gain < 1e-7 * arrays.scale:
                     break
             else:
                 damping = 4.0 * damping + 1e-3
-                place(problem, work, NEXT, q)
+                place(arrays, work, NEXT, q)
                 if damping > 1e3:
                     break
         best = min(best, error)
     return best
 
 
-def _within(problem: Problem, cone_chord: float) -> Problem:
+def _within(arrays: SearchArrays, cone_chord: float) -> SearchArrays:
     """The same problem with another cone, asked at one cell's centre: nothing strays there."""
-    return problem._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord)
+    return arrays._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord)
 
 
 def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -135,7 +135,7 @@ def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _nearest_to_limits(
-    exploration: Exploration, relaxed: Problem, cell: int, solutions: NDArray[np.float64]
+    exploration: Exploration, relaxed: SearchArrays, cell: int, solutions: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(n,) the configuration over a cell that passes the limits least, among what is found."""
     robot = exploration.robot
@@ -160,7 +160,7 @@ def _one(exploration: Exploration) -> NDArray[np.float64]:
     return np.empty((1, exploration.robot.n))
 
 
-def _smallest_angle(exploration: Exploration, relaxed: Problem, cell: int) -> float:
+def _smallest_angle(exploration: Exploration, relaxed: SearchArrays, cell: int) -> float:
     """Smallest angle (rad) between tool axis and approach direction with the point reached."""
     kinematics, approach = Kinematics(exploration.robot), relaxed.approaches[cell]
     found = np.empty((STARTS, exploration.robot.n))
@@ -220,32 +220,32 @@ def diagnose(exploration: Exploration, cell: int) -> Cause:
     """
     cause = _cause(exploration, cell)
     told = cause.proved or cause.kind is CauseKind.DISCONNECTED
-    if told or not exploration.problem.cone_chord > 0.0:
+    if told or not exploration.arrays.cone_chord > 0.0:
         return cause
     return replace(cause, detail=f"{cause.detail}; {UNPROVED}")
 
 
 def _cause(exploration: Exploration, cell: int) -> Cause:
     """The same without a word on what was not proved."""
-    problem, robot, work = exploration.problem, exploration.robot, exploration.work
+    arrays, robot, work = exploration.arrays, exploration.robot, exploration.work
     proved = exploration.rulings.get(cell) is Ruling.PROVED
     n = robot.n
     solutions = np.empty((ENOUGH, n))
     curvature = ~robot.prismatic
-    unlimited = problem._replace(
+    unlimited = arrays._replace(
         lower=np.where(curvature, -np.inf, robot.lower),
         upper=np.where(curvature, np.inf, robot.upper),
     )
-    slack_cone = _within(problem, np.inf)
+    slack_cone = _within(arrays, np.inf)
     anything = _within(unlimited, np.inf)
     guesses = exploration.guesses(STARTS)
-    if not problem.cone_chord > 0.0 and not proved:
+    if not arrays.cone_chord > 0.0 and not proved:
         detail = "a cone of 0 degrees leaves no room that a motion could be certified in"
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
     if not _solve(anything, work, cell, guesses, _one(exploration)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
         origin = robot.model.jointPlacements[1].translation
-        away = float(np.linalg.norm(problem.points[cell] - origin))
+        away = float(np.linalg.norm(arrays.points[cell] - origin))
         reach = robot.reach
         short, far = decimals(1e3 * distance, 0.0, 0), decimals(away, reach, 3)
         detail = (
@@ -267,7 +267,7 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
         )
     if _solve(slack_cone, work, cell, guesses, _one(exploration)):
         angle = np.degrees(_smallest_angle(exploration, slack_cone, cell))
-        alpha = np.degrees(2.0 * np.arcsin(min(0.5 * problem.cone_chord, 1.0)))
+        alpha = np.degrees(2.0 * np.arcsin(min(0.5 * arrays.cone_chord, 1.0)))
         if angle <= alpha and not proved:
             detail = "the arm can stand there, but the search ended before it found a motion to it"
             return Cause(cell, CauseKind.DISCONNECTED, False, detail)
@@ -324,7 +324,7 @@ def causes_of(exploration: Exploration) -> tuple[Cause, ...]:
     Raises:
         OutOfTime: the deadline passed.
     """
-    reached, points = exploration.reached, exploration.problem.points
+    reached, points = exploration.reached, exploration.arrays.points
     missed = np.flatnonzero(~exploration.covered)
     causes: dict[int, Cause] = {}
     for cell in missed[reached[missed]].tolist():

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
+from feasibility.roadmap.arrays import SearchArrays, Work
 from feasibility.roadmap.graph import (
     BUDGET,
     COMPONENTS,
@@ -24,7 +25,6 @@ from feasibility.roadmap.graph import (
     root_of,
     unite,
 )
-from feasibility.roadmap.problem import Problem, Work
 from feasibility.roadmap.projection import PROJECTION_STEPS, project_onto_cell
 from feasibility.roadmap.self_motion import SETTLE_STEPS, connect, settle
 from feasibility.roadmap.tracking import track
@@ -59,7 +59,7 @@ def _rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-untyped-def]
+def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-untyped-def]
     """Try to reach, by self-motion from q over `cell`, a node of another component.
 
     Waypoints go to `waypoints` behind the `rows` rows that are pending there.
@@ -78,7 +78,7 @@ def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-u
         tried[k] = root_of(roadmap, roadmap.component[node])
         put(here, q)
         written, reached = connect(
-            problem, work, problem.points[cell], problem.approaches[cell], here, roadmap.q[node],
+            arrays, work, arrays.points[cell], arrays.approaches[cell], here, roadmap.q[node],
             roadmap.waypoints, roadmap.counters[WAYPOINTS] + rows, CONNECT_STEPS,
         )  # fmt: skip
         if written == -2:
@@ -92,11 +92,11 @@ def join(problem, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-u
 
 
 @kernel
-def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type: ignore[no-untyped-def]
+def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: ignore[no-untyped-def]
     """Spread every queued node into the neighbouring cells that its component does not cover yet.
 
     Args:
-        problem: the `Problem`.
+        problem: the `SearchArrays`.
         work: the `Work`.
         roadmap: the `Roadmap`.
         indptr: (N + 1,) where each cell's neighbours begin in `indices`.
@@ -130,7 +130,7 @@ def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type:
             put(q, roadmap.q[x])
             begin, end = (0.0, 1.0) if cell < target else (1.0, 0.0)
             rows = track(
-                problem, work, links[first + count[CURSOR]], begin, end, q, q, FREE,
+                arrays, work, links[first + count[CURSOR]], begin, end, q, q, FREE,
                 roadmap.waypoints, count[WAYPOINTS],
             )  # fmt: skip
             if rows == -2:
@@ -143,7 +143,7 @@ def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type:
                     roadmap.blocked[target, 1] = work.stop_reason[1]
                     roadmap.blocked[target, 2] = own
                 continue
-            node, more = join(problem, work, roadmap, target, q, own, rows, MOST_FAILURES)
+            node, more = join(arrays, work, roadmap, target, q, own, rows, MOST_FAILURES)
             if more == -2:
                 count[CURSOR] -= 1
                 return FULL
@@ -151,7 +151,7 @@ def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type:
                 add_edge(roadmap, x, node, rows + more)
                 own = unite(roadmap, own, roadmap.component[node])
             else:
-                node = add_node(problem, work, roadmap, target, q, own)
+                node = add_node(arrays, work, roadmap, target, q, own)
                 add_edge(roadmap, x, node, rows)
             if roadmap.size[own] == cells:
                 return COVERED
@@ -161,12 +161,12 @@ def spread_out(problem, work, roadmap, indptr, indices, links, budget):  # type:
 
 
 def seed_cell(
-    problem: Problem, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
+    arrays: SearchArrays, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
 ) -> tuple[int, int]:
     """Newton from guesses to configurations over one cell's centre; new ones become components.
 
     Args:
-        problem: the `Problem`.
+        problem: the `SearchArrays`.
         work: the `Work`.
         roadmap: the `Roadmap`; needs room for a node and a component per guess, see `grown`.
         cell: the cell.
@@ -176,7 +176,7 @@ def seed_cell(
         (configurations found, new components made).
     """
     count = roadmap.counters
-    target, approach = problem.points[cell], problem.approaches[cell]
+    target, approach = arrays.points[cell], arrays.approaches[cell]
     found, made = 0, 0
     for guess in guesses:
         if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
@@ -184,22 +184,22 @@ def seed_cell(
         if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
             break
         q = guess.copy()
-        if not project_onto_cell(problem, work, cell, q, PROJECTION_STEPS):
+        if not project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
         found += 1
-        settle(problem, work, target, approach, q, SETTLE_STEPS)
-        node, _ = join(problem, work, roadmap, cell, q, -1, 0, 0)
+        settle(arrays, work, target, approach, q, SETTLE_STEPS)
+        node, _ = join(arrays, work, roadmap, cell, q, -1, 0, 0)
         if node >= 0:
             continue
         component = int(count[COMPONENTS])
         count[COMPONENTS] += 1
-        add_node(problem, work, roadmap, cell, q, component)
+        add_node(arrays, work, roadmap, cell, q, component)
         made += 1
     return found, made
 
 
 @kernel
-def explore_self_motions(problem, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
+def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
     """Explore the fibre over one cell from the nodes there, and join the components that meet.
 
     A rapidly exploring tree for each component: the node nearest to a random point of the fibre
@@ -208,7 +208,7 @@ def explore_self_motions(problem, work, roadmap, cell, guesses, most):  # type: 
     could not.
 
     Args:
-        problem: the `Problem`.
+        problem: the `SearchArrays`.
         work: the `Work`.
         roadmap: the `Roadmap`.
         cell: the cell.
@@ -234,7 +234,7 @@ def explore_self_motions(problem, work, roadmap, cell, guesses, most):  # type: 
             if k == 0:
                 # Aim at a point of the fibre: a random guess, put onto it.
                 put(aimed, guesses[g])
-                if not project_onto_cell(problem, work, cell, aimed, AIM_STEPS):
+                if not project_onto_cell(arrays, work, cell, aimed, AIM_STEPS):
                     break
             node = _rival(roadmap, cell, aimed, NOBODY, tried, NONE)
             if node < 0:
@@ -243,16 +243,16 @@ def explore_self_motions(problem, work, roadmap, cell, guesses, most):  # type: 
             tried[k] = own
             put(q, roadmap.q[node])
             rows, _ = connect(
-                problem, work, problem.points[cell], problem.approaches[cell], q, aimed,
+                arrays, work, arrays.points[cell], arrays.approaches[cell], q, aimed,
                 roadmap.waypoints, count[WAYPOINTS], CONNECT_STEPS,
             )  # fmt: skip
             if rows == -2:
                 return FULL, g, merged
             if rows < 2:
                 continue
-            new = add_node(problem, work, roadmap, cell, q, own)
+            new = add_node(arrays, work, roadmap, cell, q, own)
             add_edge(roadmap, node, new, rows)
-            rival, more = join(problem, work, roadmap, cell, q, own, NONE, most)
+            rival, more = join(arrays, work, roadmap, cell, q, own, NONE, most)
             if more == -2:
                 return FULL, g, merged
             if rival >= 0:
@@ -283,11 +283,11 @@ def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # type: ignore[no-untyped-def]
+def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type: ignore[no-untyped-def]
     """Try to join every neighbouring pair of cells inside one component by a motion of its own.
 
     Args:
-        problem: the `Problem`.
+        problem: the `SearchArrays`.
         work: the `Work`.
         roadmap: the `Roadmap`; an edge that ends nowhere near a node makes a new one.
         pairs: (M, 2) neighbouring cells, one for each course.
@@ -322,7 +322,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                     j = roadmap.cell[b]
                     put(q, roadmap.q[a])
                     rows = track(
-                        problem, work, k, begin, end, q, roadmap.q[b], attempt < 2,
+                        arrays, work, k, begin, end, q, roadmap.q[b], attempt < 2,
                         roadmap.waypoints, count[WAYPOINTS],
                     )  # fmt: skip
                     if rows == -2:
@@ -332,7 +332,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                         continue
                     put(arrival, q)
                     more, reached = connect(
-                        problem, work, problem.points[j], problem.approaches[j], q, roadmap.q[b],
+                        arrays, work, arrays.points[j], arrays.approaches[j], q, roadmap.q[b],
                         roadmap.waypoints, count[WAYPOINTS] + rows, CONNECT_STEPS,
                     )  # fmt: skip
                     if more == -2:
@@ -344,7 +344,7 @@ def close_pairs(problem, work, roadmap, pairs, state, component, budget):  # typ
                         break
                     if attempt == 3:
                         # The motion leads there all the same, to a configuration of its own.
-                        new = add_node(problem, work, roadmap, j, arrival, component)
+                        new = add_node(arrays, work, roadmap, j, arrival, component)
                         add_edge(roadmap, a, new, rows)
                         state[k] = 1
         state[m] += 1

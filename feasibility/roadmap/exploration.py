@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.clock import Clock
+from feasibility.roadmap.arrays import SearchArrays, Work, work_for
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
 from feasibility.roadmap.expansion import close_pairs, explore_self_motions, seed_cell, spread_out
@@ -26,8 +27,6 @@ from feasibility.roadmap.graph import (
     joined_pairs,
     root_of,
 )
-from feasibility.roadmap.problem import Problem, Work, work_for
-from feasibility.search import Progress
 from robots import Robot
 from surfaces import Cells
 
@@ -37,21 +36,15 @@ BRIDGES = 6  # pairs of nodes that one round tries to join between two centres
 PATIENCE = 60  # failed connections of two components that stirring allows
 
 
-class OutOfTime(Exception):
-    """The time limit has run out."""
-
-
 @dataclass
 class Exploration:
     """The state of one search; `explore` drives it and `checking` reads it."""
 
     robot: Robot
     cells: Cells
-    problem: Problem
+    arrays: SearchArrays
     seed: int
-    deadline: float = np.inf
-    """`time.monotonic()` after which `OutOfTime` is raised."""
-    progress: Progress | None = None
+    clock: Clock = field(default_factory=Clock)
     work: Work = field(init=False)
     roadmap: Roadmap = field(init=False)
     rulings: dict[int, Ruling] = field(default_factory=dict)
@@ -79,7 +72,7 @@ class Exploration:
         self.high = np.where(wide, middle + np.pi, upper)
         # A slide is seeded as far as the cells, the arm and its other slides reach.
         ends = np.where(bounded & self.robot.prismatic, np.maximum(abs(lower), abs(upper)), 0.0)
-        far = self.problem.scale + np.abs(self.problem.points).sum(axis=1).max(initial=0.0)
+        far = self.arrays.scale + np.abs(self.arrays.points).sum(axis=1).max(initial=0.0)
         far = far + ends.sum() - ends
         self.low = np.where(self.robot.prismatic, np.clip(-far, lower, upper), self.low)
         self.high = np.where(self.robot.prismatic, np.clip(far, lower, upper), self.high)
@@ -132,10 +125,7 @@ class Exploration:
         Raises:
             OutOfTime: the deadline has passed.
         """
-        if self.progress is not None:
-            self.progress(int(self.roadmap.size[self.best]), len(self.cells), text)
-        if time.monotonic() > self.deadline:
-            raise OutOfTime
+        self.clock.tick(int(self.roadmap.size[self.best]), len(self.cells), text)
 
     def before_next_look(self) -> int:
         """Evaluations of the arm that compiled loops may take before they come back to `tick`."""
@@ -149,7 +139,7 @@ class Exploration:
         """Spread all queued nodes; True when one component covers every cell."""
         while True:
             status = spread_out(
-                self.problem,
+                self.arrays,
                 self.work,
                 self.roadmap,
                 self.indptr,
@@ -171,7 +161,7 @@ class Exploration:
         found = 0
         for guess in guesses:
             self.roadmap = grown(self.roadmap)
-            hits, made = seed_cell(self.problem, self.work, self.roadmap, cell, guess[None])
+            hits, made = seed_cell(self.arrays, self.work, self.roadmap, cell, guess[None])
             found += hits
             if made and self.spread():
                 break
@@ -182,7 +172,7 @@ class Exploration:
         guesses = self.guesses(GUESSES)
         while True:
             status, used, _ = explore_self_motions(
-                self.problem, self.work, self.roadmap, cell, guesses, PATIENCE
+                self.arrays, self.work, self.roadmap, cell, guesses, PATIENCE
             )
             guesses = guesses[used:]
             if status != FULL:
@@ -200,7 +190,7 @@ class Exploration:
             self.met[x, y] = self.met.get((x, y), 0) + 1
             share = float(self.rng.uniform(NARROWEST, WIDEST))
             curve = self.curve(int(self.roadmap.cell[x]), int(self.roadmap.cell[y]))
-            if bridge(self.problem, self.work, self.room, x, y, curve, share):
+            if bridge(self.arrays, self.work, self.room, x, y, curve, share):
                 self.spread()
                 return
             tries += 1
@@ -223,7 +213,7 @@ class Exploration:
         joined_pairs(self.roadmap, pairs, component, state)
         while True:
             status = close_pairs(
-                self.problem,
+                self.arrays,
                 self.work,
                 self.roadmap,
                 pairs,
@@ -255,20 +245,20 @@ class Exploration:
         ruling, looked = Ruling.OPEN, int(boxes.counts[1])
         while ruling is Ruling.OPEN and boxes.counts[1] < most:
             budget = min(most, self.before_next_look())
-            ruling, q = rule(self.problem, self.work, cell, boxes, budget)
+            ruling, q = rule(self.arrays, self.work, cell, boxes, budget)
             self.tick("proving cells out of reach")
         self.boxes += int(boxes.counts[1]) - looked
         self.rulings[cell] = ruling
         # A box that is left undecided mostly straddles the tolerance: Newton starts well from it.
         # (A slide without ends has boxes without a middle.)
         if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and np.isfinite(q).all():
-            self.add_seeds(cell, wound(self.problem, q)[None])
+            self.add_seeds(cell, wound(self.arrays, q)[None])
         return ruling
 
 
-def wound(problem: Problem, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def wound(arrays: SearchArrays, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """(n,) the same placement of the arm, joints brought inside their limits by full turns."""
-    turn = np.where(problem.chain.prismatic, 0.0, 2.0 * np.pi)
-    q = q + turn * np.ceil(np.maximum(problem.lower - q, 0.0) / (2.0 * np.pi))
-    q = q - turn * np.ceil(np.maximum(q - problem.upper, 0.0) / (2.0 * np.pi))
-    return np.clip(q, problem.lower, problem.upper)  # rounding
+    turn = np.where(arrays.chain.prismatic, 0.0, 2.0 * np.pi)
+    q = q + turn * np.ceil(np.maximum(arrays.lower - q, 0.0) / (2.0 * np.pi))
+    q = q - turn * np.ceil(np.maximum(q - arrays.upper, 0.0) / (2.0 * np.pi))
+    return np.clip(q, arrays.lower, arrays.upper)  # rounding

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
-from feasibility.roadmap.problem import NEXT, place
+from feasibility.roadmap.arrays import NEXT, place
 from feasibility.roadmap.self_motion import effects
 
 NODES, EDGES, WAYPOINTS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
@@ -58,7 +58,7 @@ class Roadmap(NamedTuple):
     failures: NDArray[np.int64]
     """(components, components) failed connections between two root components."""
     blocked: NDArray[np.int64]
-    """(N, 3) why a motion into each cell stopped: a code of `problem`, a joint, and the component
+    """(N, 3) why a motion into each cell stopped: a code of `arrays`, a joint, and the component
     that it came from (the largest that was stopped there); -1 where none was."""
     counters: NDArray[np.int64]
     """(8,) see NODES ... BEST."""
@@ -153,15 +153,15 @@ def unite(roadmap, a, b):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def add_node(problem, work, roadmap, cell, q, component):  # type: ignore[no-untyped-def]
+def add_node(arrays, work, roadmap, cell, q, component):  # type: ignore[no-untyped-def]
     """Append a node to a component, and queue it; returns its index."""
     count = roadmap.counters
     node = count[NODES]
     roadmap.cell[node] = cell
     for j in range(q.shape[0]):
         roadmap.q[node, j] = q[j]
-    place(problem, work, NEXT, q)
-    effects(problem, work, NEXT, roadmap.effect[node])
+    place(arrays, work, NEXT, q)
+    effects(arrays, work, NEXT, roadmap.effect[node])
     roadmap.component[node] = component
     roadmap.following[node] = roadmap.first_node[cell]
     roadmap.first_node[cell] = node

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.compiled import kernel
-from feasibility.roadmap.problem import CONE, LIMIT, NEXT, SINGULAR, look_at, place
+from feasibility.roadmap.arrays import CONE, LIMIT, NEXT, SINGULAR, look_at, place
 from robots import jacobians
 
 COMFORT = 0.7  # [1] share of the cone that a step keeps to where it can
@@ -41,7 +41,7 @@ def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
+def least_step(arrays, work, q, m):  # type: ignore[no-untyped-def]
     """The step nearest to `work.secondary_step` with rows @ step = rhs (first m rows), inside the limits.
 
     Joints that would pass a limit are held at it, the furthest first, and the others take over.
@@ -80,26 +80,26 @@ def least_step(problem, work, q, m):  # type: ignore[no-untyped-def]
             for i in range(m):
                 s += work.rows[i, j] * y[i]
             work.step[j] = s
-            over = max(q[j] + s - problem.upper[j], problem.lower[j] - q[j] - s)
+            over = max(q[j] + s - arrays.upper[j], arrays.lower[j] - q[j] - s)
             if over > furthest:
                 worst, furthest = j, over
         if worst < 0:
             return True
         work.stop_reason[1] = worst
-        limit = problem.upper[worst] if work.step[worst] > 0.0 else problem.lower[worst]
+        limit = arrays.upper[worst] if work.step[worst] > 0.0 else arrays.lower[worst]
         work.step[worst] = limit - q[worst]
         work.held[worst] = True
     return False
 
 
 @kernel
-def linearise(problem, work, slot, chord_goal):  # type: ignore[no-untyped-def]
+def linearise(arrays, work, slot, chord_goal):  # type: ignore[no-untyped-def]
     """Linearise at a slot: three position rows, and a cone row; returns its direction's norm.
 
     The cone row is the derivative of c = |a - b|, which is well scaled for narrow cones too.
     """
     jacobians(
-        problem.chain,
+        arrays.chain,
         work.origins[slot],
         work.axes[slot],
         work.point[slot],
@@ -129,32 +129,32 @@ def linearise(problem, work, slot, chord_goal):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def project(problem, work, q, slack, before, most):  # type: ignore[no-untyped-def]
+def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-def]
     """Newton from q (in place) onto the fibre over `work.target`; slot 1 holds the result.
 
     The first step starts at what slot 1 holds for q, heads for `work.secondary_step`, and keeps well inside
     the cone; `before` is |a - b| at the start of the step, from where it comes in gradually (inf
     where that does not matter). Later steps are the least ones that mend the errors. Returns True
-    when the tool point is at its target to `problem.near`, and the axis inside the cone.
+    when the tool point is at its target to `arrays.near`, and the axis inside the cone.
     """
     n = q.shape[0]
     inner = work.room[1]
     hard = inner * (1.0 - slack)
     last = np.inf
     for it in range(most):
-        if it > 0 and work.error[1, 0] <= problem.near and work.error[1, 1] <= inner:
+        if it > 0 and work.error[1, 0] <= arrays.near and work.error[1, 1] <= inner:
             return True
         chord = work.error[1, 1]
         goal = hard
         if it == 0:
             # Come in from the rim by a part of what the target's motion costs anyway.
             inwards = max(0.5 * (chord - before), 150.0 * slack * before)
-            goal = min(hard, max(COMFORT * problem.cone_chord, before - inwards))
-        norm = linearise(problem, work, NEXT, goal)
+            goal = min(hard, max(COMFORT * arrays.cone_chord, before - inwards))
+        norm = linearise(arrays, work, NEXT, goal)
         usable = norm > 1e-9
         work.stop_reason[1] = -1
         cone = chord > goal and usable
-        done = least_step(problem, work, q, POINT_AND_CONE if cone else POINT)
+        done = least_step(arrays, work, q, POINT_AND_CONE if cone else POINT)
         if done and not cone and usable and chord > 0.3 * goal:
             # Would the step leave the cone? Then do it again along the rim.
             predicted = 0.0
@@ -165,10 +165,10 @@ def project(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
                 predicted += change * change
             if np.sqrt(predicted) > goal:
                 cone = True
-                done = least_step(problem, work, q, POINT_AND_CONE)
+                done = least_step(arrays, work, q, POINT_AND_CONE)
         if not done and cone and goal < hard:
             work.rhs[3] = hard - chord
-            done = least_step(problem, work, q, POINT_AND_CONE)
+            done = least_step(arrays, work, q, POINT_AND_CONE)
         if not done:
             work.stop_reason[0] = (
                 LIMIT if work.stop_reason[1] >= 0 else (CONE if cone else SINGULAR)
@@ -179,22 +179,22 @@ def project(problem, work, q, slack, before, most):  # type: ignore[no-untyped-d
             largest = max(largest, abs(work.step[j]))
         shrink = 1.0 if largest <= LARGEST_STEP else LARGEST_STEP / largest
         for j in range(n):
-            q[j] = min(max(q[j] + shrink * work.step[j], problem.lower[j]), problem.upper[j])
+            q[j] = min(max(q[j] + shrink * work.step[j], arrays.lower[j]), arrays.upper[j])
             work.secondary_step[j] = 0.0
-        place(problem, work, NEXT, q)
-        error = work.error[1, 0] / problem.scale + max(work.error[1, 1] - inner, 0.0)
+        place(arrays, work, NEXT, q)
+        error = work.error[1, 0] / arrays.scale + max(work.error[1, 1] - inner, 0.0)
         work.stop_reason[0] = LIMIT if work.stop_reason[1] >= 0 else (CONE if cone else SINGULAR)
         if not error < np.inf or (it > 2 and error > 2.0 * last and most < 20):
             return False
         last = error
-    return work.error[1, 0] <= problem.near and work.error[1, 1] <= inner
+    return work.error[1, 0] <= arrays.near and work.error[1, 1] <= inner
 
 
 @kernel
-def project_onto_cell(problem, work, cell, q, most):  # type: ignore[no-untyped-def]
+def project_onto_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
     """Newton from a guess q (in place) onto the fibre over a cell's centre; True when it lands."""
-    look_at(problem, work, problem.points[cell], problem.approaches[cell])
-    place(problem, work, NEXT, q)
+    look_at(arrays, work, arrays.points[cell], arrays.approaches[cell])
+    place(arrays, work, NEXT, q)
     for j in range(q.shape[0]):
         work.secondary_step[j] = 0.0
-    return project(problem, work, q, PROJECTION_SLACK, np.inf, most)
+    return project(arrays, work, q, PROJECTION_SLACK, np.inf, most)

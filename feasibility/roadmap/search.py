@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import EDGES, NODES, root_of
+from feasibility.roadmap.graph import NODES, root_of
 from feasibility.roadmap.self_motion import margin_shares
 
 PIVOT_SEEDS = 8
@@ -55,7 +55,7 @@ def _pivot(exploration: Exploration) -> bool:
     pivot = exploration.cells.middle
     exploration.tick("looking for configurations")
     guesses = exploration.guesses(PIVOT_SEEDS)
-    room = margin_shares(exploration.problem, exploration.work, pivot, guesses)
+    room = margin_shares(exploration.arrays, exploration.work, pivot, guesses)
     # The one with most room first: it is the least likely to get stuck.
     for k in np.argsort(-room, kind="stable"):
         if room[k] >= 0.0:
@@ -68,9 +68,9 @@ def _pivot(exploration: Exploration) -> bool:
 def _unreached(exploration: Exploration) -> None:
     """Step 2: a ruling on every cell that nothing has reached."""
     distance = np.linalg.norm(
-        exploration.problem.points - exploration.robot.model.jointPlacements[1].translation, axis=1
+        exploration.arrays.points - exploration.robot.model.jointPlacements[1].translation, axis=1
     )
-    beyond = distance > exploration.robot.reach + exploration.problem.tolerance
+    beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
     for cell in np.flatnonzero(beyond).tolist():
         exploration.rulings[cell] = Ruling.PROVED
     open_boxes: dict[int, Boxes] = {}
@@ -82,7 +82,7 @@ def _unreached(exploration: Exploration) -> None:
         fruitless += 1
         if fruitless > MOST_RULED:
             break
-        boxes = root_box(exploration.problem)
+        boxes = root_box(exploration.arrays)
         if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
             if exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS)) == 0:
                 open_boxes[cell] = boxes
@@ -169,15 +169,3 @@ def close(exploration: Exploration) -> None:
     if exploration.roadmap.counters[NODES] == 0:
         return
     exploration.join(exploration.pairs, exploration.best)
-
-
-def pair_edges(exploration: Exploration) -> dict[tuple[int, int], int]:
-    """One edge of the best component for each pair of cells that has any."""
-    roadmap, best = exploration.roadmap, exploration.best
-    edges: dict[tuple[int, int], int] = {}
-    for e in range(roadmap.counters[EDGES]):
-        x, y = roadmap.ends[e]
-        i, j = int(roadmap.cell[x]), int(roadmap.cell[y])
-        if i != j and root_of(roadmap, roadmap.component[x]) == best:
-            edges.setdefault((min(i, j), max(i, j)), e)
-    return edges

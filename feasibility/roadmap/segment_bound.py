@@ -32,19 +32,19 @@ from feasibility.compiled import kernel
 
 
 @kernel
-def spread(problem, work, q0, q1):  # type: ignore[no-untyped-def]
+def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     """D and Da of the module's bound for the segment from q0 (slot 0) to q1 (slot 1)."""
     n = q0.shape[0]
     behind = 0.0  # how far the tool point moves by the joints behind j
     behind_axis = 0.0
     before = 0.0  # total turn of the revolute joints before j
     for j in range(n):
-        if not problem.chain.prismatic[j]:
+        if not arrays.chain.prismatic[j]:
             before += abs(q1[j] - q0[j])
     total, total_axis = 0.0, 0.0
     for j in range(n - 1, -1, -1):
         d = abs(q1[j] - q0[j])
-        if problem.chain.prismatic[j]:
+        if arrays.chain.prismatic[j]:
             total += 2.0 * d * before
             behind += d
             continue
@@ -77,7 +77,7 @@ def peak(a, b, most):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
+def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     """Do point and cone hold on the whole straight segment from q0 (slot 0) to q1 (slot 1)?
 
     Slot 0 holds the errors against the target where it comes from, slot 1 against where it goes.
@@ -86,7 +86,7 @@ def segment_holds(problem, work, q0, q1):  # type: ignore[no-untyped-def]
     what they keep to of the rim: both must be at most 1. NaN compares false, so it never
     certifies.
     """
-    total, total_axis = spread(problem, work, q0, q1)
+    total, total_axis = spread(arrays, work, q0, q1)
     # The replay takes the nearest places of the course, up to twice the errors from those aimed at;
     # where the target sets out from rest, s goes by the root of the way.
     longer = 1.0

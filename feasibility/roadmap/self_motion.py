@@ -11,7 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
-from feasibility.roadmap.problem import HERE, NEXT, Problem, Work, accept, copy_slot, look_at, place
+from feasibility.roadmap.arrays import (
+    HERE,
+    NEXT,
+    SearchArrays,
+    Work,
+    accept,
+    copy_slot,
+    look_at,
+    place,
+)
 from feasibility.roadmap.projection import PROJECTION_STEPS, linearise, project, project_onto_cell
 from feasibility.roadmap.segment_bound import segment_holds
 
@@ -21,15 +30,15 @@ SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
 @kernel
-def effects(problem, work, slot, out):  # type: ignore[no-untyped-def]
+def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
     """How much a radian (or metre) of each joint moves the tool: lever over scale, plus sine.
 
     Joint differences weighted so measure what a motion does to the tool: the free roll of a wrist,
     or the swing of two joints about one common axis at a singularity, costs next to nothing.
     """
     for j in range(out.shape[0]):
-        if problem.chain.prismatic[j]:
-            out[j] = 1.0 / problem.scale
+        if arrays.chain.prismatic[j]:
+            out[j] = 1.0 / arrays.scale
             continue
         zx, zy, zz = work.axes[slot, j, 0], work.axes[slot, j, 1], work.axes[slot, j, 2]
         x = work.point[slot, 0] - work.origins[slot, j, 0]
@@ -38,21 +47,21 @@ def effects(problem, work, slot, out):  # type: ignore[no-untyped-def]
         r = (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2
         x, y, z = work.axis[slot, 0], work.axis[slot, 1], work.axis[slot, 2]
         s = (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2
-        out[j] = np.sqrt(r) / problem.scale + np.sqrt(s)
+        out[j] = np.sqrt(r) / arrays.scale + np.sqrt(s)
 
 
 @kernel
-def margin_objective(problem, work, q, size):  # type: ignore[no-untyped-def]
+def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
     """Set `work.secondary_step` to lead away from limits and from the rim of the cone (slot 1's rows)."""
     n = q.shape[0]
     for j in range(n):
-        half = 0.5 * (problem.upper[j] - problem.lower[j])
+        half = 0.5 * (arrays.upper[j] - arrays.lower[j])
         work.secondary_step[j] = 0.0
         if half < np.inf and half > 0.0:
-            x = (q[j] - problem.lower[j]) / half - 1.0
+            x = (q[j] - arrays.lower[j]) / half - 1.0
             x2 = x * x
             work.secondary_step[j] = -size * x * x2 * x2
-    share = work.error[1, 1] / problem.cone_chord
+    share = work.error[1, 1] / arrays.cone_chord
     norm = 0.0
     for j in range(n):
         norm += work.rows[3, j] ** 2
@@ -63,7 +72,7 @@ def margin_objective(problem, work, q, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def connect(problem, work, target, approach, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
+def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
     """Self-motion over one target from q (in place) towards the configuration `goal`.
 
     Each step heads for the goal and is put back onto the fibre. It gives up when the way lags:
@@ -76,8 +85,8 @@ def connect(problem, work, target, approach, q, goal, waypoints, first, most):  
         one is `goal`.
     """
     n = q.shape[0]
-    look_at(problem, work, target, approach)
-    place(problem, work, HERE, q)
+    look_at(arrays, work, target, approach)
+    place(arrays, work, HERE, q)
     size, written = 0.3, 0
     left = 0.0
     for j in range(n):
@@ -88,8 +97,8 @@ def connect(problem, work, target, approach, q, goal, waypoints, first, most):  
         if left <= size:
             for j in range(n):
                 work.trial[j] = goal[j]
-            place(problem, work, NEXT, work.trial)
-            position, cone = segment_holds(problem, work, q, work.trial)
+            place(arrays, work, NEXT, work.trial)
+            position, cone = segment_holds(arrays, work, q, work.trial)
             if position <= 1.0 and cone <= 1.0:
                 if first + written >= waypoints.shape[0]:
                     return -2, False
@@ -105,8 +114,8 @@ def connect(problem, work, target, approach, q, goal, waypoints, first, most):  
         position, cone = np.inf, np.inf
         remaining, moved = np.inf, 0.0
         slack = 0.25 * CONE_SLACK * min(1.0, size / 0.1)
-        if project(problem, work, work.trial, slack, np.inf, NEWTON_STEPS):
-            position, cone = segment_holds(problem, work, q, work.trial)
+        if project(arrays, work, work.trial, slack, np.inf, NEWTON_STEPS):
+            position, cone = segment_holds(arrays, work, q, work.trial)
             remaining = 0.0
             for j in range(n):
                 remaining += (goal[j] - work.trial[j]) ** 2
@@ -134,21 +143,21 @@ def connect(problem, work, target, approach, q, goal, waypoints, first, most):  
 
 
 @kernel
-def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped-def]
+def settle(arrays, work, target, approach, q, most):  # type: ignore[no-untyped-def]
     """Self-motion over one target that makes room: away from limits and the rim (q in place)."""
     n = q.shape[0]
-    look_at(problem, work, target, approach)
-    place(problem, work, HERE, q)
+    look_at(arrays, work, target, approach)
+    place(arrays, work, HERE, q)
     size = 0.3
     for _ in range(most):
         copy_slot(work)
-        linearise(problem, work, NEXT, problem.cone_chord)
-        margin_objective(problem, work, q, size)
+        linearise(arrays, work, NEXT, arrays.cone_chord)
+        margin_objective(arrays, work, q, size)
         for j in range(n):
             work.trial[j] = q[j]
-        good = project(problem, work, work.trial, CONE_SLACK, np.inf, NEWTON_STEPS)
+        good = project(arrays, work, work.trial, CONE_SLACK, np.inf, NEWTON_STEPS)
         if good:
-            position, cone = segment_holds(problem, work, q, work.trial)
+            position, cone = segment_holds(arrays, work, q, work.trial)
             good = position <= 1.0 and cone <= 1.0
         if good:
             moved = 0.0
@@ -165,7 +174,7 @@ def settle(problem, work, target, approach, q, most):  # type: ignore[no-untyped
 
 
 def margin_shares(
-    problem: Problem, work: Work, cell: int, guesses: NDArray[np.float64]
+    arrays: SearchArrays, work: Work, cell: int, guesses: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Put guesses (in place) onto the fibre over a cell, and say how much room each has.
 
@@ -173,16 +182,16 @@ def margin_shares(
         (k,) the share of its half range, or of the cone, that the tightest constraint leaves free:
         1 in the middle of everything, 0 at a limit or at the rim, -1 where Newton failed.
     """
-    half = 0.5 * (problem.upper - problem.lower)
+    half = 0.5 * (arrays.upper - arrays.lower)
     ranged = (half > 0.0) & (half < np.inf)
     room = np.full(len(guesses), -1.0)
     for g, q in enumerate(guesses):
-        if not project_onto_cell(problem, work, cell, q, PROJECTION_STEPS):
+        if not project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
-        settle(problem, work, problem.points[cell], problem.approaches[cell], q, SETTLE_STEPS)
-        off_middle = np.abs((q - problem.lower)[ranged] / half[ranged] - 1.0)
+        settle(arrays, work, arrays.points[cell], arrays.approaches[cell], q, SETTLE_STEPS)
+        off_middle = np.abs((q - arrays.lower)[ranged] / half[ranged] - 1.0)
         room[g] = min(
-            max(0.0, 1.0 - work.error[0, 1] / problem.cone_chord),
+            max(0.0, 1.0 - work.error[0, 1] / arrays.cone_chord),
             (1.0 - off_middle).min(initial=np.inf),
         )
     return room

@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.compiled import kernel, put
-from feasibility.roadmap.problem import (
+from feasibility.roadmap.arrays import (
     CONE,
     FOLD,
     HERE,
@@ -37,17 +37,17 @@ NEWTON_STEPS = np.int64(8)  # of one step
 
 
 @kernel
-def span_of(problem, work, curve, begin, end):  # type: ignore[no-untyped-def]
+def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
     """How far apart two places of a course are, over the problem's scale."""
-    aim(problem, work, curve, begin)
+    aim(arrays, work, curve, begin)
     x, y, z = work.target[0, 0], work.target[0, 1], work.target[0, 2]
-    aim(problem, work, curve, end)
+    aim(arrays, work, curve, end)
     dx, dy, dz = work.target[0, 0] - x, work.target[0, 1] - y, work.target[0, 2] - z
-    return np.sqrt(dx * dx + dy * dy + dz * dz) / problem.scale
+    return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale
 
 
 @kernel
-def track(problem, work, curve, begin, end, q, goal, has_goal, waypoints, first):  # type: ignore[no-untyped-def]
+def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):  # type: ignore[no-untyped-def]
     """Follow a course from `begin` to `end`, from q (in place).
 
     Args:
@@ -63,10 +63,10 @@ def track(problem, work, curve, begin, end, q, goal, has_goal, waypoints, first)
         and -2 when `waypoints` is full.
     """
     n = q.shape[0]
-    size = span_of(problem, work, curve, begin, end)
-    aim(problem, work, curve, begin)
-    place(problem, work, HERE, q)
-    bounds_between(problem, work, curve, begin, begin)
+    size = span_of(arrays, work, curve, begin, end)
+    aim(arrays, work, curve, begin)
+    place(arrays, work, HERE, q)
+    bounds_between(arrays, work, curve, begin, begin)
     if not (work.error[0, 0] <= work.room[0] and work.error[0, 1] <= work.room[1]):
         work.stop_reason[0] = SINGULAR if work.room[0] > 0.0 and work.room[1] > 0.0 else FOLD
         return -1
@@ -76,23 +76,23 @@ def track(problem, work, curve, begin, end, q, goal, has_goal, waypoints, first)
         if 1.0 - t - dt < 0.1 * dt:
             dt = 1.0 - t  # no sliver at the end
         here, there = begin + t * (end - begin), begin + (t + dt) * (end - begin)
-        bounds_between(problem, work, curve, here, there)
+        bounds_between(arrays, work, curve, here, there)
         if not (work.derivative_bound[0] < np.inf and work.room[0] > 0.0 and work.room[1] > 0.0):
             work.stop_reason[0] = FOLD
             return -1
-        aim(problem, work, curve, there)
+        aim(arrays, work, curve, there)
         copy_slot(work)
         if has_goal:
             for j in range(n):
                 work.secondary_step[j] = dt / (1.0 - t) * (goal[j] - q[j])
         else:
-            linearise(problem, work, NEXT, problem.cone_chord)
-            margin_objective(problem, work, q, 2.0 * size * dt)
+            linearise(arrays, work, NEXT, arrays.cone_chord)
+            margin_objective(arrays, work, q, 2.0 * size * dt)
         put(work.trial, q)
         position, cone = np.inf, np.inf
-        if project(problem, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
+        if project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
             # Slot 0's errors are against the old target; they were stored when it was accepted.
-            position, cone = segment_holds(problem, work, q, work.trial)
+            position, cone = segment_holds(arrays, work, q, work.trial)
         if position <= 1.0 and cone <= 1.0:
             if first + written >= waypoints.shape[0]:
                 return -2

@@ -46,10 +46,10 @@ def warm_up() -> None:
     if _warm:
         return
     from feasibility.certification import replay
+    from feasibility.roadmap.arrays import arrays_of
     from feasibility.roadmap.branch_and_bound import root_box
     from feasibility.roadmap.diagnosis import diagnose
     from feasibility.roadmap.exploration import Exploration
-    from feasibility.roadmap.problem import problem_of
     from feasibility.roadmap.search import close, explore
     from feasibility.roadmap.walk import covering_walk
     from feasibility.task import Task
@@ -59,14 +59,14 @@ def warm_up() -> None:
     robot = load_robot("puma560")
     cells = plane(width=(0.7, 0.72), length=(0.1, 0.12), side="outside").cells(1, 2)
     task = Task(standoff=0.01, cone_deg=60)
-    exploration = Exploration(robot, cells, problem_of(robot, cells, task), 0)
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
     close(exploration)
     exploration.explore_self_motions(0)
-    exploration.rule(0, root_box(exploration.problem), 1)
+    exploration.rule(0, root_box(exploration.arrays), 1)
     diagnose(exploration, 0)
     beyond = plane(width=(5.0, 5.02), length=(0.1, 0.12), side="outside").cells(1, 2)
-    diagnose(Exploration(robot, beyond, problem_of(robot, beyond, task), 0), 0)
+    diagnose(Exploration(robot, beyond, arrays_of(robot, beyond, task), 0), 0)
     replay(
         robot,
         cells,

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap import NODES, Exploration, OutOfTime, Problem
+from feasibility.clock import OutOfTime
+from feasibility.roadmap import NODES, Exploration, SearchArrays
 from feasibility.verdict import Answer, Evidence, Walk
 
 LEAST = 100  # evaluations between two looks at the ration
@@ -74,7 +75,7 @@ def configurations(exploration: Exploration) -> NDArray[np.float64]:
     return q
 
 
-def certifiable(problem: Problem) -> bool:
+def certifiable(problem: SearchArrays) -> bool:
     """Could a motion be certified everywhere, if there were one?
 
     Not in a cone of 0 degrees, where the offset surface folds, or where the surface is known less

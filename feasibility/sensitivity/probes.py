@@ -16,18 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification import replay
+from feasibility.clock import Clock, OutOfTime
 from feasibility.roadmap import (
     HERE,
     Exploration,
-    OutOfTime,
-    Problem,
     Ruling,
+    SearchArrays,
+    arrays_of,
     covering_walk,
     evenly,
     explore,
     margin_shares,
     place,
-    problem_of,
     root_box,
     rule,
     work_for,
@@ -57,7 +57,7 @@ class Prober:
         self.setup = setup
         self.seed = seed
         self.deadline = deadline
-        self.problem = problem_of(*setup)
+        self.problem = arrays_of(*setup)
         self._latest = ("", 0), self.problem
         beyond = replace(setup.task, standoff=setup.task.standoff + 1.0)
         self.outwards = beyond.targets(setup.cells).points - self.problem.points
@@ -81,11 +81,11 @@ class Prober:
         """Evaluations of the arm so far; a box of a proof counts as one."""
         return self.spent_before + int(self.work.counts[0])
 
-    def problem_at(self, quantity: Quantity, k: int) -> Problem:
+    def problem_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The problem with a quantity k steps from where it stands, without making it anew."""
         if quantity.kind in (Kind.CONE, Kind.STANDOFF):
             if self._latest[0] != (quantity.name, k):
-                self._latest = (quantity.name, k), problem_of(*quantity.applied(self.setup, k))
+                self._latest = (quantity.name, k), arrays_of(*quantity.applied(self.setup, k))
             return self._latest[1]
         problem = self.centres_at(quantity, k)
         if quantity.kind is Kind.SHIFT:
@@ -96,7 +96,7 @@ class Prober:
             return problem._replace(targets=targets)
         return problem
 
-    def centres_at(self, quantity: Quantity, k: int) -> Problem:
+    def centres_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The same over the cells' centres, cheaper: what lies between them may be as it was."""
         value = quantity.value(k) if k else quantity.given
         if quantity.kind is Kind.CONE:
@@ -111,7 +111,7 @@ class Prober:
         ends[quantity.kind is Kind.UPPER][quantity.joint] = value
         return self.problem._replace(lower=ends[0], upper=ends[1])
 
-    def _coned(self, cone: float) -> Problem | None:
+    def _coned(self, cone: float) -> SearchArrays | None:
         """The problem with another cone (rad), as it is over the cells' centres, nearly."""
         cone_chord, former = float(2.0 * np.sin(0.5 * cone)), self.problem
         if not (cone < np.pi and former.cone_chord < np.inf and former.cone_chord > 0.0):
@@ -134,7 +134,9 @@ class Prober:
         self.suspects.insert(0, cell)
         del self.suspects[MOST_SUSPECTS:]
 
-    def follow(self, problem: Problem, q: NDArray[np.float64]) -> tuple[int, NDArray[np.float64]]:
+    def follow(
+        self, problem: SearchArrays, q: NDArray[np.float64]
+    ) -> tuple[int, NDArray[np.float64]]:
         """Put configurations of a case nearby onto the fibres of this one.
 
         Args:
@@ -155,7 +157,7 @@ class Prober:
         return int(order[projected]), found
 
     def rule(
-        self, problem: Problem, cell: int, boxes: int
+        self, problem: SearchArrays, cell: int, boxes: int
     ) -> tuple[Ruling, NDArray[np.float64] | None]:
         """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
 
@@ -183,7 +185,7 @@ class Prober:
         projected = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
         return ruling, row[cell] if projected else None
 
-    def beyond_reach(self, problem: Problem) -> NDArray[np.bool_]:
+    def beyond_reach(self, problem: SearchArrays) -> NDArray[np.bool_]:
         """(N,) cells that are further away than the arm reaches.
 
         Turning joints reach alike in any limits; a slide that is longer than in the case as it
@@ -198,7 +200,7 @@ class Prober:
 
     def attempt(
         self,
-        problem: Problem,
+        problem: SearchArrays,
         seeds: NDArray[np.float64],
         most: float,
         deep: bool,
@@ -223,9 +225,8 @@ class Prober:
         robot, cells, _ = self.setup
         robot = robot.with_limits(np.column_stack([problem.lower, problem.upper]))
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
-        exploration = Rationed(
-            robot, cells, problem, self.seed, self.deadline, lambda *_: self.tick(), most=most
-        )
+        clock = Clock(self.deadline - time.monotonic(), lambda *_: self.tick()).start()
+        exploration = Rationed(robot, cells, problem, self.seed, clock, most=most)
         ended = False
         try:
             self._add_seeds(exploration, seeds, deep)
@@ -326,7 +327,7 @@ class Prober:
         guesses = exploration.guesses(LANDINGS)
         projected = np.zeros(len(guesses), dtype=bool)
         project_guesses(
-            exploration.problem, exploration.work, cell, guesses, PROJECTION_STEPS, projected
+            exploration.arrays, exploration.work, cell, guesses, PROJECTION_STEPS, projected
         )
         if projected.any():
             exploration.add_seeds(cell, guesses[projected])

@@ -8,8 +8,7 @@ import numpy as np
 import pinocchio as pin
 from paper_cases import PAPER_CASES
 
-from feasibility import Search
-from feasibility.paper import greedy_check
+from feasibility import Search, greedy_check
 
 
 def pinocchio_fk_us(calls: int = 20_000) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -259,7 +260,7 @@ class Clock:
     """The search's clock, on which the time limit passes at the k-th look."""
 
     def __init__(self, looks: int) -> None:
-        self.looks = 0
+        self.looks = -1  # the first one starts it
         self.enough = looks
 
     def monotonic(self) -> float:
@@ -270,7 +271,7 @@ class Clock:
 @pytest.mark.parametrize("looks", [1, 2, 5, 40, 120])
 def test_a_time_limit_is_honoured(looks: int, monkeypatch) -> None:
     clock = Clock(looks)
-    monkeypatch.setattr("feasibility.roadmap.exploration.time", clock)
+    monkeypatch.setattr("feasibility.clock.time", clock)
     verdict = check(*hard(), Search(time_limit=3600.0))
     assert (verdict.answer, verdict.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
     assert "time limit" in verdict.message
@@ -377,10 +378,10 @@ def test_ctrl_c_ends_a_hard_search(tmp_path) -> None:
 
 def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
     """The search is made to use more than the tolerance; the second time it keeps to less."""
-    from feasibility import checking
-    from feasibility.roadmap import problem
+    from feasibility import checking, problem
+    from feasibility.roadmap import complete
 
-    made = problem.problem_of
+    made = complete.arrays_of
     asked = []
     warm_up()
 
@@ -390,15 +391,31 @@ def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
         return given._replace(tolerance=1.08 * given.tolerance)
 
     robot, cells, task, _ = load_case("paper/4a").build()
-    monkeypatch.setattr(problem, "problem_of", generous)
+    monkeypatch.setattr(complete, "arrays_of", generous)
     verdict = checking.check(robot, cells, task)
     assert asked == pytest.approx([1e-3, 0.9e-3])
     assert verdict.feasible
     assert verdict.certificate.max_position_error <= 1e-3
     every = np.ones(len(cells), dtype=bool)
     assert replay(robot, cells, task, verdict.witness, every).accepted
-    monkeypatch.setattr(checking, "NARROWER", 1.0)
+    monkeypatch.setattr(problem, "NARROWER", 1.0)
     again = checking.check(robot, cells, task)
     assert again.answer == "undecided"
     assert "refuses it: the tool point strays" in again.message
     assert again.witness is None
+
+
+@pytest.mark.parametrize("method", ["complete", "greedy"])
+def test_a_verdict_pickles(method):
+    """With all that it makes when it is read, which are properties that completion shows."""
+    robot, cells, task, _ = load_case("paper/4d").build()
+    verdict = check(robot, cells, task, Search(method=method, step_deg=0.5, moves="all", starts=1))
+    again = pickle.loads(pickle.dumps(verdict))
+    assert (again.answer, again.message, again.causes) == (
+        verdict.answer, verdict.message, verdict.causes
+    )  # fmt: skip
+    assert again.graph.edges == verdict.graph.edges
+    assert (again.tree is None) == (method == "complete")
+    assert np.array_equal(again.covered, verdict.covered)
+    assert all(isinstance(vars(Verdict)[name], property) for name in ("graph", "causes", "tree"))
+    assert {"graph", "causes", "tree"} <= set(dir(verdict))

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from paper_cases import PAPER_CASES
 
-from feasibility import Answer, Evidence, Search, Verdict
-from feasibility.paper import greedy_check
+from feasibility import Answer, Evidence, Search, Verdict, greedy_check
 from feasibility.paper.jcell_steps import Steps
 from robots import Kinematics
 

@@ -10,8 +10,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from feasibility import Answer, CauseKind, Evidence, Search, Task
-from feasibility.paper import greedy_check
+from feasibility import Answer, CauseKind, Evidence, Search, Task, greedy_check
 from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace, Outcome, continuity
 from feasibility.paper.jcell_steps import Steps

@@ -8,8 +8,8 @@ import io
 import numpy as np
 import pytest
 
-from feasibility import Search, Task, Verdict
-from feasibility.paper import greedy_check, tree_walk
+from feasibility import Search, Task, Verdict, greedy_check
+from feasibility.paper import tree_walk
 from feasibility.paper.jcell_steps import Steps
 from feasibility.paper.tree_replay import Borders, tool_poses
 from feasibility.reports.verdict import as_csv

@@ -23,7 +23,7 @@ from feasibility.paths.motion_graph import MotionGraph, joint_length, motion_gra
 from feasibility.paths.motion_links import windings, wound
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.results import load_result, save_result
-from feasibility.roadmap import problem_of, work_for
+from feasibility.roadmap import arrays_of, work_for
 from feasibility.verdict import Answer, Walk
 from robots import Kinematics, load_robot
 from surfaces import cylinder
@@ -230,7 +230,7 @@ def test_the_same_question_has_the_same_path():
 def hand_made(rng, cells, nodes, density):
     """A graph over cells in a row: some nodes over each, random motions between neighbours."""
     verdict = small_verdict("plate")
-    problem = problem_of(verdict.robot, verdict.cells, verdict.task)
+    problem = arrays_of(verdict.robot, verdict.cells, verdict.task)
     graph = MotionGraph(problem, work_for(2), {(k, k + 1): k for k in range(cells - 1)})
     for cell in range(cells):
         for _ in range(nodes):

@@ -46,8 +46,8 @@ from feasibility.reports.placement import as_csv, as_json, as_text, settings_of
 from feasibility.roadmap import (
     PROJECTION_STEPS,
     Exploration,
+    arrays_of,
     covering_walk,
-    problem_of,
     project_onto_cell,
 )
 from feasibility.safe_files import FileError
@@ -271,7 +271,7 @@ def test_a_moved_problem_is_the_problem_of_the_moved_surface(name: str) -> None:
     for seed in range(3):
         pose = moved_away(placement_case("ur5 plate"), seed)
         one = placer.problem_at(pose)
-        two = problem_of(setup.robot, moved_cells(cells, pose), setup.task)
+        two = arrays_of(setup.robot, moved_cells(cells, pose), setup.task)
         for field in (
             "points",
             "approaches",
@@ -336,7 +336,7 @@ def test_the_margin_can_be_kept_over_every_cell() -> None:
         limits, cone, _ = vars_of(trial)
         margin_shares += min(limits, cone) > 0.05
         exploration = Exploration(setup.robot, setup.cells, placer.problem_at(pose), 1)
-        problem = exploration.problem
+        problem = exploration.arrays
         half = 0.5 * (problem.upper - problem.lower)
         bounded = np.isfinite(half)
         inwards = np.where(bounded, (limits - 1e-3) * half, 0.0)

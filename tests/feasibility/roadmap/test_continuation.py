@@ -9,11 +9,11 @@ from random_arms import QUESTIONS, finite_limits, question, tools
 from feasibility.certification import replay
 from feasibility.roadmap import (
     Exploration,
+    arrays_of,
     close,
     edge_motion,
     explore,
     margin_shares,
-    problem_of,
     track,
     work_for,
 )
@@ -32,7 +32,7 @@ def refusal(robot, cells, task, q, first, last):
 def test_tracks_end_over_the_next_centre(name):
     """From several configurations over every cell into every neighbour."""
     robot, cells, task = question(name)
-    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
     targets = task.targets(cells)
     rng = np.random.default_rng(5)
     ways = np.empty((500, robot.n))
@@ -63,7 +63,7 @@ def test_tracks_end_over_the_next_centre(name):
 def test_a_track_does_not_start_off_its_target():
     """A start that is not where it is said to be is no motion."""
     robot, cells, task = question("ur5, plate")
-    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
     ways = np.empty((500, robot.n))
     q = np.zeros(robot.n)
     assert track(problem, work, 0, 0.0, 1.0, q, q, False, ways, 0) == -1
@@ -74,7 +74,7 @@ def test_a_track_does_not_start_off_its_target():
 def test_every_motion_that_a_search_stores_holds(name, seed):
     """Spread, stirred and closed: each edge runs from node to node, and the replay accepts it."""
     robot, cells, task = question(name)
-    exploration = Exploration(robot, cells, problem_of(robot, cells, task), seed)
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), seed)
     explore(exploration)
     for cell in range(0, len(cells), 3):
         exploration.add_seeds(cell, exploration.guesses(3))

@@ -9,7 +9,7 @@ from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
 
 from feasibility import Task, check
 from feasibility.certification import replay
-from feasibility.roadmap import Exploration, connect, margin_shares, problem_of, work_for
+from feasibility.roadmap import Exploration, arrays_of, connect, margin_shares, work_for
 from feasibility.roadmap.self_motion import settle
 from feasibility.verdict import Walk
 from surfaces import plane
@@ -19,7 +19,7 @@ from surfaces import plane
 def over_a_cell(request):
     """Robot, cells, task, problem, work, a cell, configurations on its fibre, and their room."""
     robot, cells, task = question(request.param)
-    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
     rng = np.random.default_rng(4)
     cell = len(cells) // 2
     guesses = rng.uniform(*finite_limits(robot), (60, robot.n))
@@ -121,7 +121,7 @@ def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
     robot = robot_of([joint(1, "prismatic", axis=(1, 0, 0), limits=(-1, 1)), joint(2)])
     robot = robot.with_limits({"j1": stroke})
     cells = plane((tool - 0.1, tool + 0.1), (-1e-4, 1e-4), side="outside").cells(3, 1)
-    guesses = Exploration(robot, cells, problem_of(robot, cells, Task(0.0, 180)), 0).guesses(50)
+    guesses = Exploration(robot, cells, arrays_of(robot, cells, Task(0.0, 180)), 0).guesses(50)
     assert (guesses >= robot.lower).all()
     assert (guesses <= robot.upper).all()
     verdict = check(robot, cells, Task(0.0, 180))

@@ -7,7 +7,7 @@ import pytest
 from random_arms import QUESTIONS, finite_limits, planar_arm, question, tools
 
 from feasibility import Task
-from feasibility.roadmap import look_at, place, problem_of, project, work_for
+from feasibility.roadmap import arrays_of, look_at, place, project, work_for
 from surfaces import plane
 
 SLACK = 1e-6  # [1] share of the cone kept free
@@ -29,7 +29,7 @@ def test_results_obey_every_constraint(name, cone_deg, tolerance):
     """20 random starts over 3 cells each; Pinocchio says where the result is."""
     robot, cells, task = question(name)
     task = Task(task.standoff, cone_deg, tolerance)
-    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
     targets = task.targets(cells)
     rng = np.random.default_rng(1)
     low, high = finite_limits(robot)
@@ -58,7 +58,7 @@ def test_results_at_limits_stand_exactly_at_them():
         (point[0] - 0.1, point[0] + 0.1), (point[1] - 0.1, point[1] + 0.1), side="outside"
     )
     snug = robot.with_limits(np.column_stack([corner - 0.4, corner]))
-    problem, work = problem_of(snug, patch.cells(1, 1), Task(0.0, 180, 1e-3)), work_for(3)
+    problem, work = arrays_of(snug, patch.cells(1, 1), Task(0.0, 180, 1e-3)), work_for(3)
     rng = np.random.default_rng(2)
     at_limits = 0
     for _ in range(50):
@@ -81,7 +81,7 @@ def test_what_cannot_be_is_not_found():
         (Task(0.0, 0, 1e-3), np.array([0.5, 0.1, 0.0])),
         (Task(0.0, 180, 1e-3), np.array([np.nan, 0.1, 0.0])),
     ):
-        problem, work = problem_of(robot, cells, task), work_for(3)
+        problem, work = arrays_of(robot, cells, task), work_for(3)
         for _ in range(20):
             q = rng.uniform(robot.lower, robot.upper)
             assert not solve(problem, work, point, DOWN, q)

@@ -23,8 +23,8 @@ from feasibility import Task
 from feasibility.roadmap import (
     Exploration,
     Ruling,
+    arrays_of,
     margin_shares,
-    problem_of,
     root_box,
     rule,
     work_for,
@@ -43,7 +43,7 @@ def one_target(point, approach, rng):
 
 def ruling(robot, cells, task, boxes=BOXES):
     """What branch and bound says of the only cell, what it found, and how many boxes it took."""
-    problem = problem_of(robot, cells, task)
+    problem = arrays_of(robot, cells, task)
     waiting = root_box(problem)
     said, found = rule(problem, work_for(robot.n), 0, waiting, boxes)
     return said, found, int(waiting.counts[1])
@@ -146,7 +146,7 @@ def test_newton_finds_nothing_where_there_is_a_proof(name):
         if ruling(robot, cells, task)[0] is not Ruling.PROVED:
             continue
         proved += 1
-        problem, work = problem_of(robot, cells, task), work_for(robot.n)
+        problem, work = arrays_of(robot, cells, task), work_for(robot.n)
         low = np.maximum(robot.lower, -np.pi)
         high = np.minimum(robot.upper, np.pi)
         guesses = rng.uniform(low, high, (25, robot.n))
@@ -238,8 +238,8 @@ def test_what_branch_and_bound_finds_is_planted_at_its_winding(limits):
     for angle in np.radians([-170.0, -90.0, -10.0, 5.0, 95.0, 175.0]):
         target = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
         cells = one_target(target, np.array([0.0, 0.0, 1.0]), rng)
-        exploration = Exploration(robot, cells, problem_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
-        said = exploration.rule(0, root_box(exploration.problem), BOXES)
+        exploration = Exploration(robot, cells, arrays_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
+        said = exploration.rule(0, root_box(exploration.arrays), BOXES)
         assert said in (Ruling.REACHED, Ruling.UNKNOWN)
         assert exploration.reached[0]
 

@@ -19,8 +19,8 @@ from random_arms import (
 )
 
 from feasibility import Task
-from feasibility.roadmap import look_at, place, problem_of, project, segment_holds, work_for
-from feasibility.roadmap.problem import aim, bounds_between
+from feasibility.roadmap import arrays_of, look_at, place, project, segment_holds, work_for
+from feasibility.roadmap.arrays import aim, bounds_between
 from feasibility.roadmap.segment_bound import peak, spread
 from surfaces import cylinder, sphere
 from surfaces.patches import GridCells, plane
@@ -58,7 +58,7 @@ def test_second_derivatives_bound_the_sag_of_every_segment():
     previous = None
     for robot, q0, q1 in random_segments(rng, 80, 30):
         if robot is not previous:
-            problem, work = problem_of(robot, far_plane(), Task(0.0, 30)), work_for(robot.n)
+            problem, work = arrays_of(robot, far_plane(), Task(0.0, 30)), work_for(robot.n)
             previous = robot
         place(problem, work, 0, q0)
         place(problem, work, 1, q1)
@@ -84,7 +84,7 @@ def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
     Ends: the second joint at -+bend, so that the tool is as near to the first axis at both.
     """
     robot = planar_arm(2, (-3.1, 3.1))
-    problem, work = problem_of(robot, far_plane(), Task(0.0, 30)), work_for(2)
+    problem, work = arrays_of(robot, far_plane(), Task(0.0, 30)), work_for(2)
     worst = 0.0
     for derivative_bound in np.linspace(0.05, 3.1, 60):
         for turn in (0.01, 0.1, 1.0, 3.0):
@@ -156,7 +156,7 @@ def surface_segment(rng, robot, kind, task, share, deviations, longest, onto):
     (away,), _ = tools(robot, q1[None])
     closest_points = surface.closest(np.array([surface.point(u, v), away]))
     cells = two_cells(surface, np.column_stack([closest_points.u, closest_points.v]))
-    problem, work = problem_of(robot, cells, task), work_for(robot.n)
+    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
     aim(problem, work, 0, 1.0)
     place(problem, work, 1, q1)
     bounds_between(problem, work, 0, 0.0, 1.0)
@@ -262,7 +262,7 @@ def test_a_normal_that_bulges_away_from_a_fixed_axis(surface, half):
     at = {"sphere": lambda a: (0.5 * np.pi, a), "cylinder": lambda a: (a, 0.0)}[surface.kind]
     cells = two_cells(surface, (at(-half), at(half)))
     # The approach direction is -x where the surface's outward normal is +x.
-    problem = problem_of(gantry, cells, Task(0.0, 179.0, 0.1))
+    problem = arrays_of(gantry, cells, Task(0.0, 179.0, 0.1))
     work = work_for(3)
     q0, q1 = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (-half, half))
     for slot, q in enumerate((q0, q1)):
@@ -280,7 +280,7 @@ def test_a_normal_that_bulges_away_from_a_fixed_axis(surface, half):
 def test_nothing_that_is_not_a_number_passes():
     """NaN or infinity in a joint, or a surface that folds, never certifies a segment."""
     robot = planar_arm(3)
-    problem, work = problem_of(robot, far_plane(), Task(0.0, 180, 1.0)), work_for(3)
+    problem, work = arrays_of(robot, far_plane(), Task(0.0, 180, 1.0)), work_for(3)
     q = np.array([0.1, 0.2, 0.3])
     look_at(problem, work, np.zeros(3), np.array([0.0, 0.0, 1.0]))
     place(problem, work, 0, q)

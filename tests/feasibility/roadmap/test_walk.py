@@ -13,11 +13,11 @@ from feasibility import Task
 from feasibility.roadmap import (
     NODES,
     Exploration,
+    arrays_of,
     close,
     covering_walk,
     edge_motion,
     explore,
-    problem_of,
     work_for,
 )
 from feasibility.roadmap.graph import (
@@ -39,7 +39,7 @@ def roadmap_of(graph, cells, cell_of=None, rng=None):
     """
     rng = np.random.default_rng(0) if rng is None else rng
     robot = planar_arm(2)
-    problem = problem_of(robot, plane((-1, 1), (-1, 1)).cells(1, 1), Task(0.0, 30))
+    problem = arrays_of(robot, plane((-1, 1), (-1, 1)).cells(1, 1), Task(0.0, 30))
     work = work_for(2)
     roadmap = empty_roadmap(cells, 2)
     slot_of = {}
@@ -162,7 +162,7 @@ def test_a_component_that_does_not_hang_together_is_no_walk():
 def test_the_walk_of_a_search(name):
     """Every cell, along stored motions alone, with at most 40 per cent more visits than cells."""
     robot, cells, task = question(name)
-    exploration = Exploration(robot, cells, problem_of(robot, cells, task), 0)
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
     close(exploration)
     order = check_walk(exploration.roadmap, covering_walk(exploration.roadmap, exploration.best))

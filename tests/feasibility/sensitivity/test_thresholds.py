@@ -13,7 +13,7 @@ from dense_replay import tools
 from paper_cases import PAPER_CASES
 
 from feasibility import Task
-from feasibility.roadmap import Ruling, problem_of
+from feasibility.roadmap import Ruling, arrays_of
 from feasibility.sensitivity import Kind, Quantity, last_true
 from feasibility.sensitivity.parameters import Setup, quantities, shifted
 from feasibility.sensitivity.probes import LEAST_BOXES, Prober, apart
@@ -187,7 +187,7 @@ def test_a_problem_nearby_is_the_one_made_anew() -> None:
     setup = paper("4c")
     prober = prober_of(setup)
     for q in quantities(setup, widen=False):
-        found, fresh = prober.problem_at(q, 7), problem_of(*q.applied(setup, 7))
+        found, fresh = prober.problem_at(q, 7), arrays_of(*q.applied(setup, 7))
         for name, one, other in zip(found._fields, found, fresh, strict=True):
             if name != "chain":
                 np.testing.assert_allclose(one, other, atol=1e-9, err_msg=f"{q.name}: {name}")
@@ -230,7 +230,7 @@ def test_over_the_centres_the_cheap_problem_is_the_whole_one(name: str) -> None:
     for widen in (False, True):
         for q in quantities(setup, widen):
             for k in (0, 5, q.last):
-                cheap, fresh = prober.centres_at(q, k), problem_of(*q.applied(setup, k))
+                cheap, fresh = prober.centres_at(q, k), arrays_of(*q.applied(setup, k))
                 for field in ("points", "approaches", "lower", "upper", "rim"):
                     np.testing.assert_allclose(
                         getattr(cheap, field), getattr(fresh, field), atol=1e-9, err_msg=q.name

@@ -31,7 +31,7 @@ NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD = 0, 1, 2, 3, 4, 5
 HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
 
 
-class Problem(NamedTuple):
+class SearchArrays(NamedTuple):
     """Everything the compiled search reads: arm, surface and task as plain arrays."""
 
     chain: Chain
@@ -66,7 +66,7 @@ class Problem(NamedTuple):
     """m, length that turns metres into comparable radians (the arm's reach)."""
 
 
-def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
+def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
     """Gather arm, cells and task for the compiled search."""
     tolerance = task.effective_tolerance
     targets = task.targets(cells)
@@ -82,7 +82,7 @@ def problem_of(robot: Robot, cells: Cells, task: Task) -> Problem:
     near = NEWTON * tolerance
     if waypoints.centre_curvature > 0.0 and cone_chord < np.inf:
         near = min(near, NEWTON_CONE * cone_chord / waypoints.centre_curvature)
-    return Problem(
+    return SearchArrays(
         chain=chain,
         lower=np.array(robot.lower),
         upper=np.array(robot.upper),
@@ -172,9 +172,9 @@ def work_for(n: int) -> Work:
 
 
 @kernel
-def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
+def place(arrays, work, slot, q):  # type: ignore[no-untyped-def]
     """Evaluate the arm at q into a slot, and its errors against `work.target`."""
-    frames(problem.chain, q, work.origins[slot], work.axes[slot], work.point[slot], work.axis[slot])
+    frames(arrays.chain, q, work.origins[slot], work.axes[slot], work.point[slot], work.axis[slot])
     work.counts[0] += 1
     distance = 0.0
     chord = 0.0
@@ -186,15 +186,15 @@ def place(problem, work, slot, q):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def look_at(problem, work, target, approach):  # type: ignore[no-untyped-def]
+def look_at(arrays, work, target, approach):  # type: ignore[no-untyped-def]
     """Set `work.target`, and let it stand still."""
     work.derivative_bound[0] = 0.0
     work.derivative_bound[1] = 0.0
-    work.derivative_bound[2] = problem.curvature
+    work.derivative_bound[2] = arrays.curvature
     work.derivative_bound[3] = 0.0
     work.derivative_bound[4] = 0.0
-    work.room[0] = CENTRE_SHARE * problem.tolerance
-    work.room[1] = problem.inner_cone_chord
+    work.room[0] = CENTRE_SHARE * arrays.tolerance
+    work.room[1] = arrays.inner_cone_chord
     for k in range(3):
         work.target[0, k] = target[k]
         work.target[1, k] = approach[k]
@@ -215,60 +215,60 @@ def accept(work):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def aim(problem, work, curve, t):  # type: ignore[no-untyped-def]
+def aim(arrays, work, curve, t):  # type: ignore[no-untyped-def]
     """Set `work.target` to the place on a course at t in [0, 1]."""
-    first = problem.first_piece[curve]
-    count = problem.first_piece[curve + 1] - first
+    first = arrays.first_piece[curve]
+    count = arrays.first_piece[curve + 1] - first
     piece = min(np.int64(t * count), count - 1)
     s = t * count - piece
     for k in range(3):
         for part in range(2):
-            value = problem.targets[first + piece, 3, 3 * part + k]
+            value = arrays.targets[first + piece, 3, 3 * part + k]
             for power in range(2, -1, -1):
-                value = value * s + problem.targets[first + piece, power, 3 * part + k]
+                value = value * s + arrays.targets[first + piece, power, 3 * part + k]
             work.target[part, k] = value
 
 
 @kernel
-def speed_at(problem, curve, t):  # type: ignore[no-untyped-def]
+def speed_at(arrays, curve, t):  # type: ignore[no-untyped-def]
     """How far the target goes along a course for each unit of t, at t, m."""
-    first = problem.first_piece[curve]
-    count = problem.first_piece[curve + 1] - first
+    first = arrays.first_piece[curve]
+    count = arrays.first_piece[curve + 1] - first
     piece = min(np.int64(t * count), count - 1)
     s = t * count - piece
     square = 0.0
     for k in range(3):
-        slope = 3.0 * s * problem.targets[first + piece, 3, k]
-        slope = problem.targets[first + piece, 1, k] + s * (
-            2.0 * problem.targets[first + piece, 2, k] + slope
+        slope = 3.0 * s * arrays.targets[first + piece, 3, k]
+        slope = arrays.targets[first + piece, 1, k] + s * (
+            2.0 * arrays.targets[first + piece, 2, k] + slope
         )
         square += slope * slope
     return np.sqrt(square) * count
 
 
 @kernel
-def bounds_between(problem, work, curve, t0, t1):  # type: ignore[no-untyped-def]
+def bounds_between(arrays, work, curve, t0, t1):  # type: ignore[no-untyped-def]
     """Set `work.derivative_bound` and `work.room` for a step along a course from t0 to t1, either way."""
-    first = problem.first_piece[curve]
-    count = problem.first_piece[curve + 1] - first
+    first = arrays.first_piece[curve]
+    count = arrays.first_piece[curve + 1] - first
     low = min(np.int64(max(min(t0, t1) * count - LATERAL, 0.0)), count - 1)
     high = min(np.int64(max(t0, t1) * count + LATERAL), count - 1)
     for part in range(3):
         most = 0.0
         for piece in range(low, high + 1):
-            most = max(most, problem.derivative_bounds[first + piece, part])
+            most = max(most, arrays.derivative_bounds[first + piece, part])
         work.derivative_bound[part] = most * (t1 - t0) ** 2 if part < 2 else most
-    work.derivative_bound[3] = speed_at(problem, curve, t0) * abs(t1 - t0)
-    work.derivative_bound[4] = speed_at(problem, curve, t1) * abs(t1 - t0)
+    work.derivative_bound[3] = speed_at(arrays, curve, t0) * abs(t1 - t0)
+    work.derivative_bound[4] = speed_at(arrays, curve, t1) * abs(t1 - t0)
     # No more room than over the centres, and no less on an ordinary course: every configuration
     # that works over a cell can set out from it.
     lost = (
-        problem.cone_chord
-        - problem.deviations[curve, 1]
-        - NEAR_COSTS * work.derivative_bound[2] * problem.near
+        arrays.cone_chord
+        - arrays.deviations[curve, 1]
+        - NEAR_COSTS * work.derivative_bound[2] * arrays.near
     )
-    work.room[0] = max(problem.tolerance - problem.deviations[curve, 0], 0.0)
-    work.room[1] = max(min(problem.inner_cone_chord, lost), 0.0)
+    work.room[0] = max(arrays.tolerance - arrays.deviations[curve, 0], 0.0)
+    work.room[1] = max(min(arrays.inner_cone_chord, lost), 0.0)
 
 
 @kernel

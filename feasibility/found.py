@@ -1,0 +1,53 @@
+"""What a search hands over: what it found and counted, before any of it is certified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.verdict import Cause, Replay, Walk
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+    from feasibility.verdict import Replay
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found:
+    """The end of a search, of either method."""
+
+    covered: NDArray[np.bool_]
+    """(N,) cells that the best single component covers."""
+    components: tuple[NDArray[np.int64], ...]
+    """Cells of each connected component found, the best first."""
+    start: int | None
+    """Flat index of the cell where the best motion starts."""
+    n_edges: int
+    """Number of edges of graph G."""
+    counts: Mapping[str, Any]
+    """Work done: FK evaluations (`fk`), nodes, calls, boxes."""
+    motion: Walk | None = None
+    """One motion over the centres of all cells, where there is one."""
+    replay: Callable[[], Replay] | None = None
+    """Has the motion over all cells judged by Pinocchio; None where none was found."""
+    accepted: str = ""
+    """What to say when the replay accepts; {waypoints} stands for their number."""
+    refused: str = ""
+    """What to say when it refuses; {refusal} stands for its reason."""
+    proof: str = ""
+    """Why no motion covers all cells; empty where that is not proved."""
+    unfinished: str = ""
+    """What was left untried, a time limit that ran out, say; empty where nothing was."""
+    exhausted: str = ""
+    """What was tried in vain."""
+    make_graph: Callable[[], nx.Graph]
+    """Makes graph G, see `Verdict.graph`."""
+    make_causes: Callable[[], tuple[Cause, ...]]
+    """Finds the cause of each missed cell, see `Verdict.causes`."""
+    make_tree: Callable[[], nx.DiGraph | None] = field(default=lambda: None)
+    """Makes tree T, see `Verdict.tree`."""

@@ -1,0 +1,234 @@
+"""The paper's search: Algorithm 2 from every start, and the best of its trees.
+
+What the greedy search finds depends on where it starts, and its "no" speaks for this search alone.
+"Feasible" rests on tree T, which is one continuous motion, and not on the connectivity of G.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from coverable_errors import ArgumentError
+from feasibility.clock import Clock
+from feasibility.found import Found
+from feasibility.notices import compiling_notice
+from feasibility.paper.algorithm_2 import tree_search
+from feasibility.paper.continuity import JSpace
+from feasibility.paper.jcell_steps import Steps
+from feasibility.paper.starts import DRY_SEEDS, starts
+from feasibility.paper.tree_and_graph import Tree, graph_of, tree_of
+from feasibility.paper.tree_replay import Path, replay_tree
+from feasibility.problem import Problem
+from feasibility.search import Search
+from feasibility.task import Task
+from feasibility.verdict import Cause, CauseKind, Replay
+from robots import Chain, Robot
+from surfaces.patches import GridCells, closed_form_grid
+
+FEW_SEEDS = 10  # random configurations to try over each cell once the middle one had no start
+
+
+@dataclass(slots=True)
+class _Run:
+    """All trees of one greedy search: the best, and the sums over them."""
+
+    best: Tree | None = None
+    trees: int = 0
+    calls: int = 0
+    checked: int = 0
+    fk: float = 0.0
+    capped: int = 0
+    complete: bool = True
+
+    def add(self, tree: Tree) -> None:
+        """Count one more tree, and keep it if it touches more cells than the best so far."""
+        self.trees += 1
+        self.calls += tree.calls
+        self.checked += tree.checked
+        self.fk += tree.fk
+        self.capped += tree.capped
+        self.complete &= tree.complete
+        rank = (len(tree.jcell), len(tree.edges))
+        if self.best is None or rank > (len(self.best.jcell), len(self.best.edges)):
+            self.best = tree
+
+    def counts(self) -> dict[str, float]:
+        """The sums, and calls and edges of the best tree."""
+        return {
+            "starts": self.trees,
+            "calls": self.calls,
+            "checked": self.checked,
+            "fk": round(self.fk),
+            "capped": self.capped,
+            "best_calls": 0 if self.best is None else self.best.calls,
+            "best_capped": 0 if self.best is None else self.best.capped,
+        }
+
+
+def greedy_search(
+    problem: Problem, search: Search, clock: Clock, start: ArrayLike | None = None
+) -> Found:
+    """The paper's search: one tree T that touches every cell is a covering motion.
+
+    To touch a cell is to enter it; its centre need not be visited, so no motion over the centres is
+    found, but `tree_walk` makes one motion of T.
+
+    Args:
+        problem: arm, E-cells and task (see `Steps.tolerance` for a task without one).
+        search: step, moves, starts, cap and seed.
+        clock: started once the kernels are loaded; reports the cells touched by the running tree.
+        start: (n,) the one start configuration to use, rad or m; without it, start configurations
+            are searched over the middle cell, or the next that has some; one for each branch.
+
+    Raises:
+        SurfaceError: the cells are no grid on a patch that the compiled loops know.
+        ArgumentError: `start` is not a feasible configuration over one of the cells.
+    """
+    robot, task = problem.robot, problem.task
+    cells = closed_form_grid(problem.cells)
+    chain, steps = Chain.checked(robot), Steps.of(robot, cells.closed_form, task, search)
+    with compiling_notice():
+        JSpace(robot, cells, task, np.zeros(robot.n), search, chain, steps).load()
+    clock.start()
+    run = _Run()
+    for q in _starts(robot, cells, task, search, clock, start):
+        space = JSpace(robot, cells, task, q, search, chain, steps)
+        at = space.cell_of(np.zeros(robot.n, dtype=np.int32))
+        if at >= 0:
+            run.add(tree_search(space, cells, at, clock))
+        elif start is not None:
+            raise ArgumentError(
+                "start must satisfy limits, cone and tolerance over one of the cells"
+            )
+        if _touches_all(run, cells) or not run.complete:
+            break
+    run.complete &= _touches_all(run, cells) or not clock.out_of_time
+    return _found(problem, cells, search, steps, run)
+
+
+def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run: _Run) -> Found:
+    """The best tree, and what is to be said of it."""
+    best, count = run.best, len(cells)
+    number = 0 if best is None else len(best.jcell)
+    step = f"{search.step_deg:g}"
+    settings = (
+        f"{search.moves} moves of {step} degrees, tolerance {1e3 * steps.tolerance:.3g} mm; "
+        f"{run.calls} calls of Algorithm 1 from {run.trees} start"
+        f"{'' if run.trees == 1 else 's'}"
+    )
+
+    def replay() -> Replay:
+        """Every path of the tree, by Pinocchio."""
+        parents = {} if best is None else best.parent
+        paths = [Path(a, b, best.motion(a, b)) for b, a in parents.items() if best is not None]
+        return replay_tree(problem.robot, cells, problem.task, steps, paths)
+
+    unfinished = (
+        ""
+        if run.complete
+        else (
+            f"The time limit of {search.time_limit:g} s ran out ({settings}); the best tree touches "
+            f"{number} of {count} cells."
+        )
+    )
+    return Found(
+        covered=np.zeros(count, dtype=bool) if best is None else best.touched(count),
+        components=() if best is None else (np.array(sorted(best.jcell), dtype=np.int64),),
+        start=None if best is None else best.start,
+        n_edges=0 if best is None else len(best.edges),
+        counts=run.counts(),
+        replay=replay if _touches_all(run, cells) else None,
+        accepted="The greedy search touches every cell with one tree of motions, and Pinocchio's "
+        f"replay accepts it ({settings}). Touching a cell is entering it: centres need not be "
+        "visited.",
+        refused="The greedy search touches every cell, but Pinocchio's replay refuses it: "
+        f"{{refusal}} ({settings}).",
+        unfinished=unfinished,
+        exhausted=f"A covering motion was not found by the greedy search: "
+        f"{_why_not(run, steps, count)} ({settings}{_capped(run)}). Another start or method may "
+        "find one.",
+        make_graph=lambda: graph_of(best, count),
+        make_causes=lambda: _causes(problem, steps, run),
+        make_tree=lambda: tree_of(best),
+    )
+
+
+def _starts(
+    robot: Robot,
+    cells: GridCells,
+    task: Task,
+    search: Search,
+    clock: Clock,
+    start: ArrayLike | None,
+) -> Iterator[NDArray[np.float64]]:
+    """Start configurations (n,), as many as the search asks for.
+
+    The start cell is the one in the middle of the list (cell 45 of 90), from where this search
+    touches more cells of the paper's cases than from the first; or the next to it with a start.
+    """
+    if start is not None:
+        yield np.array(start, dtype=float)
+        return
+    points, approaches = task.targets(cells)
+    middle = len(cells) // 2
+    within = np.flatnonzero(_beyond(robot, points) <= 0.0).tolist()
+    for cell in sorted(within, key=lambda cell: abs(cell - middle)):
+        found = 0
+        patience = DRY_SEEDS if cell == middle else FEW_SEEDS
+        for q in starts(robot, points[cell], approaches[cell], task.cone, search.seed, patience):
+            yield q
+            found += 1
+            if found == search.starts:
+                break
+        if found or clock.out_of_time:
+            return
+
+
+def _touches_all(run: _Run, cells: GridCells) -> bool:
+    """True when the best tree touches every cell."""
+    return len(cells) == 0 or (run.best is not None and len(run.best.jcell) == len(cells))
+
+
+def _why_not(run: _Run, steps: Steps, count: int) -> str:
+    """What kept the best tree from touching all cells."""
+    if not math.isfinite(steps.sag):
+        return "the motion between J-cells cannot be bounded here (the offset surface folds)"
+    if steps.sag >= steps.tolerance or not steps.in_cone:
+        return "the step is too coarse for the tolerance or the cone"
+    if run.best is None:
+        return "no configuration was found over any cell"
+    return f"the best tree touches {len(run.best.jcell)} of {count} cells"
+
+
+def _capped(run: _Run) -> str:
+    """How many calls ended without an answer, for a message."""
+    if not run.capped:
+        return ""
+    return f"; {run.capped} calls stopped at the cap, which is unknown rather than no"
+
+
+def _beyond(robot: Robot, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """How far (k,) m points (k, 3) lie beyond the arm's reach; negative inside it."""
+    return np.linalg.norm(points - Chain.of(robot).translations[0], axis=1) - robot.reach
+
+
+def _causes(problem: Problem, steps: Steps, run: _Run) -> tuple[Cause, ...]:
+    """Why each cell outside the best tree is missed, as far as this search can tell."""
+    targets = problem.task.targets(problem.cells)
+    beyond = _beyond(problem.robot, targets.points) - steps.tolerance
+    touched = set() if run.best is None else set(run.best.jcell)
+    causes = []
+    for cell in sorted(set(range(len(problem.cells))) - touched):
+        if beyond[cell] > 0.0:
+            kind, proved = CauseKind.OUT_OF_REACH, True
+            detail = f"its centre's target is {beyond[cell]:.3f} m beyond the arm's reach"
+        else:
+            kind, proved = CauseKind.DISCONNECTED, False
+            detail = "not reached by the greedy search from its starts"
+        causes.append(Cause(cell, kind, proved, detail))
+    return tuple(causes)

@@ -1,0 +1,68 @@
+"""The question as one value: which arm, which cells, which task."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
+
+NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What `check` is asked, built once and handed to the search, the replay and the verdict."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    searched: Task
+    """The task that the search keeps to: `task`, or a little less than it, see `narrowed`."""
+
+    @classmethod
+    def of(cls, robot: Robot, cells: Cells, task: Task) -> Problem:
+        """The problem of covering `cells` with `robot`.
+
+        Raises:
+            TypeError: an argument is something else, such as a surface that is not cut into cells;
+                all of them are named.
+        """
+        refuse_other_types(
+            (robot, "robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
+            (cells, "cells", Cells, "a surface cut into cells, such as surface.cells(9, 10)"),
+            (task, "task", Task, "a Task, such as Task(standoff=0.02, cone_deg=20)"),
+        )
+        return cls(robot, cells, task, task)
+
+    @property
+    def narrowed(self) -> Problem:
+        """The same problem, searched with less of the tolerance and of the cone."""
+        tolerance = NARROWER * self.task.effective_tolerance
+        cone_deg = NARROWER * self.task.cone_deg
+        searched = replace(self.task, tolerance=tolerance, cone_deg=cone_deg)
+        return replace(self, searched=searched)
+
+    @property
+    def within(self) -> str:
+        """Tolerance and cone in words."""
+        return f"within {1e3 * self.task.effective_tolerance:g} mm and {self.task.cone_deg:g} deg"
+
+
+def refuse_other_types(*given: tuple[object, str, type, str]) -> None:
+    """Refuse arguments of a wrong type, all of them at once.
+
+    Args:
+        given: (value, name of the argument, its type, an example in words) of each.
+
+    Raises:
+        TypeError: some are of another type.
+    """
+    faults = [
+        f"{name}: expected {words}, got {value!r:.60}"
+        for value, name, kind, words in given
+        if not isinstance(value, kind)
+    ]
+    if faults:
+        raise TypeError("; ".join(faults))

@@ -1,0 +1,124 @@
+"""The complete search as a method of `check`: explore, close graph G, and say what was found."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from feasibility.certification import replay
+from feasibility.clock import Clock, OutOfTime
+from feasibility.found import Found
+from feasibility.notices import compiling_notice
+from feasibility.problem import Problem
+from feasibility.roadmap.arrays import arrays_of
+from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.diagnosis import causes_of
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.graph_g import graph_of
+from feasibility.roadmap.search import close, explore
+from feasibility.roadmap.walk import covering_walk
+from feasibility.roadmap.warmup import warm_up
+from feasibility.search import Search
+from feasibility.target_curves import blocked_curves
+from feasibility.verdict import Replay, Walk
+
+
+def complete_search(problem: Problem, search: Search, clock: Clock) -> Found:
+    """Search until one component of the roadmap covers every cell, or nothing new turns up.
+
+    Args:
+        problem: arm, cells and task.
+        search: the seed is used, and the time limit for its message.
+        clock: started once the kernels are loaded; reports the cells of the best component.
+    """
+    with compiling_notice():
+        warm_up()
+    problem.cells.curves  # noqa: B018 - part of the cells, made once
+    clock.start()
+    arrays = arrays_of(problem.robot, problem.cells, problem.searched)
+    exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock)
+    in_time = True
+    try:
+        explore(exploration)
+        close(exploration)
+    except OutOfTime:
+        in_time = False
+    exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
+    return _found(problem, exploration, in_time)
+
+
+def _found(problem: Problem, exploration: Exploration, in_time: bool) -> Found:
+    """The best component, and what is to be said of it."""
+    total = len(problem.cells)
+    complete = exploration.complete and total > 0
+    walk = covering_walk(exploration.roadmap, exploration.best) if complete else None
+    covered = int(exploration.covered.sum())
+    nodes, motions = (int(count) for count in exploration.roadmap.counters[:2])
+    return Found(
+        covered=exploration.covered,
+        components=tuple(np.flatnonzero(exploration.covers(r)) for r in exploration.roots()),
+        start=None if walk is None else int(walk.cell[0]),
+        n_edges=exploration.n_edges,
+        counts={
+            "fk": int(exploration.work.counts[0]),
+            "nodes": nodes,
+            "motions": motions,
+            "boxes": exploration.boxes,
+            "rounds": exploration.rounds,
+        },
+        motion=walk,
+        replay=None if walk is None else partial(_judged, problem, walk),
+        accepted="One continuous motion of {waypoints} waypoints visits every cell centre; "
+        f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
+        refused="A motion over every cell was found, but the independent replay refuses it: "
+        "{refusal}.",
+        proof="" if complete else _proof(problem, exploration),
+        unfinished="" if complete else _unfinished(problem, exploration, in_time),
+        exhausted=f"The search ended without a covering motion {problem.within}: "
+        f"{_missed(exploration)}; the best covers {covered} of {total} cells ({nodes} nodes, "
+        f"{exploration.rounds} rounds, seed {exploration.seed}).",
+        make_graph=lambda: graph_of(exploration),
+        make_causes=lambda: causes_of(exploration),
+    )
+
+
+def _judged(problem: Problem, walk: Walk) -> Replay:
+    """The walk by Pinocchio: over every cell, whatever the search believes that it covers."""
+    needed = np.ones(len(problem.cells), dtype=bool)
+    return replay(problem.robot, problem.cells, problem.task, walk, needed)
+
+
+def _proof(problem: Problem, exploration: Exploration) -> str:
+    """What is proved, if anything is."""
+    proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
+    if not proved:
+        return ""
+    return (
+        f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {problem.within} "
+        f"(reach bound and branch and bound, {exploration.boxes} boxes); the best single motion "
+        f"covers {int(exploration.covered.sum())} of {len(problem.cells)}."
+    )
+
+
+def _unfinished(problem: Problem, exploration: Exploration, in_time: bool) -> str:
+    """What is known to be left untried; empty where nothing is."""
+    if not in_time:
+        return (
+            f"The time limit ran out; the best single motion so far covers "
+            f"{int(exploration.covered.sum())} of {len(problem.cells)} cells."
+        )
+    if not exploration.arrays.cone_chord > 0.0:
+        return (
+            "A cone of 0 degrees leaves a motion no margin between samples, so none can be "
+            "certified; allow a small angle."
+        )
+    return blocked_curves(problem.cells, problem.task)
+
+
+def _missed(exploration: Exploration) -> str:
+    """Why the search ended without a covering motion."""
+    missed = int((~exploration.reached).sum())
+    if missed:
+        return f"{missed} cell{'s were' if missed > 1 else ' was'} never reached, without a proof"
+    return "every cell is reached, but by no single component"
