@@ -21,6 +21,9 @@ MOST_MODULES = 20  # of one folder
 ORDER = """
 coverable_errors
 coverable_files
+coverable_errors
+coverable_files
+coverable_files
 robots: robot kinematics chain reach
 robots.urdf
 robots: pinocchio_model library dh

@@ -270,6 +270,7 @@ class Clock:
 
 @pytest.mark.parametrize("looks", [1, 2, 5, 40, 120])
 def test_a_time_limit_is_honoured(looks: int, monkeypatch) -> None:
+    warm_up()
     clock = Clock(looks)
     monkeypatch.setattr("feasibility.clock.time", clock)
     verdict = check(*hard(), Search(time_limit=3600.0))
