@@ -1,9 +1,9 @@
 from .chain import Chain as Chain
 from .chain import frames as frames
 from .chain import jacobians as jacobians
+from .errors import RobotError as RobotError
 from .kinematics import Kinematics as Kinematics
 from .library import RobotInfo as RobotInfo
 from .library import list_robots as list_robots
 from .library import load_robot as load_robot
 from .robot import Robot as Robot
-from .robot import RobotError as RobotError

@@ -1,8 +1,8 @@
 """The compiled chain: forward kinematics and Jacobian for the search loops.
 
 Every constant is read from the `pin.Model`, so there is one source of truth; Pinocchio's frame
-placements remain the authority (`robots.kinematics`), and the two are compared when a robot is
-first loaded.
+placements remain the authority (`robots.kinematics`), and the two are compared once for each robot
+(`Robot.chain`).
 
 Each joint i turns or slides about the z axis of its own frame:
 
@@ -22,9 +22,10 @@ import pinocchio as pin
 from numba import njit
 from numpy.typing import NDArray
 
-from robots.robot import Robot, RobotError
+from robots.errors import RobotError
 
-AGREEMENT = 1e-9  # [m], [1]: largest difference from Pinocchio that `checked` accepts
+AGREEMENT = 1e-9  # [m], [1]: largest difference from Pinocchio that is accepted
+SAMPLES = 20  # configurations at which the two are compared
 
 
 class Chain(NamedTuple):
@@ -39,68 +40,79 @@ class Chain(NamedTuple):
     approach: NDArray[np.float64]
     """(3,) the approach axis in the last joint's frame."""
 
-    @staticmethod
-    def of(robot: Robot) -> Chain:
-        """Read the constants of `robot` from its Pinocchio model.
 
-        Raises:
-            RobotError: a joint has more than one degree of freedom, or the joints do not form one
-                chain that ends at the tool frame.
-        """
-        model = robot.model
-        n = robot.n
-        frame = model.frames[robot.tool_frame_id]
-        if model.nv != n or list(model.parents)[1:] != list(range(n)) or frame.parentJoint != n:
+def checked_chain(
+    name: str,
+    model: pin.Model,
+    tool_frame: int,
+    approach_axis: NDArray[np.float64],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+) -> Chain:
+    """Read the constants of a chain, and compare it with Pinocchio at random configurations.
+
+    Args:
+        name: what the robot is called in messages.
+        model: the n free joints.
+        tool_frame: index of the tool's frame in the model.
+        approach_axis: (3,) in the tool frame.
+        lower: (n,) rad or m.
+        upper: (n,) rad or m.
+
+    Raises:
+        RobotError: a joint has more than one degree of freedom, the joints do not form one chain
+            that ends at the tool frame, or the two differ by more than `AGREEMENT`.
+    """
+    n, frame = len(lower), model.frames[tool_frame]
+    if model.nv != n or list(model.parents)[1:] != list(range(n)) or frame.parentJoint != n:
+        raise RobotError(
+            f"robot {name!r}: its {model.nv} free joints do not form one serial chain of "
+            f"one-dof joints that ends at {frame.name!r}; lock the joints not on that chain"
+        )
+    chain = _constants(model, tool_frame, approach_axis)
+    data, neutral = model.createData(), pin.neutral(model)
+    rng = np.random.default_rng(0)
+    low = np.where(np.isfinite(lower), lower, -np.pi)
+    high = np.where(np.isfinite(upper), upper, np.pi)
+    for _ in range(SAMPLES):
+        q = low + (high - low) * rng.random(n)
+        point, axis = tool(chain, q)
+        pin.forwardKinematics(model, data, pin.integrate(model, neutral, q))
+        expected = pin.updateFramePlacement(model, data, tool_frame)
+        error = max(
+            np.abs(point - expected.translation).max(),
+            np.abs(axis - expected.rotation @ approach_axis).max(),
+        )
+        if not error <= AGREEMENT:
             raise RobotError(
-                f"robot {robot.name!r}: its {model.nv} free joints do not form one serial chain of "
-                f"one-dof joints that ends at {robot.tool_frame!r}; lock the joints off the chain"
+                f"robot {name!r}: the compiled chain and Pinocchio differ by {error:.2g} "
+                f"at q = {q.tolist()}; this is a defect of coverable, please report it"
             )
-        data = model.createData()
-        pin.computeJointJacobians(model, data, pin.neutral(model))
-        rotations = np.empty((n, 3, 3))
-        translations = np.empty((n + 1, 3))
-        prismatic = np.empty(n, dtype=bool)
-        align = np.eye(3)  # brings z onto the axis of the previous joint
-        for i in range(n):
-            # The joint's motion subspace, in its own frame: (linear, angular).
-            jacobian = pin.getJointJacobian(model, data, i + 1, pin.ReferenceFrame.LOCAL)
-            subspace = jacobian.reshape(6, n)[:, i]  # Pinocchio flattens a single column
-            linear, angular = subspace[:3], subspace[3:]
-            prismatic[i] = np.linalg.norm(angular) < 0.5
-            placement = model.jointPlacements[i + 1]
-            next_align = _rotation_onto(linear if prismatic[i] else angular)
-            rotations[i] = align.T @ placement.rotation @ next_align
-            translations[i] = align.T @ placement.translation
-            align = next_align
-        translations[n] = align.T @ frame.placement.translation
-        approach = align.T @ frame.placement.rotation @ robot.approach_axis
-        return Chain(rotations, translations, prismatic, approach)
+    return chain
 
-    @staticmethod
-    def checked(robot: Robot, samples: int = 20) -> Chain:
-        """Like `of`, and compared with Pinocchio at random configurations.
 
-        Raises:
-            RobotError: the two differ by more than 1e-9 m or 1e-9 in the axis.
-        """
-        from robots.kinematics import Kinematics
-
-        chain = Chain.of(robot)
-        authority = Kinematics(robot)
-        rng = np.random.default_rng(0)
-        lower = np.where(np.isfinite(robot.lower), robot.lower, -np.pi)
-        upper = np.where(np.isfinite(robot.upper), robot.upper, np.pi)
-        for _ in range(samples):
-            q = lower + (upper - lower) * rng.random(robot.n)
-            point, axis = tool(chain, q)
-            expected_point, expected_axis = authority.tool(q)
-            error = max(np.abs(point - expected_point).max(), np.abs(axis - expected_axis).max())
-            if not error <= AGREEMENT:
-                raise RobotError(
-                    f"robot {robot.name!r}: the compiled chain and Pinocchio differ by {error:.2g} "
-                    f"at q = {q.tolist()}; this is a defect of coverable, please report it"
-                )
-        return chain
+def _constants(model: pin.Model, tool_frame: int, approach_axis: NDArray[np.float64]) -> Chain:
+    """Every joint's frame in that of the joint before it, turned so that its axis is z."""
+    n, frame, data = model.nv, model.frames[tool_frame], model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    rotations = np.empty((n, 3, 3))
+    translations = np.empty((n + 1, 3))
+    prismatic = np.empty(n, dtype=bool)
+    align = np.eye(3)  # brings z onto the axis of the previous joint
+    for i in range(n):
+        # The joint's motion subspace, in its own frame: (linear, angular).
+        jacobian = pin.getJointJacobian(model, data, i + 1, pin.ReferenceFrame.LOCAL)
+        subspace = jacobian.reshape(6, n)[:, i]  # Pinocchio flattens a single column
+        linear, angular = subspace[:3], subspace[3:]
+        prismatic[i] = np.linalg.norm(angular) < 0.5
+        placement = model.jointPlacements[i + 1]
+        next_align = _rotation_onto(linear if prismatic[i] else angular)
+        rotations[i] = align.T @ placement.rotation @ next_align
+        translations[i] = align.T @ placement.translation
+        align = next_align
+    translations[n] = align.T @ frame.placement.translation
+    approach = align.T @ frame.placement.rotation @ approach_axis
+    return Chain(rotations, translations, prismatic, approach)
 
 
 def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -49,6 +49,47 @@ class Kinematics:
         pin.updateFramePlacement(self._model, self._data, self._frame)
         return self._translation.copy(), self._rotation @ self._approach
 
+    def tools(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Tool points (m, 3) m and unit approach axes (m, 3) at configurations q (m, n).
+
+        Example:
+            >>> from robots import load_robot
+            >>> points, axes = Kinematics(load_robot("puma560")).tools(np.zeros((4, 6)))
+            >>> points.shape, axes.shape
+            ((4, 3), (4, 3))
+        """
+        rows = self._configurations(q)
+        points, rotations = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
+        for k, row in enumerate(rows):
+            pin.forwardKinematics(self._model, self._data, row)
+            pin.updateFramePlacement(self._model, self._data, self._frame)
+            points[k] = self._translation
+            rotations[k] = self._rotation
+        return points, rotations @ self._approach
+
+    def twists(self, q: ArrayLike) -> NDArray[np.float64]:
+        """Unit twists (m, 6, n) of the joints at configurations q (m, n), in the root frame.
+
+        Column j is what joint j alone does to the root frame's origin: its velocity, 1/s times m,
+        then the angular velocity.
+        """
+        rows = self._configurations(q)
+        columns = np.empty((len(rows), 6, self.robot.n))
+        for k, row in enumerate(rows):
+            # Pinocchio flattens a single column.
+            columns[k] = pin.computeJointJacobians(self._model, self._data, row).reshape(6, -1)
+        return columns
+
+    def _configurations(self, q: ArrayLike) -> NDArray[np.float64]:
+        """Pinocchio's configuration vectors (m, nq) for joint values q (m, n)."""
+        rows = np.ascontiguousarray(q, dtype=float)
+        if rows.ndim != 2 or rows.shape[1] != self.robot.n:
+            raise ArgumentError(f"q must have shape (m, {self.robot.n}), got {rows.shape}")
+        if self._plain:
+            return rows
+        placed = [pin.integrate(self._model, self._neutral, row) for row in rows]
+        return np.array(placed).reshape(len(rows), self._model.nq)
+
     def jacobians(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Derivatives (3, n) of tool point and of approach axis by q."""
         jacobian = pin.computeFrameJacobian(
@@ -71,16 +112,12 @@ class Kinematics:
         Raises:
             ArgumentError: q or dq does not have the shape (m, n), or they differ in m.
         """
-        places, rates = (np.ascontiguousarray(rows, dtype=float) for rows in (q, dq))
-        if places.ndim != 2 or places.shape[1] != self.robot.n or rates.shape != places.shape:
-            raise ArgumentError(
-                f"q and dq must both have shape (m, {self.robot.n}), got {places.shape} and "
-                f"{rates.shape}"
-            )
-        velocities = np.empty((len(places), 3))
-        for k in range(len(places)):
-            configuration = places[k] if self._plain else self.configuration(places[k])
-            pin.forwardKinematics(self._model, self._data, configuration, rates[k])
+        rows, rates = self._configurations(q), np.ascontiguousarray(dq, dtype=float)
+        if rates.shape != (len(rows), self.robot.n):
+            raise ArgumentError(f"dq must have the shape of q, {np.shape(q)}, got {rates.shape}")
+        velocities = np.empty((len(rows), 3))
+        for k, row in enumerate(rows):
+            pin.forwardKinematics(self._model, self._data, row, rates[k])
             velocities[k] = pin.getFrameVelocity(
                 self._model, self._data, self._frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
             ).linear

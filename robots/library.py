@@ -19,8 +19,9 @@ from types import MappingProxyType
 
 from numpy.typing import ArrayLike
 
-from robots.pinocchio_model import robot_from_urdf, suggestion
-from robots.robot import Robot, RobotError
+from robots.errors import RobotError
+from robots.joint_selection import suggestion
+from robots.robot import Robot
 
 HERE = Path(__file__).parent
 SHIPPED = "coverable"
@@ -88,6 +89,7 @@ def load_robot(
         >>> load_robot("puma560", limits="set-1")
         Robot('puma560', 6 joints, tool 'link6')
     """
+    from robots.pinocchio_model import robot_from_urdf
     from robots.urdf import check_urdf
 
     info = _find(name_or_path)

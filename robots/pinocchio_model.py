@@ -1,4 +1,4 @@
-"""From a checked URDF to a `Robot`: which joints are free, which are locked, and at what value."""
+"""From a checked URDF to a `Robot`: parsed by Pinocchio, and reduced to its free joints."""
 
 from __future__ import annotations
 
@@ -6,21 +6,18 @@ import math
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from robots.robot import Robot, RobotError
+from robots.errors import RobotError
+from robots.joint_selection import select_joints
+from robots.robot import Robot
 
 if TYPE_CHECKING:
-    from robots.urdf import CheckedUrdf, JointInfo
-
-
-import pinocchio as pin
-
-MOST_NAMES = 40  # that a message lists
+    from robots.urdf import CheckedUrdf
 
 
 def robot_from_urdf(
@@ -35,31 +32,26 @@ def robot_from_urdf(
 ) -> Robot:
     """Reduce a URDF to the chain from its root link to the tool frame.
 
-    Free are the joints on the path from the root link to the tool frame, unless `lock` names them.
-    Every other moving joint is held: at the value `lock` gives, or at zero brought into its limits
+    Free are the joints on the chain from the root link to the tool frame, unless `lock` names them.
+    Every other moving joint is held: at the value `lock` gives, or at zero clipped to its limits
     (a mimic joint where the joint it follows puts it, if that one is held too).
 
     Args:
-        checked: a URDF that has passed the gate.
+        checked: a URDF that has passed the check.
         name: what the robot is called in messages.
         tool_frame: a link; None takes the only leaf.
         approach_axis: (3,) in the tool frame.
         lock: joint name -> value, rad or m.
         limits: replaces the URDF's limits, see `Robot.with_limits`. A joint whose own limits are
-            missing or senseless needs them.
+            missing or make no sense needs them.
         limit_sets: name -> joint name -> (lower, upper), rad or m. A set that lacks a free joint
             is left out.
 
     Raises:
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
-            limits, or a joint on the path cannot be used as it stands and is not locked.
+            limits, or a joint on the chain has a fault and is neither locked nor given limits.
     """
-    tool = _tool_frame(checked, name, tool_frame)
-    fixed_values = dict(lock or {})
-    _check_lock(checked, name, fixed_values)
-    free = _free_joints(checked, tool, fixed_values)
-    _check_free(checked, name, tool, free, limits)
-    locked = _locked_values(checked, {joint.name for joint in free}, fixed_values)
+    tool, free, locked = select_joints(checked, name, tool_frame, lock or {}, limits)
     free_names = [joint.name for joint in free]
     model = reduced_model(parse(checked.text, checked.path), free_names, locked, tool)
     robot = Robot(
@@ -69,9 +61,9 @@ def robot_from_urdf(
         approach_axis=np.asarray(approach_axis),
         joint_names=tuple(free_names),
         joint_kinds=tuple(joint.kind for joint in free),
-        # Pinocchio's own limits are not asked: it loses those of continuous joints.
-        lower=np.array([_range(joint)[0] for joint in free]),
-        upper=np.array([_range(joint)[1] for joint in free]),
+        # Not from Pinocchio's model, which loses the limits of continuous joints.
+        lower=np.array([joint.limits[0] for joint in free]),
+        upper=np.array([joint.limits[1] for joint in free]),
         max_velocity=np.array([joint.max_velocity or math.nan for joint in free]),
         limit_sets={
             title: np.array([rows[joint.name] for joint in free])
@@ -84,146 +76,6 @@ def robot_from_urdf(
         notes=checked.warnings,
     )
     return robot if limits is None else robot.with_limits(limits)
-
-
-def _tool_frame(checked: CheckedUrdf, name: str, asked: str | None) -> str:
-    """The tool link: the one asked for, or the only leaf."""
-    if asked is None:
-        if len(checked.leaves) == 1:
-            return checked.leaves[0]
-        raise RobotError(
-            f"robot {name!r}: {checked.path} has {len(checked.leaves)} leaf links, so tool_frame "
-            f"must name one: {', '.join(checked.leaves)} (or any other link)"
-        )
-    if asked not in checked.links:
-        raise RobotError(
-            f"robot {name!r}: {checked.path} has no link {asked!r} for tool_frame; "
-            + suggestion(asked, checked.links)
-        )
-    return asked
-
-
-def suggestion(asked: str, known: Sequence[str]) -> str:
-    """Names that come close to `asked`, or the known ones if none does."""
-    import difflib
-
-    close = difflib.get_close_matches(asked, known, n=5, cutoff=0.5)
-    if close:
-        return f"did you mean {' or '.join(repr(match) for match in close)}?"
-    shown = ", ".join(list(known)[:MOST_NAMES])
-    return f"it has: {shown}" + (", ..." if len(known) > MOST_NAMES else "")
-
-
-def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> None:
-    """Refuse locked joints that do not exist, do not move, or stand outside their limits."""
-    moving = {joint.name: joint for joint in checked.joints if joint.moves}
-    faults = []
-    for joint_name, value in lock.items():
-        joint = moving.get(joint_name)
-        if joint is None:
-            hint = suggestion(joint_name, list(moving))
-            faults.append(f"lock names {joint_name!r}, which is no moving joint; {hint}")
-            continue
-        unit = "m" if joint.kind == "prismatic" else "rad"
-        low, high = _range(joint)
-        if isinstance(value, bool) or not isinstance(value, Real):
-            faults.append(f"lock holds joint {joint_name!r} at {value!r}, not a number ({unit})")
-        elif not (math.isfinite(value) and low <= value <= high):
-            faults.append(
-                f"lock holds joint {joint_name!r} at {value:g} {unit}, outside its limits "
-                f"{low:g} .. {high:g} {unit}"
-            )
-    if faults:
-        raise RobotError(faults, f"robot {name!r}")
-
-
-def _range(joint: JointInfo) -> tuple[float, float]:
-    """Limits of a joint, rad or m; infinite where the file gives none that make sense."""
-    if joint.lower is None or joint.upper is None:
-        return -math.inf, math.inf
-    return joint.lower, joint.upper
-
-
-def _free_joints(
-    checked: CheckedUrdf, tool: str, lock: Mapping[str, float]
-) -> tuple[JointInfo, ...]:
-    """The moving joints on the way to the tool that nothing holds.
-
-    A mimic joint is held when the joint that leads it is.
-    """
-    free = [joint for joint in checked.path_to(tool) if joint.moves and joint.name not in lock]
-    names = {joint.name for joint in free}
-    while True:
-        led = {
-            joint.name
-            for joint in free
-            if joint.mimic is not None and joint.fault is None and joint.mimic.joint not in names
-        }
-        if not led & names:
-            return tuple(joint for joint in free if joint.name in names)
-        names -= led
-
-
-def _check_free(
-    checked: CheckedUrdf,
-    name: str,
-    tool: str,
-    free: Sequence[JointInfo],
-    limits: str | Mapping[str, ArrayLike] | ArrayLike | None,
-) -> None:
-    """Refuse a path without free joints, or with joints that cannot move freely."""
-    if not free:
-        raise RobotError(
-            f"robot {name!r}: no free joint lies between the root link {checked.root!r} and "
-            f"{tool!r} of {checked.path}; choose a tool_frame further out, or lock fewer joints"
-        )
-    faults = []
-    for joint in free:
-        if joint.mimic is not None and joint.fault is None:
-            faults.append(
-                f"line {joint.line}: joint {joint.name!r} on the way to {tool!r} mimics "
-                f"{joint.mimic.joint!r}; lock one of the two, or choose another tool_frame"
-            )
-        elif joint.fault is not None:
-            gets_limits = limits is not None and (
-                not isinstance(limits, Mapping) or joint.name in limits
-            )
-            # Given limits mend limits, not a mimic that leads nowhere.
-            if not (gets_limits and joint.lower is None and joint.mimic is None):
-                faults.append(joint.fault)
-    if faults:
-        raise RobotError(faults, f"robot {name!r}, {checked.path}")
-
-
-def _locked_values(
-    checked: CheckedUrdf, free: set[str], lock: Mapping[str, float]
-) -> dict[str, float]:
-    """Where every one-dof joint that is not free is held, rad or m."""
-    by_name = {joint.name: joint for joint in checked.joints}
-    held: dict[str, float] = {}
-    for joint in checked.joints:
-        if joint.moves and joint.name not in free:
-            low, high = _range(joint)
-            held[joint.name] = float(lock.get(joint.name, min(max(0.0, low), high)))
-    return {title: _followed(by_name[title], by_name, held, lock) for title in held}
-
-
-def _followed(
-    joint: JointInfo,
-    joints: Mapping[str, JointInfo],
-    held: Mapping[str, float],
-    lock: Mapping[str, float],
-) -> float:
-    """Where a held joint stands that may mimic another one.
-
-    A mimic joint whose leader is free stays where it is; it moves nothing that carries the tool.
-    A joint with a fault follows nothing, so that a ring of mimics ends here.
-    """
-    on_its_own = joint.fault is not None or joint.name in lock
-    if joint.mimic is None or on_its_own or joint.mimic.joint not in held:
-        return held[joint.name]
-    leader = _followed(joints[joint.mimic.joint], joints, held, lock)
-    return joint.mimic.multiplier * leader + joint.mimic.offset
 
 
 def parse(text: str, path: str) -> pin.Model:

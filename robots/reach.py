@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import itertools
-from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from robots.robot import Robot
-
-ARMS = 16  # whose bounds are remembered: a search asks for them again and again
 SWEEPS = 60  # of the descent below; any number gives a bound, more a tighter one
 MOST_SLIDES = 10  # prismatic joints in a row whose 2^k end positions are looked at one by one
 
 
-@lru_cache(maxsize=ARMS)
-def reach_bound(robot: Robot) -> float:
+def reach_bound(
+    model: pin.Model,
+    tool_frame: int,
+    prismatic: NDArray[np.bool_],
+    lower: NDArray[np.float64],
+    upper: NDArray[np.float64],
+) -> float:
     """Upper bound (m) on the distance of the tool point from the origin of the first joint.
 
     A revolute joint leaves every point of its axis where it is. So put one anchor on each revolute
@@ -27,28 +26,35 @@ def reach_bound(robot: Robot) -> float:
     never further from the first anchor than these distances add up to (the triangle inequality).
     The anchors may slide along their axes; sliding them until the string of distances is short
     gives a good bound. Where prismatic joints lie between two anchors, the distance is convex in
-    their positions, so its maximum stands at an end of the strokes.
+    their positions, so its maximum is at an end of the strokes.
+
+    Args:
+        model: the n joints, base to tip.
+        tool_frame: index of the frame whose origin is the tool point.
+        prismatic: (n,) True where a joint slides.
+        lower: (n,) rad or m.
+        upper: (n,) rad or m.
 
     Returns:
         The bound; inf where a prismatic joint has no limits.
     """
-    model, data = robot.model, robot.model.createData()
+    n, data = len(prismatic), model.createData()
     columns = pin.computeJointJacobians(model, data, pin.neutral(model))
-    columns = columns.reshape(6, robot.n)  # in the root frame; Pinocchio flattens a single column
+    columns = columns.reshape(6, n)  # in the root frame; Pinocchio flattens a single column
     pin.updateFramePlacements(model, data)
     anchors = [data.oMi[1].translation.copy()]
     axes: list[NDArray[np.float64] | None] = [None]  # None: this anchor does not slide
     slides: list[list[int]] = [[]]  # prismatic joints between an anchor and the next one
-    for i in range(robot.n):
-        if robot.prismatic[i]:
+    for i in range(n):
+        if prismatic[i]:
             slides[-1].append(i)
         elif i > 0:
             anchors.append(data.oMi[i + 1].translation.copy())
             axes.append(columns[3:, i])
             slides.append([])
-    anchors.append(data.oMf[robot.tool_frame_id].translation.copy())
+    anchors.append(data.oMf[tool_frame].translation.copy())
     _shorten(anchors, axes, slides)
-    strokes = np.column_stack([robot.lower, robot.upper])
+    strokes = np.column_stack([lower, upper])
     return float(
         sum(
             _longest(end - start, columns[:3, joints].T, strokes[joints])
@@ -62,22 +68,22 @@ def _shorten(
     axes: list[NDArray[np.float64] | None],
     slides: list[list[int]],
 ) -> None:
-    """Slide the anchors, one at a time, to where the way past each is shortest; in place.
+    """Slide the anchors, one at a time, to where the path past each is shortest; in place.
 
-    For a point on a line, the way from a over it to b is shortest where a mirror would put it: the
-    feet of a and b on the line, weighted by the other's distance from it.
+    For a point on a line, the path from a over it to b is shortest where a mirror would put it: at
+    the projections of a and b onto the line, each weighted by the other's distance from it.
     """
     for _ in range(SWEEPS):
         for k, axis in enumerate(axes):
             if axis is None or slides[k - 1] or slides[k]:
                 continue
             before, after = anchors[k - 1] - anchors[k], anchors[k + 1] - anchors[k]
-            foot_before, foot_after = float(before @ axis), float(after @ axis)
-            far_before = float(np.linalg.norm(before - foot_before * axis))
-            far_after = float(np.linalg.norm(after - foot_after * axis))
+            along_before, along_after = float(before @ axis), float(after @ axis)
+            far_before = float(np.linalg.norm(before - along_before * axis))
+            far_after = float(np.linalg.norm(after - along_after * axis))
             total = far_before + far_after
             if total > 1e-12:
-                shift = (foot_before * far_after + foot_after * far_before) / total
+                shift = (along_before * far_after + along_after * far_before) / total
                 anchors[k] = anchors[k] + shift * axis
 
 

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from coverable_errors import CoverableError
+from robots.errors import RobotError
 
 if TYPE_CHECKING:
     import pinocchio as pin
 
+    from robots.chain import Chain
 
 KINDS = ("revolute", "continuous", "prismatic")
 
 
-class RobotError(CoverableError):
-    """A robot that cannot be used as asked: what was wrong, where, and what would do."""
-
-
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False)  # no slots: cached properties need a __dict__
 class Robot:
     """A serial chain of n one-dof joints from the URDF's root link to a tool frame.
 
@@ -142,7 +140,7 @@ class Robot:
         """(n,) True where a joint slides."""
         return np.array([kind == "prismatic" for kind in self.joint_kinds], dtype=bool)
 
-    @property
+    @cached_property
     def tool_frame_id(self) -> int:
         """Index of the tool frame in `model.frames`.
 
@@ -156,15 +154,39 @@ class Robot:
         return int(self.model.getFrameId(self.tool_frame, kind))
 
     @property
+    def base_point(self) -> NDArray[np.float64]:
+        """(3,) m, origin of the first joint in the root frame, from which `reach` is measured."""
+        return np.array(self.model.jointPlacements[1].translation)
+
+    def distance_from_base(self, points: ArrayLike) -> NDArray[np.float64]:
+        """Distances (...) m of points (..., 3) m in the root frame from `base_point`."""
+        return np.asarray(np.linalg.norm(np.asarray(points) - self.base_point, axis=-1))
+
+    @cached_property
     def reach(self) -> float:
-        """Upper bound (m) on the distance of the tool point from the first joint's axis origin.
+        """Upper bound (m) on the distance of the tool point from `base_point`.
 
         See `robots.reach.reach_bound`; inf where a prismatic joint has no limits. No configuration
         inside the limits puts the tool further out.
         """
         from robots.reach import reach_bound
 
-        return reach_bound(self)
+        return reach_bound(self.model, self.tool_frame_id, self.prismatic, self.lower, self.upper)
+
+    @cached_property
+    def chain(self) -> Chain:
+        """The compiled forward kinematics, compared with Pinocchio when first asked for.
+
+        Raises:
+            RobotError: the free joints form no serial chain, or the two differ by more than 1e-9 m
+                or 1e-9 in the axis.
+        """
+        # Not imported above: it compiles, and whoever only replays a motion must not depend on it.
+        from robots.chain import checked_chain
+
+        return checked_chain(
+            self.name, self.model, self.tool_frame_id, self.approach_axis, self.lower, self.upper
+        )
 
     def with_limits(self, limits: str | Mapping[str, ArrayLike] | ArrayLike) -> Robot:
         """Return the same arm with other limits.

@@ -21,12 +21,9 @@ MOST_MODULES = 20  # of one folder
 ORDER = """
 coverable_errors
 coverable_files
-coverable_errors
-coverable_files
-coverable_files
-robots: robot kinematics chain reach
+robots: errors chain reach robot kinematics
 robots.urdf
-robots: pinocchio_model library dh
+robots: joint_selection pinocchio_model library dh
 surfaces: surface cells adjacency cell_curves arguments
 surfaces.patches
 surfaces.patches.nurbs

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from feasibility.certification.curve_matching import follow
@@ -42,26 +41,8 @@ class Placements:
 def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
     """Ask Pinocchio for tool points, axes and lever arms at q (m, n)."""
     kinematics = Kinematics(robot)
-    model, data = robot.model, robot.model.createData()
-    frame = robot.tool_frame_id
-    placement = data.oMf[frame]
-    translation, rotation = placement.translation, placement.rotation  # live views
-    m = len(q)
-    points, axes = np.empty((m, 3)), np.empty((m, 3))
-    columns = np.empty((m, 6, robot.n))
-    plain = model.nq == model.nv
-    rotations = np.empty((m, 3, 3))
-    for k in range(m):
-        configuration = q[k] if plain else kinematics.configuration(q[k])
-        # Columns are the joints' twists at the root's origin: (velocity there, angular velocity).
-        # Pinocchio flattens a single column.
-        columns[k] = pin.computeJointJacobians(model, data, configuration).reshape(6, -1)
-        pin.updateFramePlacement(model, data, frame)
-        points[k] = translation
-        rotations[k] = rotation
-    axes = rotations @ robot.approach_axis
-    linear = columns[:, :3].transpose(0, 2, 1)
-    angular = columns[:, 3:].transpose(0, 2, 1)
+    points, axes = kinematics.tools(q)
+    linear, angular = np.split(kinematics.twists(q).transpose(0, 2, 1), 2, axis=2)
     levers = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
     sines = np.linalg.norm(np.cross(angular, axes[:, None]), axis=2)
     return Placements(points, axes, levers, sines)

@@ -15,7 +15,7 @@ from feasibility.paper.jcell_grid import Grid, cell_of, place_tool
 from feasibility.paper.jcell_steps import Steps
 from feasibility.search import Search
 from feasibility.task import Task
-from robots import Chain, Robot
+from robots import Robot
 from surfaces.patches import GridCells
 
 CAP = 20_000  # J-cells of one call at the step below, unless the search says otherwise
@@ -76,7 +76,6 @@ class JSpace:
         task: Task,
         start: ArrayLike,
         search: Search | None = None,
-        chain: Chain | None = None,
         steps: Steps | None = None,
     ) -> None:
         """Lay the grid of J-cells through `start` (n,).
@@ -87,7 +86,6 @@ class JSpace:
             task: what makes a J-cell feasible.
             start: (n,) q_start, rad or m.
             search: step, moves and cap; the defaults of `Search` without it.
-            chain: the compiled chain of `robot`, when it is at hand.
             steps: `Steps.of` the same, when they are at hand.
         """
         search = Search(method="greedy") if search is None else search
@@ -99,7 +97,7 @@ class JSpace:
         self.start = origin
         self.steps = Steps.of(robot, cells.closed_form, task, search) if steps is None else steps
         size = self.steps.size
-        self._chain = Chain.checked(robot) if chain is None else chain
+        self._chain = robot.chain
         self._patch_kernel = cells.patch_kernel
         self._points = task.targets(cells).points
         cap = search.cap or round(CAP * max(1.0, CAP_STEP_DEG / search.step_deg))

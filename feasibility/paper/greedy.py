@@ -27,7 +27,7 @@ from feasibility.problem import Problem
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.verdict import Cause, CauseKind, Replay
-from robots import Chain, Robot
+from robots import Robot
 from surfaces.patches import GridCells, closed_form_grid
 
 FEW_SEEDS = 10  # random configurations to try over each cell once the middle one had no start
@@ -91,13 +91,13 @@ def greedy_search(
     """
     robot, task = problem.robot, problem.task
     cells = closed_form_grid(problem.cells)
-    chain, steps = Chain.checked(robot), Steps.of(robot, cells.closed_form, task, search)
+    steps = Steps.of(robot, cells.closed_form, task, search)
     with compiling_notice():
-        JSpace(robot, cells, task, np.zeros(robot.n), search, chain, steps).load()
+        JSpace(robot, cells, task, np.zeros(robot.n), search, steps).load()
     clock.start()
     run = _Run()
     for q in _starts(robot, cells, task, search, clock, start):
-        space = JSpace(robot, cells, task, q, search, chain, steps)
+        space = JSpace(robot, cells, task, q, search, steps)
         at = space.cell_of(np.zeros(robot.n, dtype=np.int32))
         if at >= 0:
             run.add(tree_search(space, cells, at, clock))
@@ -214,7 +214,7 @@ def _capped(run: _Run) -> str:
 
 def _beyond(robot: Robot, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """How far (k,) m points (k, 3) lie beyond the arm's reach; negative inside it."""
-    return np.linalg.norm(points - Chain.of(robot).translations[0], axis=1) - robot.reach
+    return robot.distance_from_base(points) - robot.reach
 
 
 def _causes(problem: Problem, steps: Steps, run: _Run) -> tuple[Cause, ...]:

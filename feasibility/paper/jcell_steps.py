@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from feasibility.search import Search
 from feasibility.task import Task
-from robots import Chain, Robot
+from robots import Robot
 from surfaces.patches import ClosedFormPatch
 
 TOLERANCE_STEPS = 0.5
@@ -78,7 +78,7 @@ def _extent(robot: Robot) -> float:
     """The reach (m); where an endless rail makes that infinite, the sum of the link lengths."""
     if math.isfinite(robot.reach):
         return robot.reach
-    return float(np.linalg.norm(Chain.of(robot).translations[1:], axis=1).sum())
+    return float(np.linalg.norm(robot.chain.translations[1:], axis=1).sum())
 
 
 def _room(
@@ -92,7 +92,7 @@ def _room(
     """Sag (m) and turn between J-cells, as in the module's docstring."""
     prismatic = robot.prismatic
     stroke = np.where(prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
-    links = np.linalg.norm(Chain.of(robot).translations[1:], axis=1)
+    links = np.linalg.norm(robot.chain.translations[1:], axis=1)
     # The lever about joint j: all links after it, and all strokes after it.
     lever = np.cumsum((links + np.append(stroke[1:], 0.0))[::-1])[::-1]
     angle = np.where(prismatic, 0.0, size)

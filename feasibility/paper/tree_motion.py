@@ -72,8 +72,8 @@ def _at_centres(verdict: Verdict, q: NDArray[np.float64]) -> NDArray[np.int64]:
     """(k,) the cell at whose centre target the tool point is within the tolerance, or -1."""
     from scipy.spatial import KDTree
 
-    kinematics, task = Kinematics(verdict.robot), verdict.task
+    task = verdict.task
     tolerance = task.effective_tolerance
-    points = np.array([kinematics.tool(row)[0] for row in q])
+    points, _ = Kinematics(verdict.robot).tools(q)
     away, cell = KDTree(task.targets(verdict.cells).points).query(points)
     return np.where(away <= tolerance, cell, -1).astype(np.int64)

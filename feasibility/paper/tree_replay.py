@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 from feasibility.paper.jcell_steps import Steps
@@ -67,7 +66,7 @@ def replay_tree(
     if not margin >= 0.0:
         faults.append(f"a joint passes its limit by {-margin:.3g}")
 
-    points, axes = tool_poses(robot, q)
+    points, axes = Kinematics(robot).tools(q)
     closest_point = cells.surface.closest(points)
     sign = cells.surface.side_sign
     error = np.abs(closest_point.height - sign * task.standoff).max(initial=0.0) + steps.sag
@@ -89,25 +88,6 @@ def replay_tree(
         faults.append("a path does not begin where its cell was entered")
     certificate = Certificate(len(q), float(error), float(angle), float(margin))
     return Replay(certificate, "; ".join(faults))
-
-
-def tool_poses(
-    robot: Robot, q: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Tool points (k, 3) m and approach axes (k, 3) at q (k, n), by Pinocchio."""
-    model, data = robot.model, robot.model.createData()
-    frame = robot.tool_frame_id
-    points, rotations = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
-    kinematics = Kinematics(robot)
-    plain = model.nq == model.nv
-    placement = data.oMf[frame]
-    translation, rotation = placement.translation, placement.rotation  # live views
-    for k in range(len(q)):
-        pin.forwardKinematics(model, data, q[k] if plain else kinematics.configuration(q[k]))
-        pin.updateFramePlacement(model, data, frame)
-        points[k] = translation
-        rotations[k] = rotation
-    return points, rotations @ robot.approach_axis
 
 
 class Borders:

@@ -61,7 +61,7 @@ class Reach:
         return Reach(
             targets=(task.targets(cells).points - surface.position) @ surface.rotation,
             areas=np.array(cells.areas),
-            origin=np.array(robot.model.jointPlacements[1].translation),
+            origin=robot.base_point,
             reach=robot.reach,
             tolerance=task.effective_tolerance,
         )

@@ -21,19 +21,15 @@ def probes(robot: Robot) -> NDArray[np.float64]:
     """
     from robots import Kinematics
 
-    kinematics = Kinematics(robot)
     n = robot.n
     low, high = np.clip(robot.lower, -3.0, 3.0), np.clip(robot.upper, -3.0, 3.0)
     limits = np.zeros((n, 6))
     for column, bound in enumerate((robot.lower, robot.upper)):
         limits[:, column] = np.where(np.isfinite(bound), bound, 0.0)
         limits[:, 2 + column] = np.isfinite(bound)
-    rows = []
-    for k in range(4):
-        share = np.modf(0.17 + 0.23 * k + 0.31 * np.arange(n))[0]
-        point, axis = kinematics.tool(low + share * (high - low))
-        rows.append(np.concatenate([point, axis]))
-    return np.vstack([limits, rows])
+    share = np.modf(0.17 + 0.23 * np.arange(4)[:, None] + 0.31 * np.arange(n))[0]
+    points, axes = Kinematics(robot).tools(low + share * (high - low))
+    return np.vstack([limits, np.hstack([points, axes])])
 
 
 def check_robot(robot: Robot, fields: Fields, archive: Archive) -> None:

@@ -71,7 +71,6 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
     tolerance = task.effective_tolerance
     targets = task.targets(cells)
     waypoints = target_curves(cells, task.standoff, tolerance)
-    chain = Chain.checked(robot)
     cone_chord = task.cone_chord
     deviations = waypoints.deviations[:, 1]
     ordinary = (
@@ -83,7 +82,7 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
     if waypoints.centre_curvature > 0.0 and cone_chord < np.inf:
         near = min(near, NEWTON_CONE * cone_chord / waypoints.centre_curvature)
     return SearchArrays(
-        chain=chain,
+        chain=robot.chain,
         lower=np.array(robot.lower),
         upper=np.array(robot.upper),
         points=np.ascontiguousarray(targets.points),
@@ -100,7 +99,7 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
         curvature=waypoints.centre_curvature,
         near=float(near),
         # A gantry may have no links at all: its strokes are as good as any length then.
-        scale=float(np.linalg.norm(chain.translations, axis=1).sum()) or 1.0,
+        scale=float(np.linalg.norm(robot.chain.translations, axis=1).sum()) or 1.0,
     )
 
 

@@ -162,10 +162,11 @@ def _one(exploration: Exploration) -> NDArray[np.float64]:
 
 def _smallest_angle(exploration: Exploration, relaxed: SearchArrays, cell: int) -> float:
     """Smallest angle (rad) between tool axis and approach direction with the point reached."""
-    kinematics, approach = Kinematics(exploration.robot), relaxed.approaches[cell]
+    approach = relaxed.approaches[cell]
     found = np.empty((STARTS, exploration.robot.n))
     count = _solve(relaxed, exploration.work, cell, exploration.guesses(2 * STARTS), found)
-    chords = [float(np.linalg.norm(kinematics.tool(q)[1] - approach)) for q in found[:count]]
+    _, axes = Kinematics(exploration.robot).tools(found[:count])
+    chords = [float(np.linalg.norm(axis - approach)) for axis in axes]
     low, high = 0.0, 2.0 * np.arcsin(min(0.5 * min(chords, default=2.0), 1.0))
     # Bisect on the cone: is there a configuration inside a narrower one?
     for _ in range(9):
@@ -244,8 +245,7 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
     if not _solve(anything, work, cell, guesses, _one(exploration)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
-        origin = robot.model.jointPlacements[1].translation
-        away = float(np.linalg.norm(arrays.points[cell] - origin))
+        away = float(robot.distance_from_base(arrays.points[cell]))
         reach = robot.reach
         short, far = decimals(1e3 * distance, 0.0, 0), decimals(away, reach, 3)
         detail = (

@@ -67,9 +67,7 @@ def _pivot(exploration: Exploration) -> bool:
 
 def _unreached(exploration: Exploration) -> None:
     """Step 2: a ruling on every cell that nothing has reached."""
-    distance = np.linalg.norm(
-        exploration.arrays.points - exploration.robot.model.jointPlacements[1].translation, axis=1
-    )
+    distance = exploration.robot.distance_from_base(exploration.arrays.points)
     beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
     for cell in np.flatnonzero(beyond).tolist():
         exploration.rulings[cell] = Ruling.PROVED

@@ -195,8 +195,8 @@ class Prober:
         longer = (problem.lower < self.problem.lower) | (problem.upper > self.problem.upper)
         if (slides & longer).any():
             return np.zeros(len(problem.points), dtype=bool)
-        away = problem.points - self.setup.robot.model.jointPlacements[1].translation
-        return np.linalg.norm(away, axis=1) > self.reach + problem.tolerance
+        distance = self.setup.robot.distance_from_base(problem.points)
+        return distance > self.reach + problem.tolerance
 
     def attempt(
         self,

@@ -170,8 +170,7 @@ def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
         turning = math.degrees(float(least[~robot.prismatic].min(initial=np.inf)))
         sliding = float(least[robot.prismatic].min(initial=np.inf))
     points = task.targets(verdict.cells).points
-    first = robot.model.jointPlacements[1].translation
-    away = float(np.linalg.norm(points - first, axis=1).max())
+    away = float(robot.distance_from_base(points).max())
     return {
         "limit_deg": finite(turning),
         "limit_m": finite(sliding),

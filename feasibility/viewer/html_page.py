@@ -57,7 +57,6 @@ def page(
     camera: Camera,
     *,
     animated: bool = False,
-    socket: str | None = None,
 ) -> str:
     """The page as HTML text.
 
@@ -66,14 +65,13 @@ def page(
         legend: title, text and colours of the overlay.
         camera: where it looks from at first.
         animated: offer a button that pauses and resumes the motion.
-        socket: path of a WebSocket on the page's own host that sends further commands.
     """
     return _TEMPLATE.format(
         title=html.escape(legend.title),
         legend=_legend(legend, animated),
         program=_program(),
         commands=_base64(_framed(pack(commands))),
-        setup=json.dumps({"socket": socket, **asdict(camera)}),
+        setup=json.dumps(asdict(camera)),
     )
 
 
@@ -190,7 +188,6 @@ async function start() {{
   viewer.set_dirty();
   controls(viewer);
   window.viewer = viewer;
-  if (setup.socket) viewer.connect("ws://" + location.host + setup.socket);
 }}
 function complain(error) {{
   const note = document.createElement("p");

@@ -148,8 +148,8 @@ def plot_transition(verdict: Verdict, edge: tuple[int, int] | None = None) -> Pl
 
 def cells_below(verdict: Verdict, walk: NDArray[np.float64]) -> NDArray[np.int64]:
     """The cell (k,) below the tool point at each row of a walk (k, n); -1 off the patch."""
-    kinematics = Kinematics(verdict.robot)
-    return verdict.cells.locate(np.array([kinematics.tool(q)[0] for q in walk]))
+    points, _ = Kinematics(verdict.robot).tools(walk)
+    return verdict.cells.locate(points)
 
 
 def unrolled_edges(verdict: Verdict) -> list[NDArray[np.float64]]:

@@ -105,8 +105,7 @@ def _timed(robot: Robot, trajectory: Trajectory) -> Motion:
     q, time = trajectory.q[kept], trajectory.time[kept] - trajectory.time[0]
     if time[-1] > LONGEST:
         time = time * (LONGEST / time[-1])
-    kinematics = Kinematics(robot)
-    points = np.array([kinematics.tool(row)[0] for row in q])
+    points, _ = Kinematics(robot).tools(q)
     return Motion(q, time, points, False, "coverage path")
 
 
@@ -133,9 +132,8 @@ def _move(
     robot: Robot, start: NDArray[np.float64], end: NDArray[np.float64], name: str, size: float
 ) -> Layer:
     """The tool's way in a move between patches."""
-    kinematics = Kinematics(robot)
     share = np.linspace(0.0, 1.0, 4 * DENSE)[:, None]
-    line = np.array([kinematics.tool(q)[0] for q in start + share * (end - start)])
+    line, _ = Kinematics(robot).tools(start + share * (end - start))
     path = f"/motion/move from patch {name}"
     vertices, faces = tubes([line], 0.05 * size)
     commands = (threejs.mesh(path, vertices, faces, RECONFIGURED, lit=False),)

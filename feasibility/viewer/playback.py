@@ -110,8 +110,7 @@ def paced(robot: Robot, walk: NDArray[np.float64], there_and_back: bool, label: 
     Where the tool stands still and only joints move, their motion counts: 1 rad as a twentieth of
     the arm's reach, so that nothing jumps.
     """
-    kinematics = Kinematics(robot)
-    points = np.array([kinematics.tool(q)[0] for q in walk])
+    points, _ = Kinematics(robot).tools(walk)
     reach = robot.reach if np.isfinite(robot.reach) else 1.0
     lever = np.where(robot.prismatic, 1.0, reach / 20.0)  # [m] or [m/rad]
     travel = np.hypot(

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
@@ -48,19 +48,9 @@ class View:
     notes: tuple[str, ...]
     """What could not be drawn as the URDF says."""
 
-    def html(self, socket: str | None = None) -> str:
-        """One self-contained page; it fetches nothing and needs no server.
-
-        Args:
-            socket: path of a WebSocket that the page shall listen to, for `show`.
-        """
-        return page(
-            self.commands,
-            self.legend,
-            self.camera,
-            animated=self.motion is not None,
-            socket=socket,
-        )
+    def html(self) -> str:
+        """One self-contained page; it fetches nothing and needs no server."""
+        return page(self.commands, self.legend, self.camera, animated=self.motion is not None)
 
     def save_html(self, path: str | os.PathLike[str]) -> Path:
         """Write the page to a file and return its path."""
@@ -70,14 +60,10 @@ class View:
 
     def show(self, open_browser: bool = True) -> LiveView:
         """Serve the page on 127.0.0.1 until the result is closed or this program ends."""
-        live = LiveView(self.html)
+        live = LiveView(self.html())
         if open_browser:
             live.open()
         return live
-
-    def pose(self, q: ArrayLike) -> list[Command]:
-        """Commands that put the arm into configuration q (n,): `live.send(view.pose(q))`."""
-        return robot_visuals.pose(self.robot, q)
 
     def _repr_html_(self) -> str:
         """The page inside a notebook's output; it stays there when the notebook is saved."""

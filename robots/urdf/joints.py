@@ -74,6 +74,13 @@ class JointInfo:
         """True for every kind but 'fixed'."""
         return self.kind != "fixed"
 
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Lower and upper, rad or m; infinite where `fault` says why there are none."""
+        if self.lower is None or self.upper is None:
+            return -math.inf, math.inf
+        return self.lower, self.upper
+
 
 @dataclass(frozen=True, slots=True)
 class _Range:

@@ -14,7 +14,7 @@ from xml.parsers import expat
 
 from coverable_errors import Fault
 from coverable_files import FileFault, read_regular, too_large
-from robots.robot import RobotError
+from robots.errors import RobotError
 
 MAX_BYTES = 8 * 2**20  # the largest URDF in example-robot-data has 0.2 MB
 MAX_ELEMENTS = 50_000  # the same file has 3,900

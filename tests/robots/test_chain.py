@@ -1,13 +1,14 @@
 """The compiled chain against Pinocchio, on every listed robot and on random chains."""
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
 from arm_urdfs import arm, joint, load_text, random_arm, random_q
 
 import robots.chain
-from robots import Chain, Kinematics, Robot, RobotError, frames, jacobians, list_robots, load_robot
+from robots import Kinematics, Robot, RobotError, frames, jacobians, list_robots, load_robot
 
 NAMES = [info.name for info in list_robots()]
 
@@ -24,7 +25,7 @@ def evaluate(chain, q):
 
 
 def check_against_pinocchio(robot: Robot, samples: int) -> None:
-    chain, authority = Chain.checked(robot), Kinematics(robot)
+    chain, authority = robot.chain, Kinematics(robot)
     rng = np.random.default_rng(7)
     for _ in range(samples):
         q = random_q(robot, rng)
@@ -64,7 +65,7 @@ def test_axes_that_are_almost_z_keep_their_tilt(tilt, sign, tmp_path):
 def test_frames_of_a_planar_arm_are_those_worked_out_by_hand(tmp_path):
     text = arm([joint(1), joint(2, xyz=(2, 0, 0)), joint(3, "fixed", xyz=(1, 0, 0))])
     robot = load_text(tmp_path, text, approach_axis=(1, 0, 0))
-    point, axis, point_rows, axis_rows = evaluate(Chain.of(robot), np.array([np.pi / 2, np.pi / 2]))
+    point, axis, point_rows, axis_rows = evaluate(robot.chain, np.array([np.pi / 2, np.pi / 2]))
     np.testing.assert_allclose(point, [-1, 2, 0], atol=1e-15)
     np.testing.assert_allclose(axis, [-1, 0, 0], atol=1e-15)
     np.testing.assert_allclose(point_rows, [[-2, 0], [-1, -1], [0, 0]], atol=1e-15)
@@ -74,11 +75,26 @@ def test_frames_of_a_planar_arm_are_those_worked_out_by_hand(tmp_path):
 def test_a_branched_model_is_refused():
     panda = load_robot("panda")
     with pytest.raises(RobotError, match="do not form one serial chain"):
-        Chain.of(dataclasses.replace(panda, tool_frame="panda_link3"))
+        _ = dataclasses.replace(panda, tool_frame="panda_link3").chain
 
 
 def test_a_chain_that_differs_from_pinocchio_is_refused(monkeypatch):
     monkeypatch.setattr(robots.chain, "_rotation_onto", lambda axis: np.eye(3))
-    Chain.checked(load_robot("panda"))  # all its axes are z
+    assert load_robot("panda").chain  # all its axes are z
     with pytest.raises(RobotError, match="differ by"):
-        Chain.checked(load_robot("ur5"))
+        _ = load_robot("ur5").chain
+
+
+def test_the_comparison_with_pinocchio_happens_once_for_each_robot(monkeypatch):
+    compared = []
+    tool = robots.chain.tool
+    monkeypatch.setattr(
+        robots.chain, "tool", lambda chain, q: compared.append(chain) or tool(chain, q)
+    )
+    robot = load_robot("panda")
+    assert robot.chain is robot.chain is compared[0]
+    assert len(compared) == robots.chain.SAMPLES
+    copy = pickle.loads(pickle.dumps(robot))
+    for value, expected in zip(copy.chain, robot.chain, strict=True):
+        np.testing.assert_array_equal(value, expected)
+    assert len(compared) == 2 * robots.chain.SAMPLES

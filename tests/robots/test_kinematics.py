@@ -51,9 +51,41 @@ def test_the_tool_moves_as_its_jacobian_says(seed, tmp_path):
     np.testing.assert_allclose(kinematics.tool_velocities(q, dq), expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("shapes", [((6,), (6,)), ((2, 6), (3, 6)), ((2, 5), (2, 5))])
-def test_velocities_of_the_wrong_shape_are_refused(shapes):
-    with pytest.raises(ValueError, match=r"q and dq must both have shape \(m, 6\)"):
+@pytest.mark.parametrize("name", ["puma560", "kinova", "z1"])
+def test_many_configurations_are_those_of_one_bit_for_bit(name):
+    robot = load_robot(name)
+    kinematics, rng = Kinematics(robot), np.random.default_rng(9)
+    q = np.array([random_q(robot, rng) for _ in range(20)])
+    points, axes = kinematics.tools(q)
+    for row, point, axis in zip(q, points, axes, strict=True):
+        expected_point, expected_axis = kinematics.tool(row)
+        np.testing.assert_array_equal(point, expected_point)
+        np.testing.assert_array_equal(axis, expected_axis)
+    assert [part.shape for part in kinematics.tools(q[:0])] == [(0, 3), (0, 3)]
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_twists_moved_to_the_tool_are_its_jacobian(seed, tmp_path):
+    rng = np.random.default_rng(700 + seed)
+    robot = load_text(tmp_path, random_arm(rng), approach_axis=rng.normal(size=3))
+    kinematics = Kinematics(robot)
+    q = np.array([random_q(robot, rng) for _ in range(3)])
+    for row, twists, point in zip(q, kinematics.twists(q), kinematics.tools(q)[0], strict=True):
+        expected = kinematics.jacobians(row)[0]
+        moved = twists[:3] + np.cross(twists[3:], point, axis=0)
+        np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("shapes", "message"),
+    [
+        (((6,), (6,)), r"q must have shape \(m, 6\), got \(6,\)"),
+        (((2, 5), (2, 5)), r"q must have shape \(m, 6\), got \(2, 5\)"),
+        (((2, 6), (3, 6)), r"dq must have the shape of q, \(2, 6\), got \(3, 6\)"),
+    ],
+)
+def test_rows_of_the_wrong_shape_are_refused(shapes, message):
+    with pytest.raises(ValueError, match=message):
         Kinematics(load_robot("puma560")).tool_velocities(*map(np.zeros, shapes))
 
 

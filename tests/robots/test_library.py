@@ -269,10 +269,10 @@ def test_locks_that_make_no_sense_are_refused(lock, message):
         load_robot("panda", lock=lock)
 
 
-def test_a_mimic_joint_on_the_way_has_to_be_held(tmp_path):
+def test_a_mimic_joint_on_the_chain_has_to_be_held(tmp_path):
     mimic = '<mimic joint="j1" multiplier="2" offset="0.1"/>'
     text = arm([joint(1), joint(2, extra=mimic), joint(3, xyz=(1, 0, 0))])
-    with pytest.raises(RobotError, match="'j2' on the way to 'l3' mimics 'j1'; lock one"):
+    with pytest.raises(RobotError, match="'j2' on the chain to 'l3' mimics 'j1'; lock one"):
         load_text(tmp_path, text)
     assert load_text(tmp_path, text, lock={"j2": 0.5}).joint_names == ("j1", "j3")
     held = load_text(tmp_path, text, lock={"j1": 0.5})

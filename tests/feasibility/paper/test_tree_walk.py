@@ -11,9 +11,9 @@ import pytest
 from feasibility import Search, Task, Verdict, greedy_check
 from feasibility.paper import tree_walk
 from feasibility.paper.jcell_steps import Steps
-from feasibility.paper.tree_replay import Borders, tool_poses
+from feasibility.paper.tree_replay import Borders
 from feasibility.reports.verdict import as_csv
-from robots import load_robot
+from robots import Kinematics, load_robot
 from surfaces import sphere
 
 PUMA = load_robot("puma560", limits="set-1")
@@ -51,7 +51,7 @@ def test_its_csv_is_one_motion_that_enters_every_cell(moves: str, step: float) -
 
     steps = Steps.of(PUMA, DOME.closed_form, TASK, search)
     assert ((q >= PUMA.lower) & (q <= PUMA.upper)).all()
-    points, axes = tool_poses(PUMA, q)
+    points, axes = Kinematics(PUMA).tools(q)
     closest_point = DOME.surface.closest(points)
     sign = DOME.surface.side_sign
     assert closest_point.inside.all()
@@ -67,7 +67,7 @@ def test_a_row_is_at_a_cell_only_where_the_tool_is_at_its_centre() -> None:
     verdict = greedy_check(PUMA, DOME, TASK, Search(method="greedy", step_deg=0.05))
     walk = tree_walk(verdict)
     assert walk is not None
-    points, _ = tool_poses(PUMA, walk.q)
+    points, _ = Kinematics(PUMA).tools(walk.q)
     away = np.linalg.norm(points[:, None] - TASK.targets(DOME).points, axis=2)
     np.testing.assert_array_equal(walk.cell >= 0, away.min(axis=1) <= 1e-3)
     at = np.flatnonzero(walk.cell >= 0)

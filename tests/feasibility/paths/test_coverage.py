@@ -152,8 +152,7 @@ def test_the_figures_of_a_path_measured_again(name):
     # Lengths: straight from foot to foot along a much denser walk.
     t = np.arange(16)[:, None] / 16.0
     dense = walk.q[:-1, None] * (1 - t) + walk.q[1:, None] * t
-    kinematics = Kinematics(robot)
-    points = np.array([kinematics.tool(q)[0] for q in [*dense.reshape(-1, robot.n), walk.q[-1]]])
+    points, _ = Kinematics(robot).tools(np.vstack([dense.reshape(-1, robot.n), walk.q[-1:]]))
     closest_point = verdict.cells.surface.closest(points)
     way = np.linalg.norm(
         np.diff(points - closest_point.height[:, None] * closest_point.normal, axis=0), axis=1

@@ -1,0 +1,9 @@
+"""The error of this package; a module of its own, so that all others may import it."""
+
+from __future__ import annotations
+
+from coverable_errors import CoverableError
+
+
+class RobotError(CoverableError):
+    """A robot that cannot be used as asked: what was wrong, where, and what would do."""
