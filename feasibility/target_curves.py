@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from feasibility.task import Task
 from surfaces import Cells
-from surfaces.meshes import MeshSurface
 
 TELLING = 0.03  # [1] a course whose normal strays no further knows how the surface bends
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
@@ -101,25 +100,15 @@ def beside_facets(
         everywhere: look at the whole mesh, which takes long at large standoffs; otherwise at the
             cells of the course and at those that touch both.
     """
-    surface = cells.surface
-    if not isinstance(surface, MeshSurface):
-        raise TypeError("the cells are not of a mesh")
-
-    def nearest(points: NDArray[np.float64]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        if everywhere:
-            return surface.nearest(points)
-        faces, weights = surface.faces_beneath(cells, cells.pairs[curves], points[:, None])
-        return faces[:, 0], weights[:, 0]
-
+    pairs = cells.pairs[curves]
     point, normal = cells.curves.at(curves, t)
-    target = point + surface.side_sign * standoff * normal
-    away, direction = surface.beside(target, *nearest(target))
+    target = point + cells.surface.side_sign * standoff * normal
+    away, direction = cells.distances(pairs, target, everywhere)
     leans = np.zeros(len(t))
     off = np.abs(standoff - away) if standoff > 0.0 else leans
-    if surface.creased:
-        strip = surface.from_crease(*nearest(point))
-        some = np.isfinite(strip) & (strip >= tolerance - standoff)
-        leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
+    strip = cells.crease_distances(pairs, point, everywhere)
+    some = np.isfinite(strip) & (strip >= tolerance - standoff)
+    leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
     return BesideFacets(off, leans, away)
 
 
@@ -143,10 +132,9 @@ def target_curves(cells: Cells, standoff: float, tolerance: float) -> TargetCurv
     derivative_bounds[:, 0] += standoff * derivative_bounds[:, 1]
     derivative_bounds[np.repeat(folded, np.diff(curves.first))] = np.inf
     # To the side of a course the normal may turn faster than along it.
-    max_curvature = cells.surface.max_curvature(cells, height)
-    if standoff > 0.0 and isinstance(cells.surface, MeshSurface):
-        # Over an edge it turns as over a ball of the standoff.
-        edge = np.where(cells.surface.creased_cells(cells), 1.0 / max(standoff, tolerance), 0.0)
+    max_curvature = cells.parallel_curvature(height)
+    if standoff > 0.0:  # over an edge it turns as over a ball of the standoff
+        edge = np.where(cells.creased, 1.0 / max(standoff, tolerance), 0.0)
         max_curvature = np.maximum(max_curvature, edge)
     across = max_curvature[cells.pairs].max(axis=1)
     curvature = np.maximum(curves.curvature(height), np.repeat(across, np.diff(curves.first)))

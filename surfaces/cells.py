@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours
+from surfaces.cell_curves import CellCurves
 from surfaces.surface import Surface
 
 if TYPE_CHECKING:
     import networkx as nx
 
-    from surfaces.cell_curves import CellCurves
+Array = NDArray[np.float64]
 
 
 class Triangles(NamedTuple):
@@ -100,17 +101,76 @@ class Cells(ABC):
         pairs.flags.writeable = False
         return pairs
 
-    @cached_property
+    @property
+    @abstractmethod
     def curves(self) -> CellCurves:
-        """The ways between the centres of the M `pairs`, as smooth curves."""
-        from surfaces.cell_curves import curves_of
+        """The smooth curves between the centres of the M `pairs`."""
 
-        return curves_of(self)
+    @abstractmethod
+    def trace(self, pairs: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+        """Curves on the surface from cell centre to cell centre, to which `curves` are fitted.
+
+        Args:
+            pairs: (m, 2) rows of `pairs`.
+            t: (k,) places on the curve, 0 at the first cell's centre, 1 at the second's.
+
+        Returns:
+            Points (m, k, 3) m and outward unit normals (m, k, 3); both continuous in t.
+        """
+
+    def closest_along(self, pairs: NDArray[np.int64], points: Array) -> tuple[Array, Array]:
+        """The points of the surface closest to points near the curve between two cells.
+
+        Args:
+            pairs: (m, 2) rows of `pairs`.
+            points: (m, k, 3) m.
+
+        Returns:
+            Points (m, k, 3) m and outward unit normals (m, k, 3).
+        """
+        found = self.surface.closest(points)
+        return points - found.height[..., None] * found.normal, found.normal
+
+    def smoothed(self, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """(m,) where `curves` are smoother than the surface; `closest_along` gives the error."""
+        return np.full(len(pairs), self.surface.mean_edge_length > 0.0)
+
+    @abstractmethod
+    def parallel_curvature(self, height: float) -> Array:
+        """(N,) 1/m, the largest curvature of the parallel surface at a signed height (m)."""
 
     @cached_property
-    def max_curvature(self) -> NDArray[np.float64]:
-        """(N,) 1/m; see `Surface.max_curvature`."""
-        return self.surface.max_curvature(self)
+    def max_curvature(self) -> Array:
+        """(N,) 1/m, the largest curvature of the surface in each cell, in any direction."""
+        return self.parallel_curvature(0.0)
+
+    @property
+    def creased(self) -> NDArray[np.bool_]:
+        """(N,) cells with a strip along a crease where the normal turns; only meshes have them."""
+        return np.zeros(len(self), dtype=bool)
+
+    def distances(
+        self, pairs: NDArray[np.int64], points: Array, everywhere: bool
+    ) -> tuple[Array, Array]:
+        """Distances (k,) m of points from the surface, and outward unit vectors along them (k, 3).
+
+        On a mesh these are measured from the triangles, without interpolated normals.
+
+        Args:
+            pairs: (k, 2) rows of `pairs`, near whose curve each point lies.
+            points: (k, 3) m.
+            everywhere: measure from all of the surface, which takes long on a mesh at large
+                distances; otherwise from the two cells and those that touch both.
+        """
+        found = self.surface.closest(points)
+        return np.abs(found.height), found.normal
+
+    def crease_distances(self, pairs: NDArray[np.int64], points: Array, everywhere: bool) -> Array:
+        """(k,) m, how far points of the surface are from the crease on whose strip they lie.
+
+        An upper bound; inf off the strips. See `distances` for the arguments.
+        """
+        return np.full(len(points), np.inf)
 
     def graph(self) -> nx.Graph:
         """Adjacency as a graph: nodes are flat indices, edges are `pairs`."""

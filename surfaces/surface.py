@@ -1,19 +1,16 @@
-"""Surface: what is to be covered, with its pose and working side, and what can be asked of it."""
+"""Surface: what is to be covered, with its pose and working side, and its closest points."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, ClassVar, Literal, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError, CoverableError
-
-if TYPE_CHECKING:
-    from surfaces.cells import Cells
 
 Side = Literal["inside", "outside"]
 TURN_TOLERANCE = 1e-9  # [rad]: a range this close to a full turn is one
@@ -25,10 +22,10 @@ class SurfaceError(CoverableError):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ClosestPoint:
-    """The points of a surface nearest to given points; every array has the points' leading shape.
+    """The points of a surface closest to given points; every array has the points' leading shape.
 
-    The foot lies on the whole surface that a patch is cut from; `inside` tells whether it lies
-    on the patch. A mesh has nothing beyond its border: its foot is always its nearest point.
+    They lie on the unbounded surface that a patch is cut from; `inside` is True where they lie on
+    the patch. A mesh has nothing beyond its border: there they are always inside.
     """
 
     u: NDArray[np.float64]
@@ -37,19 +34,19 @@ class ClosestPoint:
     v: NDArray[np.float64]
     """Second parameter, likewise."""
     height: NDArray[np.float64]
-    """m, signed distance along the outward normal: point = foot + height * normal."""
+    """m, signed distance along the outward normal: point = closest point + height * normal."""
     normal: NDArray[np.float64]
-    """(..., 3) outward unit normal at the foot."""
+    """(..., 3) outward unit normal at the closest point."""
     inside: NDArray[np.bool_]
-    """True where the foot lies on the patch, and the normal there leads to the point."""
+    """True where it lies on the patch, and the normal there leads to the given point."""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Surface(ABC):
     """A surface placed in the frame of the URDF's root link.
 
-    All methods are vectorised and speak the root frame. Surfaces are values: they pickle and are
-    never changed in place. `surfaces.sphere` and its fellows build them from checked numbers.
+    All methods are vectorised and use the root frame. Surfaces are values: they pickle and are
+    never changed in place. `surfaces.sphere` and the like build them from checked numbers.
     """
 
     kind: ClassVar[str]
@@ -89,54 +86,10 @@ class Surface(ABC):
 
     @abstractmethod
     def closest(self, points: ArrayLike) -> ClosestPoint:
-        """The feet of `points` (..., 3) m on the surface; see `ClosestPoint`.
+        """The points of the surface closest to `points` (..., 3) m; see `ClosestPoint`.
 
         Raises:
             ArgumentError: `points` does not end in an axis of length 3.
-        """
-
-    @abstractmethod
-    def trace(
-        self, cells: Cells, pairs: NDArray[np.int64], t: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Ways on the surface from cell centre to cell centre.
-
-        Args:
-            cells: cells of this surface.
-            pairs: (m, 2) rows of `cells.pairs`.
-            t: (k,) places on the way, 0 at the first cell's centre, 1 at the second's.
-
-        Returns:
-            Points (m, k, 3) m and outward unit normals (m, k, 3); both continuous in t.
-        """
-
-    def beneath(
-        self, cells: Cells, pairs: NDArray[np.int64], points: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """The places of the surface nearest to points near the way between two cells.
-
-        Args:
-            cells: cells of this surface.
-            pairs: (m, 2) rows of `cells.pairs`.
-            points: (m, k, 3) m.
-
-        Returns:
-            Places (m, k, 3) m and outward unit normals (m, k, 3).
-        """
-        closest_point = self.closest(points)
-        return points - closest_point.height[..., None] * closest_point.normal, closest_point.normal
-
-    def smoothed(self, cells: Cells, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """(m,) where ways are smoother than the surface, so that `beneath` tells how far off."""
-        return np.full(len(pairs), self.mean_edge_length > 0.0)
-
-    @abstractmethod
-    def max_curvature(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
-        """(N,) 1/m, how fast the normal turns in each cell, in the sharpest direction.
-
-        Args:
-            cells: cells of this surface.
-            height: signed height (m) of the parallel surface whose metres are meant.
         """
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
@@ -158,22 +111,24 @@ def points_of(points: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def sharpest_turn(slopes: NDArray[np.float64], turns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(k,) how fast a normal turns, at most, for each metre of the surface that it belongs to.
+def max_principal_curvature(
+    steps: NDArray[np.float64], turns: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(k,) 1/m, the larger principal curvature by magnitude: how fast a normal turns, at most.
 
     Args:
-        slopes: (k, 2, 3) two steps on the surface.
+        steps: (k, 2, 3) m, two steps on the surface.
         turns: (k, 2, 3) what the normal changes by along these steps.
 
-    The square of what is wanted is the larger eigenvalue of [[e, f], [f, g]]^-1 [[a, b], [b, c]],
-    where e, f, g are the products x.x, x.y, y.y of the steps x and y; a, b, c those of the turns.
+    Its square is the larger eigenvalue of [[e, f], [f, g]]^-1 [[a, b], [b, c]], where e, f, g are
+    the products x.x, x.y, y.y of the steps x and y; a, b, c those of the turns.
     """
     (e, f, g), (a, b, c) = (
         [(pair[:, i] * pair[:, j]).sum(axis=1) for i, j in ((0, 0), (0, 1), (1, 1))]
-        for pair in (slopes, turns)
+        for pair in (steps, turns)
     )
     area = np.maximum(e * g - f * f, 1e-300)
-    with np.errstate(over="ignore", invalid="ignore"):  # a surface that stands still
+    with np.errstate(over="ignore", invalid="ignore"):  # both steps are zero
         half = 0.5 * (a * g - 2.0 * b * f + c * e) / area
         product = (a * c - b * b) / area
         largest = half + np.sqrt(np.maximum(half * half - product, 0.0))

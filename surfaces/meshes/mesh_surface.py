@@ -13,17 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from surfaces.arguments import Checks
 from surfaces.meshes.normals import WIDTH, blended, carried, corner_normals, sectors, unit
 from surfaces.meshes.triangle_mesh import TriangleMesh
-from surfaces.surface import ClosestPoint, Side, Surface, points_of, sharpest_turn
+from surfaces.surface import ClosestPoint, Side, Surface, points_of
 
 if TYPE_CHECKING:
-    from surfaces.cells import Cells
     from surfaces.meshes.cells import MeshCells
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _ORIGIN = (0.0, 0.0, 0.0)
-JUMP = 3.0  # times as far as the line goes: then nearest places jump
 ON = 1e-9  # [1] of the mean edge: so near to a face is on it
 FIRST_CANDIDATES = 8  # faces looked at for each point before it is known that they are enough
 
@@ -53,7 +51,9 @@ class MeshSurface(Surface):
     @property
     def notes(self) -> tuple[str, ...]:
         """What was repaired in the mesh, and what to know about it."""
-        return self.mesh.notes
+        from surfaces.meshes.repair import notes_of
+
+        return notes_of(self.mesh)
 
     @cached_property
     def mean_edge_length(self) -> float:
@@ -97,7 +97,7 @@ class MeshSurface(Surface):
         interpolation: over an edge the direction to the edge; on a face the face's own normal.
         """
         local = (points - self.position) @ self.rotation
-        off = local - np.einsum("kc,kci->ki", weights, self._balls[0][face])
+        off = local - np.einsum("kc,kci->ki", weights, self.face_balls[0][face])
         distance = np.linalg.norm(off, axis=1)
         # Not by the face's own normal: beyond a sharp edge a point may lie under its plane.
         mean = self.normals_at(face, weights) @ self.rotation
@@ -107,11 +107,6 @@ class MeshSurface(Surface):
         flat = self.mesh.face_normals[face]
         return distance, np.where(on[:, None], flat, direction) @ self.rotation.T
 
-    @property
-    def creased(self) -> bool:
-        """Are there strips along creases, where the normal turns?"""
-        return bool(self._rims.any())
-
     def from_crease(self, face: Ints, weights: Array) -> Array:
         """(k,) m, how far off a crease places of faces are, at most.
 
@@ -119,27 +114,22 @@ class MeshSurface(Surface):
         """
         away = np.full(len(face), np.inf)
         some = np.flatnonzero(self.rim_share(face, weights) > 0.0)
-        corners, rims = self._balls[0][face[some]], self._rims[face[some]]
+        corners, rims = self.face_balls[0][face[some]], self.on_crease[face[some]]
         parts = weights[some] * rims
         near = np.einsum("kc,kci->ki", parts / parts.sum(axis=1, keepdims=True), corners)
         off = np.linalg.norm(np.einsum("kc,kci->ki", weights[some], corners) - near, axis=1)
         # A face with three corners on creases may have none of its edges on one.
-        away[some] = np.where(rims.all(axis=1), 2.0 * self._balls[2][face[some]], off)
+        away[some] = np.where(rims.all(axis=1), 2.0 * self.face_balls[2][face[some]], off)
         return away
-
-    def creased_cells(self, cells: Cells) -> NDArray[np.bool_]:
-        """(N,) which of the cells have such a strip."""
-        from surfaces.meshes.cells import MeshCells
-
-        if not isinstance(cells, MeshCells):
-            raise TypeError("the cells are not of a mesh")
-        creased = np.zeros(len(cells), dtype=bool)
-        creased[cells.labels[self._rims.any(axis=1)]] = True
-        return creased
 
     def faces_below(self, points: ArrayLike) -> Ints:
         """(k,) the face nearest to each of `points` (k, 3) m."""
         return self.nearest(points_of(points))[0]
+
+    def points_at(self, face: Ints, weights: Array) -> Array:
+        """(..., 3) m, places of faces by their weights, in the root frame."""
+        local = np.einsum("...c,...ci->...i", weights, self.face_balls[0][face])
+        return local @ self.rotation.T + self.position
 
     def normals_at(self, face: Ints, weights: Array) -> Array:
         """(..., 3) unit normals in the root frame at places of faces, by their weights."""
@@ -151,64 +141,8 @@ class MeshSurface(Surface):
 
     def rim_share(self, face: Ints, weights: Array) -> Array:
         """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it."""
-        along = (weights * self._rims[face]).sum(axis=-1)  # 1 on the crease
+        along = (weights * self.on_crease[face]).sum(axis=-1)  # 1 on the crease
         return np.asarray(np.clip(1.0 - (1.0 - along) / WIDTH, 0.0, 1.0))
-
-    def trace(self, cells: Cells, pairs: Ints, t: Array) -> tuple[Array, Array]:
-        """See `Surface.trace`: the nearest places of straight lines on the faces of both cells.
-
-        Where these jump, because the surface is strongly bent or creased between the centres, the
-        line is led over the middle of the border that the cells share.
-        """
-        from surfaces.meshes.cells import MeshCells
-
-        if not isinstance(cells, MeshCells):
-            raise TypeError("the cells are not of a mesh")
-        start, end = cells.centres[pairs[:, 0]], cells.centres[pairs[:, 1]]
-        points, normals = self.beneath(
-            cells, pairs, _bent_lines(start, 0.5 * (start + end), end, t)
-        )
-        steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
-        even = np.linalg.norm(end - start, axis=1)[:, None] * np.diff(t)
-        jumps = (steps > JUMP * even).any(axis=1)
-        over = pairs[jumps]
-        bent = _bent_lines(start[jumps], cells.crossings(over), end[jumps], t)
-        points[jumps], normals[jumps] = self.beneath(cells, over, bent)
-        return points, normals
-
-    def beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Array, Array]:
-        """See `Surface.beneath`: on the two cells and those that touch both."""
-        faces, weights = self.faces_beneath(cells, pairs, points)
-        found = np.einsum("mkc,mkci->mki", weights, self._balls[0][faces])
-        return found @ self.rotation.T + self.position, self.normals_at(faces, weights)
-
-    def faces_beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Ints, Array]:
-        """The same as faces (m, k) and weights (m, k, 3)."""
-        from surfaces.meshes.cells import MeshCells
-        from surfaces.meshes.closest_point import put_on_cells
-
-        if not isinstance(cells, MeshCells):
-            raise TypeError("the cells are not of a mesh")
-        local = np.ascontiguousarray((points - self.position) @ self.rotation)
-        faces = np.empty(points.shape[:2], dtype=np.int64)
-        weights = np.empty((*points.shape[:2], 3))
-        members, indptr = cells.members
-        pairs = np.ascontiguousarray(pairs)
-        near_indptr, near = cells.neighbours
-        put_on_cells(*self._balls, members, indptr, near, near_indptr, pairs, local, faces, weights)
-        return faces, weights
-
-    def max_curvature(self, cells: Cells, height: float = 0.0) -> Array:
-        """See `Surface.max_curvature`: of the face of each cell where the normal turns fastest."""
-        from surfaces.meshes.cells import MeshCells
-
-        if not isinstance(cells, MeshCells):
-            raise TypeError("the cells are not of a mesh")
-        sides, turns = self._sides
-        face = sharpest_turn(sides + height * turns, turns)
-        sharpest = np.zeros(len(cells))
-        np.maximum.at(sharpest, cells.labels, face)
-        return sharpest
 
     def cells(self, count: int | None = None, size: float | None = None) -> MeshCells:
         """Cut the mesh into connected cells of even area.
@@ -243,26 +177,26 @@ class MeshSurface(Surface):
         return MeshSurface(self.rotation, self.position, self.side, mesh, own, rim)
 
     @cached_property
-    def _rims(self) -> NDArray[np.bool_]:
-        """(F, 3) corners that lie on a crease."""
+    def on_crease(self) -> NDArray[np.bool_]:
+        """(F, 3) corners of faces that lie on a crease."""
         return np.asarray((self.corner_normals != self.rim_normals).any(axis=2))
 
     @cached_property
-    def _sides(self) -> tuple[Array, Array]:
+    def turns(self) -> tuple[Array, Array]:
         """Two sides of each face (F, 2, 3) m, and what the normal turns by along them, own frame.
 
         On the strip along a crease it turns as over a face that is so much smaller; half way from
         one unit normal to the other, their mean is shorter, and turns faster.
         """
-        corners = self._balls[0]
+        corners = self.face_balls[0]
         halves = 0.5 * np.linalg.norm(self.corner_normals + self.rim_normals, axis=2).min(axis=1)
         strip = WIDTH / (1.0 + WIDTH) * halves
-        size = np.where(self._rims.any(axis=1), strip, 1.0)[:, None, None]
+        size = np.where(self.on_crease.any(axis=1), strip, 1.0)[:, None, None]
         turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]
         return size * (corners[:, 1:] - corners[:, :1]), turns
 
     @cached_property
-    def _balls(self) -> tuple[Array, Array, Array]:
+    def face_balls(self) -> tuple[Array, Array, Array]:
         """Corners (F, 3, 3), middles (F, 3) and radii (F,) of the faces, m, in the own frame."""
         corners = self.mesh.vertices[self.mesh.faces]
         middles = corners.mean(axis=1)
@@ -274,7 +208,7 @@ class MeshSurface(Surface):
         """The middles of the faces, to be asked for neighbours."""
         from scipy.spatial import cKDTree
 
-        return cKDTree(self._balls[1])
+        return cKDTree(self.face_balls[1])
 
     def _nearest(self, points: Array) -> tuple[Ints, Array]:
         """Nearest face (k,) and weights (k, 3) of its nearest point, of points in the own frame."""
@@ -283,7 +217,7 @@ class MeshSurface(Surface):
         faces = np.full(len(points), -1, dtype=np.int64)
         weights = np.full((len(points), 3), np.nan)
         left, wanted = np.flatnonzero(np.isfinite(points).all(axis=1)), FIRST_CANDIDATES
-        corners, middles, radii = self._balls
+        corners, middles, radii = self.face_balls
         while len(left):
             wanted = min(wanted, len(middles))
             away, some = self._tree.query(points[left], k=wanted)
@@ -306,17 +240,6 @@ class MeshSurface(Surface):
     def __repr__(self) -> str:
         """One line."""
         return f"mesh({self.mesh!r}, side={self.side!r}, position={self.position.tolist()})"
-
-
-def _bent_lines(start: Array, middle: Array, end: Array, t: Array) -> Array:
-    """(m, k, 3) points at t (k,) of m lines that bend in the middle, at even speed."""
-    first = np.linalg.norm(middle - start, axis=1)
-    second = np.linalg.norm(end - middle, axis=1)
-    share = (first / np.maximum(first + second, 1e-300))[:, None]
-    before = np.clip(t / np.maximum(share, 1e-300), 0.0, 1.0)[..., None]
-    after = np.clip((t - share) / np.maximum(1.0 - share, 1e-300), 0.0, 1.0)[..., None]
-    start, middle, end = start[:, None], middle[:, None], end[:, None]
-    return np.asarray(start + before * (middle - start) + after * (end - middle))
 
 
 def mesh(

@@ -111,13 +111,6 @@ class TriangleMesh:
         """(F,) number of the connected piece of each face; 0 is the piece of largest area."""
         return piece_numbers(self.edges.faces, self.face_areas)
 
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What was repaired or cut, and what to know about the surface as it stands."""
-        from surfaces.meshes.repair import remarks
-
-        return (*self.history, *remarks(self))
-
 
 def doubled_areas(vertices: Floats, faces: Ints) -> Floats:
     """(F, 3) m^2: the normals of the faces, as long as twice their areas."""

@@ -1,7 +1,8 @@
-"""The surface as compiled loops see it: the foot of a point, and the cell it falls in.
+"""Patches as compiled loops see them: the closest point to a point, and the cell it falls in.
 
-One implementation serves `ClosedFormPatch.closest` and the search kernels alike. A new kind of surface
-adds a code, a `_..._foot` function in its own frame, and a branch in `closest_on_patch`.
+One implementation serves `ClosedFormPatch.closest` and the search kernels alike. A new kind of
+surface adds a code, a `_closest_on_...` function in its own frame, and a branch in
+`closest_on_patch`.
 """
 
 from __future__ import annotations
@@ -13,12 +14,12 @@ import numpy as np
 from numba import njit
 
 PLANE, SPHERE, CYLINDER, HYPERBOLOID = 0, 1, 2, 3
-EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lies on it
+EDGE = 1e-9  # [rad], [m]: a point that misses the patch by no more than this lies on it
 _TURN = 2.0 * math.pi
 
 
 class PatchKernel(NamedTuple):
-    """A patch of a surface, cut into cells; a plain tuple, as numba likes it.
+    """A patch of a surface, cut into cells, as a plain tuple for numba.
 
     It holds no arrays: numba counts references to an array whenever it is read out of a tuple,
     and that took longer than the geometry.
@@ -57,10 +58,10 @@ def wrap(angle, low, high):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _closest_on_sphere(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
-    """Foot on the sphere about the origin: u, v, height, normal, in its own frame."""
+    """Closest point on the sphere about the origin: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     distance = math.hypot(rho, z)
-    if distance == 0.0:  # every point is equally near: take the patch's first corner
+    if distance == 0.0:  # all points are equally close: take the patch's first corner
         u, v = low[0], low[1]
         s = math.sin(u)
         return u, v, -radius, s * math.cos(v), s * math.sin(v), math.cos(u)
@@ -73,7 +74,7 @@ def _closest_on_sphere(radius, x, y, z, low, high):  # type: ignore[no-untyped-d
 
 @njit(cache=True, error_model="numpy")
 def _closest_on_cylinder(radius, x, y, z, low, high):  # type: ignore[no-untyped-def]
-    """Foot on the cylinder about z: u, v, height, normal, in its own frame."""
+    """Closest point on the cylinder about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     if rho == 0.0:
         u = low[0]
@@ -83,10 +84,10 @@ def _closest_on_cylinder(radius, x, y, z, low, high):  # type: ignore[no-untyped
 
 @njit(cache=True, error_model="numpy")
 def closest_on_hyperbola(waist, slope, rho, z):  # type: ignore[no-untyped-def]
-    """Abscissa t of the point of r(t) = sqrt(waist^2 + slope^2 t^2) nearest to (z, rho).
+    """Abscissa t of the point of r(t) = sqrt(waist^2 + slope^2 t^2) closest to (z, rho).
 
     It is a root of f(t) = (1 + s^2) t - s^2 rho t / r(t) - z. For z >= 0, f is convex on t >= 0
-    with f(0) <= 0, so it has one root there where it rises, and the nearest point is that one.
+    with f(0) <= 0, so it has one root there where it rises, and the closest point is that one.
     Newton from a bound on its right falls onto it monotonically, and stops when rounding ends
     the fall.
     """
@@ -109,7 +110,7 @@ def closest_on_hyperbola(waist, slope, rho, z):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):  # type: ignore[no-untyped-def]
-    """Foot on the hyperboloid of one sheet about z: u, v, height, normal, in its own frame."""
+    """Closest point on the hyperboloid about z: u, v, height, normal, in its own frame."""
     rho = math.hypot(x, y)
     slope = waist / flare
     t = closest_on_hyperbola(waist, slope, rho, z)
@@ -127,11 +128,11 @@ def _closest_on_hyperboloid(waist, flare, x, y, z, low, high):  # type: ignore[n
 
 
 @njit(cache=True, error_model="numpy")
-def closest_on_patch(patch_kernel, x, y, z):  # type: ignore[no-untyped-def]
-    """The point of the surface nearest to (x, y, z), all in the root frame.
+def closest_on_patch(patch, x, y, z):  # type: ignore[no-untyped-def]
+    """The point of the surface closest to (x, y, z), all in the root frame.
 
     Args:
-        chart: a `PatchKernel`.
+        patch: a `PatchKernel`.
         x: m, as y and z.
         y: m.
         z: m.
@@ -141,25 +142,20 @@ def closest_on_patch(patch_kernel, x, y, z):  # type: ignore[no-untyped-def]
         range, or stays outside it if no turn brings it in), signed height along the outward
         normal (m), and that unit normal.
     """
-    r, shape, low, high = (
-        patch_kernel.rotation,
-        patch_kernel.shape,
-        patch_kernel.low,
-        patch_kernel.high,
-    )
-    dx = x - patch_kernel.position[0]
-    dy = y - patch_kernel.position[1]
-    dz = z - patch_kernel.position[2]
+    r, shape, low, high = patch.rotation, patch.shape, patch.low, patch.high
+    dx = x - patch.position[0]
+    dy = y - patch.position[1]
+    dz = z - patch.position[2]
     a = r[0] * dx + r[3] * dy + r[6] * dz
     b = r[1] * dx + r[4] * dy + r[7] * dz
     c = r[2] * dx + r[5] * dy + r[8] * dz
-    if patch_kernel.code == SPHERE:
+    if patch.code == SPHERE:
         u, v, height, na, nb, nc = _closest_on_sphere(shape[0], a, b, c, low, high)
-    elif patch_kernel.code == CYLINDER:
+    elif patch.code == CYLINDER:
         u, v, height, na, nb, nc = _closest_on_cylinder(shape[0], a, b, c, low, high)
-    elif patch_kernel.code == HYPERBOLOID:
+    elif patch.code == HYPERBOLOID:
         u, v, height, na, nb, nc = _closest_on_hyperboloid(shape[0], shape[1], a, b, c, low, high)
-    elif patch_kernel.code == PLANE:
+    elif patch.code == PLANE:
         u, v, height, na, nb, nc = a, b, c, 0.0, 0.0, 1.0
     else:
         u, v, height, na, nb, nc = math.nan, math.nan, math.nan, math.nan, math.nan, math.nan
@@ -174,76 +170,27 @@ def closest_on_patch(patch_kernel, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def spot(patch_kernel, u, v):  # type: ignore[no-untyped-def]
-    """The point of the surface at parameters u, v (rad or m), and the normal there.
-
-    Returns:
-        (x, y, z, nx, ny, nz): the point (m) and the outward unit normal, in the root frame.
-    """
-    r, shape, position = patch_kernel.rotation, patch_kernel.shape, patch_kernel.position
-    if patch_kernel.code == SPHERE:
-        s = math.sin(u)
-        na, nb, nc = s * math.cos(v), s * math.sin(v), math.cos(u)
-        a, b, c = shape[0] * na, shape[0] * nb, shape[0] * nc
-    elif patch_kernel.code == CYLINDER:
-        na, nb, nc = math.cos(u), math.sin(u), 0.0
-        a, b, c = shape[0] * na, shape[0] * nb, v
-    elif patch_kernel.code == HYPERBOLOID:
-        slope = shape[0] / shape[1]
-        radius = math.sqrt(shape[0] * shape[0] + slope * slope * v * v)
-        rise = slope * slope * v / radius
-        length = math.sqrt(1.0 + rise * rise)
-        na, nb, nc = math.cos(u) / length, math.sin(u) / length, -rise / length
-        a, b, c = radius * math.cos(u), radius * math.sin(u), v
-    elif patch_kernel.code == PLANE:
-        na, nb, nc = 0.0, 0.0, 1.0
-        a, b, c = u, v, 0.0
-    else:
-        na, nb, nc = math.nan, math.nan, math.nan
-        a, b, c = math.nan, math.nan, math.nan
-    return (
-        position[0] + r[0] * a + r[1] * b + r[2] * c,
-        position[1] + r[3] * a + r[4] * b + r[5] * c,
-        position[2] + r[6] * a + r[7] * b + r[8] * c,
-        r[0] * na + r[1] * nb + r[2] * nc,
-        r[3] * na + r[4] * nb + r[5] * nc,
-        r[6] * na + r[7] * nb + r[8] * nc,
-    )
-
-
-@njit(cache=True, error_model="numpy")
-def on_patch(patch_kernel, u, v):  # type: ignore[no-untyped-def]
-    """True where u and v (rad or m, wrapped as `closest_on_patch` returns them) lie in the patch's ranges."""
-    u0, u1, v0, v1 = (
-        patch_kernel.low[0],
-        patch_kernel.high[0],
-        patch_kernel.low[1],
-        patch_kernel.high[1],
-    )
+def on_patch(patch, u, v):  # type: ignore[no-untyped-def]
+    """True where u and v (rad or m, as `closest_on_patch` wraps them) lie in the patch's ranges."""
+    (u0, v0), (u1, v1) = patch.low, patch.high
     return u0 - EDGE <= u <= u1 + EDGE and v0 - EDGE <= v <= v1 + EDGE
 
 
 @njit(cache=True, error_model="numpy")
-def cell_at(patch_kernel, u, v):  # type: ignore[no-untyped-def]
+def cell_at(patch, u, v):  # type: ignore[no-untyped-def]
     """Flat row-major index of the cell at u, v (rad or m), or -1 outside the patch.
 
     A closed parameter may be off by any number of turns. A border belongs to the cell of higher
     index, the outermost border to the last cell.
     """
-    u0, u1, v0, v1 = (
-        patch_kernel.low[0],
-        patch_kernel.high[0],
-        patch_kernel.low[1],
-        patch_kernel.high[1],
-    )
-    u_closed, v_closed = patch_kernel.closed[0], patch_kernel.closed[1]
-    rows, columns = patch_kernel.cells[0], patch_kernel.cells[1]
+    (u0, v0), (u1, v1) = patch.low, patch.high
+    u_closed, v_closed = patch.closed[0], patch.closed[1]
+    rows, columns = patch.cells[0], patch.cells[1]
     if u_closed:
         u = wrap(u, u0, u1)
     if v_closed:
         v = wrap(v, v0, v1)
-    on = u0 - EDGE <= u <= u1 + EDGE and v0 - EDGE <= v <= v1 + EDGE
-    if rows == 0 or columns == 0 or not on:
+    if rows == 0 or columns == 0 or not on_patch(patch, u, v):
         return -1
     i = math.floor((u - u0) / (u1 - u0) * rows)
     j = math.floor((v - v0) / (v1 - v0) * columns)
@@ -251,20 +198,14 @@ def cell_at(patch_kernel, u, v):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def closest_points(patch_kernel, points):  # type: ignore[no-untyped-def]
-    """`closest_on_patch` of many points (k, 3): values (k, 6) in the order of `closest_on_patch`, and `on_patch` (k,)."""
+def closest_points(patch, points):  # type: ignore[no-untyped-def]
+    """`closest_on_patch` (k, 6) and `on_patch` (k,) for many points (k, 3) m."""
     count = points.shape[0]
     values = np.empty((count, 6))
     inside = np.empty(count, dtype=np.bool_)
     for k in range(count):
-        u, v, height, nx, ny, nz = closest_on_patch(
-            patch_kernel, points[k, 0], points[k, 1], points[k, 2]
-        )
-        values[k, 0] = u
-        values[k, 1] = v
-        values[k, 2] = height
-        values[k, 3] = nx
-        values[k, 4] = ny
-        values[k, 5] = nz
-        inside[k] = on_patch(patch_kernel, u, v)
+        found = closest_on_patch(patch, points[k, 0], points[k, 1], points[k, 2])
+        for j in range(6):
+            values[k, j] = found[j]
+        inside[k] = on_patch(patch, found[0], found[1])
     return values, inside

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,15 +12,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours, grid_neighbours
+from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.curve_fitting import fitted_curves
 from surfaces.patches.closed_form import ClosedFormPatch
 from surfaces.patches.patch import Patch
-from surfaces.surface import SurfaceError
+from surfaces.surface import SurfaceError, max_principal_curvature
 
 if TYPE_CHECKING:
     from surfaces.patches.closed_form_kernels import PatchKernel
 
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
+DIFFERENCE = 1e-4  # [1], share of a patch: step of differences
 CLOSED_FORM_KINDS = "a sphere, cylinder, hyperboloid or plane"
 
 
@@ -69,6 +75,50 @@ class GridCells(Cells):
             array.flags.writeable = False
         return found
 
+    @cached_property
+    def curves(self) -> CellCurves:
+        """See `Cells.curves`."""
+        return fitted_curves(self)
+
+    def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
+        """See `Cells.trace`: straight in u and v; over a pole, closest to the straight line.
+
+        So the curve stays on a patch which the straight line through space would leave: the rim of
+        a dome, the far side of a pipe. A closed parameter runs the shorter way round. Only over a
+        pole the straight line is the one that stays.
+        """
+        surface, u, v = self.surface, self.u, self.v
+        i, j = pairs[:, 0], pairs[:, 1]
+        du, dv = u[j] - u[i], v[j] - v[i]
+        if surface.u_closed:
+            du -= math.tau * np.round(du / math.tau)
+        if surface.v_closed:
+            dv -= math.tau * np.round(dv / math.tau)
+        us, vs = u[i, None] + t * du[:, None], v[i, None] + t * dv[:, None]
+        over = np.zeros(len(pairs), dtype=bool)
+        for pole, end in zip(surface.poles, surface.u_range, strict=True):
+            # Both cells lie in the row at the pole, on different sides of it. (A single row from
+            # pole to pole has its straight lines through the middle, far from the surface.)
+            if pole and (self.shape[0] > 1 or not all(surface.poles)):
+                near = np.abs(u - end) <= 1.01 * np.abs(u - end).min()
+                over |= near[i] & near[j] & (np.abs(dv) > 0.5 * math.pi)
+        begin, stop = self.centres[i[over], None], self.centres[j[over], None]
+        found = surface.closest(begin + t[:, None] * (stop - begin))
+        us[over], vs[over] = found.u, found.v
+        return surface.point(us, vs), surface.normal(us, vs)
+
+    def parallel_curvature(self, height: float) -> Array:
+        """See `Cells.parallel_curvature`: at the centres, by central differences."""
+        surface = self.surface
+        steps, turns = [], []
+        for axis, (low, high) in enumerate((surface.u_range, surface.v_range)):
+            shift = np.zeros((2, 1))
+            shift[axis] = min(DIFFERENCE, 0.25 / max(self.shape[axis], 1)) * (high - low)
+            ahead, behind = np.add((self.u, self.v), shift), np.subtract((self.u, self.v), shift)
+            turns.append(surface.normal(*ahead) - surface.normal(*behind))
+            steps.append(surface.point(*ahead) - surface.point(*behind) + height * turns[-1])
+        return max_principal_curvature(np.stack(steps, axis=1), np.stack(turns, axis=1))
+
     @property
     def middle(self) -> int:
         """The cell in the middle row and column."""
@@ -111,7 +161,7 @@ class GridCells(Cells):
         i, j = divmod(int(k), self.shape[1])
         return i, j
 
-    def outlines(self, samples: int = 8) -> NDArray[np.float64]:
+    def outlines(self, samples: int = 8) -> Array:
         """Borders of the cells as closed polylines (N, 4 * samples + 1, 3) m, in the root frame.
 
         Args:
@@ -134,17 +184,17 @@ class GridCells(Cells):
             self.v[:, None] + dv * width_v,
         )
 
-    def borders(self, samples: int = 8) -> NDArray[np.float64]:
+    def borders(self, samples: int = 8) -> Array:
         """See `Cells.borders`."""
         lines = self.outlines(samples)
         return np.stack([lines[:, :-1], lines[:, 1:]], axis=2).reshape(-1, 2, 3)
 
-    def locate(self, points: ArrayLike) -> NDArray[np.int64]:
+    def locate(self, points: ArrayLike) -> Ints:
         """See `Cells.locate`."""
         closest_point = self.surface.closest(points)
         return np.where(closest_point.inside, self.at(closest_point.u, closest_point.v), -1)
 
-    def at(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.int64]:
+    def at(self, u: ArrayLike, v: ArrayLike) -> Ints:
         """The cells at some parameters; -1 where these are NaN, or where there are no cells.
 
         Parameters beyond the ranges count as the nearest ones within.
@@ -154,9 +204,7 @@ class GridCells(Cells):
         column = _bin(v, self.surface.v_range, self.shape[1])
         return np.where((row >= 0) & (column >= 0), row * self.shape[1] + column, -1)
 
-    def triangles(
-        self, which: NDArray[np.int64], samples: int = 8, inset: float = 0.0
-    ) -> Triangles:
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
         """See `Cells.triangles`."""
         t = (np.linspace(0.0, 1.0, samples + 1) - 0.5) * (1.0 - inset)
         du, dv = (part.reshape(-1) for part in np.meshgrid(t, t, indexing="ij"))
@@ -230,7 +278,7 @@ def _no_closed_form(kind: str) -> SurfaceError:
     )
 
 
-def _bin(values: NDArray[np.float64], limits: tuple[float, float], count: int) -> NDArray[np.int64]:
+def _bin(values: Array, limits: tuple[float, float], count: int) -> Ints:
     """Which of `count` equal parts of a range each value falls in; -1 for NaN, and of none."""
     share = (values - limits[0]) / (limits[1] - limits[0])
     part = np.clip(np.floor(share * count), 0, count - 1)

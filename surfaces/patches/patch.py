@@ -10,13 +10,10 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.surface import TURN_TOLERANCE, Surface, sharpest_turn
+from surfaces.surface import TURN_TOLERANCE, Surface
 
 if TYPE_CHECKING:
-    from surfaces.cells import Cells
     from surfaces.patches.grid_cells import GridCells
-
-DIFFERENCE = 1e-4  # [1], share of a patch: step of differences
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -82,45 +79,6 @@ class Patch(Surface):
         u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
         return self.local_normal(u, v) @ self.rotation.T
 
-    def trace(
-        self, cells: Cells, pairs: NDArray[np.int64], t: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """See `Surface.trace`: straight in u and v, and over a pole the chord's feet.
-
-        So the way stays on a patch which the straight line through space would leave: the rim of
-        a dome, the far side of a pipe. A closed parameter runs the shorter way round. Only over a
-        pole the chord is the one that stays.
-        """
-        u, v = cells.u, cells.v  # type: ignore[attr-defined]  # of a grid
-        i, j = pairs[:, 0], pairs[:, 1]
-        du, dv = u[j] - u[i], v[j] - v[i]
-        if self.u_closed:
-            du -= math.tau * np.round(du / math.tau)
-        if self.v_closed:
-            dv -= math.tau * np.round(dv / math.tau)
-        us, vs = u[i, None] + t * du[:, None], v[i, None] + t * dv[:, None]
-        over = np.zeros(len(pairs), dtype=bool)
-        for pole, end in zip(self.poles, self.u_range, strict=True):
-            # Both cells lie in the row at the pole, on different sides of it. (One row from pole to
-            # pole has its chords through the middle, whose feet are nowhere.)
-            if pole and (cells.shape[0] > 1 or not all(self.poles)):
-                near = np.abs(u - end) <= 1.01 * np.abs(u - end).min()
-                over |= near[i] & near[j] & (np.abs(dv) > 0.5 * math.pi)
-        us[over], vs[over] = _over_a_pole(self, cells, pairs[over], t)
-        return self.point(us, vs), self.normal(us, vs)
-
-    def max_curvature(self, cells: Cells, height: float = 0.0) -> NDArray[np.float64]:
-        """See `Surface.max_curvature`: the larger principal curvature, by central differences."""
-        places = cells.u, cells.v  # type: ignore[attr-defined]  # of a grid
-        slopes, turns = [], []
-        for axis, (low, high) in enumerate((self.u_range, self.v_range)):
-            step = np.zeros((2, 1))
-            step[axis] = min(DIFFERENCE, 0.25 / max(cells.shape[axis], 1)) * (high - low)
-            ahead, behind = np.add(places, step), np.subtract(places, step)
-            turns.append(self.normal(*ahead) - self.normal(*behind))
-            slopes.append(self.point(*ahead) - self.point(*behind) + height * turns[-1])
-        return sharpest_turn(np.stack(slopes, axis=1), np.stack(turns, axis=1))
-
     def cells(self, nu: int, nv: int) -> GridCells:
         """Cut the patch into nu x nv E-cells of equal parameter steps.
 
@@ -148,12 +106,3 @@ class Patch(Surface):
                 ranges.append(f"{name}=({low:g}, {high:g})")
         parts = [lengths, *ranges, f"side={self.side!r}", f"position={self.position.tolist()}"]
         return f"{self.kind}({', '.join(part for part in parts if part)})"
-
-
-def _over_a_pole(
-    patch: Patch, cells: Cells, pairs: NDArray[np.int64], t: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Parameters (m, k) of the feet of straight lines between centres."""
-    start, end = cells.centres[pairs[:, 0], None], cells.centres[pairs[:, 1], None]
-    closest_point = patch.closest(start + t[:, None] * (end - start))
-    return closest_point.u, closest_point.v

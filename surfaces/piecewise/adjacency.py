@@ -42,7 +42,11 @@ class Joints:
     def of(self, pairs: Ints) -> Joints:
         """The joints of some of the pairs (k, 2), i < j, in their order."""
         row = np.searchsorted(_keys(self.pairs), _keys(pairs))
-        return Joints(self.pairs[row], self.crossings[row], self.normals[row])
+        return self.rows(row)
+
+    def rows(self, which: Ints | NDArray[np.bool_]) -> Joints:
+        """Some of the joints."""
+        return Joints(self.pairs[which], self.crossings[which], self.normals[which])
 
 
 def joints_of(surface: Piecewise, counts: Counts) -> Joints:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours
+from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.curve_fitting import fitted_curves
 from surfaces.patches import GridCells
+from surfaces.piecewise.curves import SMOOTH, curves_across
+from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import SurfaceError
 
 if TYPE_CHECKING:
     from surfaces.piecewise.adjacency import Joints
-    from surfaces.piecewise.piecewise_surface import Piecewise
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -91,6 +94,51 @@ class PieceCells(Cells):
         for array in (indptr, indices):
             array.flags.writeable = False
         return Neighbours(indptr, indices)
+
+    @cached_property
+    def curves(self) -> CellCurves:
+        """See `Cells.curves`."""
+        return fitted_curves(self)
+
+    def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
+        """See `Cells.trace`: within a piece as on its grid, across a seam see `curves_across`."""
+        points, normals = np.empty((2, len(pairs), len(t), 3))
+        for a, b, both in self._by_pieces(pairs):
+            some = pairs[both]
+            if a == b:
+                found = self.grids[a].trace(some - self.first[a], t)
+                points[both], normals[both] = found[0], self.surface.signs[a] * found[1]
+            else:
+                ends = self.centres[some[:, 0]], self.centres[some[:, 1]]
+                points[both], normals[both] = curves_across(
+                    self.surface, self.joints.of(some), *ends, t, (a, b), self.around(a, b)
+                )
+        return points, normals
+
+    def closest_along(self, pairs: Ints, points: Array) -> tuple[Array, Array]:
+        """See `Cells.closest_along`: on the pieces of both cells, and those that touch both."""
+        found_points, normals = np.empty_like(points), np.empty_like(points)
+        for a, b, both in self._by_pieces(pairs):
+            found = self.surface.nearest(points[both], self.around(a, b))
+            found_points[both] = found.places.reshape(-1, *points.shape[1:])
+            normals[both] = found.normals.reshape(-1, *points.shape[1:])
+        return found_points, normals
+
+    def smoothed(self, pairs: Ints) -> NDArray[np.bool_]:
+        """See `Cells.smoothed`: across creases."""
+        creased = self.piece[pairs[:, 0]] != self.piece[pairs[:, 1]]
+        creased[creased] = self.joints.of(pairs[creased]).creases > SMOOTH
+        return creased
+
+    def parallel_curvature(self, height: float) -> Array:
+        """See `Cells.parallel_curvature`."""
+        return np.concatenate([grid.parallel_curvature(height) for grid in self.grids])
+
+    def _by_pieces(self, pairs: Ints) -> Iterator[tuple[int, int, Ints]]:
+        """Both pieces of pairs (m, 2) of cells, and the rows that have them."""
+        of = self.piece[pairs]
+        for a, b in np.unique(of, axis=0).tolist():
+            yield a, b, np.flatnonzero((of == (a, b)).all(axis=1))
 
     def around(self, a: int, b: int) -> tuple[int, ...]:
         """Two pieces, and all others that have a seam with both; of one piece, itself alone."""

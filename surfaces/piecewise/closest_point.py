@@ -93,7 +93,7 @@ def _closest_points(patch: Patch, sign: float, points: Array) -> _ClosestPoints:
 def _nearest(
     patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
 ) -> tuple[Ints, Array, NDArray[np.bool_]]:
-    """Piece (k,), values (k, 9) as in `_ClosestPoints`, and whether they are inside, of finite points."""
+    """Piece (k,), values (k, 9) as in `_ClosestPoints`, and `inside` (k,) of finite points."""
     found = [
         _closest_points(patch, sign, points) for patch, sign in zip(patches, signs, strict=True)
     ]

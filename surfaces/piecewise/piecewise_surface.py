@@ -19,7 +19,6 @@ from surfaces.piecewise.seams import Seam, sides_of, survey
 from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
-    from surfaces.cells import Cells
     from surfaces.piecewise.cells import PieceCells
 
 Array = NDArray[np.float64]
@@ -119,38 +118,6 @@ class Piecewise(Surface):
             inside=found.inside.reshape(shape),
         )
 
-    def trace(self, cells: Cells, pairs: Ints, t: Array) -> tuple[Array, Array]:
-        """See `Surface.trace`: within a piece its own ways, across a seam see `piece_ways`."""
-        from surfaces.piecewise.curves import ways_across
-
-        cells = _own(cells)
-        points, normals = np.empty((2, len(pairs), len(t), 3))
-        of = cells.piece[pairs]
-        for a, b in np.unique(of, axis=0):
-            both = np.flatnonzero((of == (a, b)).all(axis=1))
-            if a == b:
-                grid = cells.grids[a]
-                found = grid.surface.trace(grid, pairs[both] - cells.first[a], t)
-                points[both], normals[both] = found[0], self.signs[a] * found[1]
-            else:
-                found = ways_across(self, cells, pairs[both], t, (int(a), int(b)))
-                points[both], normals[both] = found
-        return points, normals
-
-    def smoothed(self, cells: Cells, pairs: Ints) -> NDArray[np.bool_]:
-        """See `Surface.smoothed`: across creases."""
-        from surfaces.piecewise.curves import SMOOTH
-
-        cells = _own(cells)
-        creased = cells.piece[pairs[:, 0]] != cells.piece[pairs[:, 1]]
-        creased[creased] = cells.joints.of(pairs[creased]).creases > SMOOTH
-        return creased
-
-    def max_curvature(self, cells: Cells, height: float = 0.0) -> Array:
-        """See `Surface.max_curvature`."""
-        cells = _own(cells)
-        return np.concatenate([grid.surface.max_curvature(grid, height) for grid in cells.grids])
-
     def cells(self, counts: Any) -> PieceCells:
         """Cut every piece into a grid of cells.
 
@@ -163,18 +130,6 @@ class Piecewise(Surface):
         from surfaces.piecewise.cells import PieceCells
 
         return PieceCells.cut(self, counts)
-
-    def beneath(self, cells: Cells, pairs: Ints, points: Array) -> tuple[Array, Array]:
-        """See `Surface.beneath`: on the pieces of both cells, and those that touch both."""
-        cells = _own(cells)
-        places, normals = np.empty_like(points), np.empty_like(points)
-        of = cells.piece[pairs]
-        for a, b in np.unique(of, axis=0):
-            both = np.flatnonzero((of == (a, b)).all(axis=1))
-            found = self.nearest(points[both], cells.around(int(a), int(b)))
-            places[both] = found.places.reshape(-1, *points.shape[1:])
-            normals[both] = found.normals.reshape(-1, *points.shape[1:])
-        return places, normals
 
     def __repr__(self) -> str:
         """One line."""
@@ -274,12 +229,3 @@ def _gap(gap: Any, patches: tuple[Patch, ...], check: Checks) -> float:
             f"got {gap!r}"
         )
     return width
-
-
-def _own(cells: Cells) -> PieceCells:
-    """Cells of a piecewise surface, and no others."""
-    from surfaces.piecewise.cells import PieceCells
-
-    if not isinstance(cells, PieceCells):
-        raise TypeError("the cells are not of a piecewise surface")
-    return cells

@@ -7,7 +7,6 @@ import pytest
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
 from surfaces import bspline, cone, ellipsoid, revolution, torus
-from surfaces.cell_curves import curves_of
 
 
 def nurbs_pipe():
@@ -29,7 +28,7 @@ PATCHES = {
 def test_courses_run_on_the_surface_and_the_short_way(name):
     patch = PATCHES[name]
     cells = patch.cells(6, 9)
-    curves = curves_of(cells)
+    curves = cells.curves
     pair = np.repeat(np.arange(len(cells.pairs)), 21)
     t = np.tile(np.linspace(0, 1, 21), len(cells.pairs))
     closest_point, normal = curves.at(pair, t)
@@ -55,7 +54,7 @@ def test_courses_run_on_the_surface_and_the_short_way(name):
 def test_a_single_row_counts_the_bend_to_its_side(name, shape):
     """No other course shows how sharply the surface bends across these."""
     patch = PATCHES[name]
-    curves = curves_of(patch.cells(*shape))
+    curves = patch.cells(*shape).curves
     pair = np.repeat(np.arange(len(curves)), 21)
     closest_point, normal = curves.at(pair, np.tile(np.linspace(0, 1, 21), len(curves)))
     on = patch.closest(closest_point)

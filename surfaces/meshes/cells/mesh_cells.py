@@ -10,15 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours
+from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
-from surfaces.surface import SurfaceError
+from surfaces.curve_fitting import CurveFit
+from surfaces.meshes.mesh_surface import MeshSurface
+from surfaces.surface import SurfaceError, max_principal_curvature
 
 if TYPE_CHECKING:
     from surfaces.meshes.cells.properties import Figures
-    from surfaces.meshes.mesh_surface import MeshSurface
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+JUMP = 3.0  # times the step along the straight line: there closest points jump
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -87,6 +91,95 @@ class MeshCells(Cells):
     def neighbours(self) -> Neighbours:
         """(indptr, indices): the cells that share a border with each, clockwise from outside."""
         return self.figures.neighbours
+
+    @cached_property
+    def curves(self) -> CellCurves:
+        """See `Cells.curves`; those over creases and tight bends are shaped for them."""
+        from surfaces.meshes.cells.curves_over_bends import fit_over_bends
+        from surfaces.meshes.cells.curves_over_creases import creases_of, fit_over_creases
+
+        fit = CurveFit.of(self)
+        rough = fit.rough
+        if len(rough):
+            fit_over_creases(fit, creases_of(self.surface, self.labels), self._crease_shares)
+            fit_over_bends(fit)
+        return fit.joined()
+
+    def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
+        """See `Cells.trace`: the closest points to straight lines on the faces of both cells.
+
+        Where these jump, because the surface is strongly bent or creased between the centres, the
+        line is led over the middle of the border that the cells share.
+        """
+        start, end = self.centres[pairs[:, 0]], self.centres[pairs[:, 1]]
+        points, normals = self.closest_along(pairs, _bent_lines(start, 0.5 * (start + end), end, t))
+        steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
+        even = np.linalg.norm(end - start, axis=1)[:, None] * np.diff(t)
+        jumps = (steps > JUMP * even).any(axis=1)
+        over = pairs[jumps]
+        bent = _bent_lines(start[jumps], self.crossings(over), end[jumps], t)
+        points[jumps], normals[jumps] = self.closest_along(over, bent)
+        return points, normals
+
+    def closest_along(self, pairs: Ints, points: Array) -> tuple[Array, Array]:
+        """See `Cells.closest_along`: on the two cells and those that touch both."""
+        faces, weights = self._closest_faces(pairs, points)
+        return self.surface.points_at(faces, weights), self.surface.normals_at(faces, weights)
+
+    def parallel_curvature(self, height: float) -> Array:
+        """See `Cells.parallel_curvature`: of the most curved face of each cell."""
+        steps, turns = self.surface.turns
+        sharpest = np.zeros(len(self))
+        by_face = max_principal_curvature(steps + height * turns, turns)
+        np.maximum.at(sharpest, self.labels, by_face)
+        return sharpest
+
+    @property
+    def creased(self) -> NDArray[np.bool_]:
+        """See `Cells.creased`."""
+        creased = np.zeros(len(self), dtype=bool)
+        creased[self.labels[self.surface.on_crease.any(axis=1)]] = True
+        return creased
+
+    def distances(self, pairs: Ints, points: Array, everywhere: bool) -> tuple[Array, Array]:
+        """See `Cells.distances`."""
+        return self.surface.beside(points, *self._closest_places(pairs, points, everywhere))
+
+    def crease_distances(self, pairs: Ints, points: Array, everywhere: bool) -> Array:
+        """See `Cells.crease_distances`."""
+        if not self.surface.on_crease.any():
+            return super().crease_distances(pairs, points, everywhere)
+        return self.surface.from_crease(*self._closest_places(pairs, points, everywhere))
+
+    def _crease_shares(self, pairs: Ints, points: Array) -> Array:
+        """(m, k) see `MeshSurface.rim_share`, closest to points (m, k, 3) m."""
+        return self.surface.rim_share(*self._closest_faces(pairs, points))
+
+    def _closest_places(self, pairs: Ints, points: Array, everywhere: bool) -> tuple[Ints, Array]:
+        """Faces (k,) and weights (k, 3) on them closest to points (k, 3) m; see `distances`."""
+        if everywhere:
+            return self.surface.nearest(points)
+        faces, weights = self._closest_faces(pairs, points[:, None])
+        return faces[:, 0], weights[:, 0]
+
+    def _closest_faces(self, pairs: Ints, points: Array) -> tuple[Ints, Array]:
+        """Faces (m, k) and weights (m, k, 3) on them closest to points (m, k, 3) m.
+
+        Of the two cells of each pair and of those that touch both.
+        """
+        from surfaces.meshes.closest_point import put_on_cells
+
+        surface = self.surface
+        local = np.ascontiguousarray((points - surface.position) @ surface.rotation)
+        faces = np.empty(points.shape[:2], dtype=np.int64)
+        weights = np.empty((*points.shape[:2], 3))
+        members, indptr = self.members
+        pairs = np.ascontiguousarray(pairs)
+        near_indptr, near = self.neighbours
+        put_on_cells(
+            *surface.face_balls, members, indptr, near, near_indptr, pairs, local, faces, weights
+        )
+        return faces, weights
 
     @property
     def border_lengths(self) -> Array:
@@ -171,6 +264,17 @@ class MeshCells(Cells):
     def __repr__(self) -> str:
         """One line."""
         return f"Cells({len(self)} of {self.surface!r})"
+
+
+def _bent_lines(start: Array, middle: Array, end: Array, t: Array) -> Array:
+    """(m, k, 3) points at t (k,) of m lines that bend in the middle, at even speed."""
+    first = np.linalg.norm(middle - start, axis=1)
+    second = np.linalg.norm(end - middle, axis=1)
+    share = (first / np.maximum(first + second, 1e-300))[:, None]
+    before = np.clip(t / np.maximum(share, 1e-300), 0.0, 1.0)[..., None]
+    after = np.clip((t - share) / np.maximum(1.0 - share, 1e-300), 0.0, 1.0)[..., None]
+    start, middle, end = start[:, None], middle[:, None], end[:, None]
+    return np.asarray(start + before * (middle - start) + after * (end - middle))
 
 
 def _length(line: Array) -> float:

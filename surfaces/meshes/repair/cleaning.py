@@ -54,7 +54,7 @@ def clean(
         >>> mesh = clean([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]], [[0, 1, 2]])
         >>> mesh
         TriangleMesh(1 faces, 0.5 m^2, 1 x 1 x 0 m)
-        >>> mesh.notes
+        >>> mesh.history
         ('1 vertex that no face uses was dropped',)
     """
     points, corners = _checked(vertices, faces)

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 LISTED = 5  # pieces that a note names
 
 
-def remarks(mesh: TriangleMesh) -> list[str]:
-    """Sentences about pieces, holes and inward faces; none for a plain patch."""
-    return [*_about_pieces(mesh), *_about_borders(mesh), *_about_sides(mesh)]
+def notes_of(mesh: TriangleMesh) -> tuple[str, ...]:
+    """What was repaired or cut, and sentences about pieces, holes and inward faces."""
+    return (*mesh.history, *_about_pieces(mesh), *_about_borders(mesh), *_about_sides(mesh))
 
 
 def border_loops(mesh: TriangleMesh) -> NDArray[np.int64]:

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from surfaces import SurfaceError, cut_box, cut_plane, faces_within_cone, take_faces
-from surfaces.meshes.repair import clean
+from surfaces.meshes.repair import clean, notes_of
 
 
 def hilly(nu=14, nv=11):
@@ -87,7 +87,7 @@ def test_a_cut_that_leaves_parts_hanging_in_a_point_parts_them():
     part = cut_plane(clean(vertices, faces), (0, 0, 0), (0, 0, 1))
     w.assert_clean(part)
     assert len(np.unique(part.pieces)) == 2
-    assert any("2 separate pieces" in note for note in part.notes)
+    assert any("2 separate pieces" in note for note in notes_of(part))
 
 
 def test_a_box_is_six_planes():
@@ -150,10 +150,10 @@ def test_faces_by_number():
 def test_notes_of_the_whole_stay_and_those_of_the_pieces_are_told_anew():
     vertices, faces = corpus.stacked((corpus.V, corpus.F), (corpus.SECOND, corpus.F))
     mesh = clean([*vertices, [3, 3, 3]], faces)
-    assert len(mesh.notes) == 2
+    assert len(notes_of(mesh)) == 2
     part = cut_plane(cut_plane(mesh, (0.3, 0, 0), (-1, 0, 0)), (0, 0, 0.1), (0, 0, 1))
-    assert ["no face uses" in part.notes[0], len(part.notes)] == [True, 3]
-    assert "12 faces" in part.notes[1]
+    assert ["no face uses" in notes_of(part)[0], len(notes_of(part))] == [True, 3]
+    assert "12 faces" in notes_of(part)[1]
 
 
 @pytest.mark.parametrize(

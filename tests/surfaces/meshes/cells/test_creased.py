@@ -7,7 +7,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from surfaces.cell_curves import _joined
+from surfaces.curve_fitting import CurveFit
 from surfaces.meshes import TriangleMesh, mesh
 from surfaces.meshes.cells.curves_over_creases import _shortest
 from surfaces.meshes.normals import sectors
@@ -110,7 +110,8 @@ def test_the_last_fit_of_a_course_counts(counts):
         (np.array([0, 2]), rng.normal(size=(2, others, 4, 6))),
         (np.array([3]), rng.normal(size=(1, after, 4, 6))),
     ]
-    curves = _joined(fits, np.zeros((4, 2)), np.zeros(4, dtype=bool))
+    fit = CurveFit(None, np.zeros((4, 2)), np.zeros((4, 2)), np.zeros(4, dtype=bool), fits)
+    curves = fit.joined()
     expected = [fits[1][1][0], fits[0][1][0], fits[1][1][1], fits[2][1][0]]
     assert np.diff(curves.first).tolist() == [len(cubics) for cubics in expected]
     np.testing.assert_array_equal(curves.cubics, np.concatenate(expected))
