@@ -24,15 +24,15 @@ coverable_files
 robots: errors chain reach robot kinematics
 robots.urdf
 robots: joint_selection pinocchio_model library dh
-surfaces: surface cells adjacency cell_curves arguments
+surfaces: surface cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.piecewise
 surfaces.meshes: triangle_mesh normals closest_point
 surfaces.meshes.repair
 surfaces.meshes.files
-surfaces.meshes.cells
 surfaces.meshes: mesh_surface selection
+surfaces.meshes.cells
 feasibility: clock compiled found notices problem safe_files search target_curves task verdict version
 feasibility.certification
 feasibility.paper
