@@ -1,4 +1,4 @@
-"""The question asked: `check` runs a search, has its motion replayed, and makes the verdict."""
+"""`check`: search for a covering motion, have it replayed, and make the verdict."""
 
 from __future__ import annotations
 

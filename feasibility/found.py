@@ -34,7 +34,7 @@ class Found:
     motion: Walk | None = None
     """One motion over the centres of all cells, where there is one."""
     replay: Callable[[], Replay] | None = None
-    """Has the motion over all cells judged by Pinocchio; None where none was found."""
+    """Replays the motion over all cells by Pinocchio; None where none was found."""
     accepted: str = ""
     """What to say when the replay accepts; {waypoints} stands for their number."""
     refused: str = ""

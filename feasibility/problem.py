@@ -13,7 +13,7 @@ NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just k
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What `check` is asked, built once and handed to the search, the replay and the verdict."""
+    """What `check` has to decide: built once, for search, replay and verdict."""
 
     robot: Robot
     cells: Cells

@@ -1,4 +1,4 @@
-"""The task: how the tool is to be held over the surface."""
+"""The task: how the tool is to be held over the surface (eqs. 1 to 4 of the paper)."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import Checks
+from feasibility.cone import chord_of
 from surfaces import Cells
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
@@ -45,7 +46,7 @@ class Task:
     cone_deg: float
     """alpha, the largest angle in degrees between tool axis and approach direction."""
     tolerance: float | None = None
-    """How far the tool point may stray from its target surface, metres. None leaves it to the
+    """How far the tool point may deviate from its target surface, metres. None leaves it to the
     method: `DEFAULT_TOLERANCE` for the complete search, step times reach for the greedy one; the
     verdict states what was used."""
 
@@ -79,11 +80,11 @@ class Task:
 
     @property
     def cone_chord(self) -> float:
-        """|a - b| of unit vectors a and b, `cone` apart, 0 .. 2; inf where any axis will do."""
-        return math.inf if self.cone_deg >= 180.0 else 2.0 * math.sin(0.5 * self.cone)
+        """|a - b| at the boundary of the cone, 0 .. 2; inf where any axis will do."""
+        return chord_of(self.cone)
 
     def targets(self, cells: Cells) -> Targets:
-        """Target points and approach directions of the centres of `cells` (eqs. 1 and 2)."""
+        """Targets c_p(u, v), eq. (1), and approaches b(u, v), eq. (3), of the cell centres."""
         sign = cells.surface.side_sign
         return Targets(
             points=cells.centres + sign * self.standoff * cells.normals,

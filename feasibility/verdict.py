@@ -58,7 +58,7 @@ class Cause:
     """Flat index of the cell."""
     kind: CauseKind
     proved: bool
-    """True where a bound shows it; False where a search ended without finding a way."""
+    """True where a bound shows it; False where a search ended without finding a motion."""
     detail: str
     """One sentence with the figures: by how much, which joint, which angle."""
 
@@ -79,9 +79,9 @@ class Certificate:
 
     waypoints: int
     max_position_error: float
-    """m, bound on the distance of the tool point from its target surface along the whole walk."""
+    """m, bound on the distance of the tool point from its target surface along the walk."""
     max_angle: float
-    """rad, bound on the angle between tool axis and approach direction along the whole walk."""
+    """rad, bound on the angle between tool axis and approach direction along the walk."""
     min_limit_margin: float
     """rad or m, smallest distance of a joint from a limit."""
 

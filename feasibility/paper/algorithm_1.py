@@ -140,7 +140,7 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
     Args:
         chain, chart, grid: a `Chain`, a `PatchKernel` and a `Grid`.
         target, target_cell: (3,) p_T, m, and the flat index of ec_T.
-        budget, cap: neighbours to look at now, and J-cells that the whole call may check.
+        budget, cap: neighbours to look at now, and J-cells that the call may check in all.
         memory: a `Memory`, started by `begin_search`.
     """
     # Arrays are read out of their tuples once, here: numba counts references each time it is done.

@@ -51,7 +51,7 @@ class Continuity:
     checked: int
     """J-cells evaluated."""
     fk: float
-    """Forward kinematics computed, in whole chains: joint frames placed, divided by n."""
+    """Forward kinematics computed, in chains: joint frames placed, divided by n."""
 
     @property
     def found(self) -> bool:
@@ -224,7 +224,7 @@ def continuity(
 def _last_offset(
     origin: NDArray[np.float64], step: NDArray[np.float64], upper: NDArray[np.float64]
 ) -> NDArray[np.int64]:
-    """The greatest whole k (n,) with origin + k * step <= upper, as floating point rounds it."""
+    """The greatest integer k (n,) with origin + k * step <= upper, as floating point rounds it."""
     last = np.clip(np.floor((upper - origin) / step), -FAR, FAR).astype(np.int64)
     last[origin + last * step > upper] -= 1
     last[(origin + (last + 1) * step <= upper) & (last < FAR)] += 1
@@ -244,7 +244,7 @@ def _memory(n: int, nodes: int, stack: int) -> jcells.Memory:
 
 
 def _enlarged(memory: jcells.Memory) -> jcells.Memory:
-    """The same running call with more room for what is full: J-cells, stack, or both."""
+    """The same running call with larger arrays for what is full: J-cells, stack, or both."""
     nodes, n = memory.nodes.shape
     stack = len(memory.stack_node)
     full_nodes = memory.counters[jcells.NODES] >= nodes

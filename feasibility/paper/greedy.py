@@ -128,14 +128,10 @@ def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run
         paths = [Path(a, b, best.motion(a, b)) for b, a in parents.items() if best is not None]
         return replay_tree(problem.robot, cells, problem.task, steps, paths)
 
-    unfinished = (
-        ""
-        if run.complete
-        else (
-            f"The time limit of {search.time_limit:g} s ran out ({settings}); the best tree touches "
-            f"{number} of {count} cells."
-        )
-    )
+    touched = f"the best tree touches {number} of {count} cells"
+    unfinished = ""
+    if not run.complete:
+        unfinished = f"The time limit of {search.time_limit:g} s ran out ({settings}); {touched}."
     return Found(
         covered=np.zeros(count, dtype=bool) if best is None else best.touched(count),
         components=() if best is None else (np.array(sorted(best.jcell), dtype=np.int64),),

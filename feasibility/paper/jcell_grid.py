@@ -8,7 +8,7 @@ turns about the axis (o_i, z_i) that the joint already has:
 
     p' = o_i + Rot(z_i, +-step) (p - o_i),    a' = Rot(z_i, +-step) a
 
-(p' = p +- step z_i for a prismatic joint), with one sine and one cosine for a whole search. Several
+(p' = p +- step z_i for a prismatic joint), with one sine and one cosine for one search. Several
 joints at once are the same thing from the last joint inwards, and neighbours that move their last
 joints alike share that part of the work.
 """
@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from robots import frames
 from surfaces.patches import cell_at, closest_on_patch
 
-HAIR = 1e-12  # [m], [1]: asked beyond the task, so that another rounding of the same q agrees
+HAIR = 1e-12  # [m], [1]: required beyond the task, so that another rounding of the same q agrees
 
 
 class Grid(NamedTuple):
@@ -136,7 +136,7 @@ def cell_of(patch_kernel, height, tolerance, cosine, tool):  # type: ignore[no-u
 
 @njit(cache=True, error_model="numpy")
 def place_tool(chain, grid, offsets, tool):  # type: ignore[no-untyped-def]
-    """Tool point and axis (6,) of one J-cell, by forward kinematics of the whole chain."""
+    """Tool point and axis (6,) of one J-cell, by forward kinematics of the chain."""
     n = offsets.shape[0]
     q = np.empty(n)
     for i in range(n):

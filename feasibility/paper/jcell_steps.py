@@ -1,4 +1,4 @@
-"""How far one J-cell step goes: its size, the tolerance that fits it, and the room between J-cells.
+"""How far one J-cell step goes: its size, the tolerance that fits it, and the margin between them.
 
 Between two J-cells the arm moves on a straight line in joint space, s_j the step of joint j and r_j
 the longest lever arm the tool point can have about it. Along that line
@@ -13,7 +13,7 @@ the tool point and the chord |a - approach direction| leave the values at the tw
 
     sag = (D + k L^2) / 8    and    turn = (Da + b L^2 + k D) / 8
 
-so J-cells that keep this room hold the constraints between them, too. It is small: of the second
+so J-cells that keep this margin hold the constraints between them, too. It is small: of the second
 order in the step, where the tolerance is of the first.
 """
 
@@ -26,6 +26,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.cone import chord_of
 from feasibility.search import Search
 from feasibility.task import Task
 from robots import Robot
@@ -46,17 +47,17 @@ class Steps:
     """m, the task's; where it has none, step times reach times `TOLERANCE_STEPS`. The offset
     surface is never met exactly on a grid of joint values (paper, eq. 5)."""
     sag: float
-    """m, room for the tool point between J-cells; inf where it cannot be bounded."""
+    """m, margin for the tool point between J-cells; inf where it cannot be bounded."""
     turn: float
-    """Room for |a - approach direction| between J-cells."""
+    """Margin for |a - approach direction| between J-cells."""
 
     cone_cosine: float
     """Least cosine of the angle between axis and approach direction at a J-cell: -2 where any angle
-    will do, 2 where the cone leaves no room for a step."""
+    will do, 2 where the cone is too narrow for a step."""
 
     @property
     def in_cone(self) -> bool:
-        """True when the cone has room for a step."""
+        """True when the cone is wide enough for a step."""
         return self.cone_cosine < 1.0
 
     @staticmethod
@@ -66,8 +67,8 @@ class Steps:
         reach = _extent(robot)
         size = np.where(robot.prismatic, step * reach, step)
         tolerance = TOLERANCE_STEPS * step * reach if task.tolerance is None else task.tolerance
-        sag, turn = _room(robot, surface, task, size, tolerance, search.moves == "all")
-        chord = 2.0 * math.sin(0.5 * task.cone) - turn
+        sag, turn = _margins(robot, surface, task, size, tolerance, search.moves == "all")
+        chord = chord_of(task.cone) - turn
         cosine = 1.0 - 0.5 * chord * chord if chord > 0.0 else 2.0
         if task.cone_deg >= 180.0:
             cosine = -2.0
@@ -81,7 +82,7 @@ def _extent(robot: Robot) -> float:
     return float(np.linalg.norm(robot.chain.translations[1:], axis=1).sum())
 
 
-def _room(
+def _margins(
     robot: Robot,
     surface: ClosedFormPatch,
     task: Task,

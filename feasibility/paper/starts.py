@@ -22,7 +22,7 @@ from robots import Kinematics, Robot
 
 ACCURACY = 1e-9  # [m], [1]: of a start's tool point and axis
 CLOSE = 1e-3  # [rad], [m]: configurations nearer than this are taken as one
-STALLED = 1e-7  # [rad], [m]: a Newton step this short, away from the fibre, leads nowhere
+STALLED = 1e-7  # [rad], [m]: a Newton step this short, away from the manifold, leads nowhere
 LONGEST_STEP = 0.5  # [rad], [m]: of one joint, per Newton step
 STRIDE = 0.2  # [rad], [m]: of one joint, per step of a self-motion
 STRIDES = 60  # at most, in one self-motion
@@ -30,7 +30,7 @@ DRY_SEEDS = 40  # random configurations in a row that bring nothing new, before 
 MOST_STARTS = 32  # windings of joints with several turns make branches without end
 
 
-class Fibre:
+class StartProjection:
     """The configurations that hold the tool at one target: projection onto it, motion along it."""
 
     def __init__(
@@ -46,7 +46,7 @@ class Fibre:
         """
         self._kinematics = Kinematics(robot)
         self._point, self._approach = point, approach
-        self._cone_cosine = float(np.cos(0.98 * cone))  # starts keep off the rim of the cone
+        self._cone_cosine = float(np.cos(0.98 * cone))  # starts keep off the cone's boundary
         self._lower, self._upper = robot.lower, robot.upper
         self._middle = _window(robot).mean(axis=0)
         reach = robot.reach
@@ -75,10 +75,10 @@ class Fibre:
     def project(
         self, q: NDArray[np.float64], align: bool, steps: int = 60
     ) -> NDArray[np.float64] | None:
-        """Damped Newton steps from q (n,) onto the fibre, joints stopping at their limits.
+        """Damped Newton steps from q (n,) onto the manifold, joints stopping at their limits.
 
         Returns:
-            A configuration (n,) on the fibre; without one, None.
+            A configuration (n,) on the manifold; None where Newton fails.
         """
         q = np.clip(q, self._lower, self._upper)
         damping = 1e-2
@@ -116,13 +116,13 @@ class Fibre:
     def toward(
         self, q: NDArray[np.float64], goal: NDArray[np.float64], align: bool
     ) -> NDArray[np.float64]:
-        """Follow the fibre from q (n,) straight towards `goal` (n,), until it comes no nearer."""
+        """Follow the manifold from q (n,) towards `goal` (n,), until it comes no nearer."""
         for _ in range(STRIDES):
             _, jacobian = self._rows(q, align)
             pull = goal - q
             free = self._free(q, pull)
             # The part of the pull that leaves the residuals alone: directions whose singular
-            # value is nil belong to the fibre's tangent.
+            # value is nil belong to the manifold's tangent.
             _, values, basis = np.linalg.svd(jacobian[:, free], full_matrices=True)
             rank = int((values > 1e-8 * max(values[0], 1e-300)).sum()) if len(values) else 0
             along = np.zeros(len(q))
@@ -137,7 +137,7 @@ class Fibre:
         return q
 
     def settle(self, q: NDArray[np.float64], align: bool) -> NDArray[np.float64]:
-        """Move along the fibre towards the middle of the limits (zero for endless joints)."""
+        """Move along the manifold towards the middle of the limits (zero for endless joints)."""
         return self.toward(q, self._middle, align)
 
     def joined(self, a: NDArray[np.float64], b: NDArray[np.float64], align: bool) -> bool:
@@ -163,18 +163,18 @@ def starts(
         seed: of the random configurations.
         patience: random configurations to try before the first is found.
     """
-    fibre = Fibre(robot, point, approach, cone)
+    projection = StartProjection(robot, point, approach, cone)
     for align in (True, False):
         rng = np.random.default_rng(seed)
         found: list[NDArray[np.float64]] = []
         left = patience
         while left > 0 and len(found) < MOST_STARTS:
             left -= 1
-            q = fibre.project(random_configuration(robot, rng), align)
+            q = projection.project(random_configuration(robot, rng), align)
             if q is None:
                 continue
-            q = fibre.settle(q, align)
-            if not any(fibre.joined(q, other, align) for other in found):
+            q = projection.settle(q, align)
+            if not any(projection.joined(q, other, align) for other in found):
                 found.append(q)
                 left = DRY_SEEDS
                 yield q

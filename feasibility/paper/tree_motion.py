@@ -43,19 +43,19 @@ def tree_walk(verdict: Verdict) -> Walk | None:
 def _there_and_back(tree: nx.DiGraph, root: int) -> NDArray[np.float64]:
     """(k, n) the tree's configurations depth first, up to the last cell; rad or m."""
     parts: list[NDArray[np.float64]] = [np.atleast_2d(tree.nodes[root]["q"])]
-    way: list[int] = [root]
+    branch: list[int] = [root]
     left = {cell: list(reversed(list(tree.successors(cell)))) for cell in tree}
     entered = 1
     while entered < len(tree):
-        here = way[-1]
+        here = branch[-1]
         if left[here]:
             child = left[here].pop()
             parts.append(tree.edges[here, child]["motion"][1:])
-            way.append(child)
+            branch.append(child)
             entered += 1
         else:
-            way.pop()
-            parts.append(tree.edges[way[-1], here]["motion"][::-1][1:])
+            branch.pop()
+            parts.append(tree.edges[branch[-1], here]["motion"][::-1][1:])
     return np.concatenate(parts)
 
 

@@ -1,7 +1,7 @@
 """Replay of the greedy search's paths by Pinocchio, J-cell by J-cell.
 
 Nothing of the search is used here: tool points come from Pinocchio, not from the compiled chain,
-and the questions asked are those of the paper's definitions.
+and what is checked are the paper's definitions.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.cone import angle_of
 from feasibility.paper.jcell_steps import Steps
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay
@@ -37,8 +38,8 @@ def replay_tree(
     """Check that each path is what the search says: every J-cell, every step, both end cells.
 
     - each step is one J-cell move: of one joint, or of any for all moves;
-    - every J-cell is inside the joint limits, the tolerance, the cone and the patch, with the room
-      to spare that makes this true between J-cells too;
+    - every J-cell is inside the joint limits, the tolerance, the cone and the patch, with the
+      margin that makes this true between J-cells too;
     - a path begins in its cell, where and how that cell was first entered, and ends in the
       neighbour.
 
@@ -46,7 +47,7 @@ def replay_tree(
         robot: the arm.
         cells: the E-cells.
         task: standoff and cone.
-        steps: size of the moves, tolerance, and the room between J-cells.
+        steps: size of the moves, tolerance, and the margin between J-cells.
         paths: the edges of a tree, each after the edge that enters its cell.
     """
     faults: list[str] = []
@@ -55,11 +56,11 @@ def replay_tree(
     first = last + 1 - np.array([len(path.q) for path in paths], dtype=int)
 
     moves = np.delete(np.diff(q, axis=0) / steps.size, last[:-1], axis=0)
-    whole = np.abs(moves - np.round(moves)) * steps.size
+    off_grid = np.abs(moves - np.round(moves)) * steps.size
     moved = np.abs(np.round(moves))
     count = moved.sum(axis=1)
     one = count >= 1 if steps.moves == "all" else count == 1
-    if (whole > SAME).any() or (moved > 1).any() or not one.all():
+    if (off_grid > SAME).any() or (moved > 1).any() or not one.all():
         faults.append("a step is not one J-cell move")
 
     margin = np.minimum(q - robot.lower, robot.upper - q).min(initial=np.inf)
@@ -71,7 +72,7 @@ def replay_tree(
     sign = cells.surface.side_sign
     error = np.abs(closest_point.height - sign * task.standoff).max(initial=0.0) + steps.sag
     chord = np.linalg.norm(axes + sign * closest_point.normal, axis=1).max(initial=0.0) + steps.turn
-    angle = 2.0 * np.arcsin(np.clip(0.5 * chord, 0.0, 1.0))
+    angle = angle_of(float(chord))
     if not closest_point.inside.all():
         faults.append("the tool point leaves the patch")
     if not error <= steps.tolerance:
