@@ -90,10 +90,9 @@ class GridCells(Cells):
         surface, u, v = self.surface, self.u, self.v
         i, j = pairs[:, 0], pairs[:, 1]
         du, dv = u[j] - u[i], v[j] - v[i]
-        if surface.u_closed:
-            du -= math.tau * np.round(du / math.tau)
-        if surface.v_closed:
-            dv -= math.tau * np.round(dv / math.tau)
+        for along, period in zip((du, dv), surface.periods, strict=True):
+            if period:
+                along -= period * np.round(along / period)
         us, vs = u[i, None] + t * du[:, None], v[i, None] + t * dv[:, None]
         over = np.zeros(len(pairs), dtype=bool)
         for pole, end in zip(surface.poles, surface.u_range, strict=True):

@@ -42,6 +42,11 @@ class Patch(Surface):
         return self.v_angle and self.v_range[1] - self.v_range[0] >= math.tau - TURN_TOLERANCE
 
     @property
+    def periods(self) -> tuple[float, float]:
+        """Once around in u and in v, rad; 0 where the patch is not closed."""
+        return (math.tau if self.u_closed else 0.0, math.tau if self.v_closed else 0.0)
+
+    @property
     def poles(self) -> tuple[bool, bool]:
         """Whether the rows of lowest and of highest u close around a pole of the patch."""
         return (False, False)

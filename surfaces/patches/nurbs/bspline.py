@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,9 +22,6 @@ from surfaces.patches.nurbs.nurbs_checks import (
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.surface import Side, SurfaceError
-
-if TYPE_CHECKING:
-    from surfaces.cells import Cells
 
 Array = NDArray[np.float64]
 
@@ -55,6 +52,12 @@ class SplinePatch(SmoothPatch):
         """True where the two ends of v are one smooth seam."""
         return self.net.closed[1]
 
+    @property
+    def periods(self) -> tuple[float, float]:
+        """The ranges of u and v where they are closed, else 0."""
+        (u0, u1), (v0, v1) = self.u_range, self.v_range
+        return (u1 - u0 if self.u_closed else 0.0, v1 - v0 if self.v_closed else 0.0)
+
     def local_point(self, u: Array, v: Array) -> Array:
         """The spline."""
         return self.net.point(np.stack([u, v], axis=-1))
@@ -67,22 +70,6 @@ class SplinePatch(SmoothPatch):
         """By quadrature of |S_u x S_v|, cut at the knots."""
         breaks = self.net.breaks(0), self.net.breaks(1)
         return rectangle_areas(self.net.element, u0, u1, v0, v1, *breaks)
-
-    def trace(
-        self, cells: Cells, pairs: NDArray[np.int64], t: NDArray[np.float64]
-    ) -> tuple[Array, Array]:
-        """See `Surface.trace`: straight in u and v, the shorter way round where they are closed."""
-        places = []
-        for name, (low, high), closed in (
-            ("u", self.u_range, self.u_closed),
-            ("v", self.v_range, self.v_closed),
-        ):
-            x = getattr(cells, name)
-            along = x[pairs[:, 1]] - x[pairs[:, 0]]
-            if closed:
-                along -= (high - low) * np.round(along / (high - low))
-            places.append(x[pairs[:, 0], None] + t * along[:, None])
-        return self.point(*places), self.normal(*places)
 
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """By search; see `surfaces.foot_search`."""
