@@ -42,9 +42,10 @@ class StudyTask:
     """The same for the same work on the same tables, files and version of the program."""
 
     def __post_init__(self) -> None:
-        """Work out the key."""
+        """Work out the key: no module's name is in it, so that modules may move."""
+        package = self.work.__module__.partition(".")[0]
         says = {
-            "work": f"{self.work.__module__}.{self.work.__qualname__}",
+            "work": f"{package}.{self.work.__qualname__}",
             "version": version(),
             "tables": self.tables,
             "files": [digest(*file) for file in _files_of(self.tables)],

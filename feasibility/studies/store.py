@@ -9,19 +9,18 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-import stat
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from types import TracebackType
 from typing import Any, Literal, Self
 
-from coverable_files import reason
+from coverable_files import FileFault, open_regular
 from feasibility.safe_files import FileError, check_writable, shown_path
 
 APPLICATION = 0x434F5642  # "COVB", in the header of every store
-SCHEMA = 1
+FORMAT = 2  # of the file and of its keys; those of format 1 held the names of modules
 MAGIC = b"SQLite format 3\0"
-FOREIGN = "is not a study file; give another name, or remove the file"
+LARGEST = 2**62  # [byte] no limit
 PATIENCE = 5.0  # [s] that another process may hold the file
 
 TABLE = """
@@ -33,6 +32,24 @@ CREATE TABLE tasks (
     seconds REAL NOT NULL
 ) WITHOUT ROWID
 """
+
+FOREIGN = "is not a study file; give another name, or remove the file"
+DAMAGED = "is damaged ({}); remove it to start anew"
+HELD = "is held by another process; wait until that ends, or give another name"
+NO_PLACE = "cannot be written: {}; choose another place"
+NOT_WRITTEN = "cannot be written: {}; what was kept before stays: free some space and run again"
+FAULTS = {
+    sqlite3.SQLITE_FULL: "the disk is full; what was kept before stays: free some space and run "
+    "again",
+    sqlite3.SQLITE_NOTADB: FOREIGN,
+    sqlite3.SQLITE_CORRUPT: DAMAGED,
+    sqlite3.SQLITE_BUSY: HELD,
+    sqlite3.SQLITE_LOCKED: HELD,
+    sqlite3.SQLITE_READONLY: NO_PLACE,
+    sqlite3.SQLITE_PERM: NO_PLACE,
+    sqlite3.SQLITE_CANTOPEN: NO_PLACE,
+    sqlite3.SQLITE_IOERR: NOT_WRITTEN,
+}  # what to do about an error of SQLite, by its primary code
 
 Status = Literal["done", "failed"]
 
@@ -80,46 +97,35 @@ class Store:
         self.path = os.fspath(path)
         self._name = shown_path(path)
         in_memory = self.path == ":memory:"
-        fresh = in_memory or self._look()
-        try:
+        fresh = in_memory or self._is_new()
+        with self._reported():
             self._base = sqlite3.connect(
                 self.path if in_memory else os.path.abspath(self.path),
                 timeout=PATIENCE,
                 isolation_level=None,
             )
-        except sqlite3.Error as error:
-            raise self._error(error) from error
         try:
-            self._prepare(fresh)
-        except sqlite3.Error as error:
-            self._base.close()
-            raise self._error(error) from error
+            with self._reported():
+                self._prepare(fresh)
         except StoreError:
             self._base.close()
             raise
 
-    def _look(self) -> bool:
+    def _is_new(self) -> bool:
         """Is there no file yet, or an empty one? Anything but a regular file is refused."""
         try:
-            status = os.stat(self.path)
-        except FileNotFoundError:
+            with open_regular(self.path, LARGEST, "a study file") as stream:
+                head = stream.read(len(MAGIC))
+        except (FileFault, OSError) as error:
+            if not isinstance(error.__cause__, FileNotFoundError):
+                raise self._refused(str(error)) from error
             try:
                 check_writable(self.path)
-            except FileError as error:
-                raise StoreError(str(error)) from error
+            except FileError as fault:
+                raise StoreError(fault.faults, fault.source) from fault
             return True
-        except (OSError, ValueError) as error:
-            raise StoreError(f"{self._name}: cannot be opened: {reason(error)}") from error
-        if not stat.S_ISREG(status.st_mode):
-            what = "a folder" if stat.S_ISDIR(status.st_mode) else "not a regular file"
-            raise StoreError(f"{self._name}: is {what}; give the name of a file for the study")
-        try:
-            with open(self.path, "rb") as stream:
-                head = stream.read(len(MAGIC))
-        except OSError as error:
-            raise StoreError(f"{self._name}: cannot be opened: {reason(error)}") from error
         if head not in (b"", MAGIC):  # SQLite would take a shorter file for an empty one
-            raise StoreError(f"{self._name}: {FOREIGN}")
+            raise self._refused(FOREIGN)
         return not head
 
     def _prepare(self, fresh: bool) -> None:
@@ -127,24 +133,21 @@ class Store:
         if not fresh:
             # Before anything is written: another program's file stays as it is.
             (application,) = self._base.execute("PRAGMA application_id").fetchone()
-            (schema,) = self._base.execute("PRAGMA user_version").fetchone()
-            empty = application == 0 and schema == 0 and not self._tables()
+            (written,) = self._base.execute("PRAGMA user_version").fetchone()
+            empty = application == 0 and written == 0 and not self._tables()
             if application != APPLICATION and not empty:
-                raise StoreError(
-                    f"{self._name}: is an SQLite file of another program; give another name for "
-                    "the study, or remove the file"
+                raise self._refused(
+                    "is an SQLite file of another program; give another name for the study, or "
+                    "remove the file"
                 )
-            if application == APPLICATION and schema != SCHEMA:
-                raise StoreError(
-                    f"{self._name}: is a study of version {schema}, this program writes version "
-                    f"{SCHEMA}; give another name, or use the program that wrote it"
+            if application == APPLICATION and written != FORMAT:
+                raise self._refused(
+                    f"is a study of format {written}, and this program writes format {FORMAT}; "
+                    "give another name, and its cases are decided anew"
                 )
             (state,) = self._base.execute("PRAGMA quick_check(1)").fetchone()
             if state != "ok":
-                raise StoreError(
-                    f"{self._name}: is damaged ({' '.join(str(state).split())}); remove it to "
-                    "start anew"
-                )
+                raise self._refused(DAMAGED.format(" ".join(str(state).split())))
         self._base.execute("PRAGMA journal_mode = WAL").fetchone()
         self._base.execute("PRAGMA synchronous = NORMAL")
         # Two runs may open a new file at the same time: one of them makes the table.
@@ -152,16 +155,39 @@ class Store:
             if not self._tables():
                 self._base.execute(TABLE)
                 self._base.execute(f"PRAGMA application_id = {APPLICATION}")
-                self._base.execute(f"PRAGMA user_version = {SCHEMA}")
+                self._base.execute(f"PRAGMA user_version = {FORMAT}")
 
     def _tables(self) -> list[str]:
         """Names of the tables in the file."""
         rows = self._base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
         return [str(name) for (name,) in rows]
 
-    def _transaction(self) -> _Transaction:
+    @contextmanager
+    def _transaction(self) -> Iterator[None]:
         """All or nothing of what is written inside."""
-        return _Transaction(self._base)
+        self._base.execute("BEGIN IMMEDIATE")
+        try:
+            yield
+            self._base.execute("COMMIT")
+        except BaseException:
+            if self._base.in_transaction:  # a full disk may have ended it already
+                self._base.execute("ROLLBACK")
+            raise
+
+    def _refused(self, fault: str) -> StoreError:
+        """An error about this file."""
+        return StoreError(fault, self._name)
+
+    @contextmanager
+    def _reported(self) -> Iterator[None]:
+        """Errors of SQLite, with what to do about them."""
+        try:
+            yield
+        except sqlite3.Error as error:
+            # The primary code is the lowest byte.
+            code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+            text = FAULTS.get(code, "cannot be used as a study file: {}")
+            raise self._refused(text.format(error)) from error
 
     def keep(self, records: Iterable[Record]) -> None:
         """Write records in one transaction; one with a known key replaces the old one.
@@ -180,11 +206,8 @@ class Store:
             )
             for record in records
         ]
-        try:
-            with self._transaction():
-                self._base.executemany("INSERT OR REPLACE INTO tasks VALUES (?, ?, ?, ?, ?)", rows)
-        except sqlite3.Error as error:
-            raise self._error(error) from error
+        with self._reported(), self._transaction():
+            self._base.executemany("INSERT OR REPLACE INTO tasks VALUES (?, ?, ?, ?, ?)", rows)
 
     def find(self, keys: Iterable[str]) -> dict[str, Record]:
         """The records of some keys, as far as there are any.
@@ -193,27 +216,20 @@ class Store:
             StoreError: the file cannot be read, or holds rows that no study has written.
         """
         wanted = set(keys)
-        try:
+        with self._reported():
             rows = self._base.execute("SELECT key, parameters, status, result, seconds FROM tasks")
             return {row[0]: self._record(row) for row in rows if row[0] in wanted}
-        except sqlite3.Error as error:
-            raise self._error(error) from error
 
     def _record(self, row: tuple[Any, ...]) -> Record:
         """A row read back."""
         key, parameters, status, result, seconds = row
-        try:
+        tables: tuple[Any, Any] = None, None
+        with suppress(TypeError, ValueError, RecursionError):
             tables = json.loads(parameters), json.loads(result)
-        except (TypeError, ValueError, RecursionError) as error:
-            tables = None, None
-            cause: Exception | None = error
-        else:
-            cause = None
         if not all(isinstance(table, dict) for table in tables) or not isinstance(seconds, float):
-            raise StoreError(
-                f"{self._name}: the record {str(key)[:20]!r} is damaged; remove the file to start "
-                "anew"
-            ) from cause
+            raise self._refused(
+                f"the record {str(key)[:20]!r} is damaged; remove the file to start anew"
+            )
         return Record(key, tables[0], status, tables[1], seconds)
 
     def __len__(self) -> int:
@@ -222,34 +238,9 @@ class Store:
         Raises:
             StoreError: the file cannot be read.
         """
-        try:
+        with self._reported():
             (count,) = self._base.execute("SELECT count(*) FROM tasks").fetchone()
-        except sqlite3.Error as error:
-            raise self._error(error) from error
         return int(count)
-
-    def _error(self, error: sqlite3.Error) -> StoreError:
-        """What SQLite says, in words that help."""
-        code = getattr(error, "sqlite_errorcode", None)
-        primary = None if code is None else code & 0xFF
-        if primary == sqlite3.SQLITE_FULL:
-            text = "the disk is full; what was kept before stays: make room and run again"
-        elif primary == sqlite3.SQLITE_NOTADB:
-            text = FOREIGN
-        elif primary == sqlite3.SQLITE_CORRUPT:
-            text = f"is damaged ({error}); remove it to start anew"
-        elif primary in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
-            text = "is held by another process; wait until that ends, or give another name"
-        elif primary in (sqlite3.SQLITE_READONLY, sqlite3.SQLITE_PERM, sqlite3.SQLITE_CANTOPEN):
-            text = f"cannot be written: {error}; choose another place"
-        elif primary == sqlite3.SQLITE_IOERR:
-            text = (
-                f"cannot be written: {error}; what was kept before stays: see that the disk has "
-                "room, and run again"
-            )
-        else:
-            text = f"cannot be used as a study file: {error}"
-        return StoreError(f"{self._name}: {text}")
 
     def close(self) -> None:
         """Close the file."""
@@ -259,41 +250,6 @@ class Store:
         """The store itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Close the file."""
         self.close()
-
-
-class _Transaction:
-    """BEGIN IMMEDIATE ... COMMIT, or ROLLBACK where something is raised."""
-
-    def __init__(self, base: sqlite3.Connection) -> None:
-        """A transaction of this connection."""
-        self.base = base
-
-    def __enter__(self) -> None:
-        """Begin."""
-        self.base.execute("BEGIN IMMEDIATE")
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        """Keep everything, or nothing."""
-        if error is None:
-            try:
-                self.base.execute("COMMIT")
-                return
-            except sqlite3.Error:
-                if self.base.in_transaction:
-                    self.base.execute("ROLLBACK")
-                raise
-        if self.base.in_transaction:  # a full disk may have ended it already
-            self.base.execute("ROLLBACK")

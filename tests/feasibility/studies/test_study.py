@@ -179,6 +179,16 @@ def test_the_same_task_is_done_once(pool) -> None:
     assert os.getpid() not in {row.result["pid"] for row in rows}
 
 
+def test_a_work_that_moves_to_another_module_keeps_its_tasks(monkeypatch) -> None:
+    """What was kept is found again; a work of another name, or another package, is another."""
+    before = StudyTask({"n": 1}, {}, evaluate).key
+    assert StudyTask({"n": 1}, {}, study_works.double).key != before
+    monkeypatch.setattr(evaluate, "__module__", "feasibility.somewhere.else")
+    assert StudyTask({"n": 1}, {}, evaluate).key == before
+    monkeypatch.setattr(evaluate, "__module__", "elsewhere")
+    assert StudyTask({"n": 1}, {}, evaluate).key != before
+
+
 def test_nothing_to_do(pool) -> None:
     assert run_tasks([], pool) == ()
 

@@ -15,7 +15,7 @@ import pytest
 
 from feasibility.safe_files import FileError
 from feasibility.studies import Store
-from feasibility.studies.store import APPLICATION, Record, StoreError
+from feasibility.studies.store import APPLICATION, FORMAT, Record, StoreError
 
 
 def record(k: int, status: str = "done", size: int = 10) -> Record:
@@ -97,14 +97,19 @@ def test_places_that_are_no_files(tmp_path) -> None:
             Store(path)
 
 
-def test_a_later_version_is_refused(tmp_path) -> None:
+@pytest.mark.parametrize("written", [1, FORMAT + 1])
+def test_a_store_of_another_format_is_refused_and_left_alone(tmp_path, written) -> None:
+    """Also one that was made when the keys held the names of modules."""
     path = tmp_path / "a.study"
-    Store(path).close()
+    with Store(path) as store:
+        store.keep([record(1)])
     with closing(sqlite3.connect(path)) as base:
         assert base.execute("PRAGMA application_id").fetchone() == (APPLICATION,)
-        base.execute("PRAGMA user_version = 2")
-    with pytest.raises(StoreError, match="version 2"):
+        base.execute(f"PRAGMA user_version = {written}")
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match=f"format {written}, and this program writes format"):
         Store(path)
+    assert path.read_bytes() == before
 
 
 def test_damage_is_told_and_never_believed(tmp_path) -> None:
