@@ -133,7 +133,7 @@ def _link_name(index: int) -> str:
 
 
 def _geometry(size: tuple[float, ...]) -> str:
-    """URDF element of a box, cylinder or sphere, told apart by how many sizes it has."""
+    """URDF element of a box, cylinder or sphere, by the number of its sizes."""
     if len(size) == 3:
         return f'<box size="{_text(size)}"/>'
     if len(size) == 2:

@@ -6,4 +6,4 @@ from coverable_errors import CoverableError
 
 
 class RobotError(CoverableError):
-    """A robot that cannot be used as asked: what was wrong, where, and what would do."""
+    """A robot that cannot be used: what is wrong, where, and what would do."""

@@ -148,7 +148,7 @@ def _check_free(
             gets_limits = limits is not None and (
                 not isinstance(limits, Mapping) or joint.name in limits
             )
-            # Limits given by the caller replace bad limits, not a mimic that leads nowhere.
+            # Limits given by the caller replace bad limits, not a mimic of an unknown joint.
             if not (gets_limits and joint.lower is None and joint.mimic is None):
                 faults.append(joint.fault)
     if faults:

@@ -1,8 +1,8 @@
-"""Robots by name: the shipped ones, the arms of example-robot-data, and any URDF file.
+"""Robots by name: the built-in ones, the arms of example-robot-data, and any URDF file.
 
-`library.toml` says for each name where the URDF is, which link is the tool, which way the tool
-points and which joints on the way are held. example-robot-data is only ever read as files: its
-arms are found through the metadata of the installed distribution.
+`library.toml` gives for each name the URDF, the tool's link, the axis along which the tool points
+and the joints on the chain that are held. example-robot-data is only read as files: its arms are
+found through the metadata of the installed distribution.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from robots.joint_selection import suggestion
 from robots.robot import Robot
 
 HERE = Path(__file__).parent
-SHIPPED = "coverable"
+BUILT_IN = "coverable"
 DATA = "example-robot-data"
 
 
@@ -34,7 +34,7 @@ class RobotInfo:
 
     name: str
     source: str
-    """'coverable' for a shipped robot, else the distribution that holds the URDF."""
+    """'coverable' for a built-in robot, else the distribution that holds the URDF."""
     description: str
     urdf: str
     """Path of the URDF file."""
@@ -42,7 +42,7 @@ class RobotInfo:
     approach_axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     """In the tool frame: where a tool mounted on the flange points."""
     lock: Mapping[str, float] = field(default_factory=dict)
-    """Joints on the way to the tool that are held by default, rad or m."""
+    """Joints on the chain to the tool that are held by default, rad or m."""
     limits: str | None = None
     """Path of a file of named limit sets."""
     package_dirs: tuple[str, ...] = ()
@@ -138,8 +138,8 @@ def _library() -> Mapping[str, RobotInfo]:
     share = _data_folder()
     entries = {}
     for name, entry in table.items():
-        shipped = entry["source"] == SHIPPED
-        root = HERE if shipped else share / DATA / "robots"
+        built_in = entry["source"] == BUILT_IN
+        root = HERE if built_in else share / DATA / "robots"
         entries[name] = RobotInfo(
             name=name,
             source=entry["source"],
@@ -149,7 +149,7 @@ def _library() -> Mapping[str, RobotInfo]:
             approach_axis=tuple(entry.get("approach_axis", (0.0, 0.0, 1.0))),
             lock=MappingProxyType(entry.get("lock", {})),
             limits=str(HERE / entry["limits"]) if "limits" in entry else None,
-            package_dirs=() if shipped else (str(share),),
+            package_dirs=() if built_in else (str(share),),
         )
     return MappingProxyType(entries)
 

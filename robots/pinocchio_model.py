@@ -141,8 +141,8 @@ def reduced_model(
 def _rename_clashing_joints(model: pin.Model) -> dict[str, str]:
     """Give joints that are named like a link another name in `model`; return old -> new.
 
-    A URDF may name both alike; Pinocchio parses it, and then cannot lock joints, because it asks
-    for frames by name alone.
+    A URDF may name both alike; Pinocchio parses it, and then cannot lock joints, because it looks
+    up frames by name alone.
     """
     links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
     taken = {frame.name for frame in model.frames}

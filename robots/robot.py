@@ -58,7 +58,7 @@ class Robot:
     locked: Mapping[str, float] = field(default_factory=dict)
     """Every moving joint of the URDF that is not free here, with the value it is held at."""
     notes: tuple[str, ...] = ()
-    """What reading the URDF had to assume or leave out; worth showing to whoever wrote it."""
+    """What was assumed or left out when the URDF was read."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays, and check that they fit together."""
@@ -100,7 +100,7 @@ class Robot:
         object.__setattr__(self, "locked", MappingProxyType(dict(self.locked)))
 
     def _check_joints(self) -> None:
-        """Refuse joints of unknown kind, and limits that leave no room."""
+        """Refuse joints of unknown kind, and empty limit ranges."""
         faults = []
         if not self.joint_names or len(self.joint_kinds) != len(self.joint_names):
             faults.append(
@@ -237,7 +237,7 @@ class Robot:
         return table
 
     def __repr__(self) -> str:
-        """One line that says which arm this is."""
+        """One line: name, joints and tool."""
         return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r})"
 
 

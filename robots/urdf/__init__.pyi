@@ -1,6 +1,6 @@
 from .checked_urdf import CheckedUrdf as CheckedUrdf
-from .checked_urdf import JointInfo as JointInfo
 from .checked_urdf import check_urdf as check_urdf
+from .joints import JointInfo as JointInfo
 from .visuals import Box as Box
 from .visuals import Capsule as Capsule
 from .visuals import Cylinder as Cylinder

@@ -1,4 +1,4 @@
-"""The gate that every URDF passes before a native parser sees it.
+"""The check that every URDF passes before a native parser sees it.
 
 Native URDF readers accept axes of length zero, limits that lock a joint, NaN and mesh names that
 climb out of their folder, and a long enough chain crashes the process. Here each of these is either
@@ -14,26 +14,10 @@ from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
 from robots.urdf.attributes import MAX_LENGTH, Faults
-from robots.urdf.joints import JointInfo, Mimic
-from robots.urdf.tree import MAX_LINKS, read_links, read_tree, refuse_other_formats
-from robots.urdf.visuals import (
-    Box,
-    Capsule,
-    Cylinder,
-    Geometry,
-    MeshFile,
-    MeshFolders,
-    Sphere,
-    Visual,
-    read_visuals,
-)
+from robots.urdf.joints import JointInfo
+from robots.urdf.tree import read_links, read_tree, refuse_other_formats
+from robots.urdf.visuals import MeshFolders, Visual, read_visuals
 from robots.urdf.xml import Node, UrdfError, parse_xml, read_bytes, shown
-
-__all__ = [
-    "MAX_LINKS", "Box", "Capsule", "CheckedUrdf", "Cylinder", "Geometry", "JointInfo", "MeshFile",
-    "Mimic", "Sphere", "UrdfError", "Visual", "check_urdf", "check_urdf_text",
-]  # fmt: skip
-
 
 MAX_WARNINGS = 100
 
@@ -83,7 +67,7 @@ class CheckedUrdf:
         return tuple(reversed(path))
 
     def __repr__(self) -> str:
-        """One line that says which robot this is."""
+        """One line: name, links and moving joints."""
         moving = sum(joint.moves for joint in self.joints)
         return f"CheckedUrdf({self.name!r}, {len(self.links)} links, {moving} moving joints)"
 

@@ -62,7 +62,7 @@ class JointInfo:
     mimic: Mimic | None
     """What it follows, if anything."""
     fault: str | None
-    """Why it cannot move as the file stands, and what would do; None for a sound joint.
+    """Why it cannot be used as written, and what would do; None for a sound joint.
 
     A fault matters only to a user of this joint: an arm is sound when a finger's limit is missing.
     """
@@ -144,8 +144,8 @@ def _kind(node: Node, owner: str, faults: Faults) -> str:
         return "fixed"
     near = nearest(kind or "", KINDS)
     did_you_mean = f" (did you mean {near!r}?)" if near else ""
-    said = "has no type" if kind is None else f"has the unknown type {shown(kind)}"
-    faults.error(node, f"{owner} {said}; expected one of {', '.join(KINDS)}{did_you_mean}")
+    what = "has no type" if kind is None else f"has the unknown type {shown(kind)}"
+    faults.error(node, f"{owner} {what}; expected one of {', '.join(KINDS)}{did_you_mean}")
     return "fixed"
 
 
@@ -158,7 +158,7 @@ def _link_name(node: Node, tag: str, owner: str, faults: Faults) -> str | None:
 
 
 def _check_children(node: Node, owner: str, faults: Faults) -> None:
-    """A misspelt <origin> is an origin of zero in silence."""
+    """Report misspelt elements: without <origin> the origin would silently be zero."""
     for child in node.children:
         if child.tag in CHILDREN:
             continue
@@ -172,7 +172,7 @@ def _check_children(node: Node, owner: str, faults: Faults) -> None:
 def _check_attributes(
     node: Node | None, known: tuple[str, ...], owner: str, faults: Faults
 ) -> None:
-    """A pose in an attribute that is not read would be a wrong pose in silence."""
+    """Report unknown attributes: a pose in one of them would silently be lost."""
     if node is None:
         return
     for attribute in node.attributes:
@@ -299,7 +299,7 @@ def _has_narrower_soft_limits(node: Node, lower: float, upper: float) -> bool:
 
 
 def _mimic(node: Node | None) -> tuple[Mimic | None, str | None]:
-    """What the joint follows, or the fault in saying so."""
+    """The joint that it follows, or why that cannot be read."""
     if node is None:
         return None, None
     leader = node.attributes.get("joint")
@@ -311,5 +311,5 @@ def _mimic(node: Node | None) -> tuple[Mimic | None, str | None]:
             for attribute, default in (("multiplier", 1.0), ("offset", 0.0))
         ]
     except BadValue as bad:
-        return None, f"has a bad mimic: {bad}; mend it, or lock the joint"
+        return None, f"has a bad mimic: {bad}; correct it, or lock the joint"
     return Mimic(leader, factors[0], factors[1]), None

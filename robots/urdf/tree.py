@@ -75,7 +75,8 @@ def read_links(robot: Node, faults: Faults) -> dict[str, Node]:
         name = name_of(node, faults)
         if name is not None and name in links:
             faults.error(
-                node, f"link {shown(name)} stands already on line {links[name].line}; rename one"
+                node,
+                f"link {shown(name)} is already defined on line {links[name].line}; rename one",
             )
         elif name is not None:
             links[name] = node
@@ -114,7 +115,7 @@ def read_tree(robot: Node, links: dict[str, Node], faults: Faults) -> tuple[Join
 def _joints(robot: Node, links: dict[str, Node], faults: Faults) -> dict[str, JointInfo]:
     nodes = robot.all("joint")
     if len(nodes) >= MAX_LINKS:
-        if len(robot.all("link")) <= MAX_LINKS:  # else that was said
+        if len(robot.all("link")) <= MAX_LINKS:  # else that was reported
             faults.error(
                 robot,
                 f"has {len(nodes):,} joints, more than {MAX_LINKS - 1:,}; a tree of links has one "
@@ -127,7 +128,7 @@ def _joints(robot: Node, links: dict[str, Node], faults: Faults) -> dict[str, Jo
         name = node.attributes.get("name", "")
         if name and name in lines:
             faults.error(
-                node, f"joint {shown(name)} stands already on line {lines[name]}; rename one"
+                node, f"joint {shown(name)} is already defined on line {lines[name]}; rename one"
             )
         lines.setdefault(name, node.line)
         joint = read_joint(node, faults)
@@ -145,7 +146,7 @@ def _joints(robot: Node, links: dict[str, Node], faults: Faults) -> dict[str, Jo
                 faults.error(
                     node,
                     f"joint {shown(joint.name)} has the unknown {role} link {shown(link)}; "
-                    "mend the name or add the link",
+                    "correct the name or add the link",
                 )
     return joints
 
@@ -197,16 +198,14 @@ def _tree(
 
 
 def _with_mimic_faults(joints: tuple[JointInfo, ...]) -> tuple[JointInfo, ...]:
-    """Mark the joints whose mimic leads nowhere."""
+    """Mark the joints whose mimic has no moving leader."""
     by_name = {joint.name: joint for joint in joints}
     marked = []
     for joint in joints:
         fault = _mimic_fault(joint, by_name)
         if fault is not None and joint.fault is None:
-            said = (
-                f"line {joint.line}: joint {shown(joint.name)} {fault}; mend it, or lock the joint"
-            )
-            joint = replace(joint, fault=said)
+            reason = f"line {joint.line}: joint {shown(joint.name)} {fault}; correct it, or lock the joint"
+            joint = replace(joint, fault=reason)
         marked.append(joint)
     return tuple(marked)
 

@@ -83,7 +83,7 @@ class Visual:
     """(4, 4) the shape's frame in the link's frame, m."""
     geometry: Geometry
     rgba: Rgba | None
-    """Red, green, blue, opacity in [0, 1]; None where the file says nothing."""
+    """Red, green, blue, opacity in [0, 1]; None where the file gives none."""
 
 
 class MeshFolders:
@@ -98,7 +98,7 @@ class MeshFolders:
         self.allowed = [Path(os.path.realpath(folder)) for folder in allowed if folder is not None]
 
     def candidates(self, name: str) -> list[Path]:
-        """Paths that a mesh name may stand for, best first; they need not exist."""
+        """Paths that a mesh name may refer to, best first; they need not exist."""
         if name.startswith(("package://", "model://")):
             inner = name.split("://", 1)[1].lstrip("/")
             package, _, rest = inner.partition("/")
@@ -115,7 +115,7 @@ class MeshFolders:
         return [folder / name for folder in [self.base, *self.packages] if folder is not None]
 
     def resolve(self, name: str) -> str:
-        """The file that a mesh name stands for.
+        """The file that a mesh name refers to.
 
         Raises:
             BadValue: there is none that may be opened, and why.

@@ -94,7 +94,7 @@ def parse_xml(data: bytes, path: str, encoding: str | None = None) -> Node:
     except expat.ExpatError as error:
         what = expat.ErrorString(error.code) or "not XML"
         raise UrdfError(
-            f"line {error.lineno}: broken XML ({what}); mend the file or export it again", path
+            f"line {error.lineno}: broken XML ({what}); correct the file or export it again", path
         ) from None
     except (LookupError, ValueError) as error:
         raise UrdfError(

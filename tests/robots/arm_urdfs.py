@@ -8,10 +8,22 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import Robot, load_robot
+from robots import Robot, list_robots, load_robot
 from robots.urdf import JointInfo
 
-FREE = (-float("inf"), float("inf"))
+# Six unlike arms: of 6 and 7 joints, continuous ones, a tool axis other than z, on a held body.
+SIX = ("puma560", "ur5", "panda", "kinova", "talos_arm", "baxter_left")
+UNLIKE = (*SIX, "tiago on its lift")
+
+
+def unlike(name: str) -> Robot:
+    """An arm of `UNLIKE`; the last has a prismatic joint, which the library holds."""
+    if name in SIX:
+        return load_robot(name)
+    info = next(info for info in list_robots() if info.name == "tiago")
+    robot = load_robot(info.urdf, tool_frame=info.tool_frame, package_dirs=info.package_dirs)
+    assert robot.prismatic.any()
+    return robot
 
 
 def joint(

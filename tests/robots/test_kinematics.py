@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from arm_urdfs import arm, joint, load_text, placement, random_arm, random_q
+from arm_urdfs import UNLIKE, arm, joint, load_text, placement, random_arm, random_q, unlike
 
 from robots import Kinematics, list_robots, load_robot
 from robots.urdf import check_urdf
@@ -51,9 +51,9 @@ def test_the_tool_moves_as_its_jacobian_says(seed, tmp_path):
     np.testing.assert_allclose(kinematics.tool_velocities(q, dq), expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["puma560", "kinova", "z1"])
+@pytest.mark.parametrize("name", UNLIKE)
 def test_many_configurations_are_those_of_one_bit_for_bit(name):
-    robot = load_robot(name)
+    robot = unlike(name)
     kinematics, rng = Kinematics(robot), np.random.default_rng(9)
     q = np.array([random_q(robot, rng) for _ in range(20)])
     points, axes = kinematics.tools(q)

@@ -21,10 +21,6 @@ def robot(request):
     return load_robot(request.param)
 
 
-def urdf_of(robot):
-    return check_urdf(robot.urdf, robot.package_dirs)
-
-
 # Every listed robot
 
 
@@ -46,15 +42,11 @@ def test_every_urdf_of_the_arm_families_is_listed():
     assert packed - listed == {"ur3.urdf"}  # a file without links
 
 
-def test_free_and_held_joints_are_all_moving_joints_of_the_urdf(robot):
-    checked = urdf_of(robot)
-    moving = {info.name for info in checked.joints if info.moves}
+def test_joints_and_limits_are_the_urdfs_and_held_joints_are_inside_theirs(robot):
+    joints = {info.name: info for info in check_urdf(robot.urdf, robot.package_dirs).joints}
+    moving = {name for name, info in joints.items() if info.moves}
     assert set(robot.joint_names) | robot.locked.keys() == moving
     assert not set(robot.joint_names) & robot.locked.keys()
-
-
-def test_limits_are_the_urdfs_and_held_joints_stand_inside_theirs(robot):
-    joints = {info.name: info for info in urdf_of(robot).joints}
     for name, kind, low, high in zip(
         robot.joint_names, robot.joint_kinds, robot.lower, robot.upper, strict=True
     ):

@@ -144,8 +144,8 @@ REFUSED: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
         urdf(link("base"), link("arm"), link("hand"), joint(), joint(child="hand")),
         ("line 6", "'elbow'", "line 5", "rename"),
     ),
-    "parent unknown": (arm(parent="bass"), ("elbow", "parent", "'bass'", "mend the name")),
-    "child unknown": (arm(child="harm"), ("elbow", "child", "'harm'", "mend the name")),
+    "parent unknown": (arm(parent="bass"), ("elbow", "parent", "'bass'", "correct the name")),
+    "child unknown": (arm(child="harm"), ("elbow", "child", "'harm'", "correct the name")),
     "parent missing": (arm().replace('<parent link="base"/>', ""), ("elbow", "has no parent")),
     "child missing": (arm().replace('<child link="arm"/>', ""), ("elbow", "has no child")),
     "parent without link": (
