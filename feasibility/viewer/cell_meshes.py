@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.viewer.decimated_mesh import skin_of
+from feasibility.viewer.decimated_mesh import display_mesh_of
 from surfaces import Cells, Triangles
 from surfaces.meshes.cells import MeshCells
 
@@ -15,7 +15,7 @@ FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as 
 def patch(cells: Cells, which: NDArray[np.int64], inset: float = 0.0) -> Triangles:
     """Triangles that fill some cells, as fine as their number allows; see `Cells.triangles`."""
     if isinstance(cells, MeshCells):
-        return skin_of(cells).fill(which, cells.centres, inset)
+        return display_mesh_of(cells).fill(which, cells.centres, inset)
     along = max(*cells.shape, 1) if len(cells.shape) > 1 else np.sqrt(len(cells))
     pieces = int(np.clip(np.ceil(64 / along), 2, 32))  # a cell's side, cut up
     return cells.triangles(which, 1 if len(cells) > FULL_DETAIL else pieces, inset)
@@ -24,7 +24,7 @@ def patch(cells: Cells, which: NDArray[np.int64], inset: float = 0.0) -> Triangl
 def borders(cells: Cells) -> NDArray[np.float64]:
     """(k, 2, 3) m, ends of short lines along the borders of all cells; see `Cells.borders`."""
     if isinstance(cells, MeshCells):
-        return skin_of(cells).borders()
+        return display_mesh_of(cells).borders()
     return cells.borders(8 if len(cells) <= FULL_DETAIL else 1)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from coverable_errors import CoverableError
 from feasibility.viewer.threejs import Colour
+from feasibility.viewer.vertex_clusters import merge_vertices, split_at_creases
 
 LARGEST_FILE = 200_000_000  # [byte]
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
@@ -79,19 +80,19 @@ def read_mesh(file: Path, scale: NDArray[np.float64], colour: Colour | None) -> 
 def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
     """Merge vertices that lie close together until all meshes have at most `budget` triangles.
 
-    Vertices within one box of a grid become one, at their mean, and triangles that collapse go.
-    The grid starts at 0.01 mm (which only joins what is equal) and coarsens by half from 0.4 mm to
-    at most 2 cm. Meshes that use less than a quarter of an even share of the budget are left as
-    they are, so that small parts do not vanish beside large ones.
+    Vertices within one box of a grid become that which is nearest to their mean, and triangles that
+    collapse go. The grid starts at 0.01 mm (which only joins what is equal) and coarsens by half
+    from 0.4 mm to at most 2 cm. Meshes that use less than a quarter of an even share of the budget
+    are left as they are, so that small parts do not vanish beside large ones.
 
     Returns:
         As many meshes as were given, in their order; some may have lost all their triangles.
     """
-    result = [_clustered(mesh, 1e-5) for mesh in meshes]  # [m]
+    result = [_merged(mesh, 1e-5) for mesh in meshes]  # [m]
     spacing = 4e-4  # [m]
     small = budget / (4 * max(len(meshes), 1))
     while sum(len(mesh.faces) for mesh in result) > budget and spacing <= 2e-2:
-        result = [mesh if len(mesh.faces) < small else _clustered(mesh, spacing) for mesh in result]
+        result = [mesh if len(mesh.faces) < small else _merged(mesh, spacing) for mesh in result]
         spacing *= 1.5
     return result
 
@@ -105,8 +106,7 @@ def shaded(mesh: Mesh) -> tuple[Mesh, NDArray[np.float64]]:
     Returns:
         The mesh with its vertices split, and (V, 3) unit normals.
     """
-    corners = mesh.vertices[mesh.faces]
-    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    areas = _doubled_areas(mesh.vertices, mesh.faces)
     units = areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300)
     flat = mesh.faces.reshape(-1)  # vertex of each corner
     face = np.repeat(np.arange(len(mesh.faces)), 3)
@@ -125,13 +125,8 @@ def shaded(mesh: Mesh) -> tuple[Mesh, NDArray[np.float64]]:
             left[alike], areas[face[right[alike]], axis], minlength=len(flat)
         )
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-    # Corners of one vertex whose normals agree to about a degree become one vertex again.
-    rounded = np.rint(normals * 60.0).astype(np.int64) + 64
-    key = (((flat << 7) + rounded[:, 0] << 7) + rounded[:, 1] << 7) + rounded[:, 2]
-    _, kept, renumbered = np.unique(key, return_index=True, return_inverse=True)
-    split = replace(
-        mesh, vertices=mesh.vertices[flat[kept]], faces=renumbered.reshape(-1, 3).astype(np.int64)
-    )
+    kept, faces = split_at_creases(flat, normals)
+    split = replace(mesh, vertices=mesh.vertices[flat[kept]], faces=faces)
     return split, normals[kept]
 
 
@@ -173,26 +168,19 @@ def tubes(
     return np.concatenate(vertices), np.concatenate(faces)
 
 
-def _clustered(mesh: Mesh, spacing: float) -> Mesh:
+def _merged(mesh: Mesh, spacing: float) -> Mesh:
     """Merge the vertices within each box of a grid, and drop triangles that collapse."""
-    low = mesh.vertices.min(axis=0, initial=np.inf)
-    extent = float(np.ptp(mesh.vertices, axis=0).max(initial=0.0)) if len(mesh.vertices) else 0.0
-    boxes = np.rint((mesh.vertices - low) / max(spacing, extent / 2**20)).astype(np.int64)
-    key = (boxes[:, 0] << 42) + (boxes[:, 1] << 21) + boxes[:, 2]
-    _, inverse, count = np.unique(key, return_inverse=True, return_counts=True)
-    vertices = np.column_stack(
-        [np.bincount(inverse, mesh.vertices[:, axis]) / count for axis in range(3)]
-    )
-    faces = inverse[mesh.faces]
-    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-    ordered = np.sort(faces, axis=1)
-    # As whole numbers below 2^63 where the vertices are few enough, which sorts ten times faster.
-    if len(vertices) < 2**21:
-        key = (ordered[:, 0] << 42) + (ordered[:, 1] << 21) + ordered[:, 2]
-        _, kept = np.unique(key, return_index=True)
-    else:
-        _, kept = np.unique(ordered, axis=0, return_index=True)
-    return replace(mesh, vertices=vertices, faces=faces[np.sort(kept)])
+    faces = merge_vertices(mesh.vertices, mesh.faces, spacing).faces
+    faces = faces[_doubled_areas(mesh.vertices, faces).any(axis=1)]  # no normal, nothing to see
+    used = np.zeros(len(mesh.vertices), dtype=bool)
+    used[faces] = True
+    return replace(mesh, vertices=mesh.vertices[used], faces=(np.cumsum(used) - 1)[faces])
+
+
+def _doubled_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """(F, 3) normals as long as twice the areas."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return np.cross(b - a, c - a)
 
 
 def _colour(part: Any) -> tuple[Colour | None, float]:

@@ -14,7 +14,7 @@ from matplotlib.colors import to_rgb
 
 from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import scene, view
-from feasibility.viewer.decimated_mesh import make_skin
+from feasibility.viewer.decimated_mesh import make_display_mesh
 from feasibility.viewer.paper_figures import plot_causes, plot_graph, plot_transition
 from feasibility.viewer.scene import edge_lines, patch_layers
 from robots import load_robot
@@ -168,20 +168,20 @@ def test_shrunk_cells_part_from_their_neighbours():
 
 
 def test_a_fine_mesh_is_thinned_and_its_cells_still_meet_as_they_did(fine):
-    skin = make_skin(fine, budget=4_000)
-    assert len(skin.faces) <= 4_000 < len(fine.labels)
+    display = make_display_mesh(fine, budget=4_000)
+    assert len(display.faces) <= 4_000 < len(fine.labels)
     turned = fine.surface.mesh.vertices @ fine.surface.rotation.T + fine.surface.position
     corners = set(map(tuple, turned.round(12).tolist()))
-    assert set(map(tuple, skin.vertices.round(12).tolist())) <= corners
-    area = np.bincount(skin.labels, areas_of(skin.vertices, skin.faces), 25)
+    assert set(map(tuple, display.vertices.round(12).tolist())) <= corners
+    area = np.bincount(display.labels, areas_of(display.vertices, display.faces), 25)
     np.testing.assert_allclose(area, fine.areas, rtol=0.06)
     assert area.sum() == pytest.approx(fine.areas.sum(), rel=0.005)
-    closest_point = fine.surface.closest(skin.vertices)
-    assert ((closest_point.normal * skin.normals).sum(axis=1) > np.cos(np.radians(2.0))).all()
-    around = edges_of(skin.places[skin.faces], skin.labels)
+    closest_point = fine.surface.closest(display.vertices)
+    assert ((closest_point.normal * display.normals).sum(axis=1) > np.cos(np.radians(2.0))).all()
+    around = edges_of(display.places[display.faces], display.labels)
     met = {tuple(sorted(set(labels))) for labels in around.values() if len(set(labels)) == 2}
     assert met == set(map(tuple, fine.pairs.tolist()))
-    lines = skin.borders()
+    lines = display.borders()
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
     cone_chord = fine.surface.mesh.edges.border_lengths.sum()
     assert length == pytest.approx(fine.border_lengths.sum() + cone_chord, rel=0.02)
@@ -194,18 +194,18 @@ def test_small_cells_survive_thinning():
     labels = blocks(surface, 2).labels.copy()
     labels[[100, 2000, 5000]] = [4, 5, 6]
     cells = MeshCells.of(surface, labels)
-    skin = make_skin(cells, budget=500)
-    assert len(skin.faces) < 1_500
-    assert set(skin.labels.tolist()) == set(range(7))
-    area = np.bincount(skin.labels, areas_of(skin.vertices, skin.faces), 7)
+    display = make_display_mesh(cells, budget=500)
+    assert len(display.faces) < 1_500
+    assert set(display.labels.tolist()) == set(range(7))
+    area = np.bincount(display.labels, areas_of(display.vertices, display.faces), 7)
     assert (area[4:] > 0.0).all()
 
 
 def test_a_mesh_within_the_budget_is_drawn_as_it_is(fine):
-    skin = make_skin(fine, budget=len(fine.labels))
-    assert len(skin.faces) == len(fine.labels)
-    np.testing.assert_array_equal(skin.labels, fine.labels)
-    assert len(skin.borders()) == len(fine.borders())
+    display = make_display_mesh(fine, budget=len(fine.labels))
+    assert len(display.faces) == len(fine.labels)
+    np.testing.assert_array_equal(display.labels, fine.labels)
+    assert len(display.borders()) == len(fine.borders())
 
 
 def test_edges_run_from_target_to_target_at_the_standoff(verdict):
