@@ -1,5 +1,6 @@
 # make demo   set up .venv and decide paper/4a        make bench  the table of speeds
 # make test   set up .venv and run every check        make clean  remove what was made
+# make campaign NAME=oracle   what takes too long for make test (tests/campaigns)
 # PYTHON=/path/to/python chooses the interpreter (CPython 3.11 or later).
 
 BIN := .venv/bin
@@ -8,10 +9,10 @@ CANDIDATES := python3.11 python3 python3.12 python3.13 python3.14 python
 IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint kernels bench clean distclean
+.PHONY: help demo test lint kernels bench campaign clean distclean
 
 help:
-	@sed -n '1,3s/^# //p' Makefile
+	@sed -n '1,4s/^# //p' Makefile
 
 # The stamp is younger than pyproject.toml once everything it names is installed.
 .venv/installed: pyproject.toml
@@ -51,6 +52,9 @@ test: .venv/installed
 ifneq ($(NOTEBOOKS),)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --nbmake --nbmake-timeout=900 $(NOTEBOOKS)
 endif
+
+campaign: .venv/installed
+	$(BIN)/python -m pytest -n 2 --dist loadfile tests/campaigns/test_$(NAME).py
 
 bench: .venv/installed
 	$(BIN)/python tests/benchmarks/run.py

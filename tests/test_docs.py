@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+import ast
 import json
+import os
 import re
 import shlex
+import shutil
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+import coverable
+import feasibility
+import robots
+import surfaces
 from feasibility import Search, check
 from feasibility.cases import Case, builtin_cases
 from feasibility.cli.main import main
 from feasibility.roadmap.search import DRY_ROUNDS
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = ("robots", "surfaces", "feasibility")
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 README = (ROOT / "README.md").read_text("utf-8")
@@ -131,20 +141,88 @@ def test_greedy_column_of_the_table(name: str) -> None:
     assert promised == f"{verdict.n_covered} / {verdict.n_edges}"
 
 
-def test_contributing_names_every_dependency_and_file() -> None:
+def test_contributing_names_every_dependency_and_room() -> None:
     required = [*PROJECT["dependencies"], *PROJECT["optional-dependencies"]["dev"]]
     for requirement in required:
         name = re.split(r"[<>=]", requirement)[0]
         assert f"**{name}**" in CONTRIBUTING, f"{name}: why is it here?"
-    for package in ("robots", "surfaces", "feasibility"):
-        for path in (ROOT / package).glob("*.py"):
-            if path.name != "__init__.py":
-                assert f"`{path.name}`" in CONTRIBUTING, f"{path}: what is it for?"
-    for name in re.findall(r"`(\w+\.(?:py|toml))`", CONTRIBUTING):
-        found = [
-            p for part in ("robots", "surfaces", "feasibility") for p in ROOT.glob(f"{part}/{name}")
-        ]
-        assert found, name
+    rooms = [p.parent for top in PACKAGES for p in (ROOT / top).rglob("__init__.pyi")]
+    for room in rooms:
+        assert f"| `{room.relative_to(ROOT)}/` |" in CONTRIBUTING, f"{room}: what is it for?"
+
+
+def test_files_that_contributing_names_exist() -> None:
+    names = set(re.findall(r"`([\w/]+\.(?:py|pyi|toml)|[\w/]+/)`", CONTRIBUTING))
+    assert len(names) > 60
+    for name in names:
+        assert any(ROOT.glob(f"**/{name}" if "/" not in name.rstrip("/") else name)) or any(
+            ROOT.glob(f"feasibility/{name}")
+        ), name
+
+
+def test_pages_and_notebooks_use_the_front_door_alone() -> None:
+    sources = {"README.md": "\n".join(blocks(README, "python"))}
+    for path in NOTEBOOKS:
+        cells = json.loads(path.read_text("utf-8"))["cells"]
+        sources[path.name] = "\n".join(
+            "".join(cell["source"]) for cell in cells if cell["cell_type"] == "code"
+        )
+    for name, source in sources.items():
+        assert not re.search(r"^\s*(from|import) (robots|surfaces|feasibility)\b", source, re.M), (
+            name
+        )
+        assert "from coverable import" in source, name
+
+
+def test_the_front_door_is_true() -> None:
+    """Each name is there, what type checkers see is what there is, and nothing else is shown."""
+    tree = ast.parse((ROOT / "coverable.py").read_text("utf-8"))
+    seen = {
+        name.asname or name.name
+        for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)
+        for name in node.names if str(node.module).split(".")[0] in PACKAGES
+    }  # fmt: skip
+    assert sorted(seen | {"__version__"}) == coverable.__all__ == dir(coverable)
+    for name in coverable.__all__:
+        assert getattr(coverable, name) is not None, name
+    for package in (robots, surfaces, feasibility):
+        assert dir(package) == sorted(package.__all__)
+        assert not {"Any", "TYPE_CHECKING"} & set(dir(package))
+    assert "check" in dir(feasibility)
+
+
+def test_a_wheel_works_outside_the_checkout(tmp_path: Path) -> None:
+    """Everything that it needs is in it: stubs of the rooms, built-in cases, the PUMA."""
+    source = tmp_path / "source"
+    kept = shutil.ignore_patterns(".*", "__pycache__", "tests", "notebooks", "build", "*.egg-info")
+    shutil.copytree(ROOT, source, ignore=kept)
+    for step in (
+        ["-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", "wheels", "./source"],
+        ["-m", "pip", "install", "-q", "--no-deps", "--target", "site",
+         "--find-links", "wheels", "--no-index", "coverable"],
+    ):  # fmt: skip
+        subprocess.run([sys.executable, *step], cwd=tmp_path, check=True, timeout=600)
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(tmp_path / "site"),
+        "NUMBA_DISABLE_JIT": "1",
+    }  # nothing to compile
+
+    def run(*arguments: str) -> str:
+        done = subprocess.run(
+            [sys.executable, *arguments], cwd=tmp_path, env=environment, capture_output=True,
+            text=True, check=True, timeout=600,
+        )  # fmt: skip
+        return done.stdout
+
+    assert str(tmp_path) in run("-c", "import coverable; print(coverable.__file__)")
+    command = str(tmp_path / "site" / "bin" / "coverable")
+    check = (command, "check", "paper/4a")
+    saved = run(*check, "--save", "4a.result", "--html", "4a.html")
+    assert saved.startswith("feasible")
+    run(command, "show", "4a.result", "--html", "shown.html")
+    for page in ("4a.html", "shown.html"):
+        assert (tmp_path / page).stat().st_size > 1e5
 
 
 def test_citation_and_changelog_name_this_version() -> None:
