@@ -18,8 +18,9 @@ from feasibility.placement.quick_search import MOST_COVERS, covers_of, probe, sk
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
 from feasibility.placement.trial import Margins, Stage, Trial
-from feasibility.roadmap import Exploration, SearchArrays, arrays_of, cause_counts
+from feasibility.roadmap import Exploration, SearchArrays, arrays_of
 from feasibility.search import Search
+from feasibility.studies import cause_counts
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.cases import Case, parse_toml, read_robot, read_surface, toml_document
-from feasibility.roadmap import cause_counts
+from feasibility.studies.missed_cells import cause_counts
 
 if TYPE_CHECKING:
     from feasibility.verdict import Verdict

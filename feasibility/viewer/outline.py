@@ -16,14 +16,14 @@ Array = NDArray[np.float64]
 MOST = 96  # segments of one outline
 FINEST = 8  # pieces that a cell's side is cut into, at most
 ALIKE = 1e-6  # [1] of the surface's size: corners nearer than this are one
-TELLING = 0.5  # [1] of the surface's size: a smaller rim does not show where the surface lies
+SMALL = 0.5  # [1] of the surface's size: a smaller boundary does not show where the surface lies
 STROKE = 0.12  # [1] of the surface's size: the stroke that points to the working side
 
 
 def outline(cells: Cells) -> Array:
-    """The rim of a surface and a stroke from its middle to the working side.
+    """The boundary of a surface and a stroke from its middle to the working side.
 
-    A surface without a rim, or with a small one, shows its three middle sections as well.
+    A surface without a boundary, or with a small one, shows its three middle sections as well.
 
     Returns:
         (k, 2, 3) m, ends of segments, in the surface's frame.
@@ -32,15 +32,15 @@ def outline(cells: Cells) -> Array:
         return np.empty((0, 2, 3))
     triangles = _triangles(cells)
     size = _size(triangles.vertices)
-    lines = _rim(triangles, ALIKE * size)
-    if len(lines) == 0 or _size(lines.reshape(-1, 3)) < TELLING * size:
+    lines = _boundary(triangles, ALIKE * size)
+    if len(lines) == 0 or _size(lines.reshape(-1, 3)) < SMALL * size:
         lines = np.concatenate([lines, _sections(triangles)])
     lines = np.concatenate([_thinned(lines, size / MOST), _stroke(cells, STROKE * size)])
     return lines
 
 
 def placed(points: Array, pose: Pose) -> Array:
-    """Points (..., 3) m of the surface's frame in the root frame, the frame standing at `pose`."""
+    """Points (..., 3) m of the surface's frame in the root frame, for a surface at `pose`."""
     return points @ pose.rotation.T + np.array(pose.position)
 
 
@@ -54,10 +54,10 @@ def _triangles(cells: Cells) -> Triangles:
         found = cells.triangles(every, pieces)
     else:
         found = patch(cells, every)
-    return found._replace(vertices=_at_home(cells, found.vertices))
+    return found._replace(vertices=_in_own_frame(cells, found.vertices))
 
 
-def _at_home(cells: Cells, points: Array) -> Array:
+def _in_own_frame(cells: Cells, points: Array) -> Array:
     """Points (..., 3) m of the root frame in the surface's frame."""
     return np.asarray((points - cells.surface.position) @ cells.surface.rotation)
 
@@ -67,7 +67,7 @@ def _size(points: Array) -> float:
     return float(np.linalg.norm(np.ptp(points, axis=0)))
 
 
-def _rim(triangles: Triangles, near: float) -> Array:
+def _boundary(triangles: Triangles, near: float) -> Array:
     """(k, 2, 3) m: edges of one triangle only; corners nearer than `near` (m) are one."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -90,7 +90,7 @@ def _sections(triangles: Triangles) -> Array:
     import trimesh
 
     body = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
-    # Off the middle by a hair: a plane through corners cuts along edges, or nothing.
+    # Slightly off the middle: a plane through corners cuts along edges, or nothing.
     share = np.array([0.5003, 0.4998, 0.5001])
     middle = body.bounds[0] + share * np.ptp(body.bounds, axis=0)
     cuts = [trimesh.intersections.mesh_plane(body, axis, middle) for axis in np.eye(3)]
@@ -112,17 +112,12 @@ def _thinned(lines: Array, spacing: float) -> Array:
 
 
 def _stroke(cells: Cells, length: float) -> Array:
-    """(1, 2, 3) m: from the middle to the working side; (0, 2, 3) where the sides face all ways."""
+    """(1, 2, 3) m: from the middle to the working side; (0, 2, 3) where normals cancel out."""
     mean = (cells.areas[:, None] * cells.normals).sum(axis=0) / cells.areas.sum()
-    if np.linalg.norm(mean) < TELLING:
+    if np.linalg.norm(mean) < SMALL:
         return np.empty((0, 2, 3))
     away = np.linalg.norm(cells.centres - cells.centres.mean(axis=0), axis=1)
-    closest_point = int(
-        np.argmax(away <= away.min() + ALIKE * away.max())
-    )  # the first of several as near
-    # The tool stands on the side that the targets lie on.
-    tip = (
-        cells.centres[closest_point]
-        + length * cells.surface.side_sign * cells.normals[closest_point]
-    )
-    return _at_home(cells, np.stack([cells.centres[closest_point], tip]))[None]
+    cell = int(np.argmax(away <= away.min() + ALIKE * away.max()))  # the first of several as near
+    # The tool is on the side of the targets.
+    tip = cells.centres[cell] + length * cells.surface.side_sign * cells.normals[cell]
+    return _in_own_frame(cells, np.stack([cells.centres[cell], tip]))[None]

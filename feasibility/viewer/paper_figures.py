@@ -27,7 +27,7 @@ BORDERS = (0.72, 0.75, 0.78)
 
 
 class Plot(Figure):
-    """A figure that notebooks show without being told how."""
+    """A figure that notebooks display."""
 
     def _repr_png_(self) -> bytes:
         """The figure as PNG."""
@@ -176,7 +176,7 @@ def unrolled_edges(verdict: Verdict) -> list[NDArray[np.float64]]:
 def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
     """A figure over the parameters: v to the right, u down, as cells are numbered.
 
-    A mesh has none; it is seen from outside, as large one way as the other.
+    A mesh has none; it is drawn flat, with equal scales.
     """
     surface = verdict.cells.surface
     figure = Plot(figsize=(6.4, 5.2), layout="constrained")

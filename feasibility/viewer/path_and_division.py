@@ -1,6 +1,6 @@
-"""Pictures of work to be done: a path that paints the surface, and the patches of a division.
+"""Pictures of a coverage path, with the trail of the tool, and of the patches of a division.
 
-from feasibility.job_view import view_path
+from coverable import view_path
 view_path(path, trajectory).save_html("path.html")
 """
 
@@ -39,10 +39,10 @@ FRAMES = 3_000  # samples of a trajectory that are drawn, at most
 def view_path(
     path: CoveragePath, trajectory: Trajectory | None = None, case: str | None = None
 ) -> View:
-    """The arm along a path, and the trail that it has painted growing behind it.
+    """The arm along a path, and the trail of the tool growing behind it.
 
     Args:
-        path: what is driven.
+        path: the path.
         trajectory: its timing; played as fast as it is, or in a minute if it takes longer. Without
             one the tool travels evenly.
         case: name of the case, for the title.
@@ -56,7 +56,7 @@ def view_path(
         speed = f"{trajectory.duration:.1f} s"
     strokes, tracks = _strokes(motion, 0.06 * cell_size(cells))
     title = f"{case}: " if case else ""
-    again = f", {figures.revisited:.2g} m of it again" if figures.revisited > 0.0 else ""
+    again = f", {figures.revisited:.2g} m of it revisited" if figures.revisited > 0.0 else ""
     text = (
         f"{robot.name}: {int(path.needed.sum())} cells in order {path.order}, "
         f"{figures.length:.2f} m{again}, {speed}"
@@ -110,7 +110,7 @@ def _timed(robot: Robot, trajectory: Trajectory) -> Motion:
 
 
 def _strokes(motion: Motion, radius: float) -> tuple[Layer, list[dict[str, Any]]]:
-    """The tool's trail in pieces that appear when the tool has passed, and their appearing."""
+    """The tool's trail in pieces, and the tracks that show each when the tool has passed."""
     root = "/motion/painted trail"
     end = float(motion.seconds[-1])
     edges = np.linspace(0.0, end, STROKES + 1)
@@ -131,7 +131,7 @@ def _strokes(motion: Motion, radius: float) -> tuple[Layer, list[dict[str, Any]]
 def _move(
     robot: Robot, start: NDArray[np.float64], end: NDArray[np.float64], name: str, size: float
 ) -> Layer:
-    """The tool's way in a move between patches."""
+    """The path of the tool in a move between patches."""
     share = np.linspace(0.0, 1.0, 4 * DENSE)[:, None]
     line, _ = Kinematics(robot).tools(start + share * (end - start))
     path = f"/motion/move from patch {name}"

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from feasibility.placement import AXES, Array, PlacementMap, Placements
+from feasibility.viewer.paper_figures import Plot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 BEST, OTHERS = "#d62728", "white"
 UNKNOWN = "0.85"
-DOTS_PER_INCH = 110
 
 
 def plot_map(
@@ -23,18 +21,18 @@ def plot_map(
     placements: Placements | None = None,
     value: Literal["share", "margin"] = "share",
     title: str | None = None,
-) -> Figure:
-    """Covered share, or margin, over two axes; one panel for each place along a third.
+) -> Plot:
+    """Covered share, or margin, over two axes; one panel for each value along a third.
 
     Args:
         charted: the map.
         placements: its feasible placements are marked, each in the panel nearest to it.
-        value: what the colours tell.
+        value: what the colours show.
         title: above the figure.
     """
     values = getattr(charted, value).reshape(*charted.share.shape[:2], -1)
     panels = charted.ticks[2] if len(charted.ticks) > 2 else np.zeros(1)
-    figure = _figure(1.2 + 3.4 * len(panels), 3.6)
+    figure = Plot(figsize=(1.2 + 3.4 * len(panels), 3.6), layout="constrained")
     grid = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
     most = 1.0 if value == "share" else max(float(np.nanmax(values, initial=0.0)), 1e-9)
     fields = []
@@ -45,10 +43,11 @@ def plot_map(
             vmin=0.0, vmax=most, cmap="viridis", rasterized=True,
         )  # fmt: skip
         fields.append(drawn)
-        axes.set_xlabel(label(charted.axes[0]))
+        axes.set_xlabel(_label(charted.axes[0]))
         if len(charted.ticks) > 2:
-            axes.set_title(f"{name_of(charted.axes[2])} {panels[k]:.3g}{_unit(charted.axes[2])}")
-    grid[0].set_ylabel(label(charted.axes[1]))
+            name, unit = _name_and_unit(charted.axes[2])
+            axes.set_title(f"{name} {panels[k]:.3g} {unit}")
+    grid[0].set_ylabel(_label(charted.axes[1]))
     if placements is not None:
         _mark(grid, charted, placements)
     what = "share of the area in one motion" if value == "share" else "margin"
@@ -56,19 +55,6 @@ def plot_map(
     if title:
         figure.suptitle(title)
     return figure
-
-
-def _figure(width: float, height: float) -> Figure:
-    """A figure (inches) that notebooks show without being told how."""
-    from matplotlib.figure import Figure
-
-    class Plot(Figure):
-        def _repr_png_(self) -> bytes:
-            stream = io.BytesIO()
-            self.savefig(stream, format="png", dpi=DOTS_PER_INCH)
-            return stream.getvalue()
-
-    return Plot(figsize=(width, height), layout="constrained")
 
 
 def _mark(grid: Array, charted: PlacementMap, placements: Placements) -> None:
@@ -92,16 +78,11 @@ def _edges(ticks: Array) -> Array:
     return np.concatenate([[ticks[0]], middles, [ticks[-1]]])
 
 
-def label(axis: str) -> str:
+def _label(axis: str) -> str:
     """An axis with its unit."""
-    return f"{name_of(axis)} ({'deg' if axis.endswith('_deg') else 'm'})"
+    return "{} ({})".format(*_name_and_unit(axis))
 
 
-def name_of(axis: str) -> str:
-    """An axis without its unit."""
-    return axis.removesuffix("_deg")
-
-
-def _unit(axis: str) -> str:
-    """What stands behind a number."""
-    return "\N{DEGREE SIGN}" if axis.endswith("_deg") else " m"
+def _name_and_unit(axis: str) -> tuple[str, str]:
+    """An axis of a region, and 'm' or 'deg'."""
+    return axis.removesuffix("_deg"), "deg" if axis.endswith("_deg") else "m"

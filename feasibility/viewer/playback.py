@@ -42,7 +42,7 @@ class Motion:
 
 
 def motion_of(verdict: Verdict) -> Motion | None:
-    """What the verdict's view plays; None where the arm stands still.
+    """What the verdict's view plays; None where the arm does not move.
 
     The witness where there is one, else the path of the search tree along which the tool travels
     furthest.
@@ -83,10 +83,10 @@ def longest_path(tree: nx.DiGraph | None, centres: NDArray[np.float64]) -> list[
 
 
 def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
-    """The motions of successive edges, each turned the way it is gone, as one walk (m, n).
+    """The motions of successive edges, each in the direction of travel, as one walk (m, n).
 
     Raises:
-        ArgumentError: an edge has no motion, or a motion starts where the one before it did not end.
+        ArgumentError: an edge has no motion, or a motion does not start at the end of the last one.
     """
     rows: list[NDArray[np.float64]] = []
     for a, b in itertools.pairwise(cells):

@@ -1,4 +1,4 @@
-"""What is drawn of poses that were tried: outlines in classes, the best one whole, stations."""
+"""What is drawn of the poses tried: outlines in classes, the best one in full, stations."""
 
 from __future__ import annotations
 
@@ -12,12 +12,20 @@ from numpy.typing import NDArray
 
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.viewer import threejs
-from feasibility.viewer.cell_meshes import patch
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.outline import outline, placed
 from feasibility.viewer.playback import Motion
 from feasibility.viewer.robot_meshes import tubes
-from feasibility.viewer.scene import MISSED, PATCHES, Layer, cells_layers, counted, trail
+from feasibility.viewer.scene import (
+    MISSED,
+    PATCHES,
+    Layer,
+    cells_layers,
+    counted,
+    filled,
+    hidden,
+    trail,
+)
 from feasibility.viewer.threejs import Colour
 from surfaces import Cells
 
@@ -27,15 +35,15 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-MOST_DRAWN = 200  # poses of one class; of more, as many spread evenly over their ranks
-FULL_SIZE = 16  # poses shown; of more, each outline is drawn smaller
+MOST_DRAWN = 200  # poses drawn of one class; of more, as many spread evenly over their ranks
+FULL_SIZE = 16  # poses up to which outlines are drawn in full size
 SMALLEST = 0.15  # [1] of their size
 THICK = 0.0045  # [1] of an outline's size: radius of those of feasible poses
 COVERED: Colour = (0.35, 0.60, 0.80)
 
 
 class Class(StrEnum):
-    """What is known of a pose, the best first."""
+    """The outcome of a pose, the best first."""
 
     FEASIBLE = "feasible"
     WHOLE = "covered by a search, not replayed"
@@ -47,7 +55,7 @@ class Class(StrEnum):
     FAILED = "could not be tried"
 
 
-# Told apart by colour-blind eyes too; feasible outlines are thick besides.
+# Distinct for colour-blind readers too; feasible outlines are also thick.
 COLOURS: dict[Class, Colour] = {
     Class.FEASIBLE: (0.00, 0.50, 0.36),
     Class.WHOLE: (0.34, 0.71, 0.91),
@@ -109,7 +117,7 @@ def best_layers(cells: Cells, best: Tried, motion: Motion | None) -> list[Layer]
 
     Args:
         cells: at the best placement.
-        best: what is known of it.
+        best: its outcome.
         motion: that covers it, or None.
     """
     if len(cells) == 0:
@@ -124,7 +132,7 @@ def best_layers(cells: Cells, best: Tried, motion: Motion | None) -> list[Layer]
         ):
             if len(which):
                 path = f"/best/{words}"
-                command = _filled(cells, which, colour, path)
+                command = filled(cells, which, colour, path)
                 entry = Entry(f"{words} ({counted(len(which))})", colour, path)
                 parts.append(Layer((command,), entry, len(which)))
     if motion is not None:
@@ -140,8 +148,8 @@ def station_layers(cells: Cells, plan: StationPlan) -> list[Layer]:
         root = f"/stations/station {k + 1}"
         there = moved_cells(cells, trial.pose)
         commands = (
-            _filled(there, station.cells, colour, f"{root}/cells"),
-            _lines(f"{root}/outline", placed(lines, trial.pose), colour),
+            filled(there, station.cells, colour, f"{root}/cells"),
+            threejs.segments(f"{root}/outline", placed(lines, trial.pose).reshape(-1, 3), colour),
         )
         entry = Entry(f"station {k + 1} ({counted(len(station.cells))})", colour, root)
         parts.append(Layer(commands, entry, len(station.cells)))
@@ -169,7 +177,7 @@ def class_layers(lines: Array, tried: Sequence[Tried]) -> list[Layer]:
             command = _thick(path, lines, some, COLOURS[kind])
         else:
             every = np.concatenate([placed(lines, pose) for pose in some])
-            command = _lines(path, every, COLOURS[kind])
+            command = threejs.segments(path, every.reshape(-1, 3), COLOURS[kind])
         layer = Layer((command,), Entry(f"{kind} ({number})", COLOURS[kind], path), len(poses))
         parts.append(hidden(layer) if kind in HIDDEN else layer)
     return parts
@@ -185,25 +193,10 @@ def drawn_size(tried: Sequence[Tried]) -> float:
     return float(np.clip(np.sqrt(FULL_SIZE / max(shown, 1)), SMALLEST, 1.0))
 
 
-def hidden(layer: Layer) -> Layer:
-    """The same part, shown only when it is asked for."""
-    path = layer.entry.path
-    if path is None:
-        return layer
-    command = threejs.set_property(path, "visible", False)
-    entry = replace(layer.entry, shown=False)
-    return replace(layer, commands=(*layer.commands, command), entry=entry)
-
-
 def _spread(poses: Sequence[Pose]) -> list[Pose]:
     """All poses, or `MOST_DRAWN` of them at even distances, the first one among them."""
     chosen = np.unique(np.linspace(0, len(poses) - 1, min(len(poses), MOST_DRAWN)).round())
     return [poses[int(k)] for k in chosen]
-
-
-def _lines(path: str, lines: Array, colour: Colour) -> threejs.Command:
-    """Segments (k, 2, 3) m as thin lines."""
-    return threejs.segments(path, lines.reshape(-1, 3), colour)
 
 
 def _thick(path: str, lines: Array, poses: Sequence[Pose], colour: Colour) -> threejs.Command:
@@ -213,9 +206,3 @@ def _thick(path: str, lines: Array, poses: Sequence[Pose], colour: Colour) -> th
     every = np.concatenate([placed(vertices, pose) for pose in poses])
     first = len(vertices) * np.arange(len(poses))[:, None, None]
     return threejs.mesh(path, every, (faces + first).reshape(-1, 3), colour, lit=False)
-
-
-def _filled(cells: Cells, which: NDArray[np.int64], colour: Colour, path: str) -> threejs.Command:
-    """Some cells filled with a colour."""
-    vertices, faces, _ = patch(cells, which, inset=0.06)
-    return threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)

@@ -1,13 +1,13 @@
 """What is drawn of a verdict: surface, cells, graph G, causes, other components, and the legend.
 
 Everything here is plain drawing commands with plain names, so that meshcat's own scene tree can
-show and hide each part; `feasibility.page` and `feasibility.meshcat_server` say where it appears.
+show and hide each part; `html_page` and `live_server` present it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ EDGES: Colour = (0.05, 0.25, 0.85)
 START: Colour = (0.0, 0.62, 0.25)
 MISSED: Colour = (0.84, 0.12, 0.12)
 TRAIL: Colour = (0.95, 0.55, 0.05)
-CAUSES: dict[CauseKind, Colour] = {  # told apart by colour-blind eyes too (Okabe and Ito)
+CAUSES: dict[CauseKind, Colour] = {  # distinct for colour-blind readers too (Okabe and Ito)
     CauseKind.OUT_OF_REACH: (0.50, 0.05, 0.22),
     CauseKind.JOINT_LIMITS: (0.90, 0.60, 0.00),
     CauseKind.ORIENTATION: (0.80, 0.47, 0.65),
@@ -98,17 +98,24 @@ def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) 
             continue
         colour = PATCHES[k % len(PATCHES)]
         path = f"/patches/{threejs.safe_name(name)}"
-        vertices, faces, _ = patch(cells, which, inset=0.06)
-        command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+        command = filled(cells, which, colour, path)
         parts.append(Layer((command,), Entry(name, colour, path), len(which)))
     return parts
+
+
+def filled(
+    cells: Cells, which: NDArray[np.int64], colour: Colour, path: str, inset: float = 0.06
+) -> Command:
+    """Some cells filled with a colour, smaller by `inset` of their size."""
+    vertices, faces, _ = patch(cells, which, inset=inset)
+    return threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
 
 
 def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
     """The edges of G, in the order of `graph.edges`: lines (E, k, 3) m at the standoff.
 
-    Each runs over the surface from target to target. It says that a motion joins the two cells; the
-    motion itself may take another way (the greedy search stops as soon as it has entered a cell).
+    Each runs over the surface from target to target and shows that a motion joins the two cells.
+    The motion itself may differ (the greedy search stops as soon as it has entered a cell).
     """
     cells = verdict.cells
     pairs = np.array(list(verdict.graph.edges), dtype=np.int64).reshape(-1, 2)
@@ -202,47 +209,48 @@ def missed_layer(cells: Cells, kind: CauseKind | None, which: NDArray[np.int64])
     colour = MISSED if kind is None else CAUSES[kind]
     words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
     path = f"/cells/{words} ({len(which)})"
-    vertices, faces, _ = patch(cells, which, inset=0.06)
-    command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+    command = filled(cells, which, colour, path)
     return Layer((command,), Entry(f"{words} ({len(which)})", colour, path), len(which))
 
 
 def _components(verdict: Verdict) -> Iterator[Layer]:
-    """The cells of each connected component, hidden until they are asked for."""
+    """The cells of each connected component, hidden at first."""
     if len(verdict.components) < 2:
         return
     for number, cells in enumerate(verdict.components[:LISTED_COMPONENTS], start=1):
         colour = COMPONENTS[(number - 1) % len(COMPONENTS)]
         words = f"component {number} ({counted(len(cells))})"
         path = f"/components/{words}"
-        vertices, faces, _ = patch(verdict.cells, np.asarray(cells), inset=0.15)
-        commands = (
-            threejs.mesh(path, vertices, faces, colour, opacity=0.9, lit=False),
-            threejs.set_property(path, "visible", False),
-        )
-        yield Layer(commands, Entry(words, colour, path, shown=False), len(cells))
+        command = filled(verdict.cells, np.asarray(cells), colour, path, inset=0.15)
+        yield hidden(Layer((command,), Entry(words, colour, path), len(cells)))
+
+
+def hidden(layer: Layer) -> Layer:
+    """The same part, shown only when the reader asks for it."""
+    path = layer.entry.path
+    if path is None:
+        return layer
+    command = threejs.set_property(path, "visible", False)
+    entry = replace(layer.entry, shown=False)
+    return replace(layer, commands=(*layer.commands, command), entry=entry)
 
 
 def trail(cells: Cells, motion: Motion) -> Layer:
-    """Where the tool goes in the motion that is played.
+    """The path of the tool point in the motion that is played.
 
-    A covering motion runs along most edges of G, so it is hidden until it is asked for.
+    A covering motion runs along most edges of G, so it is hidden at first.
     """
     path = f"/motion/tool path, {motion.label}"
-    shown = motion.there_and_back
     even = np.linspace(0.0, motion.seconds[-1], TRAIL_POINTS)
     line = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
-    size = cell_size(cells)
-    vertices, faces = tubes([line], 0.035 * size)
-    commands = (
-        threejs.mesh(path, vertices, faces, TRAIL, lit=False),
-        threejs.set_property(path, "visible", shown),
-    )
-    return Layer(commands, Entry(f"tool path: {motion.label}", TRAIL, path, shown), 1)
+    vertices, faces = tubes([line], 0.035 * cell_size(cells))
+    command = threejs.mesh(path, vertices, faces, TRAIL, lit=False)
+    layer = Layer((command,), Entry(f"tool path: {motion.label}", TRAIL, path), 1)
+    return layer if motion.there_and_back else hidden(layer)
 
 
 def _edge_points(cells: Cells) -> int:
-    """On the way from cell to cell: the more cells, the shorter and straighter their edges."""
+    """Points of an edge as drawn: the more cells, the shorter and straighter their edges."""
     if len(cells) > FULL_DETAIL:
         return 2
     return 9 if len(cells) <= 400 else 5

@@ -26,12 +26,12 @@ from feasibility.viewer.html_page import Camera, Entry, Legend, page
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.playback import Motion, animate, motion_of
 from feasibility.viewer.scene import Layer, layers, trail
+from feasibility.viewer.stage import camera_on, ground
 from feasibility.viewer.threejs import Command
 from robots import Robot
 from surfaces import Cells
 
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
-FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -40,7 +40,7 @@ class View:
 
     robot: Robot
     commands: tuple[Command, ...]
-    """Of meshcat's page, in order."""
+    """Drawing commands of the page, in order."""
     legend: Legend
     camera: Camera
     motion: Motion | None
@@ -127,13 +127,13 @@ def compose(
         text: below it.
         parts: what is drawn, in the order of the legend.
         motion: what the arm plays, or None.
-        resting: (n,) where it stands otherwise.
+        resting: (n,) its configuration otherwise.
         tracks: what else moves with it, see `threejs.track`.
         play: start the motion when the page opens.
         at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
     """
     drawing = robot_visuals.draw(robot)
-    commands = _stage(robot, cells, drawing.lowest) + list(drawing.commands)
+    commands = ground(robot, cells, drawing.lowest) + list(drawing.commands)
     entries = [Entry(robot.name, ARM, robot_visuals.ROOT)]
     for part in parts:
         commands += part.commands
@@ -147,7 +147,7 @@ def compose(
         robot=robot,
         commands=tuple(commands),
         legend=Legend(title, " · ".join([text, *drawing.notes]), tuple(entries)),
-        camera=_camera(robot, cells, q, drawing.lowest),
+        camera=camera_on(robot, cells, q, drawing.lowest),
         motion=motion,
         notes=drawing.notes,
     )
@@ -189,7 +189,7 @@ def _in_notebook() -> bool:
 
 
 def _title(verdict: Verdict, case: str | None) -> str:
-    """What is asked, and the answer."""
+    """The case and its answer."""
     name = f"{case}: " if case else ""
     return f"{name}{verdict.answer} ({verdict.evidence})"
 
@@ -203,7 +203,7 @@ def _text(verdict: Verdict) -> str:
 
 
 def _resting(verdict: Verdict) -> NDArray[np.float64]:
-    """A configuration for an arm that does not move: over the start cell if it can be had."""
+    """A configuration for an arm that does not move: over the start cell if one is known."""
     known = [q for _, q in sorted(verdict.graph.nodes(data="q")) if q is not None]
     if verdict.start is not None and verdict.start in verdict.graph:
         known = [verdict.graph.nodes[verdict.start].get("q"), *known]
@@ -211,65 +211,3 @@ def _resting(verdict: Verdict) -> NDArray[np.float64]:
         if q is not None:
             return np.asarray(q, dtype=float)
     return robot_visuals.home(verdict.robot)
-
-
-def _stage(robot: Robot, cells: Cells, floor: float) -> list[Command]:
-    """Background, a ground grid at the height of the lowest thing, and the root frame's axes."""
-    box = _points(cells)
-    size = max(robot.reach if np.isfinite(robot.reach) else 1.0, 0.2)
-    spacing = _round_below(size / 5.0)
-    extent = np.abs(box[:, :2]).max(initial=size)
-    half = spacing * np.ceil(extent / spacing)
-    lines = np.arange(-half, half + spacing / 2.0, spacing)
-    z = min(floor, float(box[:, 2].min(initial=0.0)))
-    ends = [[(x, -half, z), (x, half, z), (-half, x, z), (half, x, z)] for x in lines]
-    axis = 0.25 * size
-    frame = [(0, 0, 0), (axis, 0, 0), (0, 0, 0), (0, axis, 0), (0, 0, 0), (0, 0, axis)]
-    colours = np.repeat([(0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9)], 2, axis=0)
-    return [
-        threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
-        threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
-        threejs.set_property("/Grid", "visible", False),
-        threejs.set_property("/Axes", "visible", False),
-        threejs.segments("/ground", np.reshape(ends, (-1, 3)), (0.78, 0.80, 0.83)),
-        threejs.segments("/root frame", np.array(frame), (0, 0, 0), colours=colours),
-    ]
-
-
-def _round_below(value: float) -> float:
-    """The largest of 1, 2.5 and 5 times a power of ten that is at most `value`."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step * power for step in (1.0, 2.5, 5.0) if step * power <= value))
-
-
-def _points(cells: Cells) -> NDArray[np.float64]:
-    """Points (k, 3) m of the surface and the arm's base."""
-    base = np.zeros((1, 3))
-    if len(cells) == 0:
-        return base
-    corners = cells.borders(1).reshape(-1, 3)
-    return np.concatenate([base, cells.centres, corners])
-
-
-def _camera(robot: Robot, cells: Cells, q: NDArray[np.float64], floor: float) -> Camera:
-    """Look at arm and surface from the tool's side, a little from above."""
-    placements = robot_visuals.joint_placements(robot, q)[0]
-    place = np.eye(4)
-    joints = []
-    for step in placements:
-        place = place @ step
-        joints.append(place[:3, 3].copy())
-    points = np.concatenate([_points(cells), joints, [[0.0, 0.0, floor]]])
-    target = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    radius = max(float(np.linalg.norm(points - target, axis=1).max()), 0.1)
-    toward = np.zeros(3)
-    if len(cells):
-        toward = cells.surface.side_sign * cells.normals.mean(axis=0)
-    heading = np.arctan2(toward[1], toward[0]) if np.hypot(*toward[:2]) > 0.1 else -np.pi / 3.0
-    heading += np.radians(25.0)
-    height = np.radians(24.0)
-    direction = np.array(
-        [np.cos(heading) * np.cos(height), np.sin(heading) * np.cos(height), np.sin(height)]
-    )
-    eye = target + radius / np.sin(FRAMED) * direction
-    return Camera(tuple(target.tolist()), tuple(eye.tolist()))

@@ -1,4 +1,4 @@
-"""Missed cells counted by cause, where only a few are looked at closely."""
+"""Missed cells counted by cause, of which only a few are examined."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from feasibility.verdict import CauseKind, Verdict
 
-EXAMINED = 6  # missed cells whose causes are looked for; the others take the nearest one's
+EXAMINED = 6  # missed cells whose causes are determined; the others take that of the nearest one
 
 
 class CauseCounts(NamedTuple):
@@ -18,14 +18,14 @@ class CauseCounts(NamedTuple):
     cells: dict[str, int]
     """Number of missed cells by cause, the most frequent first."""
     examined: int
-    """How many cells were looked at for it."""
+    """How many cells were examined for it."""
 
 
 def cause_counts(verdict: Verdict) -> CauseCounts:
     """Count the missed cells of a verdict by cause.
 
-    What another component covers is disconnected; of the cells that nothing reaches, `EXAMINED`
-    are examined, and the others count as the nearest of these.
+    Cells that another component covers are disconnected. Of the cells that no component covers,
+    `EXAMINED` are examined, and the others count as the nearest of these.
     """
     missed = np.flatnonzero(~verdict.covered)
     if len(missed) == 0:
@@ -33,9 +33,7 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if verdict.method == "greedy":
         kinds = [str(cause.kind) for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
-    from feasibility.roadmap.arrays import arrays_of
-    from feasibility.roadmap.diagnosis import diagnose
-    from feasibility.roadmap.exploration import Exploration
+    from feasibility.roadmap import Exploration, arrays_of, diagnose
 
     reached = np.zeros(len(verdict.cells), dtype=bool)
     for cells in verdict.components:
@@ -44,7 +42,7 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     lost = missed[~reached[missed]]
     if len(lost) == 0:
         return CauseCounts(_counted(kinds), 0)
-    # A fresh explorer: what is asked of it are Newton's method and random starts alone.
+    # A new exploration: only its Newton's method and its random starts are used.
     arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
     exploration = Exploration(verdict.robot, verdict.cells, arrays, verdict.seed)
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
