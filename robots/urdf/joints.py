@@ -5,16 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from robots.urdf.attributes import (
-    MAX_LENGTH,
-    BadValue,
-    Faults,
-    Triple,
-    name_of,
-    numbers,
-    only,
-    triple,
-)
+from robots.urdf.attributes import BadValue, Faults, Triple, name_of, numbers, only, triple
+from robots.urdf.joint_limits import read_limits
 from robots.urdf.xml import Node, nearest, shown
 
 # fmt: off
@@ -25,8 +17,6 @@ CHILDREN = (
 # fmt: on
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 MIN_AXIS = 1e-6  # a shorter axis has no direction worth trusting
-FREE_TURN = MAX_LENGTH  # [rad] a revolute limit this wide (1e16 is the custom) means "none"
-LIKELY_DEGREES = 20.0  # [rad] three turns: a limit beyond it was probably meant in degrees
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -82,16 +72,6 @@ class JointInfo:
         return self.lower, self.upper
 
 
-@dataclass(frozen=True, slots=True)
-class _Range:
-    """What a <limit> comes to: the joint's kind with it, the interval, or the fault."""
-
-    kind: str
-    lower: float | None
-    upper: float | None
-    fault: str | None = None
-
-
 def read_joint(node: Node, faults: Faults) -> JointInfo | None:
     """Check one <joint>; None when a fault leaves nothing to build on."""
     before = len(faults.errors)
@@ -117,12 +97,12 @@ def read_joint(node: Node, faults: Faults) -> JointInfo | None:
     axis = _axis(axis_node, owner, faults)
     if len(faults.errors) > before or name is None or ends[0] is None or ends[1] is None:
         return None
-    limits = _range(node, limit, kind, owner, faults)
+    limits = read_limits(node, limit, kind, owner, faults)
     mimic, mimic_fault = _mimic(mimic_node)
     fault = limits.fault or mimic_fault
     return JointInfo(
         name, limits.kind, ends[0], ends[1], xyz, rpy, axis, limits.lower, limits.upper,
-        _max_velocity(limit), mimic, f"line {node.line}: {owner} {fault}" if fault else None,
+        limits.max_velocity, mimic, f"line {node.line}: {owner} {fault}" if fault else None,
         node.line,
     )  # fmt: skip
 
@@ -219,83 +199,6 @@ def _axis(node: Node | None, owner: str, faults: Faults) -> Triple:
     if abs(length - 1.0) < 1e-15:
         return x, y, z
     return x / length, y / length, z / length
-
-
-def _range(node: Node, limit: Node | None, kind: str, owner: str, faults: Faults) -> _Range:
-    """The interval that a joint may move in."""
-    if kind == "fixed":
-        return _Range(kind, 0.0, 0.0)
-    unit = "metres" if kind == "prismatic" else "radians"
-    remedy = f'write <limit lower="..." upper="..."/> in {unit}, or give its limits or lock it'
-    given = [a for a in ("lower", "upper") if limit is not None and a in limit.attributes]
-    if kind == "continuous":
-        if given:
-            faults.warn(
-                limit or node,
-                f"{owner} is continuous, so the limits written there are ignored; make it "
-                "revolute, or give it limits, if it has stops",
-            )
-        return _Range(kind, -math.inf, math.inf)
-    nothing = (kind, None, None)
-    if limit is None or not given:
-        what = "no <limit>" if limit is None else "a <limit> without lower and upper"
-        return _Range(*nothing, f"is {kind} and has {what}; {remedy}")
-    ends = {"lower": 0.0, "upper": 0.0}
-    try:
-        for attribute in given:
-            (ends[attribute],) = numbers(limit, attribute, 1, bound=math.inf)
-    except BadValue as bad:
-        return _Range(*nothing, f"has a bad limit: {bad}; {remedy}")
-    lower, upper = ends["lower"], ends["upper"]
-    if kind == "revolute" and lower <= -FREE_TURN and upper >= FREE_TURN:
-        faults.warn(limit, f"{owner} has limits beyond 1,600 turns and is read as continuous")
-        return _Range("continuous", -math.inf, math.inf)
-    if max(abs(lower), abs(upper)) > MAX_LENGTH:
-        return _Range(
-            *nothing, f"has limits [{lower:g}, {upper:g}] {unit}, no real stops; {remedy}"
-        )
-    if lower >= upper:
-        what = "it is locked" if lower == upper else "lower lies above upper"
-        if len(given) == 1:
-            what += f" (a missing limit counts as 0; only {given[0]} is written)"
-        return _Range(*nothing, f"has limits [{lower:g}, {upper:g}]: {what}; {remedy}")
-    if len(given) == 1:
-        missing = "upper" if given == ["lower"] else "lower"
-        faults.warn(limit, f"{owner} has no {missing} limit; URDF's default of 0 is used")
-    if kind == "revolute" and max(abs(lower), abs(upper)) > LIKELY_DEGREES:
-        faults.warn(
-            limit,
-            f"{owner} has limits [{lower:g}, {upper:g}], read in radians; were degrees meant?",
-        )
-    if _has_narrower_soft_limits(node, lower, upper):
-        faults.soft_limits.append(owner.removeprefix("joint "))
-    return _Range(kind, lower, upper)
-
-
-def _max_velocity(limit: Node | None) -> float | None:
-    """The velocity limit; one that makes no sense counts as missing: only timing needs it."""
-    if limit is None or "velocity" not in limit.attributes:
-        return None
-    try:
-        (value,) = numbers(limit, "velocity", 1, bound=math.inf)
-    except BadValue:
-        return None
-    return value if value > 0.0 else None
-
-
-def _has_narrower_soft_limits(node: Node, lower: float, upper: float) -> bool:
-    """Whether the joint's controller would stop it earlier than its limits do."""
-    soft = node.first("safety_controller")
-    if soft is None:
-        return False
-    try:
-        low, high = (
-            numbers(soft, attribute, 1)[0] if attribute in soft.attributes else 0.0
-            for attribute in ("soft_lower_limit", "soft_upper_limit")
-        )
-    except BadValue:
-        return False  # not used, so not judged
-    return (low, high) != (0.0, 0.0) and (low > lower + 1e-9 or high < upper - 1e-9)
 
 
 def _mimic(node: Node | None) -> tuple[Mimic | None, str | None]:

@@ -204,8 +204,8 @@ def _with_mimic_faults(joints: tuple[JointInfo, ...]) -> tuple[JointInfo, ...]:
     for joint in joints:
         fault = _mimic_fault(joint, by_name)
         if fault is not None and joint.fault is None:
-            reason = f"line {joint.line}: joint {shown(joint.name)} {fault}; correct it, or lock the joint"
-            joint = replace(joint, fault=reason)
+            owner = f"line {joint.line}: joint {shown(joint.name)}"
+            joint = replace(joint, fault=f"{owner} {fault}; correct it, or lock the joint")
         marked.append(joint)
     return tuple(marked)
 
