@@ -76,7 +76,7 @@ def test_pole_rows_by_hand():
     ],
     ids=repr,
 )
-@pytest.mark.parametrize("shape", list(itertools.product([1, 2, 3, 5], repeat=2)), ids=str)
+@pytest.mark.parametrize("shape", [(1, 1), (1, 5), (2, 3), (3, 2), (5, 1), (5, 5)], ids=str)
 def test_cells_are_neighbours_exactly_when_they_share_a_corner(surface, shape):
     cells = surface.cells(*shape)
     corners = cells.outlines(samples=1)[:, :4]
