@@ -53,19 +53,22 @@ def second_derivatives(
     prismatic: NDArray[np.bool_],
     levers: NDArray[np.float64],
     cap: float,
+    bent: NDArray[np.float64] | None = None,
 ) -> NDArray[np.float64]:
-    """Bound D of |p''| (or Da of |a''|) along straight segments.
+    """Bound D of |p''| (or Da of |a''|) along segments, straight ones in joint space by default.
 
     Args:
-        steps: (m, n) absolute joint changes.
+        steps: (m, n) absolute joint changes; of bent segments, bounds on |dq/ds|, s from 0 to 1.
         prismatic: (n,) which joints slide.
         levers: (m + 1, n) r_j (or s_j) at the ends of the segments.
         cap: no lever is ever longer than this (1 for sines, inf for lengths).
+        bent: (m, n) bounds on the joints' own |d^2q/ds^2|; each adds that times its lever.
 
     Returns:
         (m,) bounds.
     """
     m, n = steps.shape
+    own = np.zeros((m, n)) if bent is None else bent
     is_length = cap > 1.0
     turns = np.where(prismatic, 0.0, steps)
     before = np.cumsum(turns, axis=1) - turns  # turn of the revolute joints before j
@@ -75,11 +78,11 @@ def second_derivatives(
         d = steps[:, j]
         if prismatic[j]:
             if is_length:
-                total += 2.0 * d * before[:, j]
+                total += 2.0 * d * before[:, j] + own[:, j]
                 behind += d
             continue
         lever = np.minimum(ends[:, j] + 0.5 * behind, cap)
-        total += lever * d * (d + 2.0 * before[:, j])
+        total += lever * d * (d + 2.0 * before[:, j]) + lever * own[:, j]
         behind += lever * d
     return total
 

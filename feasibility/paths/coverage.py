@@ -70,8 +70,8 @@ def coverage_path(
     Args:
         verdict: of the complete search.
         order: "rows" runs along the grid's rows (v), back and forth, "columns" along its columns
-            (u), "spiral" from outside to the middle; "shortest" is the shortest order found, and the
-            only one for cells that are no grid.
+            (u), "spiral" from outside to the middle; "shortest" is the shortest order found and
+            the only one for cells that are no grid.
         only: flat indices of the cells to visit; all by default. They may be cells that the best
             motion of an infeasible verdict covers.
 

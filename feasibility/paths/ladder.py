@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.paths.motion_graph import MotionGraph
-from feasibility.paths.motion_links import join_self_motions, step_to, windings, wound
+from feasibility.paths.motion_links import join_self_motions, rewound, step_to, windings
 from feasibility.paths.order import PathError
 from surfaces import Cells
 
@@ -165,7 +165,7 @@ def _wound(graph: MotionGraph, states: list[_State], cell: int) -> list[_State]:
         for winding in windings(graph, nodes):
             end = graph.node(graph.cell[state.node], graph.q[state.node] + winding)
             if step_to(graph, end, cell):
-                found.append(_State(end, state.cost, tuple(wound(graph, nodes, winding)), None))
+                found.append(_State(end, state.cost, tuple(rewound(graph, nodes, winding)), None))
     return found
 
 

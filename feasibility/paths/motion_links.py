@@ -131,7 +131,7 @@ def windings(graph: MotionGraph, nodes: list[int]) -> list[NDArray[np.float64]]:
     return found
 
 
-def wound(graph: MotionGraph, nodes: list[int], winding: NDArray[np.float64]) -> list[int]:
+def rewound(graph: MotionGraph, nodes: list[int], winding: NDArray[np.float64]) -> list[int]:
     """The nodes of the same motion in another winding, which is added to the graph."""
     moved = [graph.node(graph.cell[x], graph.q[x] + winding) for x in nodes]
     for (x, y), (a, b) in zip(pairwise(nodes), pairwise(moved), strict=True):

@@ -1,29 +1,26 @@
-"""What would make a case feasible, and how much room a feasible one has left."""
+"""What would make a case feasible, and how large the margins of a feasible one are."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.checking import check
+from feasibility.roadmap import HERE, Exploration, margin_shares, place
 from feasibility.search import Progress, Search
-from feasibility.sensitivity.parameters import Quantity, Setup, quantities
-from feasibility.sensitivity.thresholds import Finding, Threshold
+from feasibility.sensitivity.limited_search import Attempt
+from feasibility.sensitivity.parameters import Quantity, Variant, quantities
+from feasibility.sensitivity.probes import Prober
+from feasibility.sensitivity.threshold_search import BEYOND, ThresholdSearch
+from feasibility.sensitivity.thresholds import Dropped, Explanation, Finding, Threshold
 from feasibility.task import Task
 from feasibility.verdict import Verdict
 from robots import Robot
 from surfaces import Cells
-
-if TYPE_CHECKING:
-    from feasibility.sensitivity.limited_search import Trial
-    from feasibility.sensitivity.probes import Prober
-    from feasibility.sensitivity.threshold_search import Turning
 
 SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search should have
@@ -31,46 +28,10 @@ EXTRA = 3  # the same, for margins that are still wide once the others have had 
 LEAST = 20_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
+SAME = 0.05  # [1], postures nearer than that are taken for one, see `_posture`
 PATIENCE = 20.0  # times the time limit of the verdict
 
-AS_IS = "asking about the case as it stands"
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Dropped:
-    """The cells without which one motion covers the rest: those that the best one misses."""
-
-    cells: NDArray[np.int64]
-    """(k,) flat indices."""
-    area: float
-    """m^2."""
-    share: float
-    """Of the whole area, 0..1."""
-    waypoints: int | None
-    """Of the motion that covers all others, which the replay accepted; None where there is none."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the cells."""
-        cells = np.array(self.cells, dtype=np.int64)
-        cells.flags.writeable = False
-        object.__setattr__(self, "cells", cells)
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Explanation:
-    """The thresholds of a case; see `explain`."""
-
-    verdict: Verdict
-    thresholds: tuple[Threshold, ...]
-    """One for each quantity that was looked at, in the order of `quantities`."""
-    left_out: tuple[str, ...]
-    """Names of the quantities that the time limit left no time for."""
-    dropped: Dropped | None
-    """None for a feasible case."""
-    evaluations: int
-    """Evaluations of the arm that the thresholds took, a box of a proof counting as one."""
-    seconds: float
-    """Time that they took."""
+AS_GIVEN = "checking the case as given"
 
 
 def explain(
@@ -83,7 +44,7 @@ def explain(
     """Find what would make a case feasible, or by how much a feasible one may be tightened.
 
     One quantity is varied at a time: the cone, each limit of each joint, the standoff, the
-    surface's place along six directions. Where the verdict turns, it is looked at on both sides;
+    surface's place along six directions. On both sides of a threshold the verdict is given;
     "feasible" is said only of a motion that the replay accepts.
 
     Args:
@@ -95,7 +56,7 @@ def explain(
         progress: called as progress(done, total, text); what it raises ends the work.
 
     Returns:
-        The verdict of the case as it stands, and the thresholds.
+        The verdict of the case as given, and the thresholds.
 
     Raises:
         ArgumentError: the method is the greedy one, whose "no" does not depend on the case alone.
@@ -112,34 +73,34 @@ def explain(
     search = Search() if search is None else search
     if search.method != "complete":
         raise ArgumentError(
-            f"explain asks the complete search: method must be 'complete', got {search.method!r}"
+            f"explain needs the complete search: method must be 'complete', got {search.method!r}"
         )
 
-    verdict = check(robot, cells, task, search, progress and (lambda *_: progress(0, None, AS_IS)))
+    verdict = check(
+        robot, cells, task, search, progress and (lambda *_: progress(0, None, AS_GIVEN))
+    )
     began = time.monotonic()
     if len(cells) == 0:
         return Explanation(verdict, (), (), None, 0, 0.0)
-    from feasibility.sensitivity.probes import Prober
-
-    setup = Setup(robot, cells, task)
-    asked = quantities(setup, widen=not verdict.feasible)
+    variant = Variant(robot, cells, task)
+    varied = quantities(variant, widen=not verdict.feasible)
     done: list[Threshold] = []
 
     def tick() -> None:
         if progress is not None:
-            progress(len(done), len(asked), "looking for thresholds")
+            progress(len(done), len(varied), "looking for thresholds")
 
     deadline = np.inf if search.time_limit is None else began + PATIENCE * search.time_limit
-    prober = Prober(setup, search.seed, deadline, tick)
+    prober = Prober(variant, search.seed, deadline, tick)
     q = known_configurations(verdict)
     dropped = None if verdict.feasible else drop(prober, verdict, q)
     motions = _motions(prober, verdict, q) if verdict.feasible else []
-    turnings: list[Turning] = []
-    for turning, threshold in _thresholds(prober, verdict, q, motions, asked):
-        turnings.append(turning)
+    searches: list[ThresholdSearch] = []
+    for made, threshold in _thresholds(prober, verdict, q, motions, varied):
+        searches.append(made)
         done.append(threshold)  # one by one: `tick` counts them
-    _refine(prober, verdict, turnings, done)
-    left_out = tuple(quantity.name for quantity in asked[len(done) :])
+    _refine(prober, verdict, searches, done)
+    left_out = tuple(quantity.name for quantity in varied[len(done) :])
     seconds = time.monotonic() - began
     return Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds)
 
@@ -156,44 +117,81 @@ def _thresholds(
     prober: Prober,
     verdict: Verdict,
     q: NDArray[np.float64],
-    motions: Sequence[Trial],
-    asked: Sequence[Quantity],
-) -> Iterator[tuple[Turning, Threshold]]:
+    motions: Sequence[Attempt],
+    varied: Sequence[Quantity],
+) -> Iterator[tuple[ThresholdSearch, Threshold]]:
     """The thresholds one by one, each with a fair share of what is left; until the deadline."""
-    from feasibility.sensitivity.threshold_search import Turning
-
     cost = cost_of(verdict)
     total = max(SHARE * cost, LEAST)
-    for index, quantity in enumerate(asked):
+    for index, quantity in enumerate(varied):
         if time.monotonic() > prober.deadline:
             return
         prober.tick()
-        fair = (total - prober.spent) // (len(asked) - index)
-        turning = Turning(prober, quantity, cost, prober.spent + fair, motions)
+        fair = (total - prober.spent) // (len(varied) - index)
+        made = ThresholdSearch(prober, quantity, cost, prober.spent + fair, motions)
         if verdict.feasible:
-            yield turning, turning.tighten()
+            yield made, made.tighten()
         else:
             here = Finding(quantity.given, verdict.answer, verdict.evidence, verdict.message)
-            yield turning, turning.widen(here, q)
+            yield made, made.widen(here, q)
 
 
-def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[Trial]:
+def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[Attempt]:
     """The witness of a feasible case, and covering motions in other postures."""
-    from feasibility.sensitivity.limited_search import Trial
-
     angle = None if verdict.certificate is None else verdict.certificate.max_angle
-    start = Trial(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
+    start = Attempt(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
     if time.monotonic() > prober.deadline:
         return [start]
-    return [start, *prober.others(GUESSES, POSTURES)]
+    return [start, *other_motions(prober, GUESSES, POSTURES)]
+
+
+def other_motions(prober: Prober, guesses: int, most: int) -> list[Attempt]:
+    """Covering motions of the case as given, from postures far from each other.
+
+    Args:
+        prober: of that case.
+        guesses: random configurations that are projected onto a cell in the middle.
+        most: searches.
+    """
+    robot, cells, _ = prober.given
+    exploration = Exploration(robot, cells, prober.problem, prober.seed + 1)
+    tried = exploration.guesses(guesses)
+    margins = margin_shares(prober.problem, prober.work, cells.middle, tried)
+    order = np.argsort(-margins, kind="stable")
+    found = []
+    tried = tried[order[margins[order] >= 0.0]]
+    for k in apart(np.array([_posture(prober, q) for q in tried]), most):
+        seeds = np.full((len(cells), robot.n), np.nan)
+        seeds[cells.middle] = tried[k]
+        found.append(prober.attempt(prober.problem, seeds, np.inf, deep=False))
+    return [attempt for attempt in found if attempt.found]
+
+
+def _posture(prober: Prober, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(7 n,) numbers that differ where postures do: where the joints are, most of all.
+
+    Joint values alone say little: wrists turned by half turns change them much.
+    """
+    place(prober.problem, prober.work, HERE, q)
+    origins, axes = prober.work.origins[0] / prober.problem.scale, prober.work.axes[0]
+    return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
+
+
+def apart(features: NDArray[np.float64], most: int) -> list[int]:
+    """Rows of (k, m) features, each as far as can be from those chosen before it; up to `most`."""
+    chosen = [0] if len(features) else []
+    while chosen and len(chosen) < min(most, len(features)):
+        away = np.linalg.norm(features[:, None] - features[chosen], axis=2).min(axis=1)
+        if away.max() < SAME:
+            break
+        chosen.append(int(away.argmax()))
+    return chosen
 
 
 def _refine(
-    prober: Prober, verdict: Verdict, turnings: Sequence[Turning], found: list[Threshold]
+    prober: Prober, verdict: Verdict, searches: Sequence[ThresholdSearch], found: list[Threshold]
 ) -> None:
     """Spend what others left over on margins whose sides are still far apart, in place."""
-    from feasibility.sensitivity.threshold_search import BEYOND
-
     cost = cost_of(verdict)
     most = (SHARE + EXTRA) * cost
     wide = [k for k, t in enumerate(found) if verdict.feasible and t.steps_apart > max(BEYOND)]
@@ -201,8 +199,8 @@ def _refine(
         left = most - prober.spent
         if left < EXTRA * cost or time.monotonic() > prober.deadline:
             return
-        turnings[k].stop = prober.spent + left // (len(wide) - done)
-        found[k] = turnings[k].tighter(found[k])
+        searches[k].stop = prober.spent + left // (len(wide) - done)
+        found[k] = searches[k].tighter(found[k])
 
 
 def known_configurations(verdict: Verdict) -> NDArray[np.float64]:
@@ -223,7 +221,7 @@ def drop(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> Dropped:
     covered, areas = verdict.covered, verdict.cells.areas
     most = 2 * cost_of(verdict)
     rest = prober.attempt(prober.problem, q, most, deep=False, needed=covered)
-    rest = prober.confirmed(prober.setup, rest, covered)
+    rest = prober.confirmed(prober.given, rest, covered)
     cells = np.flatnonzero(~covered)
     return Dropped(
         cells=cells,

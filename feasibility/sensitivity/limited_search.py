@@ -1,4 +1,8 @@
-"""A search with a ration, and what it came to."""
+"""Searches with a limited number of evaluations, what they found, and what is quicker than one.
+
+Configurations from a case nearby are projected onto the cells of this one by Newton steps, a few
+evaluations a cell.
+"""
 
 from __future__ import annotations
 
@@ -8,42 +12,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.clock import OutOfTime
-from feasibility.roadmap import NODES, Exploration, SearchArrays
+from feasibility.compiled import kernel
+from feasibility.roadmap import NODES, Exploration, SearchArrays, project_onto_cell
 from feasibility.verdict import Answer, Evidence, Walk
 
-LEAST = 100  # evaluations between two looks at the ration
+LEAST = 100  # evaluations between two checks of the limit
+NEARBY_STEPS = np.int64(15)  # Newton steps from the configuration of a case nearby
+NO_CELL = -1
 
 
 @dataclass
-class Rationed(Exploration):
-    """An exploration that stops after a number of evaluations of the arm, whatever the clock."""
+class LimitedExploration(Exploration):
+    """An exploration that stops after a number of evaluations of the arm, on any machine."""
 
     most: float = np.inf
 
     def tick(self, text: str) -> None:
-        """Stop when the ration is used up.
+        """Stop at the limit.
 
         Raises:
-            OutOfTime: it is, or the deadline has passed.
+            OutOfTime: it is reached, or the deadline has passed.
         """
         super().tick(text)
         if self.work.counts[0] > self.most:
             raise OutOfTime
 
     def before_next_look(self) -> int:
-        """No more than is left of the ration; see `Exploration.before_next_look`."""
+        """No more than is left; see `Exploration.before_next_look`."""
         left = self.most - float(self.work.counts[0])
         return int(min(super().before_next_look(), max(left, LEAST)))
 
     def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
-        """Plant, unless the ration is used up; see `Exploration.add_seeds`."""
+        """Add seeds, unless the limit is reached; see `Exploration.add_seeds`."""
         self.tick("looking for configurations")
         return super().add_seeds(cell, guesses)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Trial:
-    """What a search came to."""
+class Attempt:
+    """What a search found."""
 
     answer: Answer
     evidence: Evidence
@@ -54,7 +61,7 @@ class Trial:
     """A covering motion; None unless feasible."""
     angle: float | None = None
     """rad, the replay's bound on the angle between tool axis and approach direction along the walk;
-    None until the replay has seen it. Until then the trial leads on, and is not told to anyone."""
+    None until the replay has accepted it; until then the attempt is not reported to anyone."""
 
     @property
     def found(self) -> bool:
@@ -78,9 +85,32 @@ def configurations(exploration: Exploration) -> NDArray[np.float64]:
 def certifiable(problem: SearchArrays) -> bool:
     """Could a motion be certified everywhere, if there were one?
 
-    Not in a cone of 0 degrees, where the offset surface folds, or where the surface is known less
-    well than the task asks for.
+    Not in a cone of 0 degrees, where the offset surface folds, or where the deviation bounds exceed
+    the tolerance or the cone.
     """
     smooth = bool(np.isfinite(problem.derivative_bounds).all())
     known = bool((problem.deviations < (problem.tolerance, problem.cone_chord)).all())
     return smooth and known and problem.cone_chord > 0.0
+
+
+@kernel
+def project_all(problem, work, order, q):  # type: ignore[no-untyped-def]
+    """Project row q[k] (n,) onto the self-motion manifold over cell k, for the cells of `order`.
+
+    Returns:
+        How many cells of `order` succeeded before the first failure; q (N, n) is changed in place.
+    """
+    for k in range(order.shape[0]):
+        row = q[order[k]]
+        for j in range(row.shape[0]):
+            row[j] = min(max(row[j], problem.lower[j]), problem.upper[j])
+        if not project_onto_cell(problem, work, order[k], row, NEARBY_STEPS):
+            return k
+    return order.shape[0]
+
+
+@kernel
+def project_guesses(problem, work, cell, guesses, steps, projected):  # type: ignore[no-untyped-def]
+    """Project each guess (k, n) onto one cell's manifold, in place; fills `projected` (k,)."""
+    for k in range(guesses.shape[0]):
+        projected[k] = project_onto_cell(problem, work, cell, guesses[k], steps)

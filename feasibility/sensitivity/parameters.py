@@ -13,11 +13,11 @@ from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
 
-ANGLE_STEP_DEG = 0.1  # resolution of cone and turning joints
-LENGTH_STEP = 1e-3  # [m], resolution of standoff, shifts and sliding joints
+ANGLE_STEP_DEG = 0.1  # resolution of cone and revolute joints
+LENGTH_STEP = 1e-3  # [m], resolution of standoff, shifts and prismatic joints
 LEAST_CONE_DEG = 3.0  # cap on tightening the cone: narrower ones take many times the waypoints
 FURTHEST = 0.5  # [m], cap on shifts, on the standoff's growth and on the widening of a slide
-TURN_DEG = 360.0  # cap on the widening of a turning joint: a turn more places the arm no other way
+TURN_DEG = 360.0  # cap on the widening of a revolute joint: more places the arm in no other way
 
 
 class Kind(StrEnum):
@@ -30,8 +30,8 @@ class Kind(StrEnum):
     SHIFT = "shift"
 
 
-class Setup(NamedTuple):
-    """A case: what `feasibility.check` is asked."""
+class Variant(NamedTuple):
+    """A case, as given or with one quantity varied."""
 
     robot: Robot
     cells: Cells
@@ -48,14 +48,14 @@ class Quantity:
     unit: str
     """'rad' or 'm', of all values."""
     given: float
-    """The value of the case as it stands; 0 for a shift."""
+    """The value of the case as given; 0 for a shift."""
     end: float
-    """The furthest value looked at."""
+    """The furthest value that is tried."""
     step: float
     """> 0, distance of neighbouring values; degrees for angles, m for lengths."""
     monotone: bool
-    """Can feasibility turn only once on the way? True where every value allows all that the ones
-    before it allow, or the other way round."""
+    """Is there one threshold at most? True where every value allows all that the ones before it
+    allow, or the other way round."""
     joint: int = -1
     """The joint whose limit it is; -1 for other kinds."""
     axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -64,9 +64,9 @@ class Quantity:
     @property
     def last(self) -> int:
         """Number of steps from the value given to the end; the last one may be shorter."""
-        way = abs(self.end - self.given)
-        way = math.degrees(way) if self.unit == "rad" else way
-        return math.ceil(round(way / self.step, 6))
+        length = abs(self.end - self.given)
+        length = math.degrees(length) if self.unit == "rad" else length
+        return math.ceil(round(length / self.step, 6))
 
     def value(self, k: int) -> float:
         """The value (rad or m) after k steps, 0 <= k <= last."""
@@ -77,52 +77,52 @@ class Quantity:
             return round(self.given + sign * k * self.step, 9)
         return math.radians(round(math.degrees(self.given) + sign * k * self.step, 9))
 
-    def applied(self, setup: Setup, k: int) -> Setup:
-        """The case with this quantity k steps from where it stands."""
+    def applied(self, variant: Variant, k: int) -> Variant:
+        """The case with this quantity k steps from the value given."""
         if k == 0:
-            return setup
-        robot, cells, task = setup
+            return variant
+        robot, cells, task = variant
         value = self.value(k)
         if self.kind is Kind.CONE:
-            return Setup(robot, cells, replace(task, cone_deg=round(math.degrees(value), 9)))
+            return Variant(robot, cells, replace(task, cone_deg=round(math.degrees(value), 9)))
         if self.kind is Kind.STANDOFF:
-            return Setup(robot, cells, replace(task, standoff=value))
+            return Variant(robot, cells, replace(task, standoff=value))
         if self.kind is Kind.SHIFT:
-            return Setup(robot, shifted(cells, value * np.array(self.axis)), task)
+            return Variant(robot, shifted(cells, value * np.array(self.axis)), task)
         limits = [float(robot.lower[self.joint]), float(robot.upper[self.joint])]
         limits[self.kind is Kind.UPPER] = value
-        return Setup(robot.with_limits({robot.joint_names[self.joint]: limits}), cells, task)
+        return Variant(robot.with_limits({robot.joint_names[self.joint]: limits}), cells, task)
 
 
 def shifted(cells: Cells, translation: np.ndarray) -> Cells:
     """The same cells on the surface moved by a translation (3,) m of the root frame."""
     surface = cells.surface.moved(np.eye(3), translation)
     moved = replace(cells, surface=surface, centres=cells.centres + translation)
-    # What is derived from the cells is moved too: deriving the courses again takes longer than a
+    # What is derived from the cells is moved too: deriving the curves again takes longer than a
     # search along them.
     cubics = cells.curves.cubics.copy()
-    cubics[:, 0, :3] += translation  # the constant coefficients of the feet
+    cubics[:, 0, :3] += translation  # the constant coefficients of the closest points
     vars(moved)["curves"] = replace(cells.curves, cubics=cubics)
     vars(moved)["neighbours"] = cells.neighbours
     return moved
 
 
-def quantities(setup: Setup, widen: bool) -> tuple[Quantity, ...]:
+def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
     """What can be varied in a case.
 
     Args:
-        setup: the case.
+        variant: the case.
         widen: towards more freedom (for a case that is not feasible), or towards less. Standoff
             and shifts go both ways in any case.
 
     Returns:
-        The cone; each finite limit of each joint; standoff; shifts along six directions. What has
-        no room to vary (a cone of 180 degrees that is to be widened) is left out.
+        The cone; each finite limit of each joint; standoff; shifts along six directions. What
+        cannot be varied (a cone of 180 degrees that is to be widened) is left out.
     """
-    found = [_cone(setup.task, widen)]
-    for joint in range(setup.robot.n):
-        found += [_limit(setup.robot, joint, kind, widen) for kind in (Kind.LOWER, Kind.UPPER)]
-    standoff = setup.task.standoff
+    found = [_cone(variant.task, widen)]
+    for joint in range(variant.robot.n):
+        found += [_limit(variant.robot, joint, kind, widen) for kind in (Kind.LOWER, Kind.UPPER)]
+    standoff = variant.task.standoff
     for name, end in (("smaller standoff", 0.0), ("larger standoff", standoff + FURTHEST)):
         found.append(Quantity(Kind.STANDOFF, name, "m", standoff, end, LENGTH_STEP, False))
     for index, letter in enumerate("xyz"):
@@ -147,10 +147,10 @@ def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
     slides = bool(robot.prismatic[joint])
     lower, upper = float(robot.lower[joint]), float(robot.upper[joint])
     given, opposite = (lower, upper) if kind is Kind.LOWER else (upper, lower)
-    room = FURTHEST if slides else math.radians(TURN_DEG)
+    most = FURTHEST if slides else math.radians(TURN_DEG)
     if not math.isfinite(opposite):  # tightened by no more than it would be widened
-        opposite = given + (room if kind is Kind.LOWER else -room)
-    outwards = given + (room if kind is Kind.UPPER else -room)
+        opposite = given + (most if kind is Kind.LOWER else -most)
+    outwards = given + (most if kind is Kind.UPPER else -most)
     return Quantity(
         kind=kind,
         name=f"{robot.joint_names[joint]} {'lower' if kind is Kind.LOWER else 'upper'} limit",

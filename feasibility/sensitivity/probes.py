@@ -1,7 +1,7 @@
 """Questions about one case that cost less than a verdict, asked again and again by `explain`.
 
-- `follow`: is every cell's fibre still there, when configurations from a case nearby are put back
-  onto it? (A few evaluations a cell; a hint, not an answer.)
+- `follow`: do configurations from a case nearby still project onto every cell's self-motion
+  manifold? (A few evaluations a cell; a hint, not an answer.)
 - `rule`: is one cell proved uncoverable, or what covers it?
 - `attempt`: a search that starts from known configurations and stops at a number of evaluations.
 """
@@ -18,63 +18,65 @@ from numpy.typing import NDArray
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.roadmap import (
-    HERE,
-    Exploration,
     Ruling,
     SearchArrays,
     arrays_of,
     covering_walk,
     evenly,
     explore,
-    margin_shares,
-    place,
     root_box,
     rule,
     work_for,
     wound,
 )
-from feasibility.sensitivity.limited_search import Rationed, Trial, certifiable, configurations
-from feasibility.sensitivity.parameters import Kind, Quantity, Setup
-from feasibility.sensitivity.warm_start import NO_CELL, follow_all, project_guesses
+from feasibility.sensitivity.limited_search import (
+    NO_CELL,
+    Attempt,
+    LimitedExploration,
+    certifiable,
+    configurations,
+    project_all,
+    project_guesses,
+)
+from feasibility.sensitivity.parameters import Kind, Quantity, Variant
 from feasibility.verdict import Answer, Evidence
 
-PLANTS = 2  # missed cells that an attempt starts from, besides the first
-SAME = 0.05  # [1], postures nearer than that are taken for one, see `Prober._posture`
+MORE_SEEDS = 2  # missed cells that an attempt starts from, besides the first
 MOST_SUSPECTS = 12  # cells that are taken for hard
 AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
-LANDINGS = 16  # random configurations that are put over a cell that no known one covers
-PROJECTION_STEPS = np.int64(20)  # Newton steps of each
-LEAST_BOXES = 120  # for one cell, however dear proofs have turned out to be
+GUESSES = 16  # random configurations that are projected onto a cell that no known one covers
+GUESS_STEPS = np.int64(20)  # Newton steps of each
+LEAST_BOXES = 120  # for one cell, however expensive proofs have been
 
 
 class Prober:
-    """Asks about one case and those nearby, and counts what that costs."""
+    """Searches one case and those nearby, and counts what that costs."""
 
     def __init__(
-        self, setup: Setup, seed: int, deadline: float, tick: Callable[[], None] | None = None
+        self, variant: Variant, seed: int, deadline: float, tick: Callable[[], None] | None = None
     ) -> None:
-        """Prepare the case as it stands; `tick` is called before each piece of work."""
-        self.setup = setup
+        """Prepare the case as given; `tick` is called before each piece of work."""
+        self.given = variant
         self.seed = seed
         self.deadline = deadline
-        self.problem = arrays_of(*setup)
+        self.problem = arrays_of(*variant)
         self._latest = ("", 0), self.problem
-        beyond = replace(setup.task, standoff=setup.task.standoff + 1.0)
-        self.outwards = beyond.targets(setup.cells).points - self.problem.points
+        beyond = replace(variant.task, standoff=variant.task.standoff + 1.0)
+        self.outwards = beyond.targets(variant.cells).points - self.problem.points
         """(N, 3) how the target points move with the standoff."""
-        self.work = work_for(setup.robot.n)
+        self.work = work_for(variant.robot.n)
         self.spent_before = 0
         self.tick = tick or (lambda: None)
-        self.reach = setup.robot.reach
+        self.reach = variant.robot.reach
         self.suspects: list[int] = []
         """Cells that were hard to cover so far, the latest first."""
-        degree = np.diff(setup.cells.neighbours.indptr)
+        degree = np.diff(variant.cells.neighbours.indptr)
         inner = degree >= np.median(degree)
         self._spread = np.concatenate(
             [evenly(np.flatnonzero(~inner)), evenly(np.flatnonzero(inner))]
         )
         self.allowance = 0.5
-        """Share of the boxes asked for that a proof gets: less for each that failed lately."""
+        """Share of the boxes requested that a proof gets: less for each that failed lately."""
 
     @property
     def spent(self) -> int:
@@ -82,10 +84,10 @@ class Prober:
         return self.spent_before + int(self.work.counts[0])
 
     def problem_at(self, quantity: Quantity, k: int) -> SearchArrays:
-        """The problem with a quantity k steps from where it stands, without making it anew."""
+        """The problem with a quantity k steps from the value given, without making it anew."""
         if quantity.kind in (Kind.CONE, Kind.STANDOFF):
             if self._latest[0] != (quantity.name, k):
-                self._latest = (quantity.name, k), arrays_of(*quantity.applied(self.setup, k))
+                self._latest = (quantity.name, k), arrays_of(*quantity.applied(self.given, k))
             return self._latest[1]
         problem = self.centres_at(quantity, k)
         if quantity.kind is Kind.SHIFT:
@@ -97,7 +99,7 @@ class Prober:
         return problem
 
     def centres_at(self, quantity: Quantity, k: int) -> SearchArrays:
-        """The same over the cells' centres, cheaper: what lies between them may be as it was."""
+        """The same over the cells' centres, cheaper: what lies between them may be unchanged."""
         value = quantity.value(k) if k else quantity.given
         if quantity.kind is Kind.CONE:
             return self._coned(value) or self.problem_at(quantity, k)
@@ -122,13 +124,13 @@ class Prober:
         return former._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord - lost)
 
     def order(self) -> NDArray[np.int64]:
-        """(N,) all cells, the hard ones first, then those at the edge of the surface."""
+        """(N,) all cells, the hard ones first, then those at the boundary of the surface."""
         hard = np.array(self.suspects, dtype=np.int64)
         rest = self._spread[~np.isin(self._spread, hard)]
         return np.concatenate([hard, rest])
 
     def suspect(self, cell: int) -> None:
-        """Look at this cell first from now on."""
+        """Try this cell first from now on."""
         if cell in self.suspects:
             self.suspects.remove(cell)
         self.suspects.insert(0, cell)
@@ -137,7 +139,7 @@ class Prober:
     def follow(
         self, problem: SearchArrays, q: NDArray[np.float64]
     ) -> tuple[int, NDArray[np.float64]]:
-        """Put configurations of a case nearby onto the fibres of this one.
+        """Project configurations of a case nearby onto the manifolds of this one.
 
         Args:
             problem: see `problem_at`.
@@ -150,7 +152,7 @@ class Prober:
         self.tick()
         found = q.copy()
         order = self.order()
-        projected = int(follow_all(problem, self.work, order, found))
+        projected = int(project_all(problem, self.work, order, found))
         if projected == len(order):
             return NO_CELL, found
         self.suspect(int(order[projected]))
@@ -162,8 +164,8 @@ class Prober:
         """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
 
         Returns:
-            The ruling; and, unless it is PROVED or OPEN, a configuration (n,) that Newton put onto
-            the cell's fibre, None where it could not.
+            The ruling; and, unless it is PROVED or OPEN, a configuration (n,) on the cell's
+            manifold, None where Newton's steps end elsewhere.
         """
         self.tick()
         if self.beyond_reach(problem)[cell]:
@@ -172,7 +174,7 @@ class Prober:
         boxes = max(int(self.allowance * boxes), min(boxes, LEAST_BOXES))
         ruling, q = rule(problem, self.work, cell, root_box(problem), boxes)
         if ruling is Ruling.OPEN:
-            self.allowance *= 0.5  # the arm's proofs are dear; one that succeeds takes this back
+            self.allowance *= 0.5  # until a proof of this arm succeeds
             return ruling, None
         if ruling is Ruling.PROVED:
             self.allowance = 1.0
@@ -182,20 +184,20 @@ class Prober:
             return ruling, None
         row = np.full((len(problem.points), len(q)), np.nan)
         row[cell] = wound(problem, q)
-        projected = int(follow_all(problem, self.work, np.array([cell]), row)) == 1
+        projected = int(project_all(problem, self.work, np.array([cell]), row)) == 1
         return ruling, row[cell] if projected else None
 
     def beyond_reach(self, problem: SearchArrays) -> NDArray[np.bool_]:
         """(N,) cells that are further away than the arm reaches.
 
-        Turning joints reach alike in any limits; a slide that is longer than in the case as it
-        stands is not ruled out here.
+        Revolute joints reach alike in any limits; a prismatic joint that is longer than in the case
+        as given is not ruled out here.
         """
-        slides = self.setup.robot.prismatic
+        slides = self.given.robot.prismatic
         longer = (problem.lower < self.problem.lower) | (problem.upper > self.problem.upper)
         if (slides & longer).any():
             return np.zeros(len(problem.points), dtype=bool)
-        distance = self.setup.robot.distance_from_base(problem.points)
+        distance = self.given.robot.distance_from_base(problem.points)
         return distance > self.reach + problem.tolerance
 
     def attempt(
@@ -206,27 +208,27 @@ class Prober:
         deep: bool,
         needed: NDArray[np.bool_] | None = None,
         hard: int = NO_CELL,
-    ) -> Trial:
+    ) -> Attempt:
         """Search for a covering motion, from known configurations first.
 
         Args:
             problem: see `problem_at`.
             seeds: (N, n) configurations to start from, one for each cell; NaN where there is none.
             most: evaluations of the arm after which the search is stopped.
-            deep: go on with the whole search where the seeds do not lead to a covering motion.
+            deep: go on with the full search where the seeds do not lead to a covering motion.
             needed: (N,) cells that are to be covered; all by default.
-            hard: a cell that random configurations are put over before the whole search begins.
+            hard: a cell that random configurations are tried at before the full search begins.
 
         Returns:
-            What it came to: feasible with a motion that is still to be `confirmed`; infeasible
-            where the whole search ended in time; undecided otherwise.
+            Feasible with a motion that is still to be `confirmed`; infeasible where the full search
+            ended in time; undecided otherwise.
         """
         self.tick()
-        robot, cells, _ = self.setup
+        robot, cells, _ = self.given
         robot = robot.with_limits(np.column_stack([problem.lower, problem.upper]))
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
         clock = Clock(self.deadline - time.monotonic(), lambda *_: self.tick()).start()
-        exploration = Rationed(robot, cells, problem, self.seed, clock, most=most)
+        exploration = LimitedExploration(robot, cells, problem, self.seed, clock, most=most)
         ended = False
         try:
             self._add_seeds(exploration, seeds, deep)
@@ -243,75 +245,48 @@ class Prober:
         if needed.any() and exploration.covered[needed].all():
             walk = covering_walk(exploration.roadmap, exploration.best)
             detail = f"one motion of {len(walk.q)} waypoints"
-            return Trial(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
+            return Attempt(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
         proved = [k for k, ruling in exploration.rulings.items() if ruling is Ruling.PROVED]
         if proved:
             self.suspect(proved[0])
             detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
-            return Trial(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
+            return Attempt(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
         best = f"the best motion covers {int(exploration.covered.sum())} of {len(cells)} cells"
         if ended and certifiable(problem):
             detail = f"the search ended without a covering motion; {best}"
-            return Trial(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
+            return Attempt(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
         detail = f"not found with {int(exploration.work.counts[0])} evaluations of the arm; {best}"
         if time.monotonic() > self.deadline:
             detail = "unknown, because the time limit ran out"
-        return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
+        return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
 
     def confirmed(
-        self, setup: Setup, trial: Trial, needed: NDArray[np.bool_] | None = None
-    ) -> Trial:
-        """A trial whose motion the replay has seen: feasible still, or undecided if it refuses."""
-        if trial.walk is None or trial.angle is not None:
-            return trial
+        self, variant: Variant, attempt: Attempt, needed: NDArray[np.bool_] | None = None
+    ) -> Attempt:
+        """An attempt once its motion is replayed: still feasible, or undecided if refused."""
+        if attempt.walk is None or attempt.angle is not None:
+            return attempt
         self.tick()
-        robot, cells, task = setup
+        robot, cells, task = variant
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
-        replayed = replay(robot, cells, task, trial.walk, needed)
+        replayed = replay(robot, cells, task, attempt.walk, needed)
         if replayed.accepted:
             angle = replayed.certificate.max_angle
-            return replace(trial, detail=f"{trial.detail}, replayed", angle=angle)
+            return replace(attempt, detail=f"{attempt.detail}, replayed", angle=angle)
         detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
-        return Trial(Answer.UNDECIDED, Evidence.BUDGET, detail, trial.q, None)
+        return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
 
-    def others(self, guesses: int, most: int) -> list[Trial]:
-        """Covering motions of the case as it stands, from postures far from each other.
-
-        Args:
-            guesses: random configurations that are put over a cell in the middle.
-            most: searches.
-        """
-        robot, cells, _ = self.setup
-        exploration = Exploration(robot, cells, self.problem, self.seed + 1)
-        tried = exploration.guesses(guesses)
-        room = margin_shares(self.problem, self.work, cells.middle, tried)
-        order = np.argsort(-room, kind="stable")
-        trials = []
-        tried = tried[order[room[order] >= 0.0]]
-        for k in apart(np.array([self._posture(q) for q in tried]), most):
-            seeds = np.full((len(cells), robot.n), np.nan)
-            seeds[cells.middle] = tried[k]
-            trials.append(self.attempt(self.problem, seeds, np.inf, deep=False))
-        return [trial for trial in trials if trial.found]
-
-    def _posture(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
-        """(7 n,) numbers that differ where postures do: where the joints are, most of all.
-
-        Joint values alone would tell little: turning wrists by half turns changes much of them.
-        """
-        place(self.problem, self.work, HERE, q)
-        origins, axes = self.work.origins[0] / self.problem.scale, self.work.axes[0]
-        return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
-
-    def _add_seeds(self, exploration: Rationed, seeds: NDArray[np.float64], deep: bool) -> None:
-        """Plant seeds until one component covers every cell, hard cells first."""
+    def _add_seeds(
+        self, exploration: LimitedExploration, seeds: NDArray[np.float64], deep: bool
+    ) -> None:
+        """Add seeds until one component covers every cell, hard cells first."""
         known = np.asarray(np.isfinite(seeds).all(axis=1))
         first = [cell for cell in self.suspects if known[cell]][:1]
         for cell in first or np.flatnonzero(known)[:1].tolist():
             exploration.add_seeds(cell, np.clip(seeds[[cell]], exploration.low, exploration.high))
         if not deep:
             exploration.most = min(exploration.most, AGAIN * float(exploration.work.counts[0]))
-        for _ in range(PLANTS):
+        for _ in range(MORE_SEEDS):
             missed = np.flatnonzero(known & ~exploration.covered)
             if exploration.complete or not len(missed):
                 return
@@ -319,28 +294,15 @@ class Prober:
             known[cell] = False
             exploration.add_seeds(cell, seeds[[cell]])
 
-    def _project(self, exploration: Rationed, cell: int) -> None:
-        """Plant what random configurations lead to over one cell, the hardest.
+    def _project(self, exploration: LimitedExploration, cell: int) -> None:
+        """Add as seeds the random configurations that project onto one cell, the hardest.
 
-        Where they lead to nothing, little hope is left: half of the ration will do.
+        Where none does, little hope is left: half of the evaluations will do.
         """
-        guesses = exploration.guesses(LANDINGS)
+        guesses = exploration.guesses(GUESSES)
         projected = np.zeros(len(guesses), dtype=bool)
-        project_guesses(
-            exploration.arrays, exploration.work, cell, guesses, PROJECTION_STEPS, projected
-        )
+        project_guesses(exploration.arrays, exploration.work, cell, guesses, GUESS_STEPS, projected)
         if projected.any():
             exploration.add_seeds(cell, guesses[projected])
         elif exploration.roadmap.first_node[cell] < 0:
             exploration.most = 0.5 * (exploration.most + float(exploration.work.counts[0]))
-
-
-def apart(features: NDArray[np.float64], most: int) -> list[int]:
-    """Rows of (k, m) features, each as far as can be from those chosen before it; up to `most`."""
-    chosen = [0] if len(features) else []
-    while chosen and len(chosen) < min(most, len(features)):
-        away = np.linalg.norm(features[:, None] - features[chosen], axis=2).min(axis=1)
-        if away.max() < SAME:
-            break
-        chosen.append(int(away.argmax()))
-    return chosen

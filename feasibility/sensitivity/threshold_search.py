@@ -1,9 +1,9 @@
-"""Where the verdict turns along one quantity: few dear questions, led by many cheap ones.
+"""The search for a threshold: at which value of one quantity the verdict changes.
 
-From a value with a covering motion towards one without: the motion's configurations are put back
-onto the fibres, value by value (`Prober.follow`), which tells how far this motion can go and which
-cell is the first to fail. A short search at that value confirms it. Past it that cell is asked for
-a proof; what the proof finds instead is a configuration of another branch, which may go further.
+From a value with a covering motion towards one without: the motion's configurations are projected
+again, value by value (`WarmStart`), which shows how far this motion can go and which cell is the
+first to fail. A short search at that value confirms it. Past it a proof is attempted for that cell;
+what it finds instead is a configuration of another branch, which may go further.
 """
 
 from __future__ import annotations
@@ -16,45 +16,45 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap import Ruling
-from feasibility.sensitivity.limited_search import Trial
+from feasibility.sensitivity.limited_search import NO_CELL, Attempt
 from feasibility.sensitivity.parameters import Kind, Quantity
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.thresholds import Finding, Span, Threshold, last_true
-from feasibility.sensitivity.warm_start import NO_CELL, Carrying, Reached
+from feasibility.sensitivity.warm_start import Reached, WarmStart
 from feasibility.verdict import Answer, Evidence
 
 PROOF_BOXES = 3000  # for one cell
 HINT_BOXES = 1500  # for one cell, where a configuration is as welcome as a proof
-BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is looked for
-LOOKED_AT = 3  # cells asked for a proof before a search is made
-SCAN = 20  # values looked at on the way to the end of a quantity that is not monotone
+BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is attempted
+PROOFS = 3  # cells for which a proof is attempted before a search is made
+SCAN = 20  # values tried on the way to the end of a quantity that is not monotone
 SEARCHES = 2  # short of one that failed, even when none should be begun any more
 MORE_SEARCHES = 4  # the same where none has found anything
 BACKS = (0.1, 0.3)  # [1] where the search fails at the end: the next ones are that much nearer
 SHORT = 0.8  # verdicts' worth of evaluations that a search from known configurations may take
 
 
-class Side(NamedTuple):
-    """A number of steps, and what was found there."""
+class Probe(NamedTuple):
+    """A number of steps, and what a search found there."""
 
     k: int
-    trial: Trial
+    attempt: Attempt
 
 
-class Edge(NamedTuple):
-    """Where carrying a motion's configurations, and short searches, have led."""
+class Bracket(NamedTuple):
+    """Between which steps the threshold is, after warm starts and short searches."""
 
-    good: Side
+    good: Probe
     bad: int
     """Steps at which no motion was found, the nearest to `good`; or the far end."""
     failed: int
-    """The cell that could not be carried to there; `NO_CELL` where a search failed."""
+    """The cell that does not project there; `NO_CELL` where a search failed."""
     other: Finding | None
-    """What the search found there; None without one."""
+    """What the search found at `bad`; None without one."""
 
 
 @dataclass
-class Turning:
+class ThresholdSearch:
     """The search for one threshold."""
 
     prober: Prober
@@ -63,28 +63,28 @@ class Turning:
     """Evaluations that one verdict of the case takes."""
     stop: int
     """Evaluations (of the prober) at which no further search is begun, except to end with one."""
-    motions: Sequence[Trial] = ()
-    """Covering motions of the case as it stands, the one of its verdict first."""
-    rivals: list[Side] = field(default_factory=list)
-    """The same, as far as each goes as it is, the furthest first; none that was looked at."""
-    good: Side | None = None
-    """The last feasible side of a margin that was found."""
+    motions: Sequence[Attempt] = ()
+    """Covering motions of the case as given, the one of its verdict first."""
+    rivals: list[Probe] = field(default_factory=list)
+    """The same, as far as each goes unchanged, the furthest first; none that was tried."""
+    good: Probe | None = None
+    """The last feasible probe of a margin that was found."""
 
-    # -- a case that is feasible as it stands ----------------------------------------------------
+    # -- a case that is feasible as given -------------------------------------------------------
 
     def tighten(self) -> Threshold:
         """How far the quantity can go before the case is no longer feasible."""
         end = self.quantity.last + 1
-        # The cone is no matter of posture, and asking each motion for its angle is dear.
+        # The cone is no matter of posture, and replaying each motion for its angle is expensive.
         motions = self.motions[: 1 if self.quantity.kind is Kind.CONE else None]
-        sides = [self._slid(Side(0, trial), end) for trial in motions]
-        self.rivals = sorted(sides, key=lambda side: -side.k)
+        probes = [self._extended(Probe(0, attempt), end) for attempt in motions]
+        self.rivals = sorted(probes, key=lambda probe: -probe.k)
         good, other = self._outwards(self.rivals.pop(0))
-        told = self._told(good)
-        if not told.feasible:  # the replay refuses what the search found
-            return Threshold(self.quantity, self._told(Side(0, self.motions[0])), told)
+        reported = self._reported(good)
+        if not reported.feasible:  # the replay refuses what the search found
+            return Threshold(self.quantity, self._reported(Probe(0, self.motions[0])), reported)
         self.good = good
-        return Threshold(self.quantity, told, other)
+        return Threshold(self.quantity, reported, other)
 
     def tighter(self, found: Threshold) -> Threshold:
         """The same threshold, its sides brought nearer to each other if that succeeds."""
@@ -96,19 +96,19 @@ class Turning:
         if bad is None:
             return found
         good, beyond = self._narrow(good, bad, other)
-        told = self._told(good)
-        return Threshold(self.quantity, told, beyond) if told.feasible else found
+        reported = self._reported(good)
+        return Threshold(self.quantity, reported, beyond) if reported.feasible else found
 
-    def _outwards(self, here: Side) -> tuple[Side, Finding | None]:
-        """The last feasible side on the way to the end; and what was found past it, if anything."""
+    def _outwards(self, here: Probe) -> tuple[Probe, Finding | None]:
+        """The last feasible probe on the way to the end, what was found past it, if anything."""
         end = self.quantity.last
         if self.quantity.monotone:
-            cell, q = self.prober.follow(self.prober.problem_at(self.quantity, end), here.trial.q)
+            cell, q = self.prober.follow(self.prober.problem_at(self.quantity, end), here.attempt.q)
             if cell == NO_CELL:
-                trial = self._search(end, q)
-                if trial.found:
-                    return Side(end, trial), None
-                return self._narrow(here, end, self._finding(Side(end, trial)))
+                attempt = self._search(end, q)
+                if attempt.found:
+                    return Probe(end, attempt), None
+                return self._narrow(here, end, self._finding(Probe(end, attempt)))
         return self._narrow(here, end + 1)
 
     # -- a case that is not ----------------------------------------------------------------------
@@ -117,7 +117,7 @@ class Turning:
         """How far the quantity has to go for the case to become feasible.
 
         Args:
-            here: the verdict as the case stands.
+            here: the verdict of the case as given.
             seeds: (N, n) configurations of its best component; NaN where it has none.
         """
         last = self.quantity.last
@@ -133,135 +133,135 @@ class Turning:
                 known, before = found, k
                 proved += found.evidence is Evidence.PROOF
                 continue
-            entry = Side(k, found)
+            entry = Probe(k, found)
             good, other = self._narrow(entry, before)
-            told = self._told(good)
-            if not told.feasible:
-                return Threshold(self.quantity, None, told)
-            return Threshold(self.quantity, told, other or known, self._span(entry))
+            reported = self._reported(good)
+            if not reported.feasible:
+                return Threshold(self.quantity, None, reported)
+            return Threshold(self.quantity, reported, other or known, self._span(entry))
         tried = ""
         if not self.quantity.monotone:
             tried = f"{looked} of {count} values tried, {proved} of them proved infeasible"
         return Threshold(self.quantity, None, known, None, tried)
 
-    def _span(self, entry: Side) -> Span | None:
+    def _span(self, entry: Probe) -> Span | None:
         """How far on a standoff stays feasible; None for other quantities."""
         if self.quantity.kind is not Kind.STANDOFF:
             return None
         good, other = self._outwards(entry)
-        told = self._told(good)
-        return Span(told, other) if told.feasible else Span(self._told(entry), told)
+        reported = self._reported(good)
+        return Span(reported, other) if reported.feasible else Span(self._reported(entry), reported)
 
-    def _look(self, k: int, seeds: NDArray[np.float64]) -> Trial | Finding:
-        """Is it feasible at k steps? A trial if so, or what speaks against it."""
+    def _look(self, k: int, seeds: NDArray[np.float64]) -> Attempt | Finding:
+        """Is it feasible at k steps? An attempt if so, or what speaks against it."""
         problem = self.prober.problem_at(self.quantity, k)
         missed = np.flatnonzero(~np.isfinite(seeds).all(axis=1))
-        spread = missed[np.linspace(0, len(missed) - 1, min(LOOKED_AT, len(missed))).astype(int)]
+        spread = missed[np.linspace(0, len(missed) - 1, min(PROOFS, len(missed))).astype(int)]
         hard = [cell for cell in self.prober.suspects if cell in missed]
         far = self.prober.beyond_reach(problem)
         if far.any():
             return self._proof(k, int(far.argmax()))
         seeds = seeds.copy()
-        for cell in list(dict.fromkeys([*hard, *spread.tolist()]))[:LOOKED_AT]:
+        for cell in list(dict.fromkeys([*hard, *spread.tolist()]))[:PROOFS]:
             ruling, q = self.prober.rule(problem, cell, HINT_BOXES)
             if ruling is Ruling.PROVED:
                 return self._proof(k, cell)
             if q is None:
-                break  # neither a proof nor a configuration: the next cell would tell no more
+                break  # neither a proof nor a configuration: the next cell would add nothing
             seeds[cell] = q
         nowhere = not np.isfinite(seeds).any()
-        trial = self._search(k, seeds, deep=self.quantity.monotone or nowhere)
-        return trial if trial.found else self._finding(Side(k, trial))
+        attempt = self._search(k, seeds, deep=self.quantity.monotone or nowhere)
+        return attempt if attempt.found else self._finding(Probe(k, attempt))
 
     # -- between the two -------------------------------------------------------------------------
 
     def _narrow(
-        self, good: Side, far: int, there: Finding | None = None
-    ) -> tuple[Side, Finding | None]:
+        self, good: Probe, far: int, there: Finding | None = None
+    ) -> tuple[Probe, Finding | None]:
         """From a feasible value towards one that is not, until they are neighbours or nearly so.
 
         Args:
-            good: a feasible side.
+            good: a feasible probe.
             far: steps where it is not feasible, or one past the end.
             there: what a search found at `far`, although the motion can be followed to it.
 
         Returns:
-            The last feasible side, and what was found on the other one, `there` if that is `far`.
+            The last feasible probe, and what was found on the other side, `there` if that is `far`.
         """
         while True:
-            edge = self._follow(good, far, there)
-            if edge.bad == far and abs(far - edge.good.k) == 1:
-                return edge.good, there
-            beyond = self._beyond(edge, far)
+            bracket = self._follow(good, far, there)
+            if bracket.bad == far and abs(far - bracket.good.k) == 1:
+                return bracket.good, there
+            beyond = self._beyond(bracket, far)
             if isinstance(beyond, Finding):
-                return edge.good, beyond
+                return bracket.good, beyond
             good = beyond
             if abs(far - good.k) == 1:
                 return good, there
 
-    def _follow(self, good: Side, far: int, there: Finding | None) -> Edge:
-        """As far as a motion's configurations can be carried, and a short search agrees."""
-        good = self._slid(good, far)
+    def _follow(self, good: Probe, far: int, there: Finding | None) -> Bracket:
+        """As far as a motion's configurations project, and a short search agrees."""
+        good = self._extended(good, far)
         begun, bad, other, searches, backs = good.k, far, there, 0, list(BACKS)
         if there is None:
             reached = self._furthest(good, far)
         else:
-            reached = self._short_of(good, far, good.trial.q, 0.5)
+            reached = self._short_of(good, far, good.attempt.q, 0.5)
         while reached.k != good.k:
-            trial = self._search(reached.k, reached.q)
-            if trial.found:
-                good = self._slid(Side(reached.k, trial), bad)
+            attempt = self._search(reached.k, reached.q)
+            if attempt.found:
+                good = self._extended(Probe(reached.k, attempt), bad)
                 if other is None:
                     reached = self._reach(good, bad)
                     continue
                 backs = []
             else:
-                bad, other = reached.k, self._finding(Side(reached.k, trial))
+                bad, other = reached.k, self._finding(Probe(reached.k, attempt))
             searches += 1
             enough = SEARCHES if good.k != begun else MORE_SEARCHES
             if searches > enough and self.prober.spent >= self.stop:
                 break
             reached = self._short_of(good, bad, reached.q, backs.pop(0) if backs else 0.5)
         if other is not None:
-            return Edge(good, bad, NO_CELL, other)
-        return Edge(good, good.k + (1 if far > good.k else -1), reached.cell, None)
+            return Bracket(good, bad, NO_CELL, other)
+        return Bracket(good, good.k + (1 if far > good.k else -1), reached.cell, None)
 
-    def _reach(self, good: Side, bad: int) -> Reached:
-        """How far the configurations of a motion can be carried."""
-        return Carrying(self.prober, self.quantity, good.k, good.trial.q).reach(bad)
+    def _reach(self, good: Probe, bad: int) -> Reached:
+        """How far the configurations of a motion project."""
+        return WarmStart(self.prober, self.quantity, good.k, good.attempt.q).reach(bad)
 
-    def _furthest(self, good: Side, far: int) -> Reached:
-        """The same, of this motion and those of the case as it stands, whichever go furthest."""
-        way = 1 if far > good.k else -1
+    def _furthest(self, good: Probe, far: int) -> Reached:
+        """The same, of this motion and those of the case as given, whichever goes furthest."""
+        sign = 1 if far > good.k else -1
         best = self._reach(good, far)
         while self.rivals:
-            k, trial = self.rivals.pop(0)
-            beyond = best.k + way
+            k, attempt = self.rivals.pop(0)
+            beyond = best.k + sign
             if beyond == far:
                 return best
-            carrying = Carrying(self.prober, self.quantity, k, trial.q)
-            if k * way > best.k * way or carrying.goes_to(beyond):
-                reached = carrying.reach(far)
-                if reached.k * way > best.k * way:
+            warm = WarmStart(self.prober, self.quantity, k, attempt.q)
+            if k * sign > best.k * sign or warm.reaches(beyond):
+                reached = warm.reach(far)
+                if reached.k * sign > best.k * sign:
                     best = reached
         return best
 
-    def _short_of(self, good: Side, bad: int, q: NDArray[np.float64], share: float) -> Reached:
+    def _short_of(self, good: Probe, bad: int, q: NDArray[np.float64], share: float) -> Reached:
         """Short of a failed search by a share of the way to it, with its configurations."""
         back = max(round(share * abs(bad - good.k)), 1)
         return Reached(bad - back if bad > good.k else bad + back, q, NO_CELL)
 
-    def _slid(self, good: Side, bad: int) -> Side:
-        """As far as the motion itself, as it is, keeps to the limit or to the cone."""
-        walk, joint, value = good.trial.walk, self.quantity.joint, self.quantity.value
+    def _extended(self, good: Probe, bad: int) -> Probe:
+        """As far as the unchanged motion keeps to the limit or to the cone."""
+        walk, joint, value = good.attempt.walk, self.quantity.joint, self.quantity.value
         if walk is None or not self.quantity.monotone:
             return good
         if self.quantity.kind is Kind.CONE:
-            setup = self.quantity.applied(self.prober.setup, good.k)
-            trial = self.prober.confirmed(setup, good.trial)
-            if trial.angle is None:
+            variant = self.quantity.applied(self.prober.given, good.k)
+            attempt = self.prober.confirmed(variant, good.attempt)
+            if attempt.angle is None:
                 return good
-            angle, good = trial.angle, Side(good.k, trial)
+            angle, good = attempt.angle, Probe(good.k, attempt)
             k = last_true(lambda k: value(k) > angle, good.k, bad)
         elif self.quantity.kind is Kind.LOWER:
             least = float(walk.q[:, joint].min())
@@ -269,61 +269,61 @@ class Turning:
         else:
             most = float(walk.q[:, joint].max())
             k = last_true(lambda k: value(k) >= most, good.k, bad)
-        return Side(min(k, self.quantity.last), good.trial)
+        return Probe(min(k, self.quantity.last), good.attempt)
 
-    def _beyond(self, edge: Edge, far: int) -> Side | Finding:
+    def _beyond(self, bracket: Bracket, far: int) -> Probe | Finding:
         """Past the last feasible value: a proof, or a motion after all, or nothing found."""
-        k, seeds = edge.bad, np.full_like(edge.good.trial.q, np.nan)
-        if edge.failed != NO_CELL:
-            proof, q = self._proof_beyond(edge, far)
+        k, seeds = bracket.bad, np.full_like(bracket.good.attempt.q, np.nan)
+        if bracket.failed != NO_CELL:
+            proof, q = self._proof_beyond(bracket, far)
             if proof is not None:
                 return proof
-            k = edge.good.k + (1 if far > edge.good.k else -1)
+            k = bracket.good.k + (1 if far > bracket.good.k else -1)
             if q is not None:
-                seeds[edge.failed] = q
-        elif edge.other is not None and abs(edge.bad - edge.good.k) > 1:
-            return edge.other  # the ration ended the halving
+                seeds[bracket.failed] = q
+        elif bracket.other is not None and abs(bracket.bad - bracket.good.k) > 1:
+            return bracket.other  # the limit of evaluations ended the bisection
         # This motion goes no further. Another one may, so the search begins afresh.
-        hard = [edge.failed, *self.prober.suspects][edge.failed == NO_CELL :][:1]
-        trial = self._search(k, seeds, deep=True, hard=hard[0] if hard else NO_CELL)
-        return Side(k, trial) if trial.found else self._finding(Side(k, trial))
+        hard = [bracket.failed, *self.prober.suspects][bracket.failed == NO_CELL :][:1]
+        attempt = self._search(k, seeds, deep=True, hard=hard[0] if hard else NO_CELL)
+        return Probe(k, attempt) if attempt.found else self._finding(Probe(k, attempt))
 
     def _proof_beyond(
-        self, edge: Edge, far: int
+        self, bracket: Bracket, far: int
     ) -> tuple[Finding | None, NDArray[np.float64] | None]:
         """A proof of the cell that failed, as near as one is found; or what covers that cell."""
-        way = 1 if far > edge.good.k else -1
+        sign = 1 if far > bracket.good.k else -1
         proof, q = None, None
-        for steps in (s for s in BEYOND if (far - edge.good.k) * way > s):
-            k = edge.good.k + way * steps
+        for steps in (s for s in BEYOND if (far - bracket.good.k) * sign > s):
+            k = bracket.good.k + sign * steps
             problem = self.prober.problem_at(self.quantity, k)
-            ruling, q = self.prober.rule(problem, edge.failed, PROOF_BOXES)
+            ruling, q = self.prober.rule(problem, bracket.failed, PROOF_BOXES)
             if ruling is not Ruling.PROVED:
                 break
-            proof = self._proof(k, edge.failed)
+            proof = self._proof(k, bracket.failed)
         return proof, q
 
     def _search(
         self, k: int, seeds: NDArray[np.float64], deep: bool = False, hard: int = NO_CELL
-    ) -> Trial:
+    ) -> Attempt:
         """Search at k steps: from the seeds alone, or deeper, with half of what is left."""
         left = self.stop - self.prober.spent
         most = max(left, self.verdict_cost) // 2 if deep else SHORT * self.verdict_cost
         problem = self.prober.problem_at(self.quantity, k)
         return self.prober.attempt(problem, seeds, most, deep, hard=hard)
 
-    def _told(self, side: Side) -> Finding:
-        """A feasible side, once the replay has seen its motion."""
-        setup = self.quantity.applied(self.prober.setup, side.k)
-        return self._finding(Side(side.k, self.prober.confirmed(setup, side.trial)))
+    def _reported(self, probe: Probe) -> Finding:
+        """A feasible probe as a finding, once its motion is replayed."""
+        variant = self.quantity.applied(self.prober.given, probe.k)
+        return self._finding(Probe(probe.k, self.prober.confirmed(variant, probe.attempt)))
 
-    def _finding(self, side: Side) -> Finding:
-        """A side, as it is told."""
-        value, trial = self.quantity.value(side.k), side.trial
-        return Finding(value, trial.answer, trial.evidence, trial.detail)
+    def _finding(self, probe: Probe) -> Finding:
+        """A probe as a finding."""
+        value, attempt = self.quantity.value(probe.k), probe.attempt
+        return Finding(value, attempt.answer, attempt.evidence, attempt.detail)
 
     def _proof(self, k: int, cell: int) -> Finding:
         """A cell that is proved uncoverable at k steps."""
-        value, name = self.quantity.value(k), list(self.prober.setup.cells.unravel(cell))
+        value, name = self.quantity.value(k), list(self.prober.given.cells.unravel(cell))
         detail = f"cell {name} is proved uncoverable"
         return Finding(value, Answer.INFEASIBLE, Evidence.PROOF, detail, cell)

@@ -1,4 +1,4 @@
-"""Thresholds: between which two values of one quantity the verdict turns, and what says so."""
+"""Thresholds: between which two values of one quantity the verdict changes, and the evidence."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from feasibility.sensitivity.parameters import Quantity
-from feasibility.verdict import Answer, Evidence
+from feasibility.verdict import Answer, Evidence, Verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,24 +46,24 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """Where the verdict turns along one quantity, with the verdict on both sides.
+    """Where the verdict changes along one quantity, with the verdict on both sides.
 
     The quantity goes from the value given towards `quantity.end`. Where the case as given is not
-    feasible, that is the way of more freedom, and `feasible` is the first value found to be
-    feasible; None when no value helps. Where it is feasible, that is the way of less freedom, and
+    feasible, that is towards more freedom, and `feasible` is the first value found to be
+    feasible; None when no value helps. Where it is feasible, that is towards less freedom, and
     `feasible` is the last value found to be feasible; `other` is None when all of them are.
     """
 
     quantity: Quantity
     feasible: Finding | None
-    """The value nearest to the turn at which the case is feasible."""
+    """The value nearest to the threshold at which the case is feasible."""
     other: Finding | None
-    """The value nearest to the turn at which it is not: proved, exhausted, or not found. Without a
-    feasible value: what is known at the far end."""
+    """The value nearest to the threshold at which it is not: proved, exhausted, or not found.
+    Without a feasible value: what is known at the far end."""
     span: Span | None = None
     """The far end of the feasible range, for the standoff of a case that is not feasible."""
     tried: str = ""
-    """What was tried, where no value helps or not every value was looked at."""
+    """What was tried, where no value helps or not every value was tried."""
 
     @property
     def resolution(self) -> float | None:
@@ -90,11 +93,48 @@ class Threshold:
         return self.feasible is None and self.quantity.monotone and end and proved
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Dropped:
+    """The cells without which one motion covers the rest: those that the best one misses."""
+
+    cells: NDArray[np.int64]
+    """(k,) flat indices."""
+    area: float
+    """m^2."""
+    share: float
+    """Of the whole area, 0..1."""
+    waypoints: int | None
+    """Of the motion that covers all others, which the replay accepted; None where there is none."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the cells."""
+        cells = np.array(self.cells, dtype=np.int64)
+        cells.flags.writeable = False
+        object.__setattr__(self, "cells", cells)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Explanation:
+    """The thresholds of a case; see `explain`."""
+
+    verdict: Verdict
+    thresholds: tuple[Threshold, ...]
+    """One for each quantity that was tried, in the order of `quantities`."""
+    left_out: tuple[str, ...]
+    """Names of the quantities for which no time was left."""
+    dropped: Dropped | None
+    """None for a feasible case."""
+    evaluations: int
+    """Evaluations of the arm that the thresholds took, a box of a proof counting as one."""
+    seconds: float
+    """Time that they took."""
+
+
 def last_true(holds: Callable[[int], bool], good: int, bad: int, gallop: bool = False) -> int:
     """The last whole number before `bad`, seen from `good`, for which `holds` is true.
 
     Args:
-        holds: asked for numbers strictly between the two ends, at most about log2 of their
+        holds: called for numbers strictly between the two ends, at most about log2 of their
             distance times, twice that when galloping.
         good: where it is known to be true.
         bad: where it is known, or taken, to be false; above or below `good`.
@@ -112,13 +152,13 @@ def last_true(holds: Callable[[int], bool], good: int, bad: int, gallop: bool = 
         >>> last_true(lambda k: k >= -5, 10, -90, gallop=True)
         -5
     """
-    way = 1 if bad > good else -1
+    sign = 1 if bad > good else -1
     step = 1
-    while gallop and good + way * step != bad and (bad - good) * way > step:
-        if not holds(good + way * step):
-            bad = good + way * step
+    while gallop and good + sign * step != bad and (bad - good) * sign > step:
+        if not holds(good + sign * step):
+            bad = good + sign * step
             break
-        good += way * step
+        good += sign * step
         step *= 2
     while abs(bad - good) > 1:
         middle = (good + bad) // 2

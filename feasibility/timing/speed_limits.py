@@ -2,9 +2,8 @@
 
 On a piece of a cubic spline q'(s) is a parabola, so its Bernstein coefficients bound it: the middle
 one is q'(0) + q''(0) h / 2 for a piece of length h. And with |p''(s)| <= D on the piece, which the
-lever arms give (as in `feasibility.segment`, and sum_j r_j |q_j''| for the bent curve), the tool's
-|p'(s)| is at most its larger end plus D h / 2. So the bounds hold on whole pieces, not only where
-they are looked at.
+lever arms give (`certification.second_derivatives`), the tool's |p'(s)| is at most its larger end
+plus D h / 2. So the bounds hold on whole pieces, not only where they are evaluated.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 
-from feasibility.certification import placements
+from feasibility.certification import placements, second_derivatives
 from feasibility.paths import PathError
 from robots import Kinematics, Robot
 
@@ -156,36 +155,9 @@ def _slopes(robot: Robot, spline: BSpline, grid: Array) -> tuple[Array, Array, A
     middle = slope[:-1] + 0.5 * h * bend[:-1]
     fastest = np.maximum(np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])), np.abs(middle))
     bent = np.maximum(np.abs(bend[:-1]), np.abs(bend[1:]))
-    swing = _swing(robot, placements(robot, q).levers, fastest * h, bent * h**2)
+    levers = placements(robot, q).levers
+    swing = second_derivatives(fastest * h, robot.prismatic, levers, np.inf, bent * h**2)
     return tool_slopes(robot, q, slope), fastest, swing / h[:, 0] ** 2
-
-
-def _swing(robot: Robot, levers: Array, change: Array, bent: Array) -> Array:
-    """(m - 1,) m, bounds on the tool point's second derivative along pieces of unit length.
-
-    As in `certificate.second_derivatives`, and for joints whose own second derivatives are at most
-    `bent` too: each adds that times its lever arm.
-
-    Args:
-        robot: the arm.
-        levers: (m, n) lever arms at the ends of the pieces; 1 for a sliding joint.
-        change: (m - 1, n) bounds on the joints' first derivatives.
-        bent: (m - 1, n) bounds on their second derivatives.
-    """
-    total, behind = np.zeros(len(change)), np.zeros(len(change))
-    turns = np.where(robot.prismatic, 0.0, change)
-    before = np.cumsum(turns, axis=1) - turns
-    ends = np.maximum(levers[:-1], levers[1:])
-    for j in range(robot.n - 1, -1, -1):
-        d = change[:, j]
-        if robot.prismatic[j]:
-            total += 2.0 * d * before[:, j] + bent[:, j]
-            behind += d
-            continue
-        lever = ends[:, j] + 0.5 * behind
-        total += lever * (d * (d + 2.0 * before[:, j]) + bent[:, j])
-        behind += lever * d
-    return total
 
 
 def tool_slopes(robot: Robot, q: Array, slope: Array) -> Array:

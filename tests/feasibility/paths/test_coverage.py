@@ -20,7 +20,7 @@ from feasibility.paths import ladder as joint_routes
 from feasibility.paths.ladder import joint_route
 from feasibility.paths.metrics import revisiting
 from feasibility.paths.motion_graph import MotionGraph, joint_length, motion_graph_of
-from feasibility.paths.motion_links import windings, wound
+from feasibility.paths.motion_links import rewound, windings
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.results import load_result, save_result
 from feasibility.roadmap import arrays_of, work_for
@@ -121,7 +121,7 @@ def test_a_motion_in_another_winding_is_the_same_work():
     assert path.figures.revisited == 0.0
     needed = np.isin(np.arange(len(verdict.cells)), [0, 1, 2])
     for turn in found:
-        moved = graph.walk(wound(graph, nodes, turn))
+        moved = graph.walk(rewound(graph, nodes, turn))
         assert np.array_equal(moved.cell, walk.cell)
         assert moved.q == pytest.approx(walk.q + turn, abs=1e-12)
         assert replay(verdict.robot, verdict.cells, verdict.task, moved, needed).accepted

@@ -15,7 +15,8 @@ from paper_cases import PAPER_CASES
 from feasibility import Answer, Evidence, Search, Task, Verdict, check
 from feasibility.reports.explanation import as_json, as_text, shown
 from feasibility.sensitivity import Explanation, Kind, Quantity, Threshold, explain
-from feasibility.sensitivity.parameters import Setup
+from feasibility.sensitivity import explanation as explanations
+from feasibility.sensitivity.parameters import Variant, quantities
 from feasibility.sensitivity.probes import Prober
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
@@ -28,36 +29,36 @@ STIFF = PUMA.with_limits({f"joint{k}": (0.0, 0.0) for k in (4, 5, 6)})
 WALL = plane((-0.2, 0.2), (-0.2, 0.2), "outside", (0.6, 0.1, 0.2), (0.0, 90.0, 0.0))
 
 CASES = {
-    "plate": Setup(UR5, PLATE.cells(3, 3), Task(0.02, 30)),
+    "plate": Variant(UR5, PLATE.cells(3, 3), Task(0.02, 30)),
     # begins within reach and ends far outside: nothing helps
-    "long plate": Setup(
+    "long plate": Variant(
         UR5,
         plane((0.4, 2.4), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3)).cells(4, 2),
         Task(0.02, 30),
     ),
-    "stiff wrist": Setup(STIFF, WALL.cells(3, 3), Task(0.0, 20)),
-    "ring": Setup(
+    "stiff wrist": Variant(STIFF, WALL.cells(3, 3), Task(0.0, 20)),
+    "ring": Variant(
         PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])}),
         cylinder(0.6, (-60, 60), (0.2, 0.3)).cells(12, 1),
         Task(0.02, 40),
     ),
-    "cheap ur5": Setup(
+    "cheap ur5": Variant(
         UR5,
         plane((0.3, 0.6), (-0.15, 0.15), "outside", (0.0, 0.0, 0.3)).cells(9, 10),
         Task(0.02, 30),
     ),
-    "cheap z1": Setup(
+    "cheap z1": Variant(
         load_robot("z1"),
         plane((0.25, 0.4), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2)).cells(9, 10),
         Task(0.02, 30),
     ),
-    "dome": Setup(
+    "dome": Variant(
         load_robot("panda"),
         sphere(0.25, (10, 50), (150, 230), position=(0.65, 0, 0.1), side="outside").cells(9, 10),
         Task(0.02, 25),
     ),
     # the tool at the plate's place is below the reach; the standoff lifts it
-    "deep plate": Setup(
+    "deep plate": Variant(
         UR5,
         plane((0.5, 0.6), (-0.05, 0.05), "outside", (0.0, 0.0, -0.75)).cells(2, 2),
         Task(0.01, 40),
@@ -66,25 +67,25 @@ CASES = {
 
 
 @cache
-def setup_of(name: str) -> Setup:
+def variant_of(name: str) -> Variant:
     if name in CASES:
         return CASES[name]
     case = PAPER_CASES[name]
-    return Setup(case.robot(), case.cells(), case.task())
+    return Variant(case.robot(), case.cells(), case.task())
 
 
 @cache
 def explained(name: str) -> Explanation:
-    return explain(*setup_of(name))
+    return explain(*variant_of(name))
 
 
 def threshold_of(explanation: Explanation, name: str) -> Threshold:
     return next(t for t in explanation.thresholds if t.quantity.name == name)
 
 
-def verdict_at(setup: Setup, threshold: Threshold, value: float) -> Verdict:
+def verdict_at(variant: Variant, threshold: Threshold, value: float) -> Verdict:
     """The verdict of the case with a quantity at any value, made without `Quantity.applied`."""
-    robot, cells, task = setup
+    robot, cells, task = variant
     quantity = threshold.quantity
     if quantity.kind is Kind.CONE:
         task = Task(task.standoff, math.degrees(value), task.tolerance)
@@ -105,17 +106,17 @@ def verdict_at(setup: Setup, threshold: Threshold, value: float) -> Verdict:
 
 def test_4d_names_joint1_and_granting_what_it_needs_is_enough() -> None:
     """The wrist centre's azimuth less asin(0.1 / 0.495) is where joint1 must stand."""
-    setup, found = setup_of("4d"), threshold_of(explained("4d"), "joint1 upper limit")
+    variant, found = variant_of("4d"), threshold_of(explained("4d"), "joint1 upper limit")
     assert found.feasible is not None
     assert found.other is not None
-    needed = np.degrees(setup.cells.u.max()) - math.degrees(math.asin(0.1 / 0.495))
+    needed = np.degrees(variant.cells.u.max()) - math.degrees(math.asin(0.1 / 0.495))
     assert abs(math.degrees(found.feasible.value) - needed) <= 0.2
     assert found.resolution is not None
     assert math.degrees(found.resolution) <= 0.5 + 1e-9
     value = found.feasible.value
-    assert verdict_at(setup, found, value).answer is Answer.FEASIBLE
-    assert verdict_at(setup, found, value + math.radians(0.1)).answer is Answer.FEASIBLE
-    less = verdict_at(setup, found, value - math.radians(0.5))
+    assert verdict_at(variant, found, value).answer is Answer.FEASIBLE
+    assert verdict_at(variant, found, value + math.radians(0.1)).answer is Answer.FEASIBLE
+    less = verdict_at(variant, found, value - math.radians(0.5))
     assert (less.answer, less.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
     text = as_text(explained("4d"), "paper/4d")
     assert f"joint1 would need up to {shown(found.quantity, value)}; it stops at 10 deg" in text
@@ -137,18 +138,18 @@ def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry() -> None:
     The covering motion keeps to one branch, so alpha is the least over branches of the largest
     over cells.
     """
-    setup = setup_of("stiff wrist")
+    variant = variant_of("stiff wrist")
     found = threshold_of(explained("stiff wrist"), "cone")
     assert found.feasible is not None
     assert found.other is not None
-    points, approaches = setup.task.targets(setup.cells)
+    points, approaches = variant.task.targets(variant.cells)
     tilts = np.array([branch_tilts(p, a) for p, a in zip(points, approaches, strict=True)])
     least = tilts.max(axis=0).min()
     assert -0.2 <= math.degrees(found.feasible.value) - least <= 1.0
     assert found.other.value < found.feasible.value
     value = found.feasible.value
-    assert verdict_at(setup, found, value + math.radians(0.1)).answer is Answer.FEASIBLE
-    less = verdict_at(setup, found, value - math.radians(0.5 + 1.0))
+    assert verdict_at(variant, found, value + math.radians(0.1)).answer is Answer.FEASIBLE
+    less = verdict_at(variant, found, value - math.radians(0.5 + 1.0))
     assert less.answer is not Answer.FEASIBLE
     text = as_text(explained("stiff wrist"), "stiff wrist")
     assert f"feasible from alpha = {shown(found.quantity, value)} on (20 deg now)" in text
@@ -178,8 +179,8 @@ def branch_tilts(point: np.ndarray, approach: np.ndarray) -> list[float]:
 
 def test_a_ring_needs_of_joint1_what_its_azimuth_asks_for() -> None:
     """Two limits are in the way: neither alone helps, and one is enough once the other is wide."""
-    setup, offset = setup_of("ring"), math.degrees(math.asin(0.1 / 0.58))
-    azimuth = np.degrees(setup.cells.u)
+    variant, offset = variant_of("ring"), math.degrees(math.asin(0.1 / 0.58))
+    azimuth = np.degrees(variant.cells.u)
     both = explained("ring")
     assert {c.kind for c in both.verdict.causes} == {"joint_limits"}
     for wide, name, needed in (
@@ -187,8 +188,8 @@ def test_a_ring_needs_of_joint1_what_its_azimuth_asks_for() -> None:
         ("upper", "joint1 lower limit", azimuth.min() - offset),
     ):
         limits = np.radians([-120.0, 20.0] if wide == "lower" else [-30.0, 120.0])
-        arm = setup.robot.with_limits({"joint1": limits})
-        found = threshold_of(explain(arm, setup.cells, setup.task), name)
+        arm = variant.robot.with_limits({"joint1": limits})
+        found = threshold_of(explain(arm, variant.cells, variant.task), name)
         assert found.feasible is not None
         # Stretched arms that reach backwards would need more than this, in either direction.
         assert abs(math.degrees(found.feasible.value) - needed) <= 0.3
@@ -216,7 +217,7 @@ def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it() -> None:
 
 
 def test_a_standoff_that_lifts_the_tool_has_two_ends() -> None:
-    setup = setup_of("deep plate")
+    variant = variant_of("deep plate")
     found = threshold_of(explained("deep plate"), "larger standoff")
     assert not explained("deep plate").verdict.feasible
     assert found.feasible is not None
@@ -224,9 +225,9 @@ def test_a_standoff_that_lifts_the_tool_has_two_ends() -> None:
     assert found.span is not None
     assert found.other.value < found.feasible.value <= found.span.feasible.value
     for value in (found.feasible.value, found.span.feasible.value):
-        assert verdict_at(setup, found, value).answer is Answer.FEASIBLE
+        assert verdict_at(variant, found, value).answer is Answer.FEASIBLE
     if found.other.evidence is Evidence.PROOF:
-        assert verdict_at(setup, found, found.other.value).answer is not Answer.FEASIBLE
+        assert verdict_at(variant, found, found.other.value).answer is not Answer.FEASIBLE
 
 
 def test_nothing_helps_a_plate_that_leaves_the_room() -> None:
@@ -255,15 +256,15 @@ def test_nothing_helps_a_plate_that_leaves_the_room() -> None:
 )
 def test_what_is_said_of_a_side_is_what_a_verdict_says(name: str) -> None:
     """Feasible sides are feasible, proved ones are not, in cases built from scratch."""
-    setup, sides = setup_of(name), 0
+    variant, sides = variant_of(name), 0
     for found in explained(name).thresholds:
         if found.feasible is not None:
             assert found.feasible.evidence is Evidence.WITNESS
-            verdict = verdict_at(setup, found, found.feasible.value)
+            verdict = verdict_at(variant, found, found.feasible.value)
             assert verdict.answer is Answer.FEASIBLE, found.quantity.name
             sides += 1
         if found.other is not None and found.other.evidence is Evidence.PROOF:
-            verdict = verdict_at(setup, found, found.other.value)
+            verdict = verdict_at(variant, found, found.other.value)
             assert verdict.answer is not Answer.FEASIBLE, found.quantity.name
             sides += 1
     assert sides >= 12
@@ -291,10 +292,10 @@ def test_margins_run_from_the_case_as_it_stands_inwards(name: str) -> None:
 
 def test_4a_may_lose_as_much_of_joint1_as_the_azimuth_leaves() -> None:
     """Arm forwards, joint1 stands at the azimuth less an offset; backwards, half a turn further."""
-    setup = setup_of("4a")
-    radii = np.linalg.norm(setup.task.targets(setup.cells).points[:, :2], axis=1)
+    variant = variant_of("4a")
+    radii = np.linalg.norm(variant.task.targets(variant.cells).points[:, :2], axis=1)
     offset = np.degrees(np.arcsin(0.1 / radii))
-    azimuth = np.degrees(setup.cells.v)
+    azimuth = np.degrees(variant.cells.v)
     lower = threshold_of(explained("4a"), "joint1 lower limit")
     upper = threshold_of(explained("4a"), "joint1 upper limit")
     assert lower.feasible is not None
@@ -308,7 +309,7 @@ def test_4a_may_lose_as_much_of_joint1_as_the_azimuth_leaves() -> None:
 
 
 def test_a_wider_cone_never_needs_a_wider_joint() -> None:
-    robot, cells, task = setup_of("4d")
+    robot, cells, task = variant_of("4d")
     needs = []
     for cone_deg in (20, 45, 90):
         found = explain(robot, cells, Task(task.standoff, cone_deg))
@@ -342,7 +343,7 @@ def test_no_cells_need_no_explanation() -> None:
 
 
 def test_out_of_time_is_said_and_nothing_is_claimed() -> None:
-    explanation = explain(*setup_of("4d"), Search(time_limit=1e-9))
+    explanation = explain(*variant_of("4d"), Search(time_limit=1e-9))
     assert explanation.verdict.answer is Answer.UNDECIDED
     assert not any(t.feasible is not None for t in explanation.thresholds)
     assert len(explanation.left_out) == 21 - len(explanation.thresholds)
@@ -361,12 +362,12 @@ def test_out_of_time_is_said_and_nothing_is_claimed() -> None:
 
 def test_a_search_that_the_time_limit_cut_says_so() -> None:
     """Not "not found": more time may find it."""
-    setup = setup_of("4a")
-    prober = Prober(setup, 0, deadline=0.0)
+    variant = variant_of("4a")
+    prober = Prober(variant, 0, deadline=0.0)
     nothing = np.full((90, 6), np.nan)
-    trial = prober.attempt(prober.problem, nothing, np.inf, deep=True)
-    assert (trial.answer, trial.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
-    assert trial.detail == "unknown, because the time limit ran out"
+    attempt = prober.attempt(prober.problem, nothing, np.inf, deep=True)
+    assert (attempt.answer, attempt.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    assert attempt.detail == "unknown, because the time limit ran out"
 
 
 @pytest.mark.parametrize("cents", [0.0, 0.3, 0.5, 0.7])
@@ -382,23 +383,29 @@ def test_a_printed_limit_is_on_the_side_that_was_found(cents: float) -> None:
                 assert -1e-9 <= off < 0.01
 
 
-def test_a_cone_of_zero_is_undecided_and_a_wider_one_is_found() -> None:
+def test_a_cone_of_zero_is_undecided_and_a_wider_one_is_found(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of all quantities the cone alone, which is the first one, is looked at here."""
+    monkeypatch.setattr(
+        explanations, "quantities", lambda variant, widen: quantities(variant, widen)[:1]
+    )
     explanation = explain(UR5, PLATE.cells(2, 2), Task(0.02, 0))
     assert explanation.verdict.answer is Answer.UNDECIDED
     found = threshold_of(explanation, "cone")
     assert found.feasible is not None
     assert found.feasible.value > 0.0
-    assert verdict_at(setup_of("plate"), found, found.feasible.value).feasible
+    assert verdict_at(variant_of("plate"), found, found.feasible.value).feasible
 
 
 def test_the_greedy_search_is_refused() -> None:
     with pytest.raises(ValueError, match="method must be 'complete'"):
-        explain(*setup_of("plate"), Search(method="greedy"))
+        explain(*variant_of("plate"), Search(method="greedy"))
 
 
 def test_the_same_question_gets_the_same_answer() -> None:
     one = as_json(explained("4f"), "4f")
-    other = as_json(explain(*setup_of("4f")), "4f")
+    other = as_json(explain(*variant_of("4f")), "4f")
     for result in (one, other):
         result.pop("seconds")
     assert one == other
@@ -424,7 +431,7 @@ def test_progress_counts_the_thresholds_and_may_end_the_work() -> None:
             raise Enough
 
     with pytest.raises(Enough):
-        explain(*setup_of("long plate"), progress=report)
+        explain(*variant_of("long plate"), progress=report)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     assert {total for _, total in seen} <= {None, 21}
     assert (3, 21) in seen

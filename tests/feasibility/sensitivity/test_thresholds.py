@@ -15,25 +15,27 @@ from paper_cases import PAPER_CASES
 from feasibility import Task
 from feasibility.roadmap import Ruling, arrays_of
 from feasibility.sensitivity import Kind, Quantity, last_true
-from feasibility.sensitivity.parameters import Setup, quantities, shifted
-from feasibility.sensitivity.probes import LEAST_BOXES, Prober, apart
-from feasibility.sensitivity.threshold_search import Turning
-from feasibility.sensitivity.warm_start import NO_CELL, Carrying, follow_all
+from feasibility.sensitivity.explanation import apart, other_motions
+from feasibility.sensitivity.limited_search import NO_CELL, project_all
+from feasibility.sensitivity.parameters import Variant, quantities, shifted
+from feasibility.sensitivity.probes import LEAST_BOXES, Prober
+from feasibility.sensitivity.threshold_search import ThresholdSearch
+from feasibility.sensitivity.warm_start import WarmStart
 from feasibility.verdict import Answer, Evidence, Walk
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
 
 PLATE = plane((0.4, 0.6), (-0.1, 0.1), "outside", (0.0, 0.0, 0.3))
-SMALL = Setup(load_robot("ur5"), PLATE.cells(3, 3), Task(standoff=0.02, cone_deg=30))
+SMALL = Variant(load_robot("ur5"), PLATE.cells(3, 3), Task(standoff=0.02, cone_deg=30))
 
 
-def paper(name: str) -> Setup:
+def paper(name: str) -> Variant:
     case = PAPER_CASES[name]
-    return Setup(case.robot(), case.cells(), case.task())
+    return Variant(case.robot(), case.cells(), case.task())
 
 
-def prober_of(setup: Setup) -> Prober:
-    return Prober(setup, 0, np.inf)
+def prober_of(variant: Variant) -> Prober:
+    return Prober(variant, 0, np.inf)
 
 
 # -- bisection -----------------------------------------------------------------------------------
@@ -106,12 +108,12 @@ def test_values_run_from_the_given_one_to_the_end_in_equal_steps(widen: bool) ->
 
 @pytest.mark.parametrize("widen", [False, True])
 def test_a_quantity_changes_itself_and_nothing_else(widen: bool) -> None:
-    setup = paper("4d")
-    for q in quantities(setup, widen):
-        robot, cells, task = q.applied(setup, 3)
+    variant = paper("4d")
+    for q in quantities(variant, widen):
+        robot, cells, task = q.applied(variant, 3)
         value = q.value(3)
-        lower, upper = np.array(setup.robot.lower), np.array(setup.robot.upper)
-        expected = setup.task
+        lower, upper = np.array(variant.robot.lower), np.array(variant.robot.upper)
+        expected = variant.task
         shift = np.zeros(3)
         if q.kind is Kind.CONE:
             expected = replace(expected, cone_deg=round(math.degrees(value), 9))
@@ -127,8 +129,8 @@ def test_a_quantity_changes_itself_and_nothing_else(widen: bool) -> None:
         np.testing.assert_array_equal(robot.upper, upper)
         assert (task.standoff, task.tolerance) == (expected.standoff, expected.tolerance)
         assert task.cone_deg == expected.cone_deg
-        np.testing.assert_allclose(cells.centres, setup.cells.centres + shift, atol=1e-12)
-        assert q.applied(setup, 0) is setup
+        np.testing.assert_allclose(cells.centres, variant.cells.centres + shift, atol=1e-12)
+        assert q.applied(variant, 0) is variant
 
 
 def test_a_slide_counts_in_metres(tmp_path: Path) -> None:
@@ -136,9 +138,9 @@ def test_a_slide_counts_in_metres(tmp_path: Path) -> None:
     rail = on_a_base(bare(arm.urdf or ""), "prismatic", limits=(-0.3, 0.4))
     robot = built(rail, tmp_path, arm)
     (slide,) = np.flatnonzero(robot.prismatic)
-    setup = Setup(robot, SMALL.cells, SMALL.task)
+    variant = Variant(robot, SMALL.cells, SMALL.task)
     for widen, ends in ((True, (-0.8, 0.9)), (False, (0.4, -0.3))):
-        limits = [q for q in quantities(setup, widen) if q.joint == slide]
+        limits = [q for q in quantities(variant, widen) if q.joint == slide]
         assert [q.unit for q in limits] == ["m", "m"]
         assert tuple(q.end for q in limits) == pytest.approx(ends)
         assert limits[1].value(3) == pytest.approx(0.403 if widen else 0.397)
@@ -148,7 +150,7 @@ def test_joints_that_turn_freely_have_no_limit_to_vary() -> None:
     kinova = load_robot("kinova")
     named = {
         q.joint
-        for q in quantities(Setup(kinova, SMALL.cells, SMALL.task), True)
+        for q in quantities(Variant(kinova, SMALL.cells, SMALL.task), True)
         if q.kind in (Kind.LOWER, Kind.UPPER)
     }
     assert named == set(np.flatnonzero(np.isfinite(kinova.lower)).tolist())
@@ -156,8 +158,8 @@ def test_joints_that_turn_freely_have_no_limit_to_vary() -> None:
 
 
 def test_what_has_no_room_is_left_out() -> None:
-    setup = Setup(SMALL.robot, SMALL.cells, Task(standoff=0.0, cone_deg=180))
-    names = [q.name for q in quantities(setup, widen=True)]
+    variant = Variant(SMALL.robot, SMALL.cells, Task(standoff=0.0, cone_deg=180))
+    names = [q.name for q in quantities(variant, widen=True)]
     assert "cone" not in names
     assert "smaller standoff" not in names
     assert "larger standoff" in names
@@ -184,17 +186,17 @@ def test_shifted_cells_are_those_of_the_shifted_surface(surface) -> None:  # typ
 
 
 def test_a_problem_nearby_is_the_one_made_anew() -> None:
-    setup = paper("4c")
-    prober = prober_of(setup)
-    for q in quantities(setup, widen=False):
-        found, fresh = prober.problem_at(q, 7), arrays_of(*q.applied(setup, 7))
+    variant = paper("4c")
+    prober = prober_of(variant)
+    for q in quantities(variant, widen=False):
+        found, fresh = prober.problem_at(q, 7), arrays_of(*q.applied(variant, 7))
         for name, one, other in zip(found._fields, found, fresh, strict=True):
             if name != "chain":
                 np.testing.assert_allclose(one, other, atol=1e-9, err_msg=f"{q.name}: {name}")
 
 
-def quantity(setup: Setup, name: str, widen: bool = False) -> Quantity:
-    return next(q for q in quantities(setup, widen) if q.name == name)
+def quantity(variant: Variant, name: str, widen: bool = False) -> Quantity:
+    return next(q for q in quantities(variant, widen) if q.name == name)
 
 
 @pytest.mark.parametrize(
@@ -202,16 +204,16 @@ def quantity(setup: Setup, name: str, widen: bool = False) -> Quantity:
 )
 def test_followed_configurations_lie_on_the_fibres(name: str) -> None:
     """Pinocchio says where the tool is; the task says where it should be."""
-    setup = paper("4c")
-    prober = prober_of(setup)
-    nowhere = np.full((len(setup.cells), setup.robot.n), np.nan)
-    start = prober.others(24, 1)[0]
+    variant = paper("4c")
+    prober = prober_of(variant)
+    nowhere = np.full((len(variant.cells), variant.robot.n), np.nan)
+    start = other_motions(prober, 24, 1)[0]
     assert not np.isnan(start.q).any()
-    q = quantity(setup, name)
+    q = quantity(variant, name)
     for k in (1, 10, 40):
         cell, found = prober.follow(prober.problem_at(q, k), start.q)
         assert cell == NO_CELL
-        robot, cells, task = q.applied(setup, k)
+        robot, cells, task = q.applied(variant, k)
         points, axes = tools(robot, found)
         aims = task.targets(cells)
         assert np.linalg.norm(points - aims.points, axis=1).max() <= 1e-3
@@ -224,35 +226,35 @@ def test_followed_configurations_lie_on_the_fibres(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["4c", "small"])
-def test_over_the_centres_the_cheap_problem_is_the_whole_one(name: str) -> None:
-    setup = SMALL if name == "small" else paper(name)
-    prober = prober_of(setup)
+def test_over_the_centres_the_cheap_problem_is_the_same(name: str) -> None:
+    variant = SMALL if name == "small" else paper(name)
+    prober = prober_of(variant)
     for widen in (False, True):
-        for q in quantities(setup, widen):
+        for q in quantities(variant, widen):
             for k in (0, 5, q.last):
-                cheap, fresh = prober.centres_at(q, k), arrays_of(*q.applied(setup, k))
-                for field in ("points", "approaches", "lower", "upper", "rim"):
+                cheap, fresh = prober.centres_at(q, k), arrays_of(*q.applied(variant, k))
+                for field in ("points", "approaches", "lower", "upper", "cone_chord"):
                     np.testing.assert_allclose(
                         getattr(cheap, field), getattr(fresh, field), atol=1e-9, err_msg=q.name
                     )
 
 
 @pytest.mark.parametrize("name", ["4c", "small"])
-def test_configurations_are_carried_as_far_as_they_go_and_no_further(name: str) -> None:
-    """At the value reached every cell is landed on; the cell that is named fails at the next."""
-    setup = SMALL if name == "small" else paper(name)
-    prober = prober_of(setup)
-    start = prober.others(24, 1)[0]
+def test_warm_starts_reach_as_far_as_they_go_and_no_further(name: str) -> None:
+    """At the value reached every cell projects; the cell that is named fails at the next."""
+    variant = SMALL if name == "small" else paper(name)
+    prober = prober_of(variant)
+    start = other_motions(prober, 24, 1)[0]
     named = 0
-    for q in quantities(setup, widen=False):
-        reached = Carrying(prober, q, 0, start.q).reach(q.last + 1)
+    for q in quantities(variant, widen=False):
+        reached = WarmStart(prober, q, 0, start.q).reach(q.last + 1)
         assert 0 <= reached.k <= q.last
         problem = prober.problem_at(q, reached.k)
-        if len(setup.cells) <= 40:  # on more cells the search that follows looks at the rest
+        if len(variant.cells) <= 40:  # on more cells the search that follows looks at the rest
             cell, found = prober.follow(problem, reached.q)
             assert cell == NO_CELL
-            points, axes = tools(setup.robot, found)
-            robot, cells, task = q.applied(setup, reached.k)
+            points, axes = tools(variant.robot, found)
+            robot, cells, task = q.applied(variant, reached.k)
             aims = task.targets(cells)
             assert np.linalg.norm(points - aims.points, axis=1).max() <= 1e-3
             cosine = np.clip((axes * aims.approaches).sum(axis=1), -1.0, 1.0)
@@ -262,15 +264,15 @@ def test_configurations_are_carried_as_far_as_they_go_and_no_further(name: str) 
             named += 1
             beyond = prober.centres_at(q, reached.k + 1)
             one = np.array([reached.cell])
-            assert follow_all(beyond, prober.work, one, reached.q.copy()) == 0, q.name
+            assert project_all(beyond, prober.work, one, reached.q.copy()) == 0, q.name
         else:
             assert reached.k == q.last
     assert named >= 5
 
 
 def test_proofs_that_fail_are_asked_for_less_until_one_succeeds() -> None:
-    setup = paper("4d")
-    prober = prober_of(setup)
+    variant = paper("4d")
+    prober = prober_of(variant)
     for _ in range(20):
         assert prober.rule(prober.problem, 89, 2)[0] is Ruling.OPEN
     assert prober.allowance < 1e-3
@@ -286,9 +288,9 @@ def test_proofs_that_fail_are_asked_for_less_until_one_succeeds() -> None:
 
 
 def test_a_ruling_brings_a_proof_or_a_configuration() -> None:
-    setup = paper("4d")
-    prober = prober_of(setup)
-    points, approaches = setup.task.targets(setup.cells)
+    variant = paper("4d")
+    prober = prober_of(variant)
+    points, approaches = variant.task.targets(variant.cells)
     for cell in (0, 45, 89):
         ruling, q = prober.rule(prober.problem, cell, 20_000)
         if cell >= 60:
@@ -297,31 +299,31 @@ def test_a_ruling_brings_a_proof_or_a_configuration() -> None:
             assert prober.suspects[0] == cell
         else:
             assert q is not None
-            point, axis = tools(setup.robot, q[None])
+            point, axis = tools(variant.robot, q[None])
             assert np.linalg.norm(point[0] - points[cell]) <= 1e-3
-            assert axis[0] @ approaches[cell] >= math.cos(setup.task.cone) - 1e-9
+            assert axis[0] @ approaches[cell] >= math.cos(variant.task.cone) - 1e-9
 
 
 def test_a_search_without_a_ration_finds_nothing_and_says_so() -> None:
-    setup = paper("4a")
-    prober = prober_of(setup)
+    variant = paper("4a")
+    prober = prober_of(variant)
     nothing = np.full((90, 6), np.nan)
-    trial = prober.attempt(prober.problem, nothing, 10, deep=True)
-    assert not trial.found
-    assert (trial.answer, trial.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
+    attempt = prober.attempt(prober.problem, nothing, 10, deep=True)
+    assert not attempt.found
+    assert (attempt.answer, attempt.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
     assert prober.spent > 0
-    trial = prober.attempt(prober.problem, nothing, np.inf, deep=True)
-    assert trial.found
+    attempt = prober.attempt(prober.problem, nothing, np.inf, deep=True)
+    assert attempt.found
 
 
 def test_a_motion_that_the_replay_refuses_is_not_feasible() -> None:
     prober = prober_of(SMALL)
-    trial = prober.attempt(prober.problem, np.full((9, 6), np.nan), np.inf, deep=True)
-    assert trial.walk is not None
-    assert prober.confirmed(SMALL, trial).answer is Answer.FEASIBLE
-    q = trial.walk.q.copy()
+    attempt = prober.attempt(prober.problem, np.full((9, 6), np.nan), np.inf, deep=True)
+    assert attempt.walk is not None
+    assert prober.confirmed(SMALL, attempt).answer is Answer.FEASIBLE
+    q = attempt.walk.q.copy()
     q[len(q) // 2] += 0.05
-    bent = replace(trial, walk=Walk(q, trial.walk.cell))
+    bent = replace(attempt, walk=Walk(q, attempt.walk.cell))
     refused = prober.confirmed(SMALL, bent)
     assert (refused.answer, refused.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
     assert refused.walk is None
@@ -329,13 +331,13 @@ def test_a_motion_that_the_replay_refuses_is_not_feasible() -> None:
 
 
 def test_motions_from_other_postures_are_motions() -> None:
-    setup = paper("4a")
-    prober = prober_of(setup)
-    trials = prober.others(64, 4)
-    assert len(trials) >= 2
-    for trial in trials:
-        assert prober.confirmed(setup, trial).answer is Answer.FEASIBLE
-    first = np.array([trial.q[0] for trial in trials])
+    variant = paper("4a")
+    prober = prober_of(variant)
+    attempts = other_motions(prober, 64, 4)
+    assert len(attempts) >= 2
+    for attempt in attempts:
+        assert prober.confirmed(variant, attempt).answer is Answer.FEASIBLE
+    first = np.array([attempt.q[0] for attempt in attempts])
     assert np.ptp(first, axis=0).max() > 0.5
 
 
@@ -347,15 +349,15 @@ def test_rows_far_apart_are_chosen_first() -> None:
 
 
 def test_a_wide_margin_is_narrowed_from_where_it_stands() -> None:
-    setup = paper("4a")
-    prober = prober_of(setup)
-    motions = prober.others(24, 2)
+    variant = paper("4a")
+    prober = prober_of(variant)
+    motions = other_motions(prober, 24, 2)
     narrowed = 0
     for name in ("joint5 lower limit", "joint5 upper limit", "shift along +x"):
-        turning = Turning(prober, quantity(setup, name), 2000, 0, motions)
-        found = turning.tighten()
-        turning.stop = prober.spent + 100_000
-        again = turning.tighter(found)
+        search = ThresholdSearch(prober, quantity(variant, name), 2000, 0, motions)
+        found = search.tighten()
+        search.stop = prober.spent + 100_000
+        again = search.tighter(found)
         assert again.feasible is not None
         assert again.other is not None
         assert again.feasible.evidence is Evidence.WITNESS
