@@ -28,7 +28,7 @@ from feasibility.division.partition import Partition
 from feasibility.division.plans import plan_of
 from feasibility.division.reconfiguration import AS_GOOD, itinerary
 from feasibility.reports.division import STATUS, answer_of, as_json, as_text
-from feasibility.roadmap import Exploration, explore, links_of, patch_walk, problem_of
+from feasibility.roadmap import Exploration, arrays_of, explore, links_of, patch_walk
 from feasibility.verdict import CauseKind, Walk
 from robots import Robot, load_robot
 from surfaces import cylinder, plane, sphere
@@ -211,7 +211,7 @@ def test_walks_over_random_parts_of_a_component(seed: int) -> None:
     """Any cells, connected or not: the replay finds them all visited."""
     rng = np.random.default_rng(seed)
     robot, cells, task, _ = load_case("paper/4c", []).build()
-    exploration = Exploration(robot, cells, problem_of(robot, cells, task), seed)
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), seed)
     explore(exploration)
     assert exploration.complete
     wanted = rng.random(len(cells)) < rng.uniform(0.03, 0.9)
@@ -230,7 +230,7 @@ def test_walks_over_random_parts_of_a_component(seed: int) -> None:
 
 def test_a_cell_that_the_component_misses_is_an_error() -> None:
     robot, cells, task, _ = load_case("paper/4d", []).build()
-    exploration = Exploration(robot, cells, problem_of(robot, cells, task), 0)
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
     links = links_of(exploration.roadmap, exploration.best)
     wanted = np.zeros(90, dtype=bool)
@@ -405,7 +405,7 @@ def test_a_plan_of_connected_patches_beside_the_fewest() -> None:
     exploration = Exploration(
         division.robot,
         division.cells,
-        problem_of(division.robot, division.cells, division.task),
+        arrays_of(division.robot, division.cells, division.task),
         division.seed,
     )
     explore(exploration)
