@@ -81,7 +81,9 @@ def _chunks(stream: BinaryIO, size: int) -> tuple[Any, bytes]:
     if magic != b"glTF" or version != 2:
         raise SurfaceError(f"is no GLB of version 2 (it starts with {magic!r}, {version})")
     if length != size:
-        raise SurfaceError(f"has {size:,} bytes, but says {length:,}; it is damaged or cut short")
+        raise SurfaceError(
+            f"has {size:,} bytes, but its header gives {length:,}; it is damaged or cut short"
+        )
     if kind != _JSON or json_length > size - 20:
         raise SurfaceError("does not start with its scene (a JSON chunk); it is damaged")
     if json_length > LARGEST_JSON:
@@ -98,7 +100,7 @@ def _chunks(stream: BinaryIO, size: int) -> tuple[Any, bytes]:
         return content, b""
     data_length, kind = struct.unpack("<II", head.ljust(8, b"\0"))
     if kind != _BIN or data_length > size - 28 - json_length:
-        raise SurfaceError("has no whole chunk of numbers (BIN) after its scene; it is damaged")
+        raise SurfaceError("has no complete chunk of numbers (BIN) after its scene; it is damaged")
     return content, stream.read(data_length)
 
 
@@ -120,14 +122,14 @@ def _primitive(scene: Json, data: bytes, placed: Placed, mode: int) -> RawMesh:
     if "indices" in primitive:
         indices = _numbers(scene, data, primitive["indices"], "SCALAR")
         if indices.dtype.kind != "u":
-            raise SurfaceError(f"{placed.where} has indices that are no whole numbers >= 0")
+            raise SurfaceError(f"{placed.where} has indices that are not whole numbers >= 0")
         order = indices[:, 0].astype(np.int64)
     else:
         order = np.arange(len(points), dtype=np.int64)
     if mode == _TRIANGLES:
         if len(order) % 3:
             raise SurfaceError(
-                f"{placed.where} has {len(order)} corners, which are no whole triangles"
+                f"{placed.where} has {len(order)} corners, which is no multiple of 3"
             )
         faces = order.reshape(-1, 3)
     elif mode in (_STRIP, _FAN):

@@ -62,18 +62,15 @@ _OWN_STARTS = {
 }
 
 
-def read_mesh(
-    path: str | os.PathLike[str], scale: float | None = None, *, drop_crumbs: bool = False
-) -> TriangleMesh:
-    """Read a mesh file and clean it; see `surfaces.mesh_repair.clean` for what is repaired.
+def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> TriangleMesh:
+    """Read a mesh file and clean it; see `surfaces.meshes.repair.clean` for what is repaired.
 
     Args:
         path: a file of one of the formats, at most 512 MB and 2,000,000 faces.
         scale: metres per unit of the file, such as 0.001 for millimetres. Without it the unit is
             taken as the metre, and a part above 20 m or below 1 mm is refused: that is nearly
-            always a wrong unit, and an arm would only be told that it cannot reach. Any given
-            scale, 1.0 too, is believed.
-        drop_crumbs: drop separate pieces of less than a thousandth of the area.
+            always a wrong unit, and the answer would only be that the arm cannot reach. Any given
+            scale, 1.0 too, is taken.
 
     Raises:
         SurfaceError: no such file, not a mesh, damaged, too large, or not a surface; with the
@@ -85,7 +82,7 @@ def read_mesh(
         raw = _read(path)
         with np.errstate(over="ignore"):  # infinite coordinates are refused next
             vertices = raw.vertices * unit
-        mesh = clean(vertices, raw.faces, drop_crumbs=drop_crumbs, history=raw.notes)
+        mesh = clean(vertices, raw.faces, history=raw.notes)
         if scale is not None:
             return mesh
         return _with_likely_unit(mesh)

@@ -134,9 +134,9 @@ def _turned_to_fan(vertices: Floats, polygons: Ints, names: Ints) -> Ints:
         spokes = vertices[rolled[:, 1:]] - vertices[rolled[:, :1]]
         with np.errstate(all="ignore"):  # numbers that are not finite are refused later
             normals = np.cross(spokes[:, :-1], spokes[:, 1:])
-            whole = normals.sum(axis=1)  # the same whichever corner it is taken about
-            along = np.einsum("nkc,nc->nk", normals, whole)
-            backwards = (along < -1e-9 * np.einsum("nc,nc->n", whole, whole)[:, None]).any(axis=1)
+            total = normals.sum(axis=1)  # the same about any corner
+            along = np.einsum("nkc,nc->nk", normals, total)
+            backwards = (along < -1e-9 * np.einsum("nc,nc->n", total, total)[:, None]).any(axis=1)
         result[open_ones] = rolled
         open_ones = open_ones[backwards]
         if not len(open_ones):

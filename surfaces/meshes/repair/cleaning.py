@@ -1,4 +1,4 @@
-"""From any arrays to a clean mesh: what is safe is repaired and said, the rest is refused."""
+"""Any triangle arrays into a clean mesh: safe repairs are made and noted, the rest is refused."""
 
 from __future__ import annotations
 
@@ -17,22 +17,18 @@ from surfaces.meshes.triangle_mesh import (
     doubled_areas,
     half_edge_ends,
     half_edges,
-    piece_numbers,
 )
 from surfaces.surface import SurfaceError
 
-CRUMB = 1e-3  # of the mesh's area: a separate piece below it is a crumb
 FARTHEST = 1e6  # mesh diagonals from the origin; beyond it, coordinates have no digits to spare
 
 
 def clean(
     vertices: ArrayLike,
     faces: ArrayLike,
-    *,
-    drop_crumbs: bool = False,
     history: Sequence[str] = (),
 ) -> TriangleMesh:
-    """Check the triangles of a surface, repair what is safe, and say in `notes` what was done.
+    """Check the triangles of a surface, repair what is safe, and note what was done.
 
     Repaired: vertices closer than a few ten-millionths of the mesh's diagonal become one;
     vertices without a face, faces without area and repeated faces go; faces that disagree with
@@ -43,7 +39,6 @@ def clean(
     Args:
         vertices: (V, 3) m.
         faces: (F, 3) whole numbers, counterclockwise seen from outside.
-        drop_crumbs: drop separate pieces of less than a thousandth of the area.
         history: what was done to the mesh before.
 
     Raises:
@@ -63,8 +58,8 @@ def clean(
     distance = weld_distance(points)
     corners = _weld(points, corners, distance, notes)
     corners = _drop_repeated(points, corners, notes)
-    corners = _drop_crowded(points, corners, distance, notes)
-    _refuse_crowded(points, corners)
+    corners = _drop_thin_at_non_manifold(points, corners, distance, notes)
+    _refuse_non_manifold(points, corners)
     corners, turned = oriented(points, corners)
     if turned:
         notes.append(
@@ -80,8 +75,6 @@ def clean(
     if dropped:
         notes.append(f"{_count(dropped, 'face')} thinner than {distance:.2g} m dropped")
     _refuse_empty(corners, notes)
-    if drop_crumbs:
-        corners = _drop_crumbs(points, corners, notes)
     points, corners, split = one_fan_each(points, corners)
     if split:
         notes.append(f"{_count(split, 'vertex', 'vertices')} added where pieces touch in a point")
@@ -182,7 +175,7 @@ def _weld(points: Floats, corners: Ints, distance: float, notes: list[str]) -> I
 
 
 def _drop_repeated(points: Floats, corners: Ints, notes: list[str]) -> Ints:
-    """Of faces with the same three corners, whichever way they turn, the first stays."""
+    """Of faces with the same three corners, whatever their orientation, the first stays."""
     ordered = np.sort(corners, axis=1)
     ranks = np.lexsort(ordered.T[::-1])
     repeated = np.zeros(len(corners), bool)
@@ -195,49 +188,35 @@ def _drop_repeated(points: Floats, corners: Ints, notes: list[str]) -> Ints:
     return corners[~repeated]
 
 
-def _drop_crowded(points: Floats, corners: Ints, distance: float, notes: list[str]) -> Ints:
-    """Drop faces without area from edges that have more than two faces."""
+def _drop_thin_at_non_manifold(
+    points: Floats, corners: Ints, distance: float, notes: list[str]
+) -> Ints:
+    """Drop faces without area from non-manifold edges, those with more than two faces."""
     halves = half_edges(corners)
-    crowded = np.zeros(len(corners), bool)
-    crowded[halves.order[np.repeat(halves.counts, halves.counts) > 2] // 3] = True
-    crowded &= thin(points, corners, distance)
-    if crowded.any():
+    bad = np.zeros(len(corners), bool)
+    bad[halves.order[np.repeat(halves.counts, halves.counts) > 2] // 3] = True
+    bad &= thin(points, corners, distance)
+    if bad.any():
         notes.append(
-            f"{_count(int(crowded.sum()), 'face')} thinner than {distance:.2g} m dropped from "
+            f"{_count(int(bad.sum()), 'face')} thinner than {distance:.2g} m dropped from "
             "edges with more than two faces"
         )
-    _refuse_empty(corners[~crowded], notes)
-    return corners[~crowded]
+    _refuse_empty(corners[~bad], notes)
+    return corners[~bad]
 
 
-def _refuse_crowded(points: Floats, corners: Ints) -> None:
+def _refuse_non_manifold(points: Floats, corners: Ints) -> None:
     """More than two faces on an edge leave open on which side of which face the tool works."""
     halves = half_edges(corners)
-    crowded = halves.counts > 2
-    if crowded.any():
-        first = int(crowded.argmax())
+    bad = halves.counts > 2
+    if bad.any():
+        first = int(bad.argmax())
         a, b = points[half_edge_ends(corners, halves.order[halves.starts[first]])]
         raise SurfaceError(
-            f"{_count(int(crowded.sum()), 'edge')} with more than two faces; the first runs from "
-            f"{place(a)} to {place(b)} and has {halves.counts[first]}; keep only the skin that is "
+            f"{_count(int(bad.sum()), 'edge')} with more than two faces; the first runs from "
+            f"{place(a)} to {place(b)} and has {halves.counts[first]}; keep only the surface "
             "to be covered: remove inner walls and doubled parts, and export it again"
         )
-
-
-def _drop_crumbs(points: Floats, corners: Ints, notes: list[str]) -> Ints:
-    """Drop separate pieces of less than a thousandth of the area."""
-    areas = 0.5 * np.linalg.norm(doubled_areas(points, corners), axis=1)
-    pieces = piece_numbers(half_edges(corners).of_count(2) // 3, areas)
-    sizes = np.bincount(pieces, areas)
-    crumbs = sizes < CRUMB * sizes.sum()
-    crumbs[0] = False  # the largest piece stays, however many there are
-    if not crumbs.any():
-        return corners
-    notes.append(
-        f"{_count(int(crumbs.sum()), 'crumb')} (separate pieces below {CRUMB:g} of the area) of "
-        f"together {sizes[crumbs].sum():.4g} m^2 dropped"
-    )
-    return corners[~crumbs[pieces]]
 
 
 def _refuse_empty(corners: Ints, notes: list[str]) -> None:

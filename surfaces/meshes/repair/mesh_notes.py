@@ -1,4 +1,4 @@
-"""What to know about a mesh as it stands: its pieces, its borders, which way it faces."""
+"""Notes about a mesh: its separate pieces, its holes, and closed pieces that face inwards."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ LISTED = 5  # pieces that a note names
 
 
 def notes_of(mesh: TriangleMesh) -> tuple[str, ...]:
-    """What was repaired or cut, and sentences about pieces, holes and inward faces."""
+    """The repairs, and sentences about pieces, holes and inward faces."""
     return (*mesh.history, *_about_pieces(mesh), *_about_borders(mesh), *_about_sides(mesh))
 
 
@@ -69,7 +69,7 @@ def _about_borders(mesh: TriangleMesh) -> list[str]:
 
 
 def _about_sides(mesh: TriangleMesh) -> list[str]:
-    """Says so where a closed piece is inside out."""
+    """Notes closed pieces that are inside out."""
     pieces = mesh.pieces
     closed = np.bincount(pieces) > 0
     closed[pieces[mesh.edges.border_faces]] = False

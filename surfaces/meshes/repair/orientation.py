@@ -19,9 +19,9 @@ from surfaces.surface import SurfaceError
 def oriented(vertices: Floats, faces: Ints) -> tuple[Ints, int]:
     """Turn faces over until neighbours agree about the outer side.
 
-    Every face is two nodes of a graph, as it stands and turned over; neighbours join the nodes
-    that fit together. A piece with two sides gives two components, mirror images of each other,
-    of which the one that leaves more area as it stands is taken. A piece with one side gives one.
+    Every face is two nodes of a graph, unchanged and turned over; neighbours join the nodes that
+    fit together. A piece with two sides gives two components, mirror images of each other; the one
+    that leaves more area unchanged is taken. A piece with one side gives one component.
 
     Args:
         vertices: (V, 3) m.

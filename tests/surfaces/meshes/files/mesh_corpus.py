@@ -42,10 +42,10 @@ class Repaired(NamedTuple):
 
 
 def zipped() -> bytes:
-    """An archive that inflates to 256 MB of zeros."""
+    """An archive that inflates to 16 MB of zeros."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("part.stl", bytes(256 << 20))
+        archive.writestr("part.stl", bytes(16 << 20))
     return buffer.getvalue()
 
 
@@ -103,14 +103,11 @@ def stacked(*parts):
     return np.concatenate([v for v, _ in parts]), np.concatenate(faces)
 
 
-def with_caps():
-    """Two triangles that share an edge, cut apart by a cap whose middle lies on that edge."""
-    vertices = [[0, 0, 0], [0.2, 0, 0], [0.1, 0.1, 0], [0.05, 0, 0], [0.1, -0.1, 0.03]]
-    return vertices, [[0, 3, 2], [3, 1, 2], [0, 1, 3], [1, 0, 4]]
-
-
 def with_chain_of_caps():
-    """The same with three corners on the edge, fanned, so that caps lie behind caps."""
+    """Two triangles that share an edge, cut apart by caps on it: faces with no area.
+
+    Three corners lie on that edge, fanned, so that caps lie behind caps.
+    """
     vertices = [[0, 0, 0], [0.2, 0, 0], [0.1, 0.1, 0], [0.1, -0.1, 0.03]]
     vertices += [[0.05, 0, 0], [0.1, 0, 0], [0.15, 0, 0]]
     upper = [[0, 4, 2], [4, 5, 2], [5, 6, 2], [6, 1, 2]]
@@ -127,9 +124,8 @@ REFUSED = (
     Refused("folder.stl", lambda path: path.mkdir(), ("is a folder",)),
     Refused("pipe.stl", os.mkfifo, ("not a regular file",)),
     Refused("empty.stl", b"", ("is empty", "expected a mesh")),
-    Refused("blank.obj", b"\n\n  \n", ("holds no faces",)),
     Refused("archive.stl", zipped, ("zip archive", "unpack it")),
-    Refused("packed.obj", gzip.compress(bytes(64 << 20)), ("gzip", "unpack it")),
+    Refused("packed.obj", gzip.compress(bytes(64 << 10)), ("gzip", "unpack it")),
     Refused("part.step", b"ISO-10303-21;\nHEADER;", ("STEP", "export it as STL")),
     Refused("page.stl", b"<!DOCTYPE html><html>", ("web page",)),
     Refused("pointer.ply", b"version https://git-lfs.github.com/spec/v1\n", ("git lfs pull",)),
@@ -155,7 +151,6 @@ REFUSED = (
     Refused("infinite.stl", w.stl(np.where(V > 0.1, np.inf, V), F), ("7 vertices", "not finite")),
     Refused("cut_text.stl", w.text_stl(V, F)[:700], ("line",)),
     Refused("no_end.stl", w.text_stl(V, F).rsplit(b"end", 1)[0], ("without 'endsolid'",)),
-    Refused("nan_text.stl", w.text_stl(NAN, F), ("not finite",)),
     Refused("word.stl", w.text_stl(V, F).replace(b"0.2", b"0.x", 1), ("line 5", "numbers", "0.x")),
     Refused("underscore.stl", w.text_stl(V, F).replace(b"0.2", b"0_2", 1), ("line 5", "0_2")),
     Refused(
@@ -166,9 +161,7 @@ REFUSED = (
     Refused("four.stl", w.text_stl(V, F).replace(b"0.2", b"0.2 7", 1), ("vertex x y z",)),
     Refused("one_line.stl", b"solid " + b"a" * 70000, ("line 1", "longer than 65536")),
     # OFF
-    Refused("index.off", w.off(V, [*F, (0, 1, 8)]), ("face 12", "[0, 1, 8]", "0 .. 7")),
     Refused("negative.off", w.off(V, [*F, (0, 1, -1)]), ("face 12", "[0, 1, -1]")),
-    Refused("cut.off", w.off(V, F)[:-5], ("line", "face")),
     Refused("few.off", b"\n".join(w.off(V, F).split(b"\n")[:15]), ("before face 4 of 12",)),
     Refused("lies.off", w.off(V, F, counts="8 1000000 0"), ("1000000 faces", "cannot hold")),
     Refused("five_million.off", w.off(V, F, counts="8 5000000 0"), ("has 5,000,000 faces",)),
@@ -177,16 +170,13 @@ REFUSED = (
     Refused("minus.off", w.off(V, F, counts="-8 12 0"), ("negative counts",)),
     Refused("four.off", w.off(V, F, head="4OFF"), ("line 1", "'4OFF'")),
     Refused("two.off", w.off(V, [(0, 1)]), ("3 .. 64 corners",)),
-    Refused("lonely.off", w.off(V, []), ("holds no faces",)),
     # OBJ
-    Refused("index.obj", w.obj(V, [*F, (0, 1, 8)]), ("face 12", "0 .. 7")),
     Refused("zero.obj", w.obj(V, [(0, 1, -1)]), ("line 9", "vertex 0", "counts from 1")),
     Refused("before.obj", b"v 0 0 0\nf -1 -2 -1\n", ("line 2", "vertex -2")),
     Refused("spline.obj", b"v 0 0 0\ncstype bspline\n", ("line 2", "curved patch")),
     Refused("points.obj", w.obj(V, []) + b"p 1 2 3\n", ("holds no faces",)),
     Refused("prose.obj", b"dear reader\n", ("line 1", "'dear'")),
     Refused("binary.obj", bytes(range(256)) * 20, ("line",)),
-    Refused("nan.obj", w.obj(NAN, F), ("not finite",)),
     Refused(
         "star.obj",
         w.obj(
@@ -253,9 +243,8 @@ REFUSED = (
     Refused("two.ply", ply_faces("2 0 1"), ("2 corners",)),
     Refused("row.ply", ply_faces("3 0 1"), ("too short",)),
     Refused("index.ply", w.ply(V, [*F, (0, 1, 2**31 - 1)]), ("face 12", "2147483647")),
-    Refused("nan.ply", w.ply(NAN, F), ("not finite",)),
     # GLB
-    Refused("cut.glb", cube_scene()[:-4], ("but says", "cut short")),
+    Refused("cut.glb", cube_scene()[:-4], ("its header gives", "cut short")),
     Refused("tiny.glb", cube_scene()[:16], ("too short",)),
     Refused("old.glb", w.glb(*w.scene(V, F), version=1), ("version 2",)),
     Refused("json.glb", w.glb(b'{"asset": ', b""), ("no valid JSON",)),
@@ -267,11 +256,6 @@ REFUSED = (
         "outside.glb",
         cube_scene(buffers=[{"byteLength": 240, "uri": "../../etc/passwd"}]),
         ("buffers[0]", "outside the file"),
-    ),
-    Refused(
-        "data.glb",
-        cube_scene(buffers=[{"byteLength": 240, "uri": "data:;base64,AAAA"}]),
-        ("outside the file",),
     ),
     Refused(
         "view.glb",
@@ -300,7 +284,7 @@ REFUSED = (
     Refused(
         "real.glb",
         cube_scene(lambda s: s["accessors"][1].update(componentType=5126)),
-        ("no whole numbers",),
+        ("not whole numbers",),
     ),
     Refused("sparse.glb", cube_scene(lambda s: s["accessors"][0].update(sparse={})), ("sparse",)),
     Refused(
@@ -340,7 +324,6 @@ REFUSED = (
         w.off([(0.1 * k, 0.2 * k, 0.3 * k) for k in range(4)], [(0, 1, 2), (1, 3, 2)]),
         ("no face with an area is left", "2 faces thinner"),
     ),
-    Refused("line.off", w.off(V * [1, 0, 0], F), ("no face with an area is left",)),
     Refused(
         "three.off",
         w.off(WING, [(0, 4, 1), (0, 4, 2), (0, 4, 3)]),
@@ -355,16 +338,13 @@ REFUSED = (
     Refused("millimetres.stl", w.stl(V * 1500, F), ("300 m wide", "scale = 0.001", "0.3 m")),
     Refused("twice_scaled.stl", w.stl(V * 1e-3, F), ("0.0002 m wide", "scale = 1000")),
     Refused("far.off", w.off(moved((1e6, 0, 0), 0.1), F), ("from its origin", "move it")),
-    Refused("lost.off", w.off(moved((1e150, 0, 0)), F), ("within 1e9 m",)),
     Refused("overflow.off", w.off(V * 1e308, F), ("within 1e9 m",)),
 )
 
 NEAR = V[F].reshape(-1, 3) + np.random.default_rng(5).uniform(-2e-8, 2e-8, (36, 3))
 SOUP = np.arange(36).reshape(-1, 3)
-DOUBLED = "faces ({:.4g} m^2) that repeated others dropped"
 TRAY = np.delete(F, [4, 5], axis=0)
 SECOND = moved((0.5, 0, 0))
-CRUMB = moved((0.5, 0, 0), 0.02)
 Y_UP = "y axis points up"
 
 
@@ -419,14 +399,6 @@ REPAIRED = (
         CUBE_AREA,
         12,
         8,
-    ),
-    Repaired(
-        "quads.obj",
-        w.obj(P, [(0, 3, 4, 1), (3, 6, 7, 4)]),
-        0.02,
-        4,
-        6,
-        ("2 faces with more than three corners", "6 vertices that no face uses were dropped"),
     ),
     Repaired(
         "quads.ply",
@@ -507,14 +479,6 @@ REPAIRED = (
         ("28 vertices that repeated others were joined to them, 28 of them not equal",),
     ),
     Repaired(
-        "soup.off",
-        w.off(V[F].reshape(-1, 3), SOUP),
-        CUBE_AREA,
-        12,
-        8,
-        ("28 vertices that repeated others were joined to them",),
-    ),
-    Repaired(
         "unused.obj",
         w.obj([*V, (np.nan, 0, 0), (9e9, 0, 0)], F),
         CUBE_AREA,
@@ -523,15 +487,12 @@ REPAIRED = (
         ("2 vertices that no face uses",),
     ),
     Repaired(
-        "doubled.off", w.off(V, [*F, *F[:3]]), CUBE_AREA, 12, 8, ("3 " + DOUBLED.format(0.06),)
-    ),
-    Repaired(
         "both_sides.off",
         w.off(V, [*F, *FLIPPED]),
         CUBE_AREA,
         12,
         8,
-        ("12 " + DOUBLED.format(CUBE_AREA),),
+        (f"12 faces ({CUBE_AREA:.4g} m^2) that repeated others dropped",),
     ),
     Repaired(
         "collapsed.off",
@@ -540,9 +501,6 @@ REPAIRED = (
         12,
         8,
         ("2 faces with two corners in one place",),
-    ),
-    Repaired(
-        "flipped.stl", w.stl(V, [*FLIPPED[:3], *F[3:]]), CUBE_AREA, 12, 8, ("3 faces turned over",)
     ),
     Repaired(
         "mostly_flipped.stl",
@@ -560,7 +518,6 @@ REPAIRED = (
         8,
         ("1 closed piece of the mesh faces inwards",),
     ),
-    Repaired("cap.off", w.off(*with_caps()), CAPS_AREA, 4, 5, ("1 face without area",)),
     Repaired("caps.off", w.off(*with_chain_of_caps()), CAPS_AREA, 8, 7, ("without area",)),
     Repaired(
         "needle.off",
@@ -595,14 +552,6 @@ REPAIRED = (
         ("2 separate pieces (12 faces, 0.24 m^2; 10 faces, 0.2 m^2)",),
     ),
     Repaired(
-        "crumb.stl",
-        w.stl(*stacked((V, F), (CRUMB, F))),
-        CUBE_AREA * 1.0004,
-        24,
-        16,
-        ("2 separate pieces",),
-    ),
-    Repaired(
         "ring.stl",
         w.stl(*w.strip(twisted=False)),
         24 * np.sin(np.pi / 12) * 0.5 * 0.09 * (1.2**2 - 0.8**2),
@@ -610,7 +559,6 @@ REPAIRED = (
         48,
         ("1 hole",),
     ),
-    Repaired("tray.stl", w.stl(V, TRAY), CUBE_AREA * 5 / 6, 10, 8),
     Repaired("wide.stl", w.stl(V * 32, F), CUBE_AREA * 32**2, 12, 8, ("6.4 m wide",)),
 )
 

@@ -229,15 +229,6 @@ def test_a_name_with_a_nul_byte():
         read_mesh("part\0.stl")
 
 
-def test_crumbs_go_where_asked(tmp_path):
-    entry = next(entry for entry in corpus.REPAIRED if entry.file == "crumb.stl")
-    mesh = read_mesh(corpus.write(tmp_path, entry), drop_crumbs=True)
-    w.assert_clean(mesh)
-    assert mesh.area == pytest.approx(corpus.CUBE_AREA)
-    assert len(notes_of(mesh)) == 1
-    assert "1 crumb" in notes_of(mesh)[0]
-
-
 def test_reading_twice_gives_the_same_bits(tmp_path):
     for entry in corpus.REPAIRED:
         path = corpus.write(tmp_path, entry)

@@ -351,7 +351,7 @@ def test_any_arrays_are_refused_or_made_clean(make, seed):
     for _ in range(20):
         vertices, faces = make(rng)
         try:
-            mesh = clean(vertices, faces, drop_crumbs=bool(rng.integers(2)))
+            mesh = clean(vertices, faces)
         except SurfaceError:
             outcomes[False] += 1
             continue
