@@ -197,7 +197,8 @@ def test_a_wheel_works_outside_the_checkout(tmp_path: Path) -> None:
     kept = shutil.ignore_patterns(".*", "__pycache__", "tests", "notebooks", "build", "*.egg-info")
     shutil.copytree(ROOT, source, ignore=kept)
     for step in (
-        ["-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", "wheels", "./source"],
+        ["-m", "pip", "wheel", "-q", "--no-deps", "--no-build-isolation", "-w", "wheels",
+         "./source"],
         ["-m", "pip", "install", "-q", "--no-deps", "--target", "site",
          "--find-links", "wheels", "--no-index", "coverable"],
     ):  # fmt: skip

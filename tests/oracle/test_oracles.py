@@ -1,4 +1,4 @@
-"""A sample of `make campaign NAME=oracle`: the oracles know the paper's cases and their own answers."""
+"""A sample of `make campaign NAME=oracle`: the oracles know cases of the paper, and their answers."""
 
 import numpy as np
 import puma_oracle
