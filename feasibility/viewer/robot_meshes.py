@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import CoverableError
+from coverable_files import FileFault, read_regular
 from feasibility.viewer.threejs import Colour
 from feasibility.viewer.vertex_clusters import merge_vertices, split_at_creases
 
@@ -51,14 +53,12 @@ def read_mesh(file: Path, scale: NDArray[np.float64], colour: Colour | None) -> 
     import trimesh
 
     try:
-        size = file.stat().st_size
-        if size > LARGEST_FILE:
-            raise MeshError(f"{file.name}: {size} bytes, more than {LARGEST_FILE} are not drawn")
-        with file.open("rb") as stream:
-            scene = trimesh.load_scene(stream, file_type=file.suffix.lstrip(".").lower())
+        # From memory: trimesh cannot know where other files would lie.
+        stream = io.BytesIO(read_regular(file, LARGEST_FILE, "a mesh to draw"))
+        scene = trimesh.load_scene(stream, file_type=file.suffix.lstrip(".").lower())
         parts = scene.dump()
-    except MeshError:
-        raise
+    except FileFault as fault:
+        raise MeshError(f"{file.name}: {fault}") from fault
     except Exception as error:
         raise MeshError(f"{file.name}: cannot be read as a mesh: {error}") from error
     meshes = []
