@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from robots import Robot, list_robots, load_robot
 from robots.urdf import JointInfo
 
+FREE = (-float("inf"), float("inf"))
+
 # Six unlike arms: of 6 and 7 joints, continuous ones, a tool axis other than z, on a held body.
 SIX = ("puma560", "ur5", "panda", "kinova", "talos_arm", "baxter_left")
 UNLIKE = (*SIX, "tiago on its lift")
