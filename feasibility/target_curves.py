@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.task import Task
-from surfaces import Cells
+from surfaces import Cells, components
 
 TELLING = 0.03  # [1] a course whose normal strays no further knows how the surface bends
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
@@ -199,12 +199,10 @@ def blocked_curves(cells: Cells, task: Task) -> str:
 
 def _parted(cells: Cells, usable: NDArray[np.bool_]) -> str:
     """Whether the ways (M,) that can be used leave the cells in several parts, whatever the arm."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(cells)
-    links = [coo_array((np.ones(len(k)), k.T), (n, n)) for k in (cells.pairs, cells.pairs[usable])]
-    whole, parts = (connected_components(link, directed=False)[0] for link in links)
+    whole, parts = (
+        int(components(pairs, len(cells)).max(initial=-1)) + 1
+        for pairs in (cells.pairs, cells.pairs[usable])
+    )
     if parts == whole:
         return ""
     return f", which leaves {parts} parts of the surface that no arm's motion joins"

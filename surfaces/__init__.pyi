@@ -1,3 +1,4 @@
+from .adjacency import components as components
 from .arguments import table as table
 from .cells import Cells as Cells
 from .cells import Triangles as Triangles

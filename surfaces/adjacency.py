@@ -44,6 +44,20 @@ class Neighbours(NamedTuple):
         return np.column_stack(np.divmod(keys, max(count, 1)))
 
 
+def components(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """(count,) connected component of each of `count` nodes, numbered in the order of the nodes.
+
+    Args:
+        pairs: (m, 2) nodes that are joined.
+        count: number of nodes.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    joined = coo_array((np.ones(len(pairs), bool), pairs.T.reshape(2, -1)), shape=(count, count))
+    return connected_components(joined, directed=False)[1].astype(np.int64)
+
+
 def grid_neighbours(
     rows: int,
     columns: int,

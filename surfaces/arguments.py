@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,17 @@ from numpy.typing import NDArray
 from surfaces.surface import TURN_TOLERANCE, Side, SurfaceError, rotation_from_rpy
 
 LARGEST_RATIO = 1e6  # of two lengths of one surface
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+class Pose(TypedDict):
+    """What every surface is built from besides its own shape."""
+
+    side: Side
+    position: NDArray[np.float64]
+    """(3,) m."""
+    rotation: NDArray[np.float64]
+    """(3, 3)"""
 
 
 class Checks:
@@ -81,6 +92,14 @@ class Checks:
     def rotation(self, name: str, value: Any) -> NDArray[np.float64]:
         """The rotation of fixed-axis roll, pitch, yaw in degrees."""
         return rotation_from_rpy(*np.radians(self.vector(name, value, "degrees")))
+
+    def pose(self, side: Any, position: Any, rpy_deg: Any) -> Pose:
+        """Side, position (metres) and fixed-axis roll, pitch, yaw (degrees), under these names."""
+        return {
+            "side": self.side(side),
+            "position": self.vector("position", position, "metres"),
+            "rotation": self.rotation("rpy_deg", rpy_deg),
+        }
 
     def done(self) -> None:
         """Raise if anything was wrong.

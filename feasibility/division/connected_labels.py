@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfaces import components
+
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 Lists = list[list[int]]
@@ -35,14 +37,9 @@ def pieces_of(label: Ints, pairs: Ints) -> Ints:
         (N,) patch of each cell, from 0; -1 where the label is. Cells of one label that hang
         together are in one patch.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    n = len(label)
     same = pairs[label[pairs[:, 0]] == label[pairs[:, 1]]]
-    links = coo_array((np.ones(len(same)), (same[:, 0], same[:, 1])), shape=(n, n))
-    piece = connected_components(links, directed=False)[1]
-    result = np.full(n, -1, dtype=np.int64)
+    piece = components(same, len(label))
+    result = np.full(len(label), -1, dtype=np.int64)
     inside = label >= 0
     result[inside] = np.unique(piece[inside], return_inverse=True)[1]
     return result

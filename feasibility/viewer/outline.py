@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from feasibility.placement import Pose
 from feasibility.viewer.cell_meshes import patch
 from feasibility.viewer.decimated_mesh import display_mesh_of
-from surfaces import Cells, Triangles
+from surfaces import Cells, Triangles, components
 from surfaces.meshes.cells import MeshCells
 
 Array = NDArray[np.float64]
@@ -69,14 +69,11 @@ def _size(points: Array) -> float:
 
 def _boundary(triangles: Triangles, near: float) -> Array:
     """(k, 2, 3) m: edges of one triangle only; corners nearer than `near` (m) are one."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    vertices, count = triangles.vertices, len(triangles.vertices)
+    vertices = triangles.vertices
     pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
-    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
-    _, place = connected_components(links, directed=False)
+    place = components(pairs, len(vertices))
     faces = place[triangles.faces]
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     edges = edges[edges[:, 0] != edges[:, 1]]  # a side may have shrunk to a point, as at a pole

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.meshes.normals import WIDTH, blended, carried, corner_normals, sectors, unit
 from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.surface import ClosestPoint, Side, Surface, points_of
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_ORIGIN = (0.0, 0.0, 0.0)
 ON = 1e-9  # [1] of the mean edge: so near to a face is on it
 FIRST_CANDIDATES = 8  # faces looked at for each point before it is known that they are enough
 
@@ -246,8 +245,8 @@ def mesh(
     source: str | os.PathLike[str] | TriangleMesh | Any,
     scale: float | None = None,
     side: Side = "outside",
-    position: ArrayLike = _ORIGIN,
-    rpy_deg: ArrayLike = _ORIGIN,
+    position: ArrayLike = ORIGIN,
+    rpy_deg: ArrayLike = ORIGIN,
 ) -> MeshSurface:
     """A surface from a mesh file, or from triangles in hand.
 
@@ -270,15 +269,11 @@ def mesh(
         9
     """
     check = Checks("mesh")
-    pose = {
-        "side": check.side(side),
-        "position": check.vector("position", position, "metres"),
-        "rotation": check.rotation("rpy_deg", rpy_deg),
-    }
+    pose = check.pose(side, position, rpy_deg)
     check.done()
     triangles = _triangles(source, scale)
     normals = corner_normals(triangles)
-    return MeshSurface(mesh=triangles, corner_normals=normals, rim_normals=normals, **pose)  # type: ignore[arg-type]
+    return MeshSurface(mesh=triangles, corner_normals=normals, rim_normals=normals, **pose)
 
 
 def _triangles(source: Any, scale: float | None) -> TriangleMesh:

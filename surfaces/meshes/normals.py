@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.meshes.triangle_mesh import TriangleMesh, components, corner_angles
+from surfaces.adjacency import components
+from surfaces.meshes.triangle_mesh import TriangleMesh, corner_angles, sum_by
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,9 +46,7 @@ def corner_normals(mesh: TriangleMesh) -> Floats:
     a, b = mesh.face_normals[face[one]], mesh.face_normals[face[other]]
     near = (one == other) | (np.einsum("ki,ki->k", a, b) > np.cos(CREASE))
     one, other, b = one[near], other[near], b[near]
-    sums = np.column_stack(
-        [np.bincount(one, weights[other] * b[:, axis], len(corners)) for axis in range(3)]
-    )
+    sums = sum_by(one, weights[other][:, None] * b, len(corners))
     flat = normals.reshape(-1, 3)
     flat[corners] = sums / np.linalg.norm(sums, axis=1, keepdims=True)
     return flat.reshape(-1, 3, 3)
@@ -86,9 +85,7 @@ def blended(vertices: Floats, faces: Ints, normals: Floats, groups: Ints) -> Flo
     """
     weighted = normals * corner_angles(vertices, faces)[..., None]
     count = int(groups.max()) + 1
-    sums = np.column_stack(
-        [np.bincount(groups.ravel(), weighted[..., k].ravel(), count) for k in range(3)]
-    )
+    sums = sum_by(groups.ravel(), weighted.reshape(-1, 3), count)
     lengths = np.linalg.norm(sums, axis=1)
     # Where faces are folded back onto each other one of them speaks for all.
     some = np.zeros((count, 3))

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfaces.adjacency import components
 from surfaces.surface import SurfaceError
 
 Floats = NDArray[np.float64]
@@ -137,6 +138,13 @@ class HalfEdges:
         chosen = self.starts[self.counts == count]
         return self.order[chosen[:, None] + np.arange(count)]
 
+    @property
+    def edges(self) -> Ints:
+        """(3 F,) number of the edge of each half-edge, from 0 in the order of their vertices."""
+        numbers = np.empty(len(self.order), np.int64)
+        numbers[self.order] = np.repeat(np.arange(len(self.starts)), self.counts)
+        return numbers
+
 
 def half_edges(faces: Ints) -> HalfEdges:
     """Sort the half-edges of (F, 3) faces by edge."""
@@ -153,15 +161,6 @@ def half_edge_ends(faces: Ints, halves: Ints) -> Ints:
     """(..., 2) the vertices from which and to which half-edges run."""
     face, corner = np.divmod(halves, 3)
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=-1)
-
-
-def components(pairs: Ints, count: int) -> Ints:
-    """(count,) number of the connected component of each of `count` things joined by pairs."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    joined = coo_array((np.ones(len(pairs), bool), pairs.T.reshape(2, -1)), shape=(count, count))
-    return connected_components(joined, directed=False)[1].astype(np.int64)
 
 
 def piece_numbers(pairs: Ints, areas: Floats) -> Ints:
@@ -186,15 +185,10 @@ def _check_arrays(vertices: Floats, faces: Ints) -> None:
 
 
 def _edges(vertices: Floats, faces: Ints) -> Edges:
-    """Who touches whom."""
+    """The edges of faces that agree about the outer side."""
     halves = half_edges(faces)
-    if halves.counts.max() > 2:
-        raise SurfaceError("an edge has more than two faces; clean the mesh first")
-    inner, border = halves.of_count(2), halves.of_count(1)[:, 0]
-    ends = half_edge_ends(faces, inner[:, 0])
-    if (ends == half_edge_ends(faces, inner[:, 1])).all(axis=1).any():
-        raise SurfaceError("faces disagree about the outer side; clean the mesh first")
-    border_ends = half_edge_ends(faces, border)
+    inner, border = _joined(faces, halves), halves.of_count(1)[:, 0]
+    ends, border_ends = half_edge_ends(faces, inner[:, 0]), half_edge_ends(faces, border)
     arrays: list[ArrayLike] = [
         inner // 3,
         ends,
@@ -209,6 +203,36 @@ def _edges(vertices: Floats, faces: Ints) -> Edges:
     return edges
 
 
+def edge_partners(faces: Ints) -> Ints:
+    """(F, 3) for half-edge k of each face the one on its other side; -1 at the border of the mesh.
+
+    Raises:
+        SurfaceError: an edge has more than two faces, or two that run along it the same way.
+    """
+    joined = _joined(faces, half_edges(faces))
+    partner = np.full(faces.size, -1, dtype=np.int64)
+    partner[joined] = joined[:, ::-1]
+    return partner.reshape(-1, 3)
+
+
+def _joined(faces: Ints, halves: HalfEdges) -> Ints:
+    """(E, 2) the half-edges of each edge between two faces; raises if the faces do not fit."""
+    if halves.counts.max(initial=0) > 2:
+        raise SurfaceError("an edge has more than two faces; clean the mesh first")
+    joined = halves.of_count(2)
+    ends = half_edge_ends(faces, joined)
+    if (ends[:, 0] == ends[:, 1]).all(axis=1).any():
+        raise SurfaceError("faces disagree about the outer side; clean the mesh first")
+    return joined
+
+
+def sum_by(labels: Ints, values: Floats, count: int) -> Floats:
+    """(count, ...) sums of the rows of `values` (F,) or (F, C) that have the same label."""
+    if values.ndim == 1:
+        return np.bincount(labels, weights=values, minlength=count).astype(float)
+    return np.column_stack([sum_by(labels, column, count) for column in values.T])
+
+
 def corner_angles(vertices: Floats, faces: Ints) -> Floats:
     """(F, 3) rad, of each face at its corners."""
     corners = vertices[faces]
@@ -220,13 +244,8 @@ def corner_angles(vertices: Floats, faces: Ints) -> Floats:
 
 def _vertex_normals(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
     """Unit normals at the vertices, each face weighted by its angle there."""
-    angles = corner_angles(vertices, faces)
-    sums = np.column_stack(
-        [
-            np.bincount(faces.ravel(), (angles * normals[:, axis, None]).ravel(), len(vertices))
-            for axis in range(3)
-        ]
-    )
+    weighted = corner_angles(vertices, faces)[..., None] * normals[:, None]
+    sums = sum_by(faces.ravel(), weighted.reshape(-1, 3), len(vertices))
     lengths = np.linalg.norm(sums, axis=1)
     # Faces folded flat onto each other cancel; then one of them speaks for the vertex.
     folded = lengths < 1e-9

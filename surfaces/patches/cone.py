@@ -10,13 +10,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import LARGEST_RATIO, Checks, real
+from surfaces.arguments import LARGEST_RATIO, ORIGIN, Checks, real
 from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
-
-_ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -78,8 +76,8 @@ def cone(
     angle_deg: Sequence[float],
     height: Sequence[float],
     side: Side = "inside",
-    position: Sequence[float] = _ORIGIN,
-    rpy_deg: Sequence[float] = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Cone:
     """A patch of a cone, r(z) = radius + slope z, with its apex left out.
 
@@ -121,9 +119,7 @@ def cone(
         v_range=(low, high),
         radius=radius,
         slope=steep,
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

@@ -1,4 +1,4 @@
-"""cylinder."""
+"""A patch of a cylinder about the z axis of its own frame."""
 
 from __future__ import annotations
 
@@ -9,16 +9,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.closed_form import ClosedFormPatch
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
-Pair = Sequence[float]
-
-_ORIGIN = (0.0, 0.0, 0.0)
-_SLICES = 512  # over which the hyperboloid's curvatures are bounded
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -58,11 +54,11 @@ class Cylinder(ClosedFormPatch):
 
 def cylinder(
     radius: float,
-    angle_deg: Pair,
-    height: Pair,
+    angle_deg: Sequence[float],
+    height: Sequence[float],
     side: Side = "inside",
-    position: Pair = _ORIGIN,
-    rpy_deg: Pair = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Cylinder:
     """A patch of a cylinder about the z axis of its own frame.
 
@@ -82,9 +78,7 @@ def cylinder(
         u_range=check.angles("angle_deg", angle_deg),
         v_range=check.interval("height", height),
         radius=check.positive("radius", radius),
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -10,14 +9,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
+from surfaces.patches.sphere import closed_rows, unit_sphere
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
 
-_ORIGIN = (0.0, 0.0, 0.0)
 _MOST_STEPS = 200
 
 
@@ -44,18 +43,16 @@ class Ellipsoid(SmoothPatch):
 
     @property
     def poles(self) -> tuple[bool, bool]:
-        """A row closes around a pole where the patch reaches it and the azimuth is a full turn."""
-        if not self.v_closed:
-            return (False, False)
-        return (self.u_range[0] <= 1e-9, self.u_range[1] >= math.pi - 1e-9)
+        """See `closed_rows`."""
+        return closed_rows(self)
 
     def local_point(self, u: Array, v: Array) -> Array:
         """The unit sphere's point, stretched."""
-        return np.asarray(_unit(u, v) * np.array(self.semi_axes))
+        return np.asarray(unit_sphere(u, v) * np.array(self.semi_axes))
 
     def local_normal(self, u: Array, v: Array) -> Array:
         """The gradient of (x/a)^2 + (y/b)^2 + (z/c)^2 over its length."""
-        gradient = _unit(u, v) / np.array(self.semi_axes)
+        gradient = unit_sphere(u, v) / np.array(self.semi_axes)
         return np.asarray(gradient / np.linalg.norm(gradient, axis=-1, keepdims=True))
 
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
@@ -64,7 +61,7 @@ class Ellipsoid(SmoothPatch):
         stretch = np.array([b * c, c * a, a * b])
 
         def element(u: Array, v: Array) -> Array:
-            return np.asarray(np.sin(u) * np.linalg.norm(_unit(u, v) * stretch, axis=-1))
+            return np.asarray(np.sin(u) * np.linalg.norm(unit_sphere(u, v) * stretch, axis=-1))
 
         return rectangle_areas(element, u0, u1, v0, v1)
 
@@ -75,7 +72,7 @@ class Ellipsoid(SmoothPatch):
         sides meet in), the one on the patch's own side is taken, or else the one across.
         """
         axes = np.array(self.semi_axes)
-        middle = _unit(*(np.array(sum(ends) / 2.0) for ends in (self.u_range, self.v_range)))
+        middle = unit_sphere(*(np.array(sum(ends) / 2.0) for ends in (self.u_range, self.v_range)))
         closest_point = nearest_on_ellipsoid(axes, points, middle)
         u, v = self._parameters(closest_point)
         off = np.flatnonzero(~self._on_patch(u, v))
@@ -141,19 +138,13 @@ def _norm_and_fall(pull: Array, below: Array) -> tuple[Array, Array]:
     return np.linalg.norm(ratio, axis=1), third.sum(axis=1)
 
 
-def _unit(u: Array, v: Array) -> Array:
-    """Points (..., 3) of the unit sphere."""
-    s = np.sin(u)
-    return np.stack([s * np.cos(v), s * np.sin(v), np.cos(u)], axis=-1)
-
-
 def ellipsoid(
     semi_axes: Sequence[float],
     polar_deg: Sequence[float],
     azimuth_deg: Sequence[float],
     side: Side = "inside",
-    position: Sequence[float] = _ORIGIN,
-    rpy_deg: Sequence[float] = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Ellipsoid:
     """A patch of an ellipsoid with semi-axes along x, y and z of its own frame.
 
@@ -182,9 +173,7 @@ def ellipsoid(
         u_range=check.polar("polar_deg", polar_deg),
         v_range=check.angles("azimuth_deg", azimuth_deg),
         semi_axes=(a, b, c),
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

@@ -1,4 +1,4 @@
-"""hyperboloid."""
+"""A patch of a hyperboloid of one sheet about the z axis of its own frame."""
 
 from __future__ import annotations
 
@@ -10,16 +10,14 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.closed_form import ClosedFormPatch
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
-Pair = Sequence[float]
 
-_ORIGIN = (0.0, 0.0, 0.0)
-_SLICES = 512  # over which the hyperboloid's curvatures are bounded
+SLICES = 512  # over which the curvatures are bounded
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -86,7 +84,7 @@ class Hyperboloid(ClosedFormPatch):
         # Equal steps of asinh(b z / waist): fine at the waist, where the curvatures change fastest.
         scale = self.waist / math.sqrt(growth)
         low, high = self.v_range[0] - margin, self.v_range[1] + margin
-        steps = np.linspace(math.asinh(low / scale), math.asinh(high / scale), _SLICES + 1)
+        steps = np.linspace(math.asinh(low / scale), math.asinh(high / scale), SLICES + 1)
         edges = scale * np.sinh(steps)
         edges[0], edges[-1] = low, high
         a, b = np.abs(edges[:-1]), np.abs(edges[1:])
@@ -110,11 +108,11 @@ class Hyperboloid(ClosedFormPatch):
 def hyperboloid(
     waist: float,
     flare: float,
-    angle_deg: Pair,
-    height: Pair,
+    angle_deg: Sequence[float],
+    height: Sequence[float],
     side: Side = "inside",
-    position: Pair = _ORIGIN,
-    rpy_deg: Pair = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Hyperboloid:
     """A patch of a hyperboloid of one sheet, r(z) = waist sqrt(1 + (z / flare)^2).
 
@@ -138,9 +136,7 @@ def hyperboloid(
         v_range=check.interval("height", height),
         waist=waist,
         flare=flare,
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

@@ -1,4 +1,4 @@
-"""plane."""
+"""A rectangle in the xy plane of its own frame."""
 
 from __future__ import annotations
 
@@ -9,16 +9,12 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.closed_form import ClosedFormPatch
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
-Pair = Sequence[float]
-
-_ORIGIN = (0.0, 0.0, 0.0)
-_SLICES = 512  # over which the hyperboloid's curvatures are bounded
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -30,11 +26,6 @@ class Plane(ClosedFormPatch):
     code: ClassVar[int] = 0
     u_angle: ClassVar[bool] = False
     v_angle: ClassVar[bool] = False
-
-    @property
-    def lengths(self) -> tuple[float, ...]:
-        """Nothing."""
-        return ()
 
     def local_point(self, u: Array, v: Array) -> Array:
         """(u, v, 0)."""
@@ -51,16 +42,16 @@ class Plane(ClosedFormPatch):
         return np.asarray((u1 - u0) * (v1 - v0))
 
     def curvature_slices(self, margin: float) -> CurvatureSlices:
-        """None."""
+        """Flat both ways."""
         return CurvatureSlices.constant(0.0, 0.0)
 
 
 def plane(
-    width: Pair,
-    length: Pair,
+    width: Sequence[float],
+    length: Sequence[float],
     side: Side = "inside",
-    position: Pair = _ORIGIN,
-    rpy_deg: Pair = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Plane:
     """A rectangle in the xy plane of its own frame, its normal +z.
 
@@ -78,9 +69,7 @@ def plane(
     made = Plane(
         u_range=check.interval("width", width),
         v_range=check.interval("length", length),
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

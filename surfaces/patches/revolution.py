@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks, metres
+from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.patches.revolution_profile import Profile
 from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
@@ -18,7 +18,6 @@ from surfaces.surface import Side
 Array = NDArray[np.float64]
 
 MOST_POINTS = 1000
-_ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -92,8 +91,8 @@ def revolution(
     profile: Any,
     angle_deg: Sequence[float],
     side: Side = "inside",
-    position: Sequence[float] = _ORIGIN,
-    rpy_deg: Sequence[float] = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Revolution:
     """The surface that a smooth curve through given points sweeps when turned about z.
 
@@ -130,9 +129,7 @@ def revolution(
         u_range=(0.0, curve.length),
         v_range=check.angles("angle_deg", angle_deg),
         profile=Profile(curve.points[::-1]),
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

@@ -1,4 +1,4 @@
-"""sphere."""
+"""A patch of a sphere about the origin of its own frame."""
 
 from __future__ import annotations
 
@@ -10,16 +10,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.closed_form import ClosedFormPatch
 from surfaces.patches.normal_bounds import CurvatureSlices
+from surfaces.patches.patch import Patch
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
-Pair = Sequence[float]
-
-_ORIGIN = (0.0, 0.0, 0.0)
-_SLICES = 512  # over which the hyperboloid's curvatures are bounded
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -41,10 +38,8 @@ class Sphere(ClosedFormPatch):
 
     @property
     def poles(self) -> tuple[bool, bool]:
-        """A row closes around a pole where the patch reaches it and the azimuth is a full turn."""
-        if not self.v_closed:
-            return (False, False)
-        return (self.u_range[0] <= 1e-9, self.u_range[1] >= math.pi - 1e-9)
+        """See `closed_rows`."""
+        return closed_rows(self)
 
     def local_point(self, u: Array, v: Array) -> Array:
         """Radius times normal."""
@@ -52,8 +47,7 @@ class Sphere(ClosedFormPatch):
 
     def local_normal(self, u: Array, v: Array) -> Array:
         """Away from the centre."""
-        s = np.sin(u)
-        return np.stack([s * np.cos(v), s * np.sin(v), np.cos(u)], axis=-1)
+        return unit_sphere(u, v)
 
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
         """R^2 (cos u0 - cos u1) (v1 - v0), the difference written without cancellation."""
@@ -66,13 +60,25 @@ class Sphere(ClosedFormPatch):
         return CurvatureSlices.constant(1.0 / self.radius, 1.0 / self.radius)
 
 
+def unit_sphere(u: Array, v: Array) -> Array:
+    """Points (..., 3) at polar angles u from +z and azimuths v about z, rad."""
+    s = np.sin(u)
+    return np.stack([s * np.cos(v), s * np.sin(v), np.cos(u)], axis=-1)
+
+
+def closed_rows(patch: Patch) -> tuple[bool, bool]:
+    """`Patch.poles` where u is a polar angle: the range reaches 0 or pi, and v goes once around."""
+    low, high = patch.u_range
+    return (patch.v_closed and low <= 1e-9, patch.v_closed and high >= math.pi - 1e-9)
+
+
 def sphere(
     radius: float,
-    polar_deg: Pair,
-    azimuth_deg: Pair,
+    polar_deg: Sequence[float],
+    azimuth_deg: Sequence[float],
     side: Side = "inside",
-    position: Pair = _ORIGIN,
-    rpy_deg: Pair = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Sphere:
     """A patch of a sphere.
 
@@ -97,9 +103,7 @@ def sphere(
         u_range=check.polar("polar_deg", polar_deg),
         v_range=check.angles("azimuth_deg", azimuth_deg),
         radius=check.positive("radius", radius),
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

@@ -9,13 +9,11 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
-
-_ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -73,8 +71,8 @@ def torus(
     u_deg: Sequence[float],
     v_deg: Sequence[float],
     side: Side = "inside",
-    position: Sequence[float] = _ORIGIN,
-    rpy_deg: Sequence[float] = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> Torus:
     """A patch of a torus about the z axis of its own frame.
 
@@ -110,9 +108,7 @@ def torus(
         v_range=check.angles("v_deg", v_deg),
         ring=ring,
         tube=tube,
-        side=check.side(side),
-        position=check.vector("position", position, "metres"),
-        rotation=check.rotation("rpy_deg", rpy_deg),
+        **check.pose(side, position, rpy_deg),
     )
     check.done()
     return made

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks
+from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches import Patch
 from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
 from surfaces.piecewise.consistency import groups_of, on_each_other, turned_pieces
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-_ORIGIN = (0.0, 0.0, 0.0)
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
 SHARE = 1e-3  # [1], and the same as a share of the shortest border
 WIDEST = 0.02  # [1], what may be asked for, as a share of the shortest border
@@ -140,8 +139,8 @@ class Piecewise(Surface):
 def piecewise(
     pieces: Sequence[Patch],
     side: Side = "inside",
-    position: Sequence[float] = _ORIGIN,
-    rpy_deg: Sequence[float] = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
     gap: float | None = None,
 ) -> Piecewise:
     """Several patches joined into one surface along the borders that they share.
@@ -175,8 +174,7 @@ def piecewise(
     check = Checks("piecewise")
     patches = _patches(pieces, check.faults)
     width = _gap(gap, patches, check)
-    chosen, place = check.side(side), check.vector("position", position, "metres")
-    rotation = check.rotation("rpy_deg", rpy_deg)
+    pose = check.pose(side, position, rpy_deg)
     check.done()
     sheets = on_each_other(patches, width)
     if sheets:
@@ -192,13 +190,11 @@ def piecewise(
             "one of them out"
         )
     return Piecewise(
-        rotation,
-        place,
-        chosen,
-        patches,
-        turned_pieces(len(patches), found.seams),
-        width,
-        found.seams,
+        pieces=patches,
+        turned=turned_pieces(len(patches), found.seams),
+        gap=width,
+        seams=found.seams,
+        **pose,
     )
 
 

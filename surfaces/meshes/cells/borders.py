@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from surfaces.adjacency import Neighbours
-from surfaces.meshes.cells.dual_graph import sum_by
+from surfaces.meshes.triangle_mesh import sum_by
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,7 +63,7 @@ def outlines(
     Args:
         vertices: (V, 3) m.
         faces: (F, 3) vertex indices.
-        partner: (F, 3) see `face_graph.edge_partners`.
+        partner: (F, 3) see `triangle_mesh.edge_partners`.
         labels: (F,) cell of each face.
     """
     other = np.where(partner >= 0, labels[partner // 3], -1)
@@ -111,7 +111,7 @@ def shared_borders(
     Args:
         vertices: (V, 3) m.
         faces: (F, 3) vertex indices.
-        partner: (F, 3) see `face_graph.edge_partners`.
+        partner: (F, 3) see `triangle_mesh.edge_partners`.
         labels: (F,) cell of each face.
     """
     count = int(labels.max()) + 1

@@ -9,8 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from surfaces.meshes.cells.dual_graph import sum_by
 from surfaces.meshes.closest_point import nearest_on_triangle
+from surfaces.meshes.triangle_mesh import sum_by
 
 kernel = njit(cache=True, error_model="numpy")
 

@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.meshes.cells.dual_graph import FaceGraph, face_graph, sum_by
+from surfaces.meshes.cells.dual_graph import FaceGraph, face_graph
 from surfaces.meshes.cells.subdivision import MOST_FACES, Subdivision, subdivide
 from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps
+from surfaces.meshes.triangle_mesh import doubled_areas, sum_by
 from surfaces.surface import SurfaceError
 
 FACES_PER_CELL = 80
@@ -78,9 +79,8 @@ def cells_for(
         >>> cut.count, len(cut.labels)
         (16, 2048)
     """
-    corners = np.asarray(vertices, dtype=float)[np.asarray(faces, dtype=np.int64)]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = float(np.linalg.norm(cross, axis=1).sum() / 2.0)
+    double = doubled_areas(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64))
+    total = float(np.linalg.norm(double, axis=1).sum() / 2.0)
     number = _number_of_cells(total, count, size)
     mesh = subdivide(vertices, faces, total / number / FACES_PER_CELL)
     return CellCut(mesh, cluster_faces(mesh.vertices, mesh.faces, number), number)

@@ -17,7 +17,7 @@ from surfaces.meshes.cells.borders import (
     shared_borders,
 )
 from surfaces.meshes.cells.centres import centre_places
-from surfaces.meshes.cells.dual_graph import edge_partners, sum_by
+from surfaces.meshes.triangle_mesh import doubled_areas, edge_partners, sum_by
 from surfaces.surface import SurfaceError
 
 MOST_TURN_DEG = 30.0
@@ -88,10 +88,10 @@ def figures(
     if (used == 0).any():
         raise SurfaceError(f"cell {int(np.argmin(used))} has no face; number cells from 0 on")
     count = len(used)
-    partner = edge_partners(faces, len(vertices))
+    partner = edge_partners(faces)
     other = np.where(partner >= 0, labels[partner // 3], -1)
     corners = vertices[faces]
-    double = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    double = doubled_areas(vertices, faces)
     face_areas = np.linalg.norm(double, axis=1) / 2.0
     face_normals = _unit(double)
     border = other != labels[:, None]

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from surfaces.meshes.triangle_mesh import half_edge_ends, half_edges
+
 kernel = njit(cache=True, error_model="numpy")
 
 SAME = 1e-9  # relative: lengths this close are equal, so that rounding does not choose
@@ -45,15 +47,13 @@ def edges_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Edges:
     Both faces of an edge then agree on the order of edges, and splits spread no further than
     they must.
     """
-    start, end = faces, np.roll(faces, -1, axis=1)
-    key = np.minimum(start, end) * np.int64(len(vertices)) + np.maximum(start, end)
-    unique, inverse = np.unique(key.ravel(), return_inverse=True)
-    ends = np.column_stack(np.divmod(unique, np.int64(len(vertices))))
-    of_face = inverse.reshape(-1, 3)
+    halves = half_edges(faces)
+    ends = np.sort(half_edge_ends(faces, halves.order[halves.starts]), axis=1)
+    of_face = halves.edges.reshape(-1, 3)
     length = np.linalg.norm(vertices[ends[:, 0]] - vertices[ends[:, 1]], axis=1)
     of_length = length[of_face]
     near = of_length >= of_length.max(axis=1, keepdims=True) * (1.0 - SAME)
-    longest = np.argmin(np.where(near, of_face, len(unique)), axis=1)
+    longest = np.argmin(np.where(near, of_face, len(ends)), axis=1)
     return Edges(ends, of_face, length, longest)
 
 
@@ -102,7 +102,7 @@ def cut_across(
 ) -> Split:
     """Cut edges into `count` (E,) equal parts each, and join the points like a ladder's rungs.
 
-    Every face needs an edge that stays whole: the ladder's foot. The rungs lead from there to the
+    Every face needs an edge that stays whole: the ladder's base. The rungs lead from there to the
     corner on the other side.
     """
     first = len(vertices) + np.concatenate([[0], np.cumsum(count - 1)])
@@ -142,18 +142,13 @@ def _ladders(points, faces, of_face, longest, first, count, out):  # type: ignor
     """Write the parts of all faces; each next rung is the shorter of the two there could be."""
     written = 0
     for face in range(faces.shape[0]):
-        closest_point = (
-            0  # the edge that stays whole; one that is not the longest if there is a choice
-        )
+        base = 0  # the edge that stays whole; one that is not the longest if there is a choice
         for k in range(3):
             if count[of_face[face, k]] == 1 and (k != longest[face]):
-                closest_point = k
-        b, c, a = (
-            faces[face, closest_point],
-            faces[face, (closest_point + 1) % 3],
-            faces[face, (closest_point + 2) % 3],
-        )
-        right, left = of_face[face, (closest_point + 2) % 3], of_face[face, (closest_point + 1) % 3]
+                base = k
+        following, last = (base + 1) % 3, (base + 2) % 3
+        b, c, a = faces[face, base], faces[face, following], faces[face, last]
+        right, left = of_face[face, last], of_face[face, following]
         i, j = 0, 0
         p, q = b, c
         while i + 1 < count[right] or j + 1 < count[left]:

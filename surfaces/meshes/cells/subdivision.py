@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.meshes.cells.splits import SAME, Split, cut_across, edges_of, halve
+from surfaces.meshes.triangle_mesh import doubled_areas
 from surfaces.surface import SurfaceError
 
 MOST_FACES = 4_000_000
@@ -109,8 +110,7 @@ def subdivide(
 
 def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
     """(F,) m^2."""
-    a, b, c = (vertices[faces[:, k]] for k in range(3))
-    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
+    return np.linalg.norm(doubled_areas(vertices, faces), axis=1) / 2.0
 
 
 def _next_split(

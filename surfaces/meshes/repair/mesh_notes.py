@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.meshes.triangle_mesh import components
+from surfaces.adjacency import components
 
 if TYPE_CHECKING:
     from surfaces.meshes.triangle_mesh import TriangleMesh

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import Checks, table
+from surfaces.arguments import ORIGIN, Checks, table
 from surfaces.patches.nurbs.nurbs import SplineMap
 from surfaces.patches.nurbs.nurbs_checks import (
     MOST_DEGREE,
@@ -24,8 +24,6 @@ from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.surface import Side, SurfaceError
 
 Array = NDArray[np.float64]
-
-_ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -89,8 +87,8 @@ def bspline(
     u: Sequence[float] | None = None,
     v: Sequence[float] | None = None,
     side: Side = "inside",
-    position: Sequence[float] = _ORIGIN,
-    rpy_deg: Sequence[float] = _ORIGIN,
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
 ) -> SplinePatch:
     """A tensor-product B-spline patch; rational (NURBS) where weights are given.
 
@@ -120,8 +118,7 @@ def bspline(
     """
     check = Checks("bspline")
     net = _spline_map(points, degree, knots, weights, (u, v), check.faults)
-    chosen, place = check.side(side), check.vector("position", position, "metres")
-    rotation = check.rotation("rpy_deg", rpy_deg)
+    pose = check.pose(side, position, rpy_deg)
     check.done()
     if net is None:  # cannot be: without a net there are faults
         raise SurfaceError("bspline: the points make no patch")
@@ -129,9 +126,7 @@ def bspline(
         u_range=(net.low[0], net.high[0]),
         v_range=(net.low[1], net.high[1]),
         net=net,
-        side=chosen,
-        position=place,
-        rotation=rotation,
+        **pose,
     )
 
 

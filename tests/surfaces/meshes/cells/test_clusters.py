@@ -148,8 +148,8 @@ def test_unclean_meshes_are_refused():
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, -1, 0.0]])
     three_on_an_edge = np.array([[0, 1, 2], [1, 0, 3], [0, 1, 4]])
     flipped = np.array([[0, 1, 2], [0, 1, 3]])
-    for faces in (three_on_an_edge, flipped):
-        with pytest.raises(SurfaceError, match="not an oriented surface"):
+    for faces, words in ((three_on_an_edge, "more than two faces"), (flipped, "outer side")):
+        with pytest.raises(SurfaceError, match=words):
             cluster_faces(vertices, faces, 1)
 
 
