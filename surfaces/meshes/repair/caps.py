@@ -19,7 +19,7 @@ from surfaces.meshes.triangle_mesh import (
     half_edges,
 )
 
-PATIENCE = 10  # rounds without one cap less
+PATIENCE = 10  # rounds in which no cap goes
 
 
 def thin(vertices: Floats, faces: Ints, height: float) -> NDArray[np.bool_]:
@@ -37,7 +37,7 @@ def flipped(vertices: Floats, faces: Ints, height: float) -> tuple[Ints, int, in
     Args:
         vertices: (V, 3) m.
         faces: (F, 3), at most two on an edge, all facing one way.
-        height: m, what is thinner is a cap.
+        height: m, faces thinner than this are caps.
 
     Returns:
         The faces, how many caps were flipped, and how many were dropped.
@@ -52,7 +52,7 @@ def flipped(vertices: Floats, faces: Ints, height: float) -> tuple[Ints, int, in
     faces, is_cap = faces[solid].copy(), is_cap[solid]
     best, patience = len(is_cap), PATIENCE
     while is_cap.any() and patience:
-        # All that a flip needs to know are the faces around the corners of caps.
+        # A flip needs only the faces around the corners of caps.
         near = np.zeros(len(vertices), bool)
         near[faces[is_cap]] = True
         active = np.flatnonzero(near[faces].any(axis=1))

@@ -154,17 +154,17 @@ def _compact(points: Floats, corners: Ints, notes: list[str]) -> tuple[Floats, I
 
 
 def _weld(points: Floats, corners: Ints, distance: float, notes: list[str]) -> Ints:
-    """Join vertices that mean one point, and drop the faces that this leaves without corners."""
-    stands = welded(points, distance)
-    moved = (points[stands] != points).any(axis=1)
-    joined = int((stands != np.arange(len(points))).sum())
+    """Join vertices that are one point, and drop the faces that this leaves without corners."""
+    representative = welded(points, distance)
+    moved = (points[representative] != points).any(axis=1)
+    joined = int((representative != np.arange(len(points))).sum())
     if joined:
         near = f", {moved.sum()} of them not equal but within {distance:.2g} m" * bool(moved.any())
         notes.append(
             f"{_count(joined, 'vertex', 'vertices')} that repeated others "
             f"{'was' if joined == 1 else 'were'} joined to them{near}"
         )
-    corners = stands[corners]
+    corners = representative[corners]
     collapsed = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
     if collapsed.any():
         notes.append(
