@@ -23,7 +23,6 @@ import surfaces
 from feasibility import Search, check
 from feasibility.cases import Case, builtin_cases
 from feasibility.cli.main import main
-from feasibility.roadmap.search import DRY_ROUNDS
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("robots", "surfaces", "feasibility")
@@ -97,10 +96,6 @@ def test_commands_and_links_exist(page: str) -> None:
     assert made <= set(targets)
     for path in re.findall(r"\.venv/bin/python (?:-m pytest (?:\S+ )*)?([a-z]\S*/\S+?)[ `]", text):
         assert (ROOT / path).exists(), path
-
-
-def test_exhausted_means_what_the_readme_says() -> None:
-    assert f"{DRY_ROUNDS} rounds of new random configurations" in README
 
 
 def table_of_cases() -> dict[str, dict[str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from feasibility.cli.arguments import add_case, add_command, add_html
-from feasibility.cli.console import say, tell
+from feasibility.cli.console import print_err, print_out
 from feasibility.cli.outputs import STATUS, json_text, write_text
 from feasibility.cli.session import open_case
 from feasibility.safe_files import check_writable, shown_path
@@ -58,14 +58,14 @@ def check(args: argparse.Namespace, began: float) -> int:
         case, loaded = opened.case, opened.so_far()
         verdict = run(*opened.setup, progress=opened.progress)
     if args.json:
-        say(json_text(report.as_json(verdict, loaded)))
+        print_out(json_text(report.as_json(verdict, loaded)))
     else:
-        say(report.as_text(verdict, case, loaded))
+        print_out(report.as_text(verdict, case, loaded))
     if args.save is not None:
         from feasibility.results import save_result
 
         save_result(verdict, case, args.save)
-        tell(f"result: {shown_path(args.save)} (`coverable show` opens it)")
+        print_err(f"result: {shown_path(args.save)} (`coverable show` opens it)")
     if args.html is not None:
         from feasibility.viewer import view
 
@@ -74,7 +74,7 @@ def check(args: argparse.Namespace, began: float) -> int:
         motion = report.as_csv(verdict)
         if motion is None:
             why = "has no stored motion" if verdict.feasible else f"is {verdict.answer}"
-            tell(f"--witness: nothing written to {shown_path(args.witness)}: this case {why}")
+            print_err(f"--witness: nothing written to {shown_path(args.witness)}: this case {why}")
         else:
             write_text(args.witness, motion, "witness")
     return STATUS[str(verdict.answer)]
@@ -87,7 +87,7 @@ def show(args: argparse.Namespace, began: float) -> int:
     if args.html is not None:
         check_writable(args.html)
     result = load_result(args.result)
-    say(f"{result.case.name}: {result.verdict!r}")
+    print_out(f"{result.case.name}: {result.verdict!r}")
     from feasibility.viewer import view
 
     drawn = view(result.verdict, result.case.name)
@@ -95,9 +95,9 @@ def show(args: argparse.Namespace, began: float) -> int:
         write_text(args.html, drawn.html(), "view")
         return 0
     with drawn.show(open_browser=args.browser) as live:
-        tell(f"view: {live.url} (served until Ctrl-C)")
+        print_err(f"view: {live.url} (served until Ctrl-C)")
         try:
             live.wait()
         except KeyboardInterrupt:
-            tell("")
+            print_err("")
     return 0

@@ -18,13 +18,13 @@ IMPORTER = "importlib._bootstrap"
 
 
 def prepare() -> None:
-    """Make sure that no character of a message can fail to be written."""
+    """Write characters that the terminal's encoding lacks as escapes."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
-def say(text: str) -> None:
+def print_out(text: str) -> None:
     """Write an answer to stdout. A reader that has gone away (`| head`) is no error.
 
     Raises:
@@ -43,7 +43,7 @@ def say(text: str) -> None:
         raise
 
 
-def tell(text: str) -> None:
+def print_err(text: str) -> None:
     """Write a message to stderr, if there is one that takes it."""
     stream = sys.stderr
     if stream is None:
@@ -56,7 +56,7 @@ def tell(text: str) -> None:
 
 
 def _discard(stream: TextIO) -> None:
-    """Send what is still buffered nowhere, so that it does not fail again at the end."""
+    """Discard the buffered rest, so that it does not fail again at the end."""
     try:
         descriptor = stream.fileno()
     except (OSError, ValueError):  # a stream without a file
@@ -68,12 +68,12 @@ def _discard(stream: TextIO) -> None:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], None]]:
-    """Remember a Ctrl-C that Python loses.
+    """Remember a Ctrl-C that Python would lose.
 
-    A KeyboardInterrupt raised while the interpreter runs one of its own callbacks (it does so
-    during imports) is printed and dropped, and a library whose import it ends says that it is
-    broken. So the first Ctrl-C lets a running import end. Call what this context yields as soon as
-    may be, and before an answer is given: it raises KeyboardInterrupt if there has been one.
+    A KeyboardInterrupt raised while the interpreter runs one of its own callbacks (as during
+    imports) is printed and dropped, and a library whose import is interrupted reports that it is
+    broken. So the first Ctrl-C lets a running import end. The context yields a function that raises
+    KeyboardInterrupt if there has been a Ctrl-C: call it often, and before an answer is given.
     """
     seen = False
 
@@ -89,13 +89,13 @@ def interruptible() -> Iterator[Callable[[], None]]:
 
     default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
     if not default or threading.current_thread() is not threading.main_thread():
-        yield settle  # someone else decides what Ctrl-C does
+        yield settle  # Ctrl-C has another handler
         return
     signal.signal(signal.SIGINT, note)
     try:
         yield settle
     except Exception:
-        settle()  # what a library says about being interrupted is no error of its own
+        settle()  # an interrupted library may raise an error of its own
         raise
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -119,9 +119,9 @@ def progress_bar() -> Iterator[Bar]:
 
 
 class Bar:
-    """A progress bar on a terminal's stderr; nothing at all elsewhere.
+    """A progress bar on a terminal's stderr; nothing elsewhere.
 
-    It is what a search reports to, and appears with the first report.
+    A search reports to it, and it appears with the first report.
     """
 
     def __init__(self, settle: Callable[[], None] = lambda: None) -> None:

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from feasibility.cli.arguments import add_command
-from feasibility.cli.console import say
+from feasibility.cli.console import print_out
 from feasibility.cli.outputs import json_text
 
-WIDE = 240  # columns, where nothing shall be wrapped
+WIDE = 240  # columns of a file, so that nothing is wrapped
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
@@ -23,14 +23,14 @@ def add(subcommands: argparse._SubParsersAction) -> None:
 def cases(args: argparse.Namespace, began: float) -> int:
     """`coverable cases`: the built-in cases."""
     rows = case_rows()
-    say(json_text({"cases": rows}) if args.json else cases_table(rows))
+    print_out(json_text({"cases": rows}) if args.json else cases_table(rows))
     return 0
 
 
 def robots(args: argparse.Namespace, began: float) -> int:
     """`coverable robots`: the robots that a case can name."""
     rows = robot_rows()
-    say(json_text({"robots": rows}) if args.json else robots_table(rows))
+    print_out(json_text({"robots": rows}) if args.json else robots_table(rows))
     return 0
 
 
@@ -120,7 +120,7 @@ def cases_table(rows: Sequence[dict[str, Any]]) -> str:
 def robots_table(rows: Sequence[dict[str, Any]]) -> str:
     """The robots for people: joints by kind, reach, limits in order of the joints."""
     return _table(
-        ["robot", "joints", "reach", "limits (deg, or m where it says so)", "limit sets"],
+        ["robot", "joints", "reach", "limits (deg unless in m)", "limit sets"],
         [
             [
                 row["name"],

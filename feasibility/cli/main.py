@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from coverable_errors import CoverableError
 from feasibility.cli import check_command, listing, path_divide_explain, place, study_compare
-from feasibility.cli.console import prepare, say, tell
+from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.cli.outputs import BAD_INPUT
 
 INTERRUPTED = 130
@@ -27,19 +27,19 @@ class _Parser(argparse.ArgumentParser):
     """An argument parser whose faults are one line."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and leave with status 2."""
-        tell(f"{self.prog}: {message}; see `{self.prog} --help`")
+        """Print one line and leave with status 2."""
+        print_err(f"{self.prog}: {message}; see `{self.prog} --help`")
         raise SystemExit(BAD_INPUT)
 
 
 class _Version(argparse.Action):
-    """Print the version; it is looked up only when asked for."""
+    """Print the version, which is looked up only then."""
 
     def __call__(self, parser: argparse.ArgumentParser, *rest: object) -> NoReturn:
-        """Say it and leave."""
+        """Print it and leave."""
         from feasibility.version import version
 
-        say(f"coverable {version()}")
+        print_out(f"coverable {version()}")
         raise SystemExit(0)
 
 
@@ -76,43 +76,46 @@ def main(argv: Sequence[str] | None = None) -> int:
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
-        tell("coverable: interrupted")
+        print_err("coverable: interrupted")
         return INTERRUPTED
     except Exception as error:  # noqa: BLE001 - the last line before the user
-        return _failed(error)
+        if _with_traceback():
+            import traceback
+
+            print_err("".join(traceback.format_exception(error)))
+        print_err(f"coverable: {_message(error)}")
+        return BAD_INPUT
 
 
-def _failed(error: Exception) -> int:
-    """Say what went wrong in one message; a traceback only where it is asked for."""
-    if os.environ.get(TRACEBACK, "") not in ("", "0"):
-        import traceback
-
-        tell("".join(traceback.format_exception(error)))
+def _message(error: Exception) -> str:
+    """What went wrong, and what to do about it where that is known."""
     if isinstance(error, CoverableError):
-        tell(f"coverable: {error}")
-    elif isinstance(error, MemoryError):
-        tell("coverable: there is not enough memory; use fewer cells")
-    elif isinstance(error, OSError):
+        return str(error)
+    if isinstance(error, MemoryError):
+        return "there is not enough memory; use fewer cells"
+    if isinstance(error, OSError):
         file = f"{error.filename}: " if error.filename else ""
-        tell(f"coverable: {file}{error.strerror or error}")
-    elif isinstance(error, ImportError):
-        tell(
-            f"coverable: a library is missing or broken ({error}); install coverable into a fresh "
-            "virtual environment"
+        return f"{file}{error.strerror or error}"
+    if isinstance(error, ImportError):
+        return (
+            f"a library is missing or broken ({error}); install coverable into a fresh virtual "
+            "environment"
         )
-    elif isinstance(error, RuntimeError) and NO_CACHE in str(error):
-        tell(
-            "coverable: the compiled search kernels can be kept nowhere: neither the folder of the "
-            "installation nor the cache in the home folder can be written to; set NUMBA_CACHE_DIR "
-            "to a folder of yours"
+    if isinstance(error, RuntimeError) and NO_CACHE in str(error):
+        return (
+            "the compiled search kernels cannot be cached: neither the folder of the installation "
+            "nor the cache in the home folder is writable; set NUMBA_CACHE_DIR to a folder that is"
         )
-    else:
-        text = " ".join(str(error).split())
-        tell(
-            f"coverable: this is a bug in coverable: {type(error).__name__}: {text}\n"
-            f"Run the command again with {TRACEBACK}=1, and report what it prints."
-        )
-    return BAD_INPUT
+    text = " ".join(str(error).split())
+    return (
+        f"this is a bug in coverable: {type(error).__name__}: {text}\n"
+        f"Run the command again with {TRACEBACK}=1, and report what it prints."
+    )
+
+
+def _with_traceback() -> bool:
+    """Does the user want to see tracebacks?"""
+    return os.environ.get(TRACEBACK, "") not in ("", "0")
 
 
 def _say_nothing(_: sys.UnraisableHookArgs) -> None:
@@ -125,7 +128,7 @@ def run() -> NoReturn:
     Every file is closed by then. Taking numba and Pinocchio apart in order would take another third
     of a second, also after Ctrl-C.
     """
-    if os.environ.get(TRACEBACK, "") in ("", "0"):
+    if not _with_traceback():
         sys.unraisablehook = _say_nothing  # such as the half-made objects of a Ctrl-C, taken apart
     status = main()
     for stream in (sys.stdout, sys.stderr):

@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from feasibility.cli.console import tell
+from feasibility.cli.console import print_err
 from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
 
 STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
@@ -49,7 +49,7 @@ def write_text(path: str, text: str, what: str) -> None:
         FileError: the file cannot be written.
     """
     write_whole(path, lambda stream: stream.write(text.encode()))
-    tell(f"{what}: {shown_path(path)}")
+    print_err(f"{what}: {shown_path(path)}")
 
 
 def json_text(value: dict[str, Any]) -> str:

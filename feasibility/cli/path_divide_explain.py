@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from feasibility.cli.arguments import add_case, add_command, add_html, positive
-from feasibility.cli.console import say, tell
+from feasibility.cli.console import print_err, print_out
 from feasibility.cli.outputs import STATUS, json_text, write_text
 from feasibility.cli.session import open_case
 from feasibility.safe_files import shown_path
@@ -124,14 +124,14 @@ def path(args: argparse.Namespace, began: float) -> int:
             period=args.period,
         )
     if args.json:
-        say(json_text(report.as_json(found, run, limits)))
+        print_out(json_text(report.as_json(found, run, limits)))
     else:
-        say(report.as_text(found, run, limits))
+        print_out(report.as_text(found, run, limits))
     for out in args.out:
         from feasibility.results import save_trajectory
 
         save_trajectory(out, run)
-        tell(f"trajectory: {shown_path(out)}")
+        print_err(f"trajectory: {shown_path(out)}")
     if args.html is not None:
         from feasibility.viewer import view_path
 
@@ -144,16 +144,16 @@ def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: floa
     from feasibility.reports import path as report
 
     reason = f"no path over this surface is known. {verdict!r}"
-    tell(f"coverable path: {name}: {reason}")
+    print_err(f"coverable path: {name}: {reason}")
     if str(verdict.answer) == "undecided" and "time limit" in verdict.message:
-        tell("`--set search.time_limit=...` gives the search more time.")
-    tell("`coverable explain` finds what would help, `coverable divide` splits the surface.")
+        print_err("`--set search.time_limit=...` gives the search more time.")
+    print_err("`coverable explain` finds what would help, `coverable divide` splits the surface.")
     for flag, files in (("--out", args.out), ("--html", [args.html])):
         for file in files:
             if file is not None:
-                tell(f"{flag}: nothing written to {shown_path(file)}")
+                print_err(f"{flag}: nothing written to {shown_path(file)}")
     if args.json:
-        say(json_text(report.no_path_json(verdict, reason, loaded)))
+        print_out(json_text(report.no_path_json(verdict, reason, loaded)))
     return STATUS[str(verdict.answer)]
 
 
@@ -166,9 +166,9 @@ def divide(args: argparse.Namespace, began: float) -> int:
         loaded = opened.so_far()
         division = run(*opened.setup, progress=opened.progress)
     if args.json:
-        say(json_text(report.as_json(division, loaded)))
+        print_out(json_text(report.as_json(division, loaded)))
     else:
-        say(report.as_text(division, opened.case.name, loaded))
+        print_out(report.as_text(division, opened.case.name, loaded))
     if args.html is not None:
         from feasibility.viewer import view_division
 
@@ -185,9 +185,9 @@ def explain(args: argparse.Namespace, began: float) -> int:
         explanation = run(*opened.setup, progress=opened.progress)
     name = opened.case.name
     if args.json:
-        say(json_text(report.as_json(explanation, name)))
+        print_out(json_text(report.as_json(explanation, name)))
     else:
-        say(report.as_text(explanation, name))
+        print_out(report.as_text(explanation, name))
     if args.html is not None:
         write_text(args.html, _explained(explanation, name).html(), "view")
     return STATUS[str(explanation.verdict.answer)]

@@ -15,7 +15,7 @@ from feasibility.cli.arguments import (
     add_workers,
     positive,
 )
-from feasibility.cli.console import say, tell
+from feasibility.cli.console import print_err, print_out
 from feasibility.cli.outputs import STATUS, json_text, write_text
 from feasibility.cli.session import open_case
 from feasibility.safe_files import shown_path, write_whole
@@ -155,9 +155,9 @@ def _report(
     from feasibility.reports import placement as report
 
     if args.json:
-        say(json_text(report.as_json(placements, plan, chart)))
+        print_out(json_text(report.as_json(placements, plan, chart)))
     else:
-        say(report.as_text(placements, name, plan))
+        print_out(report.as_text(placements, name, plan))
     if args.csv is not None:
         write_text(args.csv, report.as_csv(placements), "table")
     if chart is not None:
@@ -166,4 +166,4 @@ def _report(
         figure = plot_map(chart, placements, title=name)
         kind = str(args.map).rsplit(".", 1)[-1].lower()
         write_whole(args.map, lambda stream: figure.savefig(stream, format=kind, dpi=150))
-        tell(f"map: {shown_path(args.map)}")
+        print_err(f"map: {shown_path(args.map)}")

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from feasibility.cli.console import Bar, progress_bar, tell
+from feasibility.cli.console import Bar, print_err, progress_bar
 from feasibility.cli.outputs import check_outputs
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ def open_case(
             setup = case.build()
         progress.settle()
         for note in setup.robot.notes:
-            tell(f"note: {setup.robot.name}: {note}")
+            print_err(f"note: {setup.robot.name}: {note}")
         for note in setup.cells.notes:
-            tell(f"note: {case.surface.label}: {note}")
+            print_err(f"note: {case.surface.label}: {note}")
         yield OpenCase(case, setup, progress, began)

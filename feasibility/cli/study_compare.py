@@ -7,7 +7,7 @@ import time
 from typing import TYPE_CHECKING
 
 from feasibility.cli.arguments import add_case, add_command, add_csv, add_html, add_workers
-from feasibility.cli.console import Bar, progress_bar, say, tell
+from feasibility.cli.console import Bar, print_err, print_out, progress_bar
 from feasibility.cli.outputs import STATUS, check_outputs, json_text, write_text
 from feasibility.safe_files import shown_path
 
@@ -68,20 +68,21 @@ def study(args: argparse.Namespace, began: float) -> int:
     outputs = {"--out": args.out, "--csv": args.csv, "--html": args.html}
     check_outputs(outputs, args.file)
     loaded = load_study(args.file)
+    stored_in = shown_path(args.out)
     with Store(args.out) as store:
         before = len(store)
         if before:
-            tell(f"{shown_path(args.out)} holds {before} finished cases; continuing from there")
+            print_err(f"{stored_in} holds {before} finished cases; continuing from there")
         try:
             with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
                 rows = run_tasks(loaded.tasks, workers, store, _with_rate(bar, "deciding cases"))
         except KeyboardInterrupt:
-            tell(f"{len(store)} cases are stored in {shown_path(args.out)}; run again to continue")
+            print_err(f"{len(store)} cases are stored in {stored_in}; run again to continue")
             raise
     if args.json:
-        say(json_text(report.as_json(loaded, rows)))
+        print_out(json_text(report.as_json(loaded, rows)))
     else:
-        say(report.as_text(loaded, rows))
+        print_out(report.as_text(loaded, rows))
     if args.csv is not None:
         write_text(args.csv, report.as_csv(loaded, rows), "table")
     if args.html is not None:
@@ -109,7 +110,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
     with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
         progress = _with_rate(bar, "comparing robots")
         found = run(case, robots, workers, critical=args.critical, progress=progress)
-    say(json_text(report.as_json(found)) if args.json else report.as_text(found))
+    print_out(json_text(report.as_json(found)) if args.json else report.as_text(found))
     if args.csv is not None:
         write_text(args.csv, report.as_csv(found), "table")
     if args.html is not None:

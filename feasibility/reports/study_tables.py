@@ -1,4 +1,4 @@
-"""What the rows of a study amount to: verdicts, causes, values by group, and the best rows."""
+"""Summaries of a study's rows: verdicts, causes, values by group, and the best rows."""
 
 from __future__ import annotations
 

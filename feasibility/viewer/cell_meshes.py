@@ -1,4 +1,4 @@
-"""What E-cells are drawn with: filled patches, borders, and marks at their centres."""
+"""Shapes for drawing E-cells: filled patches, borders, and marks at their centres."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One HTML page that holds a whole scene: the meshcat viewer, the drawing commands, a legend.
+"""One HTML page with a complete scene: the meshcat viewer, the drawing commands, a legend.
 
 Nothing is fetched from anywhere: the page works offline, from a file, and inside a saved notebook.
 The viewer's program (0.85 MB) and the commands are gzipped and unpacked by the browser.
@@ -32,7 +32,7 @@ class Entry:
 
 @dataclass(frozen=True, slots=True)
 class Legend:
-    """What the overlay says: plain text, escaped when it is written."""
+    """The text of the overlay: plain, escaped when it is written."""
 
     title: str
     text: str

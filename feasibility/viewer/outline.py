@@ -7,9 +7,7 @@ from numpy.typing import NDArray
 
 from feasibility.placement import Pose
 from feasibility.viewer.cell_meshes import patch
-from feasibility.viewer.decimated_mesh import display_mesh_of
 from surfaces import Cells, Triangles, components
-from surfaces.meshes.cells import MeshCells
 
 Array = NDArray[np.float64]
 
@@ -47,9 +45,7 @@ def placed(points: Array, pose: Pose) -> Array:
 def _triangles(cells: Cells) -> Triangles:
     """A few triangles of all cells, in the surface's frame."""
     every = np.arange(len(cells))
-    if isinstance(cells, MeshCells):
-        found = display_mesh_of(cells).fill(every, cells.centres)
-    elif len(cells.shape) > 1:
+    if len(cells.shape) > 1:
         pieces = int(np.clip(MOST // (2 * sum(cells.shape)), 1, FINEST))
         found = cells.triangles(every, pieces)
     else:

@@ -143,7 +143,7 @@ def view_study(
 
 
 def pose_of(tables: Any) -> Pose:
-    """Where the surface stands in the tables of a case."""
+    """The pose of the surface in the tables of a case."""
     surface = tables["surface"]
     return Pose.of_values([*surface.get("position", (0, 0, 0)), *surface.get("rpy_deg", (0, 0, 0))])
 

@@ -63,23 +63,13 @@ def longest_path(tree: nx.DiGraph | None, centres: NDArray[np.float64]) -> list[
 
     The length of a step is the distance between the centres (N, 3) of its two cells.
     """
-    if tree is None or tree.number_of_nodes() == 0:
+    if tree is None:
         return []
-    best: list[int] = []
-    longest = -1.0
-    for root in sorted(node for node, degree in tree.in_degree() if degree == 0):
-        length = {root: 0.0}
-        before: dict[int, int] = {}
-        for parent, child in nx.bfs_edges(tree, root):
-            length[child] = length[parent] + float(np.linalg.norm(centres[child] - centres[parent]))
-            before[child] = parent
-        leaf = max(length, key=lambda node: (length[node], -node))
-        if length[leaf] > longest:
-            longest = length[leaf]
-            best = [leaf]
-            while best[-1] in before:
-                best.append(before[best[-1]])
-    return best[::-1]
+    lengths = nx.DiGraph()
+    lengths.add_nodes_from(tree)
+    for a, b in tree.edges:
+        lengths.add_edge(a, b, weight=float(np.linalg.norm(centres[b] - centres[a])))
+    return list(nx.dag_longest_path(lengths))
 
 
 def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
@@ -107,7 +97,7 @@ def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
 def paced(robot: Robot, walk: NDArray[np.float64], there_and_back: bool, label: str) -> Motion:
     """Time a walk (m, n) so that the tool travels evenly.
 
-    Where the tool stands still and only joints move, their motion counts: 1 rad as a twentieth of
+    Where the tool point rests and only joints move, their motion counts: 1 rad as a twentieth of
     the arm's reach, so that nothing jumps.
     """
     points, _ = Kinematics(robot).tools(walk)

@@ -1,4 +1,4 @@
-"""What is drawn of the poses tried: outlines in classes, the best one in full, stations."""
+"""The parts of a picture of poses: outlines in classes, the best one in full, stations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is drawn of a verdict: surface, cells, graph G, causes, other components, and the legend.
+"""The parts of a verdict's picture: surface, cells, graph G, causes, components, legend.
 
 Everything here is plain drawing commands with plain names, so that meshcat's own scene tree can
 show and hide each part; `html_page` and `live_server` present it.

@@ -50,7 +50,7 @@ def camera_on(robot: Robot, cells: Cells, q: NDArray[np.float64], floor: float) 
     Args:
         robot: the arm.
         cells: what it works on.
-        q: (n,) where it stands.
+        q: (n,) its configuration.
         floor: m, height of the ground.
     """
     points = np.concatenate([_extent(cells), joint_points(robot, q), [[0.0, 0.0, floor]]])

@@ -3,7 +3,7 @@
     from feasibility.viewer import show
     show(verdict)
 
-The viewer stands at the edge: only other views and the commands import it.
+Nothing but other views, reports and commands imports the viewer.
 """
 
 from __future__ import annotations
