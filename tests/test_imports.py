@@ -23,7 +23,7 @@ coverable_errors
 coverable_files
 robots: errors chain reach robot kinematics
 robots.urdf
-robots: joint_selection pinocchio_model library dh
+robots: joint_selection pinocchio_model library
 surfaces: surface cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
 surfaces.patches.nurbs

@@ -3,9 +3,9 @@
 import numpy as np
 import pinocchio as pin
 import pytest
+from dh import PUMA560_ROWS, PUMA560_URDF, DHRow, Shape, dh_urdf, puma560_urdf
 
 from robots import Kinematics, load_robot
-from robots.dh import PUMA560_ROWS, PUMA560_URDF, DHRow, Shape, dh_urdf, puma560_urdf
 from robots.urdf import check_urdf
 
 A2, A3, D3, D4 = 0.7, 0.1, 0.1, 0.7

@@ -8,7 +8,7 @@ One row becomes one URDF joint about z, whose origin is that transform at theta_
 xyz = (a, -d sin(alpha), d cos(alpha)), rpy = (alpha, 0, 0). So every link frame of the URDF *is*
 the DH frame of that link, and the URDF's root link carries frame 0.
 
-`python -m robots.dh` writes `robots/puma560/puma560.urdf` anew.
+`python tests/robots/dh.py` writes `robots/puma560/puma560.urdf` anew.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from xml.sax.saxutils import quoteattr
 
 from coverable_errors import ArgumentError
 
-PUMA560_URDF = Path(__file__).with_name("puma560") / "puma560.urdf"
+PUMA560_URDF = Path(__file__).parents[2] / "robots" / "puma560" / "puma560.urdf"
 
 
 @dataclass(frozen=True, slots=True)
