@@ -21,7 +21,7 @@ from feasibility.viewer.playback import LONGEST, Motion, paced
 from feasibility.viewer.robot_meshes import tubes
 from feasibility.viewer.scene import TRAIL, Layer, cells_layers, missed_layer, patch_layers
 from feasibility.viewer.threejs import Colour
-from feasibility.viewer.viewer import View, compose
+from feasibility.viewer.viewer import View, compose, titled
 from robots import Kinematics, Robot
 
 if TYPE_CHECKING:
@@ -55,14 +55,13 @@ def view_path(
         motion = _timed(robot, trajectory)
         speed = f"{trajectory.duration:.1f} s"
     strokes, tracks = _strokes(motion, 0.06 * cell_size(cells))
-    title = f"{case}: " if case else ""
     again = f", {figures.revisited:.2g} m of it revisited" if figures.revisited > 0.0 else ""
     text = (
         f"{robot.name}: {int(path.needed.sum())} cells in order {path.order}, "
         f"{figures.length:.2f} m{again}, {speed}"
     )
     return compose(
-        robot, cells, f"{title}coverage path", text, [*cells_layers(cells), strokes], motion,
+        robot, cells, titled("coverage path", case), text, [*cells_layers(cells), strokes], motion,
         resting=path.walk.q[0], tracks=tracks,
     )  # fmt: skip
 
@@ -89,12 +88,12 @@ def view_division(division: Division, case: str | None = None) -> View:
                 _move(robot, move.start, move.end, f"{k + 1} to {k + 2}", cell_size(cells))
             )
     number = len(plan.patches)
-    title = f"{case}: " if case else ""
+    title = f"{number} patch{'' if number == 1 else 'es'}"
     text = f"{robot.name}: {division.n_covered} of {len(cells)} cells; " + "; ".join(
         f"move {k + 1} to {k + 2}: {move.described(FEW)}" for k, move in enumerate(plan.moves)
     )
     return compose(
-        robot, cells, f"{title}{number} patch{'' if number == 1 else 'es'}", text.rstrip("; "),
+        robot, cells, titled(title, case), text.rstrip("; "),
         parts, motion, resting=walks[0][0] if walks else robot_visuals.home(robot),
     )  # fmt: skip
 

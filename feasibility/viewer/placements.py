@@ -34,7 +34,7 @@ from feasibility.viewer.pose_layers import (
 )
 from feasibility.viewer.scene import Layer, cells_layers, counted
 from feasibility.viewer.stage import framing, joint_points
-from feasibility.viewer.viewer import View, compose
+from feasibility.viewer.viewer import View, compose, titled
 from robots import Robot
 from surfaces import Cells
 
@@ -84,8 +84,7 @@ def view_placements(
         Tried(trial.pose, class_of_trial(trial), trial.covers[0] if len(trial.covers) else None)
         for trial in trials
     ]
-    title = f"{case}: " if case else ""
-    title += f"placements, {placements.answer} ({placements.evidence})"
+    title = titled(f"placements, {placements.answer} ({placements.evidence})", case)
     text, stations = _found_text(placements, trials), []
     if plan is not None:
         layers = station_layers(placements.cells, plan)
@@ -138,7 +137,7 @@ def view_study(
     if len(drawn) < len(rows):
         text = f"{len(drawn)} of {text}"
         text += "; those that differ from the best one in more than the pose are not drawn"
-    title = (f"{name}: " if name else "") + "poses of the surface"
+    title = titled("poses of the surface", name)
     return _view(setup, tried, title, text, [], Playing(progress, play, at))
 
 

@@ -136,23 +136,23 @@ def track(
         values: one row per time.
     """
     kind = "quaternion" if name == "quaternion" else "vector3"
-    keys = {
-        "name": f".{name}",
-        "type": kind,
-        "times": _packed(times, "float32"),
-        "values": _packed(values, "float32"),
-    }
-    return {"path": path, "clip": {"fps": 1, "name": "default", "tracks": [keys]}}
+    return _clip(path, name, kind, times, _packed(values, "float32"))
 
 
 def appearing(path: str, when: float, end: float) -> dict[str, Any]:
     """What is at `path` hidden until `when` (s), and shown from then to `end`."""
+    return _clip(
+        path, "visible", "bool", np.array([0.0, when, max(end, when)]), [False, True, True]
+    )
+
+
+def _clip(
+    path: str, name: str, kind: str, times: NDArray[np.float64], values: Any
+) -> dict[str, Any]:
+    """One track of key frames."""
     keys = {
-        "name": ".visible",
-        "type": "bool",
-        "times": _packed(np.array([0.0, when, max(end, when)]), "float32"),
-        "values": [False, True, True],
-    }
+        "name": f".{name}", "type": kind, "times": _packed(times, "float32"), "values": values
+    }  # fmt: skip
     return {"path": path, "clip": {"fps": 1, "name": "default", "tracks": [keys]}}
 
 

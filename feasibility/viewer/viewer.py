@@ -95,8 +95,9 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     return compose(
         verdict.robot,
         verdict.cells,
-        _title(verdict, case),
-        _text(verdict),
+        titled(f"{verdict.answer} ({verdict.evidence})", case),
+        f"{verdict.robot.name}: {verdict.n_covered} of {len(verdict.cells)} cells in one "
+        f"continuous motion ({verdict.method} search)",
         parts,
         motion,
         resting=_resting(verdict),
@@ -188,26 +189,15 @@ def _in_notebook() -> bool:
     return getattr(shell, "kernel", None) is not None
 
 
-def _title(verdict: Verdict, case: str | None) -> str:
-    """The case and its answer."""
-    name = f"{case}: " if case else ""
-    return f"{name}{verdict.answer} ({verdict.evidence})"
-
-
-def _text(verdict: Verdict) -> str:
-    """Arm, surface, and how much is covered."""
-    return (
-        f"{verdict.robot.name}: {verdict.n_covered} of {len(verdict.cells)} cells in one "
-        f"continuous motion ({verdict.method} search)"
-    )
+def titled(title: str, case: str | None) -> str:
+    """A title with the name of the case, where it has one."""
+    return f"{case}: {title}" if case else title
 
 
 def _resting(verdict: Verdict) -> NDArray[np.float64]:
     """A configuration for an arm that does not move: over the start cell if one is known."""
-    known = [q for _, q in sorted(verdict.graph.nodes(data="q")) if q is not None]
-    if verdict.start is not None and verdict.start in verdict.graph:
-        known = [verdict.graph.nodes[verdict.start].get("q"), *known]
-    for q in known:
+    nodes = verdict.graph.nodes(data="q")
+    for _, q in sorted(nodes, key=lambda node: (node[0] != verdict.start, node[0])):
         if q is not None:
             return np.asarray(q, dtype=float)
     return robot_visuals.home(verdict.robot)

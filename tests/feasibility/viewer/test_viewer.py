@@ -374,7 +374,7 @@ def test_a_script_waits_until_it_is_interrupted(feasible, monkeypatch):
     monkeypatch.delattr(sys, "ps1", raising=False)
     live = show(feasible)
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", live.port), timeout=5)
+        socket.create_connection(("127.0.0.1", live.port), timeout=120)
 
 
 if BROWSER is not None:  # the data of the scene is tested above, with and without one
@@ -391,7 +391,7 @@ if BROWSER is not None:  # the data of the scene is tested above, with and witho
                 f"--user-data-dir={tmp_path / 'profile'}", "--window-size=700,500",
                 f"--screenshot={picture}", page.as_uri(),
             ],
-            check=True, capture_output=True, timeout=120,
+            check=True, capture_output=True, timeout=300,
         )  # fmt: skip
         with Image.open(picture) as image:
             pixels = np.asarray(image.convert("RGB"), dtype=int)[:, 250:]  # beside the legend
