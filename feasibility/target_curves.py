@@ -162,6 +162,11 @@ def target_curves(cells: Cells, standoff: float, tolerance: float) -> TargetCurv
 
 def blocked_curves(cells: Cells, task: Task) -> str:
     """Why no motion can be certified between some neighbouring cells; empty where it can."""
+    if not task.cone_chord > 0.0:
+        return (
+            "A cone of 0 degrees leaves a motion no margin between samples, so none can be "
+            "certified; allow a small angle."
+        )
     tolerance = task.effective_tolerance
     ways = target_curves(cells, task.standoff, tolerance)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"

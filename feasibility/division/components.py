@@ -1,10 +1,9 @@
-"""More components than a verdict needs: improving what a division is made of.
+"""Components for a division: those that fill the gaps of the others.
 
-The search for a verdict works on its largest components. A division needs those that fill the gaps
-of the others, so further rounds work on the components that the present best cover uses: cells that
-only some of them reach are seeded, their borders are stirred, and where two meet they may join. A
-round has gained something when the cover has fewer components, or one of them covers more. Some
-rounds in a row without gain end it.
+The search for a verdict works on its largest components. A division goes on with the components
+that the best cover of all reached cells uses: cells that only some of them reach are seeded, and
+each two of them may join. A round has gained something when the cover has fewer components, or one
+of them covers more. Some rounds in a row without gain end it.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.division.set_covering import set_cover
-from feasibility.roadmap import Exploration, root_of
+from feasibility.roadmap import Exploration, improve
 
 DRY_ROUNDS = 10  # rounds without gain after which components are taken as they are
 MOST_ROUNDS = 60
@@ -29,19 +28,19 @@ def cover_table(exploration: Exploration) -> tuple[list[int], NDArray[np.bool_]]
     return roots, exploration.roadmap.cover[roots].astype(bool)
 
 
-def gather(exploration: Exploration) -> None:
+def collect_components(exploration: Exploration) -> None:
     """Improve the components that the best cover uses, until some rounds in a row gain nothing.
 
     Raises:
-        OutOfTime: the deadline passed; what was found until then stands.
+        OutOfTime: the deadline passed; what was found until then is kept.
     """
     dry, before = 0, (0, 0, 0)
     for _ in range(MOST_ROUNDS):
         chosen = _chosen(exploration)
         sizes = sum(int(exploration.roadmap.size[root]) for root in chosen)
-        standing = (int(exploration.reached.sum()), -len(chosen), sizes)
-        dry = dry + 1 if standing == before else 0
-        before = standing
+        state = (int(exploration.reached.sum()), -len(chosen), sizes)
+        dry = dry + 1 if state == before else 0
+        before = state
         if len(chosen) < 2 or dry >= DRY_ROUNDS:
             return
         _round(exploration, chosen)
@@ -56,28 +55,13 @@ def _chosen(exploration: Exploration) -> list[int]:
 
 
 def _round(exploration: Exploration, chosen: list[int]) -> None:
-    """Seed cells that few of the components reach, stir their borders, join where they meet."""
+    """One round: seed a cell that few of the components reach, and improve some of them."""
     rng = exploration.rng
     exploration.tick("looking for components that cover more")
     counts = exploration.roadmap.cover[chosen].sum(axis=0)
     rare = np.flatnonzero(exploration.reached & (counts < len(chosen)))
     exploration.add_seeds(int(rng.choice(rare)), exploration.guesses(SEEDS))
-    some = rng.permutation(chosen)[:TOP].tolist()
-    for component in some:
-        exploration.tick("stirring the borders of components")
-        border = exploration.border(component)
-        if len(border):
-            exploration.explore_self_motions(int(rng.choice(border)))
-    for a in range(len(some)):
-        for b in range(a):
-            one, other = (int(root_of(exploration.roadmap, some[k])) for k in (a, b))
-            if one == other or (len(some) > 3 and rng.random() > 0.3):
-                continue
-            exploration.tick("joining components where they meet")
-            exploration.bridge(one, other)
-            shared = np.flatnonzero(exploration.covers(one) & exploration.covers(other))
-            if len(shared):
-                exploration.explore_self_motions(int(rng.choice(shared)))
+    improve(exploration, rng.permutation(chosen)[:TOP].tolist())
 
 
 def connect_pairs(exploration: Exploration, component: int, wanted: NDArray[np.bool_]) -> None:

@@ -38,11 +38,11 @@ def connected_cover(covers: Bools, pairs: Ints, deadline: float = np.inf) -> Lab
     Args:
         covers: (K, N) True where component k covers cell c.
         pairs: (M, 2) cells that touch.
-        deadline: `time.monotonic()` at which to stop with what there is.
+        deadline: `time.monotonic()` at which to stop with the best so far.
     """
     label = np.full(covers.shape[1], -1, dtype=np.int64)
     inside = np.where(covers.any(axis=0), 0, -1)
-    part = pieces_of(inside, pairs)  # what does not touch is a question of its own
+    part = pieces_of(inside, pairs)  # parts that do not touch are independent
     pieces = bound = 0
     for k in range(part.max(initial=-1) + 1):
         cells = np.flatnonzero(part == k)
@@ -75,7 +75,7 @@ def _one_part(covers: Bools, pairs: Ints, deadline: float) -> Labels:
 
 
 def _choices(regions: Bools, least: tuple[int, ...]) -> Iterator[Ints]:
-    """Regions to grow patches of, in the order in which they get their way.
+    """Regions to grow patches of, in the order of their priority.
 
     First the regions of a least set cover in several orders, then other covers: all regions,
     thrown out one by one in random order where the rest still covers everything.
@@ -115,7 +115,7 @@ def _regions(covers: Bools, pairs: Ints) -> tuple[Bools, Ints]:
 def _grow(regions: Bools, neighbours: Lists) -> Ints:
     """(N,) labels (rows of `regions`) grown from the cells that have no choice.
 
-    Label by label, a patch in several pieces is joined by shortest ways through cells that are
+    Label by label, a patch in several pieces is joined by shortest paths through cells that are
     still free; then all patches grow at the same speed. What no patch can grow into becomes a patch
     of its own.
     """
@@ -141,7 +141,7 @@ def _grow(regions: Bools, neighbours: Lists) -> Ints:
 
 
 def _bridge(label: Ints, k: int, region: Bools, neighbours: Lists) -> None:
-    """Join the pieces of label k by shortest ways through free cells of its region."""
+    """Join the pieces of label k by shortest paths through free cells of its region."""
     own = np.flatnonzero(label == k).tolist()
     if not own:
         return

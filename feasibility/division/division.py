@@ -28,7 +28,7 @@ class SubPatch:
     """Connected pieces of the surface that the cells make; the motion leads from one to the next
     over cells of other patches."""
     walk: Walk
-    """One continuous motion over these cells; on its way it may cross others."""
+    """One continuous motion over these cells; it may cross other cells."""
     certificate: Certificate
     """What the independent replay measured along the walk."""
     refusal: str
@@ -76,7 +76,7 @@ class Plan:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Division:
-    """A surface divided into the fewest patches; see `feasibility.dividing.divide`."""
+    """A surface divided into the fewest patches; see `feasibility.division.divide`."""
 
     robot: Robot
     cells: Cells
@@ -90,7 +90,7 @@ class Division:
     left_out: tuple[Cause, ...]
     """Cells that are in no patch, in order of index, and why."""
     unsettled: NDArray[np.int64]
-    """Cells that are in no patch because the time limit ran out before anything could be said."""
+    """Cells that are in no patch because the time limit ran out before they were decided."""
     ended: bool
     """Did the search run to its end, free to move everywhere? Otherwise the patches are the fewest
     known: a time limit struck, or no motion can be certified over a part of the surface."""

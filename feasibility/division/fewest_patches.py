@@ -1,24 +1,35 @@
-"""How a surface is divided: `divide` gathers components, shares the cells out, and walks them."""
+"""How a surface is divided: `divide` collects components, shares the cells out, and walks them."""
 
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock, OutOfTime
+from feasibility.division.components import collect_components
 from feasibility.division.division import Division, Plan
+from feasibility.division.plans import plans
+from feasibility.notices import compiling_notice
+from feasibility.roadmap import (
+    Exploration,
+    Ruling,
+    SearchArrays,
+    arrays_of,
+    causes_of,
+    diagnose,
+    disconnected,
+    explore,
+    warm_up,
+)
 from feasibility.search import Progress, Search
+from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause
 from robots import Robot
 from surfaces import Cells
-
-if TYPE_CHECKING:
-    from feasibility.roadmap import Exploration
 
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
@@ -62,21 +73,16 @@ def divide(
             f"a division needs search.method 'complete', got {search.method!r}: the greedy search "
             "keeps one tree of motions, not all components"
         )
-    from feasibility.notices import compiling_notice
-    from feasibility.roadmap import warm_up
-
     called = time.monotonic()
     with compiling_notice():
-        from feasibility.division.plans import plans
-
         warm_up()
     began = time.monotonic()
     exploration, ended = _searched(robot, cells, task, search, progress)
     searched = time.monotonic()
-    blocked = _no_room(exploration) if len(cells) else ""
+    folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
+    blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
     nothing = Plan((), (), 0)
     fewest, connected = (nothing, nothing) if blocked else plans(exploration, task)
-    folded = bool(_folds(exploration).any())
     missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
     causes = _causes(exploration, missing, ended)
     return Division(
@@ -90,8 +96,19 @@ def divide(
         unsettled=np.setdiff1d(missing, [cause.cell for cause in causes]),
         ended=ended and not blocked and not folded,
         message=blocked or _message(fewest, connected, len(missing), len(cells), ended, folded),
-        timing=_timing(called, began, searched),
-        statistics=_statistics(exploration),
+        timing={
+            "load_s": began - called,
+            "search_s": searched - began,
+            "divide_s": time.monotonic() - searched,
+            "total_s": time.monotonic() - called,
+        },
+        statistics={
+            "fk": int(exploration.work.counts[0]),
+            "nodes": int(exploration.roadmap.counters[0]),
+            "components": len(exploration.roots()),
+            "boxes": exploration.boxes,
+            "rounds": exploration.rounds,
+        },
     )
 
 
@@ -99,48 +116,21 @@ def _searched(
     robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
 ) -> tuple[Exploration, bool]:
     """The search with all components that it found, and whether it ran to its end."""
-    from feasibility.division.components import gather
-    from feasibility.roadmap import Exploration, arrays_of, explore
-
     clock = Clock(search.time_limit, progress).start()
     arrays = arrays_of(robot, cells, task)
     exploration = Exploration(robot, cells, arrays, search.seed, clock)
     ended = True
     try:
         explore(exploration)
-        gather(exploration)
+        collect_components(exploration)
     except OutOfTime:
         ended = False
     exploration.clock = Clock()
     return exploration, ended
 
 
-def _timing(called: float, began: float, searched: float) -> dict[str, float]:
-    """Seconds from the three times until now."""
-    done = time.monotonic()
-    return {
-        "load_s": began - called,
-        "search_s": searched - began,
-        "divide_s": done - searched,
-        "total_s": done - called,
-    }
-
-
-def _statistics(exploration: Exploration) -> dict[str, int]:
-    """Counts of the work done."""
-    return {
-        "fk": int(exploration.work.counts[0]),
-        "nodes": int(exploration.roadmap.counters[0]),
-        "components": len(exploration.roots()),
-        "boxes": exploration.boxes,
-        "rounds": exploration.rounds,
-    }
-
-
 def _causes(exploration: Exploration, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
     """Why cells are in no patch; of a search that did not end, only what is proved."""
-    from feasibility.roadmap import Ruling, causes_of, diagnose, disconnected
-
     if not ended:
         proved = [c for c in missing.tolist() if exploration.rulings.get(c) is Ruling.PROVED]
         return tuple(diagnose(exploration, cell) for cell in proved[:MOST_EXPLAINED])
@@ -151,33 +141,12 @@ def _causes(exploration: Exploration, missing: NDArray[np.int64], ended: bool) -
     )
 
 
-def _no_room(exploration: Exploration) -> str:
-    """Why no motion at all can be certified; empty where one can."""
-    problem = exploration.arrays
-    if not problem.cone_chord > 0.0:
-        return (
-            "A cone of 0 degrees leaves a motion no room between samples, so none can be "
-            "certified; allow a small angle."
-        )
-    if len(problem.derivative_bounds) and _folds(exploration).all():
-        return (
-            "The offset surface folds: the standoff reaches the surface's radius of curvature on "
-            "its hollow side, so no motion can be certified; use a smaller standoff."
-        )
-    if (
-        len(problem.deviations)
-        and (problem.deviations >= (problem.tolerance, problem.cone_chord)).any(axis=1).all()
-    ):
-        return (
-            "The surface is rougher than the task allows, so no motion can be certified; use a "
-            "finer or smoother mesh, a larger tolerance or a wider cone."
-        )
-    return ""
-
-
-def _folds(exploration: Exploration) -> NDArray[np.bool_]:
-    """Ways from cell to cell on which the offset surface folds, so that no motion follows them."""
-    return np.asarray(np.isinf(exploration.arrays.derivative_bounds).any(axis=1), dtype=bool)
+def _no_motion(arrays: SearchArrays) -> bool:
+    """Can no motion at all be certified?"""
+    folds = np.isinf(arrays.derivative_bounds).any(axis=1)
+    rough = (arrays.deviations >= (arrays.tolerance, arrays.cone_chord)).any(axis=1)
+    nowhere = any(np.size(places) > 0 and np.all(places) for places in (folds, rough))
+    return nowhere or not arrays.cone_chord > 0.0
 
 
 def _message(

@@ -148,7 +148,7 @@ def _orders(largest: Floats, own: Sequence[Ints]) -> list[tuple[int, ...]]:
         largest: (S, S) see `_Costs`.
         own: the options of each patch.
     """
-    if len(own) <= MOST_EXACT:  # of two opposite orders one will do: walks go either way
+    if len(own) <= MOST_EXACT:  # of two opposite orders one will do: walks can be reversed
         return [order for order in permutations(range(len(own))) if order[0] >= order[-1]]
     apart = np.array([[largest[np.ix_(a, b)].min() for b in own] for a in own])
     return [tuple(improved(apart, np.arange(len(own))).tolist())]

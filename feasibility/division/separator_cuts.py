@@ -13,7 +13,7 @@ programming", 2017). Each optimum on the way is a lower bound and its labels are
 stopping at any time leaves an honest gap.
 
 Two things keep it small. Cells that have no choice and touch are one node. And the root of a patch
-is its first node, which leaves one way to root it out of many.
+is its first node, which leaves one of many equal choices.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def fewest_labels(regions: Bools, pairs: Ints, known: Labels, deadline: float) -
         regions: (L, N) True where region l holds cell c; every cell is in some region.
         pairs: (M, 2) cells that touch.
         known: labels to be improved on, with a lower bound.
-        deadline: `time.monotonic()` at which to stop with what there is.
+        deadline: `time.monotonic()` at which to stop with the best so far.
 
     Returns:
         The best labels found; their number and the bound agree where the optimum is proved.
@@ -171,7 +171,7 @@ def _links(node: Ints, count: int, pairs: Ints) -> Lists:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Solution:
-    """What HiGHS says of the programme with the separators that it has so far."""
+    """A solution by HiGHS of the programme with the separators added so far."""
 
     label: Ints | None
     """(n,) label of each node; None where there is no solution, or none was found in time."""

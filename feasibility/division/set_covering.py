@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 
-ROUNDING = 1e-6  # how far HiGHS's numbers may be off a whole one
+ROUNDING = 1e-6  # by how much HiGHS's numbers may differ from integers
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,13 +85,13 @@ def _solved(table: NDArray[np.bool_], time_limit: float) -> tuple[list[int], int
     if found.x is None:
         return greedy, bound
     rows = np.flatnonzero(found.x > 0.5).tolist()
-    # The solver's word is checked: rounding must not lose an element.
+    # The solver's rows are checked: rounding must not lose an element.
     valid = bool(table[rows].any(axis=0).all()) and len(rows) < len(greedy)
     return (rows if valid else greedy), bound
 
 
 def lower_bound(value: float | None) -> int:
-    """The least whole number that a solver's dual bound allows; 1 where it gave none."""
+    """The least integer that a solver's dual bound allows; 1 where it gave none."""
     if value is None or not math.isfinite(value):
         return 1
     return max(1, math.ceil(value - ROUNDING))

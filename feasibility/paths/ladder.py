@@ -9,6 +9,7 @@ leads on, over cells that are then visited again.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -39,6 +40,11 @@ class _State:
     """Nodes from the last state on, the last one is `node`."""
     before: _State | None
 
+    @property
+    def onward(self) -> tuple[int, ...]:
+        """The node of the last state, and `nodes`."""
+        return self.nodes if self.before is None else (self.before.node, *self.nodes)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class JointRoute:
@@ -46,10 +52,8 @@ class JointRoute:
 
     graph: MotionGraph
     nodes: list[int]
-    length: float
-    """m, straight from centre to centre."""
     revisited: float
-    """m, the part of it that leads to cells visited before."""
+    """m, straight from centre to centre, of the part that leads to cells visited before."""
     travel: float
     """rad, length of the motion in joint space."""
     stuck: list[int]
@@ -75,7 +79,7 @@ def joint_route(
         most_revisited: m, of more than this the path is given up.
 
     Returns:
-        The motion; without nodes and of infinite length where it was given up.
+        The motion; without nodes and with infinite figures where it was given up.
 
     Raises:
         PathError: no configuration over a cell is known, or no motion leads there.
@@ -103,35 +107,25 @@ def joint_route(
             raise PathError(
                 f"no known motion leads from cell {list(here)} to {_names(cells, [cell])}"
             )
-        again += _revisited(graph, cells, detour, seen)
+        again += _revisited(graph, cells, detour.onward, seen)
         if again > most_revisited:
-            return JointRoute(graph, [], math.inf, math.inf, math.inf, stuck)
+            return JointRoute(graph, [], math.inf, math.inf, stuck)
         seen.update(graph.cell[x] for x in detour.nodes)
         states = [detour]
-    return measured(graph, cells, _unrolled(min(states, key=lambda state: state.cost)), stuck)
+    nodes = _unrolled(min(states, key=lambda state: state.cost))
+    travel = sum(graph.length(x, y) for x, y in pairwise(nodes))
+    return JointRoute(graph, nodes, _revisited(graph, cells, nodes), travel, stuck)
 
 
-def measured(graph: MotionGraph, cells: Cells, nodes: list[int], stuck: list[int]) -> JointRoute:
-    """A motion from node to node with its lengths."""
-    seen = {graph.cell[nodes[0]]}
-    length = revisited = travel = 0.0
-    for x, y in pairwise(nodes):
-        away = float(np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]]))
-        length += away
-        revisited += away if graph.cell[y] in seen else 0.0
-        travel += graph.length(x, y)
-        seen.add(graph.cell[y])
-    return JointRoute(graph, nodes, length, revisited, travel, stuck)
-
-
-def _revisited(graph: MotionGraph, cells: Cells, detour: _State, seen: set[int]) -> float:
-    """m, how much of a detour leads to cells visited before."""
-    nodes = list(detour.nodes) if detour.before is None else [detour.before.node, *detour.nodes]
-    known, total = set(seen), 0.0
+def _revisited(
+    graph: MotionGraph, cells: Cells, nodes: Sequence[int], seen: Iterable[int] = ()
+) -> float:
+    """m, straight from centre to centre, how much of a motion leads to cells visited before."""
+    known, total = {graph.cell[nodes[0]], *seen}, 0.0
     for x, y in pairwise(nodes):
         if graph.cell[y] in known:
-            away = cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]]
-            total += float(np.linalg.norm(away))
+            step = cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]]
+            total += float(np.linalg.norm(step))
         known.add(graph.cell[y])
     return total
 

@@ -15,7 +15,7 @@ from feasibility.verdict import Certificate, Walk
 from robots import Kinematics, Robot
 from surfaces import Cells
 
-BETWEEN = 4  # places along each straight line of joints at which the tool point is asked for
+BETWEEN = 4  # places along each straight line of joints at which the tool point is computed
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -31,7 +31,7 @@ class PathFigures:
     travel: NDArray[np.float64]
     """(n,) rad or m, travel of each joint, back and forth."""
     turn_margin: float
-    """rad, smallest distance of a turning joint from its limits; inf without such limits."""
+    """rad, smallest distance of a revolute joint from its limits; inf without such limits."""
     slide_margin: float
     """m, the same for sliding joints."""
     cone_margin: float

@@ -31,7 +31,7 @@ TIE = 1e-9  # [1], share of a length below which two lengths are alike
 
 
 class PathError(CoverableError):
-    """A path or a trajectory that cannot be made as asked: why, and what would do."""
+    """A path or a trajectory that cannot be made: why, and what can be done instead."""
 
 
 def grid_order(

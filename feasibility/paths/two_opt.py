@@ -40,7 +40,7 @@ def improved(distance: NDArray[np.float64], tour: NDArray[np.int64]) -> NDArray[
 
 
 @kernel
-def _improve(distance, tour, room, gain, sweeps):  # type: ignore[no-untyped-def]
+def _improve(distance, tour, former, gain, sweeps):  # type: ignore[no-untyped-def]
     """Sweep over all changes, taking each that gains, until a sweep finds none."""
     n = tour.shape[0]
     for _ in range(sweeps):
@@ -52,7 +52,7 @@ def _improve(distance, tour, room, gain, sweeps):  # type: ignore[no-untyped-def
                     found = True
         for size in range(1, min(LONGEST_PART, n - 2) + 1):
             for i in range(n - size + 1):
-                if _move(distance, tour, room, i, size, gain):
+                if _move(distance, tour, former, i, size, gain):
                     found = True
         if not found:
             return
@@ -83,7 +83,7 @@ def _turn(tour, i, j):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _move(distance, tour, room, i, size, gain):  # type: ignore[no-untyped-def]
+def _move(distance, tour, former, i, size, gain):  # type: ignore[no-untyped-def]
     """Put the places i .. i + size - 1 where that gains most, either way round."""
     n = tour.shape[0]
     last = i + size - 1
@@ -110,14 +110,14 @@ def _move(distance, tour, room, i, size, gain):  # type: ignore[no-untyped-def]
         return False
     if around:
         _turn(tour, i, last)
-    put(room, tour)
+    put(former, tour)
     row = 0
     for k in range(n - size + 1):
         if k == before:
             for part in range(size):
-                tour[row] = room[i + part]
+                tour[row] = former[i + part]
                 row += 1
         if k < n - size:
-            tour[row] = room[k if k < i else k + size]
+            tour[row] = former[k if k < i else k + size]
             row += 1
     return True

@@ -108,11 +108,6 @@ def _unfinished(problem: Problem, exploration: Exploration, in_time: bool) -> st
             f"The time limit ran out; the best single motion so far covers "
             f"{int(exploration.covered.sum())} of {len(problem.cells)} cells."
         )
-    if not exploration.arrays.cone_chord > 0.0:
-        return (
-            "A cone of 0 degrees leaves a motion no margin between samples, so none can be "
-            "certified; allow a small angle."
-        )
     return blocked_curves(problem.cells, problem.task)
 
 

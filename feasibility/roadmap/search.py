@@ -131,11 +131,16 @@ def _standing(exploration: Exploration) -> tuple[int, ...]:
 
 
 def _round(exploration: Exploration, top: list[int]) -> None:
-    """One round: seed what the best component misses, stir borders and meeting places."""
-    rng = exploration.rng
+    """One round: seed what the best component misses, and improve the largest ones."""
     missed = np.flatnonzero(~exploration.covered & exploration.reached)
     if len(missed):
-        exploration.add_seeds(int(rng.choice(missed)), exploration.guesses(SEEDS))
+        exploration.add_seeds(int(exploration.rng.choice(missed)), exploration.guesses(SEEDS))
+    improve(exploration, top)
+
+
+def improve(exploration: Exploration, components: list[int]) -> None:
+    """Explore self-motions at the borders of some components, and bridge each two of them."""
+    rng, top = exploration.rng, components
     for component in top:
         if exploration.complete:
             return

@@ -63,7 +63,7 @@ def halved(points: Array) -> Array:
 
 
 def closely(points: Array) -> Array:
-    """Coefficients after some halvings: what they range over is hardly more than the values."""
+    """Coefficients after some halvings: their range is hardly wider than that of the values."""
     for _ in range(HALVINGS):
         points = halved(points)
     return points
@@ -109,7 +109,7 @@ def used(robot: Robot, run: Trajectory, limits: MotionLimits) -> Used:
 
     Args:
         robot: the arm.
-        run: the samples; a single one stands still.
+        run: the samples; a single one is an arm at rest.
         limits: of joints and tool.
     """
     if len(run) < 2:

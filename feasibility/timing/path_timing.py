@@ -5,9 +5,9 @@ along it that velocities, accelerations and the tool's speed allow (`timed_curve
 limits hold along the curve.
 
 A controller sees its samples only, and puts quintics or cubics through them (`interpolation`). The
-fastest way along a curve jumps from one acceleration to another, and these swing past both. So the
-joints that would be over a limit then are given less, the way along the curve is sought again, and
-the little that is left is mended by running slower. The samples at last are replayed like any
+fastest timing of a curve jumps from one acceleration to another, and these swing past both. So the
+joints that would exceed a limit then are given less, the curve is timed again, and the little that
+is left is mended by running slower. The samples at last are replayed like any
 witness: as a motion of straight lines, of quintics and of cubics.
 """
 
@@ -37,12 +37,12 @@ Array = NDArray[np.float64]
 
 DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
-SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be asked for
+SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be requested
 FINER = 4  # times that the period may be halved
 AT_LIMIT = 1e-6  # [rad] or [m] that interpolation may add where a path runs along a joint's limit
-ROUNDS = 3  # ways along a curve that are sought, each with less for joints that were over
+ROUNDS = 3  # timings of a curve, each with less for joints that exceeded a limit
 PARTS = (1.0, 0.95, 0.91, 0.86)  # [1] of a period: where samples lie between jumps is chance
-SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing down as a whole
+SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing all of it down
 SLOWINGS = 8  # times that the last of them is slowed down a little; and then as much as it needs
 SMALL = 1.004  # [1] times that this is slower
 RESERVE = 1e-3  # [1] share of all limits that is left free
@@ -64,7 +64,7 @@ def trajectory(
         velocity: rad/s or m/s, of all joints or (n,) of each; the URDF's limits by default.
         acceleration: rad/s^2 or m/s^2, of all joints or (n,) of each; by default what takes a joint
             to its largest velocity in half a second.
-        period: s between samples; a sample more stands where a cell's centre is passed. It is
+        period: s between samples; one more is taken where a cell's centre is passed. It is
             halved where the motion between samples would leave the tolerance.
 
     Returns:
@@ -90,7 +90,7 @@ def trajectory(
     if not SHORTEST <= number(period) <= LONGEST:
         raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
     if len(np.unique(path.walk.q, axis=0)) == 1:
-        return _standing(robot, path.walk)
+        return _at_rest(robot, path.walk)
     curve, refusal = blended(robot, cells, task, path.walk), ""
     for _ in range(FINER + 1):
         run = within_limits(robot, curve, limits, period)
@@ -105,7 +105,7 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
     """Samples of a curve that keep to the limits however they are interpolated.
 
     Raises:
-        PathError: no such way to run it was found.
+        PathError: no such timing was found.
     """
     less, share = 1.0 - RESERVE, np.ones(robot.n)
     for _ in range(ROUNDS):
@@ -132,7 +132,7 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
 
 
 def _refusal(path: CoveragePath, run: Trajectory) -> str:
-    """Why the samples will not do, as straight lines or interpolated; empty where they will."""
+    """Why the samples are refused, as straight lines or interpolated; empty if they are not."""
     robot, cells, task = path.robot, path.cells, path.task
     past = past_limits(robot, run)
     if past > AT_LIMIT:
@@ -146,8 +146,8 @@ def _refusal(path: CoveragePath, run: Trajectory) -> str:
     return ""
 
 
-def _standing(robot: Robot, walk: Walk) -> Trajectory:
-    """The trajectory of a motion that stands still: one sample."""
+def _at_rest(robot: Robot, walk: Walk) -> Trajectory:
+    """The trajectory of an arm at rest: one sample."""
     q, nothing = walk.q[:1], np.zeros((1, robot.n))
     return Trajectory(
         joint_names=robot.joint_names, time=np.zeros(1), q=q, dq=nothing, ddq=nothing,

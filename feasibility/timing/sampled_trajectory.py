@@ -83,7 +83,7 @@ class Trajectory:
 
     @property
     def tool_way(self) -> float:
-        """m, way of the tool point, from its speed at the samples (trapezoidal rule)."""
+        """m, length of the tool point's path, from its speed at the samples (trapezoidal rule)."""
         return float(np.trapezoid(self.tool_speed, self.time))
 
     @property

@@ -9,7 +9,7 @@ one control point on either side of it. So
 
 How near the neighbours may be is found by replays: each turn begins as wide as its lines allow, and
 is made sharper until the independent replay accepts the curve from cell to cell. A turn at a cell's
-centre must leave the tool point within the tolerance of its target, because the replay says so.
+centre must leave the tool point within the tolerance of its target, which the replay checks.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def control_points(walk: Walk, shares: Array) -> Curve:
 def graded(first: float, last: float) -> Array:
     """Places in 0..1 from `first` to 1 - `last`, whose gaps grow from both ends by `GROWTH`.
 
-    In the middle, where what is left is shared out, two gaps may differ by twice that.
+    In the middle, where the rest is shared out, two gaps may differ by twice that.
 
     Example:
         >>> graded(0.5, 0.5).tolist(), graded(0.125, 0.5).tolist()
@@ -148,7 +148,7 @@ def blended(robot: Robot, cells: Cells, task: Task, walk: Walk) -> Curve:
         fault = str(list(cells.unravel(int(thin.cell[thin.cell >= 0][where]))))
     raise PathError(
         f"no smooth motion was found that the replay accepts from cell {fault} on, however sharply "
-        "it turns; a larger tolerance or a wider cone leaves it more room"
+        "it turns; use a larger tolerance or a wider cone"
     )
 
 

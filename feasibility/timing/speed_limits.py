@@ -21,7 +21,7 @@ from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
 
-ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, where nothing is said
+ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, by default
 LOOSE = 0.02  # [1] share by which the bound on the tool's speed may be too careful
 FEWEST, FINEST = 2, 12  # places of the grid on one piece
 MOST = 1e6  # [rad/s], [m/s] or their acceleration; more is no limit, and refused
@@ -121,9 +121,9 @@ def _per_joint(robot: Robot, name: str, unit: str, value: ArrayLike | None) -> t
 
 
 def fine_grid(robot: Robot, spline: BSpline, pieces: int) -> Array:
-    """Places 0 .. pieces of a curve, all whole numbers among them, at which to bound its speed.
+    """Places 0 .. pieces of a curve, all integers among them, at which to bound its speed.
 
-    Between the whole numbers there are so many that the tool's speed is bounded to `LOOSE`.
+    Between the integers there are so many that the tool's speed is bounded to `LOOSE`.
     """
     knots = np.arange(pieces + 1.0)
     tool, _, swing = _slopes(robot, spline, knots)
@@ -137,7 +137,7 @@ def squared_speeds(robot: Robot, spline: BSpline, grid: Array, limits: MotionLim
     """(m,) upper bounds on (ds/dt)^2 at the m places of a grid, so that all pieces keep to limits.
 
     The grid has all knots of the spline among its places. Between two of them (ds/dt)^2 runs
-    straight, so what both ends keep to the whole piece keeps to.
+    straight, so a limit that both ends keep to holds on all of the piece.
     """
     h = np.diff(grid)
     tool, fastest, swing = _slopes(robot, spline, grid)

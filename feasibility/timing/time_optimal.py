@@ -1,4 +1,4 @@
-"""The fastest way along a curve, as toppra finds it, and how well it keeps to accelerations.
+"""The fastest timing of a curve, by toppra, and how well it keeps to accelerations.
 
 Between two places of the grid d^2s/dt^2 = u is constant, so x = (ds/dt)^2 runs straight there, and
 d^2q/dt^2 = q'(s) u + q''(s) x is a parabola in s, whose Bernstein coefficients bound it.
@@ -50,7 +50,7 @@ def parameterised(
         from toppra.interpolator import AbstractGeometricPath
 
     class Path(AbstractGeometricPath):
-        """The curve as toppra asks for it."""
+        """The curve in the form that toppra needs."""
 
         dof = spline.c.shape[1]
         path_interval = np.array([grid[0], grid[-1]]) * unit

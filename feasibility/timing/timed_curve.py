@@ -69,7 +69,7 @@ def timed_curve(robot: Robot, curve: Curve, limits: MotionLimits) -> TimedCurve:
     """Time along a curve.
 
     Raises:
-        PathError: toppra finds no way to run it.
+        PathError: toppra finds no timing.
     """
     spline = curve.spline()
     grid = fine_grid(robot, spline, curve.pieces)
@@ -97,7 +97,7 @@ def timed_curve(robot: Robot, curve: Curve, limits: MotionLimits) -> TimedCurve:
     rate = np.sqrt(x)
     time = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(grid) / (rate[:-1] + rate[1:]))])
     if not np.isfinite(time).all():
-        raise PathError("no timing was found: the motion would have to stop on its way")
+        raise PathError("no timing was found: the motion would have to stop in between")
     return TimedCurve(curve, grid, x, time, limits)
 
 
