@@ -1,4 +1,4 @@
-"""The task applied to courses: where tool point and axis have to be between cell centres."""
+"""The task applied to cell curves: where tool point and axis have to be between cell centres."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from numpy.typing import NDArray
 from feasibility.task import Task
 from surfaces import Cells, components
 
-TELLING = 0.03  # [1] a course whose normal strays no further knows how the surface bends
+RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows how the surface bends
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
-FEW, MANY = 3, 32  # places on a course over a mesh; and on one over a crease, or off its facets by
+FEW, MANY = 3, 32  # places on a curve over a mesh; and on one over a crease, or off its facets by
 OFF = 0.05  # [1] of the tolerance
 
 
 class TargetCurves(NamedTuple):
-    """Target point f + h n and approach direction -+n along the M courses of some cells."""
+    """Target point f + h n and approach direction -+n along the M curves of some cells."""
 
     first: NDArray[np.int64]
-    """(M + 1,) where each course's pieces begin, and the end of the last."""
+    """(M + 1,) where each curve's pieces begin, and the end of the last."""
     cubics: NDArray[np.float64]
     """(P, 4, 6) coefficients of 1, s, s^2, s^3 of point (m) and direction; s in 0..1."""
     derivative_bounds: NDArray[np.float64]
@@ -33,27 +33,27 @@ class TargetCurves(NamedTuple):
     centre_curvature: float
     """1/m, the largest `curvature` next to the cells' centres."""
     folded: NDArray[np.bool_]
-    """(M,) courses where the offset surface folds, see `folded_curves`."""
+    """(M,) curves where the offset surface folds, see `folded_curves`."""
 
 
 def folded_curves(cells: Cells, height: float) -> NDArray[np.bool_]:
-    """(M,) courses from or to a cell from which some course runs into a fold of the offset surface.
+    """(M,) curves from or to a cell from which some curve runs into a fold of the offset surface.
 
     At a signed height (m) beyond a radius of curvature the offset surface runs backwards, but in
-    the direction of that curvature only; courses across it do not show it, their neighbours do.
+    the direction of that curvature only; curves across it do not show it, their neighbours do.
     """
     folded = cells.curves.folds(height)
     cell = np.zeros(len(cells), dtype=bool)
-    # One over a crease, or one that strays so far, tells nothing of its neighbours.
-    telling = ~cells.curves.creased & (cells.curves.deviations[:, 1] <= TELLING)
-    cell[cells.pairs[folded & telling]] = True
+    # Those over creases, or with larger deviations, show nothing about their neighbours.
+    reliable = ~cells.curves.creased & (cells.curves.deviations[:, 1] <= RELIABLE)
+    cell[cells.pairs[folded & reliable]] = True
     return np.asarray(folded | cell[cells.pairs].any(axis=1))
 
 
 def _see_facets(
     cells: Cells, standoff: float, tolerance: float, deviations: NDArray[np.float64]
 ) -> None:
-    """Bring the strays (M, 2) of courses over a mesh up to what its triangles say."""
+    """Raise the deviations (M, 2) of curves over a mesh to those from its triangles."""
     some = np.arange(len(deviations))
     for count in (FEW, MANY):
         t = (np.arange(count) + 0.5) / count
@@ -66,12 +66,12 @@ def _see_facets(
 
 
 class BesideFacets(NamedTuple):
-    """What the triangles of a mesh themselves say of k places on courses."""
+    """How targets at k places on curves lie to the triangles of a mesh themselves."""
 
     off: NDArray[np.float64]
     """(k,) m, by how much the target's distance from them is not the standoff."""
     leans: NDArray[np.float64]
-    """(k,) |n - m| of the course's normal n and the direction m from the mesh to the target; on
+    """(k,) |n - m| of the curve's normal n and the direction m from the mesh to the target; on
     the strips along creases only, elsewhere normals are interpolated."""
     away: NDArray[np.float64]
     """(k,) m, the target's distance from them."""
@@ -95,10 +95,10 @@ def beside_facets(
         cells: of a mesh.
         standoff: m.
         tolerance: m, of the tool point.
-        courses: (k,) which courses.
+        curves: (k,) which curves.
         t: (k,) places on them.
-        everywhere: look at the whole mesh, which takes long at large standoffs; otherwise at the
-            cells of the course and at those that touch both.
+        everywhere: compare with all of the mesh, which takes long at large standoffs; otherwise
+            with the cells of the curve and those that touch both.
     """
     pairs = cells.pairs[curves]
     point, normal = cells.curves.at(curves, t)
@@ -112,10 +112,10 @@ def beside_facets(
     return BesideFacets(off, leans, away)
 
 
-# Search and replay ask for the same; cells are values, told apart by identity.
+# Search and replay need the same; cells are values, compared by identity.
 @lru_cache(maxsize=4)
 def target_curves(cells: Cells, standoff: float, tolerance: float) -> TargetCurves:
-    """Offset the courses of `cells` to the tool's side by `standoff` (m).
+    """Offset the curves of `cells` to the tool's side by `standoff` (m).
 
     Args:
         cells: the cells.
@@ -131,7 +131,7 @@ def target_curves(cells: Cells, standoff: float, tolerance: float) -> TargetCurv
     derivative_bounds = curves.derivative_bounds.copy()
     derivative_bounds[:, 0] += standoff * derivative_bounds[:, 1]
     derivative_bounds[np.repeat(folded, np.diff(curves.first))] = np.inf
-    # To the side of a course the normal may turn faster than along it.
+    # To the side of a curve the normal may turn faster than along it.
     max_curvature = cells.parallel_curvature(height)
     if standoff > 0.0:  # over an edge it turns as over a ball of the standoff
         edge = np.where(cells.creased, 1.0 / max(standoff, tolerance), 0.0)
@@ -168,34 +168,36 @@ def blocked_curves(cells: Cells, task: Task) -> str:
             "certified; allow a small angle."
         )
     tolerance = task.effective_tolerance
-    ways = target_curves(cells, task.standoff, tolerance)
+    targets = target_curves(cells, task.standoff, tolerance)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
     curves = cells.curves
-    smooth = ~curves.creased & (curves.deviations[:, 1] <= TELLING)
-    folds = ways.folded & smooth
+    smooth = ~curves.creased & (curves.deviations[:, 1] <= RELIABLE)
+    folds = targets.folded & smooth
     cone_chord = task.cone_chord
     rough = (
-        (ways.deviations[:, 0] >= tolerance) | (ways.deviations[:, 1] >= cone_chord) | ways.folded
+        (targets.deviations[:, 0] >= tolerance)
+        | (targets.deviations[:, 1] >= cone_chord)
+        | targets.folded
     )
     parted = _parted(cells, ~rough)
     if folds.any():
         if cells.surface.mean_edge_length > 0.0:  # facets do not tell the two apart
             return (
-                "The offset surface folds where it is hollow, or the mesh is too coarse where it "
+                "The offset surface folds where it is concave, or the mesh is too coarse where it "
                 f"bends, {some.format(int(folds.sum()))}: the standoff is too large for the "
                 f"radius of curvature, so no motion can be certified there{parted}; use a smaller "
                 "standoff, a mesh that is finer along its bends, or a part of it that ends there."
             )
         return (
             f"The offset surface folds {some.format(int(folds.sum()))}: the standoff reaches "
-            "the surface's radius of curvature on its hollow side, so no motion can be certified "
+            "the surface's radius of curvature on its concave side, so no motion can be certified "
             f"there{parted}; use a smaller standoff."
         )
     if rough.any():
         return (
             f"The surface is creased, or rougher than the task allows, "
             f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
-            f"of a mesh it can, but not into a hollow one, or past a corner){parted}; use smaller "
+            f"of a mesh it can, but not into a concave one, or past a corner){parted}; use smaller "
             "cells, a finer or smoother mesh, cut it along its creases, or allow a wider cone or a "
             "larger tolerance."
         )
@@ -203,11 +205,11 @@ def blocked_curves(cells: Cells, task: Task) -> str:
 
 
 def _parted(cells: Cells, usable: NDArray[np.bool_]) -> str:
-    """Whether the ways (M,) that can be used leave the cells in several parts, whatever the arm."""
-    whole, parts = (
+    """Says so where the usable curves (M,) leave the cells in several parts, whatever the arm."""
+    before, parts = (
         int(components(pairs, len(cells)).max(initial=-1)) + 1
         for pairs in (cells.pairs, cells.pairs[usable])
     )
-    if parts == whole:
+    if parts == before:
         return ""
     return f", which leaves {parts} parts of the surface that no arm's motion joins"

@@ -212,6 +212,21 @@ class Cells(ABC):
     def unrolled(self) -> Unrolled:
         """The cells laid flat, for pictures on paper."""
 
+    def seen_from_outside(self) -> tuple[Array, Array]:
+        """Axes (3, 2) of a picture along the mean normal, x right and y down, and its middle (3,).
+
+        Of a closed surface, whose mean normal is near zero, along its least extent.
+        """
+        mean = (self.areas[:, None] * self.normals).sum(axis=0)
+        middle = self.centres.mean(axis=0)
+        _, _, axes = np.linalg.svd(self.centres - middle)
+        up = mean if np.linalg.norm(mean) > 0.1 * self.areas.sum() else axes[-1]
+        up = up / np.linalg.norm(up)
+        flatter = (axis - (axis @ up) * up for axis in axes[:2])
+        right = next(axis for axis in flatter if np.linalg.norm(axis) > 1e-6)
+        right = right / np.linalg.norm(right)
+        return np.column_stack([right, -np.cross(up, right)]), middle
+
     @abstractmethod
     def unravel(self, k: int) -> tuple[int, ...]:
         """The cell with flat index k as people count it: (row, column), or (k,) on a mesh.

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from feasibility.viewer.vertex_clusters import merge_vertices, split_at_creases
 from surfaces import Triangles
+from surfaces.meshes import half_edge_ends, half_edges
 from surfaces.meshes.cells import MeshCells
 
 Array = NDArray[np.float64]
@@ -63,15 +64,13 @@ class DisplayMesh:
 
     def borders(self) -> Array:
         """(k, 2, 3) m: edges between triangles of different cells, and on the mesh's border."""
-        halves = np.stack([self.faces, np.roll(self.faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        ends = np.sort(self.places[halves], axis=1)
-        key = ends[:, 0] * (int(self.places.max()) + 1) + ends[:, 1]
-        order = np.argsort(key, kind="stable")
-        starts = np.flatnonzero(np.diff(key[order], prepend=-1))
-        owner = np.repeat(self.labels, 3)[order]
-        apart = np.minimum.reduceat(owner, starts) != np.maximum.reduceat(owner, starts)
-        single = np.diff(np.append(starts, len(key))) == 1
-        drawn = halves[order[starts]]
+        halves = half_edges(self.places[self.faces])
+        owner = np.repeat(self.labels, 3)[halves.order]
+        apart = np.minimum.reduceat(owner, halves.starts) != np.maximum.reduceat(
+            owner, halves.starts
+        )
+        single = halves.counts == 1
+        drawn = half_edge_ends(self.faces, halves.order[halves.starts])
         return self.vertices[drawn[apart | (single & self.on_border[drawn].all(axis=1))]]
 
 

@@ -5,3 +5,5 @@ from .selection import cut_plane as cut_plane
 from .selection import faces_within_cone as faces_within_cone
 from .selection import take_faces as take_faces
 from .triangle_mesh import TriangleMesh as TriangleMesh
+from .triangle_mesh import half_edge_ends as half_edge_ends
+from .triangle_mesh import half_edges as half_edges

@@ -1,4 +1,4 @@
-"""Nearest points of triangles, compiled; and ways over the faces of two cells."""
+"""Closest points on triangles, and on the faces of two cells, compiled."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ def nearest_of_each(corners, middles, radii, candidates, indptr, points, faces, 
 
 @njit(cache=True, error_model="numpy")
 def _around(pair, members, indptr, near, near_indptr):  # type: ignore[no-untyped-def]
-    """Faces of two cells, and of those that touch both: the straight way may cut their corners."""
+    """Faces of two cells, and of those that touch both: the straight line may cut their corners."""
     cells = np.empty(2 + near_indptr[pair[0] + 1] - near_indptr[pair[0]], dtype=np.int64)
     cells[0], cells[1] = pair[0], pair[1]
     count = 2
@@ -126,7 +126,7 @@ def _around(pair, members, indptr, near, near_indptr):  # type: ignore[no-untype
 def put_on_cells(  # type: ignore[no-untyped-def]
     corners, middles, radii, members, indptr, near, near_indptr, pairs, points, faces, weights
 ):
-    """Nearest points on the faces of two cells each, and of those that touch both.
+    """Closest points on the faces of two cells each, and of those that touch both.
 
     Args:
         corners: (F, 3, 3) m.
@@ -146,7 +146,7 @@ def put_on_cells(  # type: ignore[no-untyped-def]
         for k in range(points.shape[1]):
             found, _ = nearest_of(corners, middles, radii, some, points[m, k], weights[m, k])
             faces[m, k] = found
-            # What is near to one point of the way is near to the next: try it first there.
+            # A face close to one point of the line is close to the next: try it first there.
             for i in range(some.shape[0]):
                 if some[i] == found:
                     some[i] = some[0]

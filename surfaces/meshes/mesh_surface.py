@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-ON = 1e-9  # [1] of the mean edge: so near to a face is on it
-FIRST_CANDIDATES = 8  # faces looked at for each point before it is known that they are enough
+ON = 1e-9  # [1] of the mean edge length: a point so close to a face lies on it
+FIRST_CANDIDATES = 8  # faces tried for each point, before more are tried where these may miss
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,14 +35,14 @@ class MeshSurface(Surface):
     """In the surface's own frame."""
     corner_normals: Array
     """(F, 3, 3) unit normal at each corner of each face, in the own frame."""
-    rim_normals: Array
+    crease_normals: Array
     """(F, 3, 3) the same on creases, where both sides have one: the normal turns to it over a strip
     along the crease, `WIDTH` of a face wide."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays."""
         super().__post_init__()
-        for name in ("corner_normals", "rim_normals"):
+        for name in ("corner_normals", "crease_normals"):
             normals = np.array(getattr(self, name), dtype=float)
             normals.flags.writeable = False
             object.__setattr__(self, name, normals)
@@ -62,10 +62,10 @@ class MeshSurface(Surface):
         return float(lengths.mean())
 
     def closest(self, points: ArrayLike) -> ClosestPoint:
-        """The points of the mesh nearest to `points` (..., 3) m; see `ClosestPoint`.
+        """The points of the mesh closest to `points` (..., 3) m; see `ClosestPoint`.
 
-        `height` is the whole distance, positive where the point lies on the outer side of the
-        surface; the mesh ends at its border, so every foot is inside.
+        `height` is the distance, positive where the point lies on the outer side of the surface;
+        the mesh ends at its border, so every closest point is inside.
         """
         points = points_of(points)
         flat = (points.reshape(-1, 3) - self.position) @ self.rotation
@@ -112,13 +112,13 @@ class MeshSurface(Surface):
         Only on the strips where the normal turns; inf elsewhere.
         """
         away = np.full(len(face), np.inf)
-        some = np.flatnonzero(self.rim_share(face, weights) > 0.0)
-        corners, rims = self.face_balls[0][face[some]], self.on_crease[face[some]]
-        parts = weights[some] * rims
+        some = np.flatnonzero(self.crease_share(face, weights) > 0.0)
+        corners, on = self.face_balls[0][face[some]], self.on_crease[face[some]]
+        parts = weights[some] * on
         near = np.einsum("kc,kci->ki", parts / parts.sum(axis=1, keepdims=True), corners)
         off = np.linalg.norm(np.einsum("kc,kci->ki", weights[some], corners) - near, axis=1)
         # A face with three corners on creases may have none of its edges on one.
-        away[some] = np.where(rims.all(axis=1), 2.0 * self.face_balls[2][face[some]], off)
+        away[some] = np.where(on.all(axis=1), 2.0 * self.face_balls[2][face[some]], off)
         return away
 
     def faces_below(self, points: ArrayLike) -> Ints:
@@ -133,12 +133,12 @@ class MeshSurface(Surface):
     def normals_at(self, face: Ints, weights: Array) -> Array:
         """(..., 3) unit normals in the root frame at places of faces, by their weights."""
         own = self.corner_normals[face]
-        turned = own + self.rim_share(face, weights)[..., None, None] * (
-            self.rim_normals[face] - own
+        turned = own + self.crease_share(face, weights)[..., None, None] * (
+            self.crease_normals[face] - own
         )
         return unit(np.einsum("...c,...ci->...i", weights, turned)) @ self.rotation.T
 
-    def rim_share(self, face: Ints, weights: Array) -> Array:
+    def crease_share(self, face: Ints, weights: Array) -> Array:
         """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it."""
         along = (weights * self.on_crease[face]).sum(axis=-1)  # 1 on the crease
         return np.asarray(np.clip(1.0 - (1.0 - along) / WIDTH, 0.0, 1.0))
@@ -172,13 +172,13 @@ class MeshSurface(Surface):
         normals = carried(self.mesh, self.corner_normals, vertices, faces, parent)
         mesh = TriangleMesh(vertices, faces, self.mesh.history)
         own = blended(vertices, faces, normals, sectors(mesh))
-        rim = blended(vertices, faces, normals, faces)
-        return MeshSurface(self.rotation, self.position, self.side, mesh, own, rim)
+        crease = blended(vertices, faces, normals, faces)
+        return MeshSurface(self.rotation, self.position, self.side, mesh, own, crease)
 
     @cached_property
     def on_crease(self) -> NDArray[np.bool_]:
         """(F, 3) corners of faces that lie on a crease."""
-        return np.asarray((self.corner_normals != self.rim_normals).any(axis=2))
+        return np.asarray((self.corner_normals != self.crease_normals).any(axis=2))
 
     @cached_property
     def turns(self) -> tuple[Array, Array]:
@@ -188,10 +188,10 @@ class MeshSurface(Surface):
         one unit normal to the other, their mean is shorter, and turns faster.
         """
         corners = self.face_balls[0]
-        halves = 0.5 * np.linalg.norm(self.corner_normals + self.rim_normals, axis=2).min(axis=1)
+        halves = 0.5 * np.linalg.norm(self.corner_normals + self.crease_normals, axis=2).min(axis=1)
         strip = WIDTH / (1.0 + WIDTH) * halves
         size = np.where(self.on_crease.any(axis=1), strip, 1.0)[:, None, None]
-        turns = self.rim_normals[:, 1:] - self.rim_normals[:, :1]
+        turns = self.crease_normals[:, 1:] - self.crease_normals[:, :1]
         return size * (corners[:, 1:] - corners[:, :1]), turns
 
     @cached_property
@@ -204,7 +204,7 @@ class MeshSurface(Surface):
 
     @cached_property
     def _tree(self) -> Any:
-        """The middles of the faces, to be asked for neighbours."""
+        """The middles of the faces, for queries of neighbours."""
         from scipy.spatial import cKDTree
 
         return cKDTree(self.face_balls[1])
@@ -229,7 +229,7 @@ class MeshSurface(Surface):
             )  # fmt: skip
             faces[left], weights[left] = found, at
             spot = np.einsum("kc,kci->ki", at, corners[found])
-            # A face that was not looked at is at least this far off.
+            # A face that was not tried is at least this far off.
             least = away[:, -1] - radii.max()
             sure = np.linalg.norm(points[left] - spot, axis=1) <= least
             left = left[~sure] if wanted < len(middles) else left[:0]
@@ -253,8 +253,8 @@ def mesh(
     Args:
         source: path of an STL, OBJ, PLY, OFF or GLB file; or a `TriangleMesh`; or anything with
             `vertices` and `faces`, such as a `trimesh.Trimesh`. The files and the last kind are
-            checked and repaired, see `surfaces.mesh_repair.clean`.
-        scale: metres per unit of the source; see `surfaces.mesh_file.read_mesh`.
+            checked and repaired, see `surfaces.meshes.repair.clean`.
+        scale: metres per unit of the source; see `surfaces.meshes.files.read_mesh`.
         side: 'outside' for a tool on the side that the faces look to, 'inside' for the other.
         position: (3,) m, origin of the mesh's frame in the root frame.
         rpy_deg: (3,) fixed-axis roll, pitch, yaw of the mesh's frame.
@@ -273,7 +273,7 @@ def mesh(
     check.done()
     triangles = _triangles(source, scale)
     normals = corner_normals(triangles)
-    return MeshSurface(mesh=triangles, corner_normals=normals, rim_normals=normals, **pose)
+    return MeshSurface(mesh=triangles, corner_normals=normals, crease_normals=normals, **pose)
 
 
 def _triangles(source: Any, scale: float | None) -> TriangleMesh:

@@ -87,7 +87,7 @@ def blended(vertices: Floats, faces: Ints, normals: Floats, groups: Ints) -> Flo
     count = int(groups.max()) + 1
     sums = sum_by(groups.ravel(), weighted.reshape(-1, 3), count)
     lengths = np.linalg.norm(sums, axis=1)
-    # Where faces are folded back onto each other one of them speaks for all.
+    # Normals of faces folded back onto each other cancel; then one of them is taken.
     some = np.zeros((count, 3))
     some[groups.ravel()] = normals.reshape(-1, 3)
     folded = lengths < 1e-9

@@ -1,4 +1,4 @@
-"""Parts of a mesh: in a box, beyond a plane, faces that look one way, or faces by number."""
+"""Parts of a mesh: in a box, beyond a plane, faces by direction, or faces by number."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def take_faces(mesh: TriangleMesh, indices: ArrayLike) -> TriangleMesh:
 def _part(
     mesh: TriangleMesh, vertices: Floats, faces: Ints, nothing: str, note: str
 ) -> TriangleMesh:
-    """A clean mesh of these faces, with a note after those of the whole."""
+    """A clean mesh of these faces, with a note after those of `mesh`."""
     if not len(faces):
         raise _nothing_left(mesh, nothing)
     used = np.zeros(len(vertices), bool)

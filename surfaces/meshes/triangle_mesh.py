@@ -34,7 +34,7 @@ class Edges:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TriangleMesh:
-    """A surface of triangles that `surfaces.mesh_repair.clean` has checked.
+    """A surface of triangles that `surfaces.meshes.repair.clean` has checked.
 
     No edge has more than two faces, faces that share an edge agree about the outer side, every
     vertex is used, by one fan of faces, and no face is without area. A face is seen from outside
@@ -207,7 +207,7 @@ def edge_partners(faces: Ints) -> Ints:
     """(F, 3) for half-edge k of each face the one on its other side; -1 at the border of the mesh.
 
     Raises:
-        SurfaceError: an edge has more than two faces, or two that run along it the same way.
+        SurfaceError: an edge has more than two faces, or both run along it in one direction.
     """
     joined = _joined(faces, half_edges(faces))
     partner = np.full(faces.size, -1, dtype=np.int64)
@@ -247,7 +247,7 @@ def _vertex_normals(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
     weighted = corner_angles(vertices, faces)[..., None] * normals[:, None]
     sums = sum_by(faces.ravel(), weighted.reshape(-1, 3), len(vertices))
     lengths = np.linalg.norm(sums, axis=1)
-    # Faces folded flat onto each other cancel; then one of them speaks for the vertex.
+    # Normals of faces folded flat onto each other cancel; then one of them is taken.
     folded = lengths < 1e-9
     if folded.any():
         some_face = np.zeros(len(vertices), np.int64)

@@ -1,6 +1,6 @@
-"""Patches whose foot point and curvatures have closed formulas, as compiled loops want them.
+"""Patches whose closest points and curvatures have closed formulas, for compiled loops.
 
-The paper's greedy search asks for the foot of every J-cell, so it works on these only.
+The paper's greedy search needs the closest point of every J-cell, so it works on these only.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class ClosedFormPatch(Patch):
-    """A patch that `surfaces.patch_kernel` knows."""
+    """A patch that `closed_form_kernels` knows."""
 
     code: ClassVar[int]
-    """What `surfaces.patch_kernel` dispatches on."""
+    """The number that `closed_form_kernels` dispatches on."""
 
     @abstractmethod
     def curvature_slices(self, margin: float) -> CurvatureSlices:
         """Bounds on the curvatures of the patch, widened by `margin` where it has open ends."""
 
     def closest(self, points: ArrayLike) -> ClosestPoint:
-        """The feet of `points` (..., 3) m on the surface; see `ClosestPoint`.
+        """The points of the surface closest to `points` (..., 3) m; see `ClosestPoint`.
 
-        Where several points are equally near (centre of a sphere, axis of a cylinder), one of
+        Where several points are equally close (centre of a sphere, axis of a cylinder), one of
         them is taken, on the patch if there is one.
 
         Raises:
@@ -72,7 +72,7 @@ class ClosedFormPatch(Patch):
     def bounds(self, height: float, slack: float = 0.0) -> NormalBounds:
         """Bounds on how fast the normal turns near the parallel surface at a signed height.
 
-        They hold at every point whose foot lies on the patch and whose height differs from
-        `height` by at most `slack` (m); see `surfaces.bounds`.
+        They hold at every point whose closest point lies on the patch and whose height differs from
+        `height` by at most `slack` (m); see `normal_bounds`.
         """
         return normal_bounds(self.curvature_slices(abs(slack)), height, abs(slack))

@@ -55,8 +55,8 @@ class Cone(SmoothPatch):
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """Perpendicular to the straight meridian at the point's azimuth.
 
-        Past the apex the foot is the apex, which no patch holds; `height` is then the distance
-        from the meridian's line.
+        Past the apex the closest point is the apex, which no patch holds; `height` is then the
+        distance from the meridian's line.
         """
         x, y, z = points.T
         rho = np.hypot(x, y)

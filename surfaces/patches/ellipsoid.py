@@ -68,7 +68,7 @@ class Ellipsoid(SmoothPatch):
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """From the one root that the normal equations leave; see `nearest_on_ellipsoid`.
 
-        Where several feet are equally near (on the planes inside that the normals of opposite
+        Where several points are equally close (on the planes inside that the normals of opposite
         sides meet in), the one on the patch's own side is taken, or else the one across.
         """
         axes = np.array(self.semi_axes)
@@ -95,12 +95,12 @@ class Ellipsoid(SmoothPatch):
 
 
 def nearest_on_ellipsoid(axes: Array, points: Array, toward: Array) -> Array:
-    """The points (n, 3) of the ellipsoid nearest to `points` (n, 3), both in its own frame.
+    """The points (n, 3) of the ellipsoid closest to `points` (n, 3), both in its own frame.
 
-    The foot of p is x_i = e_i^2 p_i / (s + d_i) with d_i = e_i^2 - e^2, e the least semi-axis, and
-    s the root of g(s) = |e_i p_i / (s + d_i)| - 1 on s > 0, where g falls. 1 / |...| is concave and
-    rises, so that Newton's method on it comes up to the root from the left without passing it
-    (the secular equation of trust regions). Where g < 0 down to s = 0, p lies on the plane across
+    The closest point to p is x_i = e_i^2 p_i / (s + d_i) with d_i = e_i^2 - e^2, e the least
+    semi-axis, and s the root of g(s) = |e_i p_i / (s + d_i)| - 1 on s > 0, where g falls.
+    1 / |...| is concave and rises, so that Newton's method on it comes up to the root from the left
+    without passing it (the secular equation of trust regions). Where g < 0 down to s = 0, p lies on the plane across
     the shortest axis, near the centre: then s = 0, and what is missing on x along that axis may
     have either sign.
 

@@ -83,7 +83,7 @@ class GridCells(Cells):
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Cells.trace`: straight in u and v; over a pole, closest to the straight line.
 
-        So the curve stays on a patch which the straight line through space would leave: the rim of
+        So the curve stays on a patch which the straight line through space would leave: the edge of
         a dome, the far side of a pipe. A closed parameter runs the shorter way round. Only over a
         pole the straight line is the one that stays.
         """
@@ -270,7 +270,7 @@ def closed_form_grid(cells: Cells) -> GridCells:
 
 
 def _no_closed_form(kind: str) -> SurfaceError:
-    """What to say of a surface that the greedy search does not know."""
+    """The error for a surface that the greedy search does not know."""
     return SurfaceError(
         f"the greedy search works on {CLOSED_FORM_KINDS} only, not on a {kind}; use "
         'search.method = "complete"'

@@ -1,7 +1,7 @@
 """How fast the field of unit normals can turn: the bounds that make certificates sound.
 
-Let m(x) be the outward unit normal at the foot of x on a surface, h(x) its signed height. Then
-m = grad h, and on the parallel surface at height h, with e1, e2 its principal directions:
+Let m(x) be the outward unit normal at the point of a surface closest to x, h(x) its signed height.
+Then m = grad h, and on the parallel surface at height h, with e1, e2 its principal directions:
 
 - Dm has the eigenvalues k_i = kappa_i / (1 + kappa_i h) along e_i, and 0 along m, where kappa_i
   are the principal curvatures of the surface itself, positive where the normals spread.
@@ -60,7 +60,7 @@ class CurvatureSlices(NamedTuple):
     parallel_slope: NDArray[np.float64]
     """(s,) 1/m^2, at least |d kappa_2 / ds|."""
     reach: NDArray[np.float64]
-    """(s,) m, the signed height up to which points above the slice have their foot on it."""
+    """(s,) m, the signed height up to which points above the slice are closest to it."""
 
     @staticmethod
     def constant(meridian: float, parallel: float) -> CurvatureSlices:
@@ -74,7 +74,7 @@ def normal_bounds(slices: CurvatureSlices, height: float, slack: float) -> Norma
 
     Both k = kappa / (1 + kappa h) and its stretch 1 / (1 + kappa h) are monotone in kappa and in h
     as long as the parallel surface does not fold, so the corners of each interval decide. Where it
-    folds or meets itself the foot jumps, and no bound holds.
+    folds or meets itself the closest point jumps, and no bound holds.
     """
     if (height + slack >= slices.reach).any():
         return NormalBounds(math.inf, math.inf)

@@ -12,7 +12,7 @@ from surfaces.surface import SurfaceError
 Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10  # of a piece's area: the two rules differ by no more
-_ROUNDING = 1e-15  # of the whole rectangle's, likewise
+_ROUNDING = 1e-15  # of all of the rectangle's, likewise
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(9)
 _MOST_HALVINGS = 60
 _MOST_PIECES = 200_000  # rectangles held at a time
@@ -34,11 +34,11 @@ def rectangle_areas(
     and Legendre's rule, exact up to degree 17, and again with only 7 of the 9 used along u, and
     along v, exact up to degree 7. Where these differ by more than `TOLERANCE` of the area, the
     piece is halved across the worse direction. The first sum is better than they show, by several
-    digits. Areas are positive, so the errors add up to no more than that share of the whole.
+    digits. Areas are positive, so the errors add up to no more than that share of the sum.
 
     Args:
         element: (u, v) of one shape -> area element |du x dv|, of that shape.
-        u0: lower ends in u; these four broadcast. A rectangle the wrong way round counts negative.
+        u0: lower ends in u; these four broadcast. A rectangle with swapped ends counts negative.
         u1: upper ends in u.
         v0: lower ends in v.
         v1: upper ends in v.
@@ -95,8 +95,8 @@ def _integrated(
         if not len(pieces):
             return done
         area, error_u, error_v = _ruled(element, pieces)
-        whole = done + np.bincount(owner, area, count)
-        rough = np.maximum(error_u, error_v) > TOLERANCE * area + _ROUNDING * whole[owner]
+        total = done + np.bincount(owner, area, count)
+        rough = np.maximum(error_u, error_v) > TOLERANCE * area + _ROUNDING * total[owner]
         done += np.bincount(owner[~rough], area[~rough], count)
         pieces = _halved(pieces[rough], (error_u >= error_v)[rough])
         owner = np.tile(owner[rough], 2)

@@ -138,7 +138,7 @@ class Profile:
         return ""
 
     def _speed_fault(self) -> str:
-        """Where the curve stands still or turns back.
+        """Where the curve stops or turns back.
 
         The second derivative is linear on each piece, so its ends bound how much the first one
         changes between samples: no place between them is missed.

@@ -1,4 +1,4 @@
-"""SmoothPatch: what the patches share that find feet by their own formulas or by search."""
+"""SmoothPatch: base of patches that find closest points by formulas in NumPy or by search."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from surfaces.surface import ClosestPoint, points_of
 
 Array = NDArray[np.float64]
 
-EDGE = 1e-9  # [rad], [m]: a foot that misses the patch by no more than this lies on it
+EDGE = 1e-9  # [rad], [m]: a point that misses the patch by no more than this lies on it
 
 
 class LocalClosestPoints(NamedTuple):
-    """Feet of n points in the own frame of a patch, before the ranges are looked at."""
+    """Closest points to n points in the own frame of a patch, before the ranges are checked."""
 
     u: Array
     """(n,) rad, m or as the knots count."""
@@ -30,23 +30,23 @@ class LocalClosestPoints(NamedTuple):
     normal: Array
     """(n, 3) outward unit normals."""
     upright: NDArray[np.bool_]
-    """(n,) True where the point lies on the normal of its foot, to 1e-9 m."""
+    """(n,) True where the point lies on the normal there, to 1e-9 m."""
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class SmoothPatch(Patch):
-    """A patch that gives points, normals and feet in its own frame."""
+    """A patch that gives points, normals and closest points in its own frame."""
 
     @abstractmethod
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
-        """Feet of finite points (n, 3) m, given in the own frame."""
+        """Closest points to finite points (n, 3) m, given in the own frame."""
 
     def closest(self, points: ArrayLike) -> ClosestPoint:
-        """The feet of `points` (..., 3) m on the surface; see `ClosestPoint`.
+        """The points of the surface closest to `points` (..., 3) m; see `ClosestPoint`.
 
-        Where a point has no foot with its normal through the point, because the nearest place is
-        on a border, `height` is the part of the distance along the normal there and `inside` is
-        False. A point that is not finite has a foot of NaN that is not inside.
+        Where the normal at the closest point does not lead through the point, because it is on a
+        border, `height` is the part of the distance along the normal there and `inside` is
+        False. For a point that is not finite it is NaN and not inside.
 
         Raises:
             ValueError: `points` does not end in an axis of length 3.
@@ -57,20 +57,10 @@ class SmoothPatch(Patch):
         values = np.full((len(flat), 6), np.nan)
         inside = np.zeros(len(flat), dtype=bool)
         if finite.any():
-            closest_points = self.local_closest_points(
-                (flat[finite] - self.position) @ self.rotation
-            )
-            values[finite] = np.column_stack(
-                [
-                    closest_points.u,
-                    closest_points.v,
-                    closest_points.height,
-                    closest_points.normal @ self.rotation.T,
-                ]
-            )
-            inside[finite] = closest_points.upright & self._on_patch(
-                closest_points.u, closest_points.v
-            )
+            found = self.local_closest_points((flat[finite] - self.position) @ self.rotation)
+            normal = found.normal @ self.rotation.T
+            values[finite] = np.column_stack([found.u, found.v, found.height, normal])
+            inside[finite] = found.upright & self._on_patch(found.u, found.v)
         shape = points.shape[:-1]
         return ClosestPoint(
             u=values[:, 0].reshape(shape),

@@ -23,7 +23,7 @@ MARKS = 16  # on each cell's border side; cells that share fewer than one of the
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Joints:
+class SeamPairs:
     """Pairs of cells that touch across a seam, on a stretch of their sides or at a corner."""
 
     pairs: Ints
@@ -39,18 +39,18 @@ class Joints:
         apart = np.linalg.norm(self.normals[:, 0] - self.normals[:, 1], axis=1)
         return 2.0 * np.arcsin(np.clip(0.5 * apart, 0.0, 1.0))
 
-    def of(self, pairs: Ints) -> Joints:
-        """The joints of some of the pairs (k, 2), i < j, in their order."""
+    def of(self, pairs: Ints) -> SeamPairs:
+        """Some of the pairs (k, 2), i < j, in the order asked for."""
         row = np.searchsorted(_keys(self.pairs), _keys(pairs))
         return self.rows(row)
 
-    def rows(self, which: Ints | NDArray[np.bool_]) -> Joints:
-        """Some of the joints."""
-        return Joints(self.pairs[which], self.crossings[which], self.normals[which])
+    def rows(self, which: Ints | NDArray[np.bool_]) -> SeamPairs:
+        """Some of the pairs."""
+        return SeamPairs(self.pairs[which], self.crossings[which], self.normals[which])
 
 
-def joints_of(surface: Piecewise, counts: Counts) -> Joints:
-    """Find the joints between the cells of all pieces.
+def seam_pairs_of(surface: Piecewise, counts: Counts) -> SeamPairs:
+    """Find the pairs of cells of different pieces that touch.
 
     Two cells touch across a seam where their border sides share more than a thirtieth or so of the
     shorter one; and, as in a grid, where they have only a corner in common but also a neighbour.
@@ -66,7 +66,7 @@ def joints_of(surface: Piecewise, counts: Counts) -> Joints:
     pairs, places = np.concatenate([pairs, more]), np.concatenate([places, corners])
     order = np.argsort(_keys(pairs))
     pairs, places = pairs[order], places[order]
-    return Joints(
+    return SeamPairs(
         pairs,
         places @ surface.rotation.T + surface.position,
         _normals(surface, first, pairs, places) @ surface.rotation.T,
@@ -76,7 +76,7 @@ def joints_of(surface: Piecewise, counts: Counts) -> Joints:
 def _along_sides(
     surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Side]
 ) -> tuple[Ints, Array]:
-    """Pairs that share a stretch of border, and the middle of it, in the frame of the whole."""
+    """Pairs that share a stretch of border, and the middle of it, in the surface's own frame."""
     joined = {seam.pieces for seam in surface.seams}
     parts = [counts[side.piece][1 - side.fixed] for side in sides]
     marks = [(np.arange(MARKS * n) + 0.5) / (MARKS * n) for n in parts]
@@ -162,11 +162,8 @@ def _normals(surface: Piecewise, first: Ints, pairs: Ints, places: Array) -> Arr
         for end in (0, 1):
             some = np.flatnonzero(pieces[:, end] == k)
             if len(some):
-                closest_point = patch.closest(places[some])
-                u, v = (
-                    np.clip(closest_point.u, *patch.u_range),
-                    np.clip(closest_point.v, *patch.v_range),
-                )
+                found = patch.closest(places[some])
+                u, v = np.clip(found.u, *patch.u_range), np.clip(found.v, *patch.v_range)
                 normals[some, end] = surface.signs[k] * patch.normal(u, v)
     return normals
 

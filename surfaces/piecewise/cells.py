@@ -21,7 +21,7 @@ from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import SurfaceError
 
 if TYPE_CHECKING:
-    from surfaces.piecewise.adjacency import Joints
+    from surfaces.piecewise.adjacency import SeamPairs
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -71,22 +71,22 @@ class PieceCells(Cells):
         return np.repeat(np.arange(len(self.counts)), np.diff(self.first))
 
     @cached_property
-    def joints(self) -> Joints:
+    def seam_pairs(self) -> SeamPairs:
         """The pairs of cells that touch across seams."""
-        from surfaces.piecewise.adjacency import joints_of
+        from surfaces.piecewise.adjacency import seam_pairs_of
 
-        return joints_of(self.surface, self.counts)
+        return seam_pairs_of(self.surface, self.counts)
 
     @cached_property
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
         own = [grid.pairs + start for grid, start in zip(self.grids, self.first, strict=False)]
-        pairs = np.concatenate([*own, self.joints.pairs])
+        pairs = np.concatenate([*own, self.seam_pairs.pairs])
         owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
         right = np.concatenate([_rightward(grid) for grid in self.grids])
         up = np.cross(self.normals, right)
-        way = self.centres[other] - self.centres[owner]
-        x, y = ((way * axes[owner]).sum(axis=1) for axes in (right, up))
+        ahead = self.centres[other] - self.centres[owner]
+        x, y = ((ahead * axes[owner]).sum(axis=1) for axes in (right, up))
         clockwise = np.mod(np.arctan2(y, -x) - LEFT, 2.0 * np.pi)
         order = np.lexsort((clockwise, owner))
         indptr = np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=len(self)))])
@@ -111,7 +111,7 @@ class PieceCells(Cells):
             else:
                 ends = self.centres[some[:, 0]], self.centres[some[:, 1]]
                 points[both], normals[both] = curves_across(
-                    self.surface, self.joints.of(some), *ends, t, (a, b), self.around(a, b)
+                    self.surface, self.seam_pairs.of(some), *ends, t, (a, b), self.around(a, b)
                 )
         return points, normals
 
@@ -127,7 +127,7 @@ class PieceCells(Cells):
     def smoothed(self, pairs: Ints) -> NDArray[np.bool_]:
         """See `Cells.smoothed`: across creases."""
         creased = self.piece[pairs[:, 0]] != self.piece[pairs[:, 1]]
-        creased[creased] = self.joints.of(pairs[creased]).creases > SMOOTH
+        creased[creased] = self.seam_pairs.of(pairs[creased]).creases > SMOOTH
         return creased
 
     def parallel_curvature(self, height: float) -> Array:
@@ -202,15 +202,7 @@ class PieceCells(Cells):
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""
-        mean = (self.areas[:, None] * self.normals).sum(axis=0)
-        middle = self.centres.mean(axis=0)
-        _, _, axes = np.linalg.svd(np.vstack([self.centres - middle, np.zeros((3, 3))]))
-        up = mean if np.linalg.norm(mean) > 0.1 * self.areas.sum() else axes[-1]
-        up = up / np.linalg.norm(up)
-        flatter = [axis - (axis @ up) * up for axis in axes[:2]]
-        right = next(axis for axis in flatter if np.linalg.norm(axis) > 1e-6)
-        right = right / np.linalg.norm(right)
-        flat = np.column_stack([right, -np.cross(up, right)])  # y runs down
+        flat, middle = self.seen_from_outside()
         return Unrolled(
             centres=(self.centres - middle) @ flat,
             outlines=tuple(

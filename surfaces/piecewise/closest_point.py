@@ -1,4 +1,4 @@
-"""The places of several patches nearest to points, borders included."""
+"""The points of several patches closest to given points, borders included."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from surfaces.patches import Patch
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-TIE = 1e-9  # [m]: of two pieces so equally near, the one whose foot lies inside it counts
+TIE = 1e-9  # [m]: of two pieces so equally close, the one with the point inside it counts
 BLOCK = 50_000  # points at once, to bound the memory
 PARALLEL = 1e-3  # [1], sine of an angle below which two normals are one
 
 
 class PieceClosestPoints(NamedTuple):
-    """For each of k points its nearest place on some pieces."""
+    """The closest points on some pieces to each of k points."""
 
     piece: Ints
     """(k,)"""
@@ -30,7 +30,7 @@ class PieceClosestPoints(NamedTuple):
     places: Array
     """(k, 3) m."""
     normals: Array
-    """(k, 3) outward unit normals of the whole there."""
+    """(k, 3) outward unit normals of the joined surface there."""
     height: Array
     """(k,) m, distance with the sign of the side; beside the surface, its part along the normal."""
     inside: NDArray[np.bool_]
@@ -40,10 +40,10 @@ class PieceClosestPoints(NamedTuple):
 def nearest_places(
     patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
 ) -> PieceClosestPoints:
-    """The nearest places of all patches.
+    """The closest points on all patches.
 
-    Where the foot on a patch lies beyond its border, the place on the border at the same parameters
-    counts. That is the nearest one as long as the point is near to the border.
+    Where the closest point on a patch lies beyond its border, the one on the border at the same
+    parameters counts. That is the closest one as long as the point is near to the border.
 
     Args:
         patches: at least one.
@@ -75,19 +75,14 @@ class _ClosestPoints(NamedTuple):
 
 def _closest_points(patch: Patch, sign: float, points: Array) -> _ClosestPoints:
     """Nearest places on one patch."""
-    closest_point = patch.closest(points)
-    u, v = np.clip(closest_point.u, *patch.u_range), np.clip(closest_point.v, *patch.v_range)
+    found = patch.closest(points)
+    u, v = np.clip(found.u, *patch.u_range), np.clip(found.v, *patch.v_range)
     places, normals = patch.point(u, v), sign * patch.normal(u, v)
     away = points - places
-    height = np.where(
-        closest_point.inside, sign * closest_point.height, (away * normals).sum(axis=1)
-    )
-    distance = np.where(
-        closest_point.inside, np.abs(closest_point.height), np.linalg.norm(away, axis=1)
-    )
-    return _ClosestPoints(
-        np.column_stack([u, v, places, normals, height]), distance, closest_point.inside
-    )
+    height = np.where(found.inside, sign * found.height, (away * normals).sum(axis=1))
+    distance = np.where(found.inside, np.abs(found.height), np.linalg.norm(away, axis=1))
+    values = np.column_stack([u, v, places, normals, height])
+    return _ClosestPoints(values, distance, found.inside)
 
 
 def _nearest(
@@ -97,15 +92,10 @@ def _nearest(
     found = [
         _closest_points(patch, sign, points) for patch, sign in zip(patches, signs, strict=True)
     ]
-    distance = np.stack(
-        [
-            closest_points.distance + np.where(closest_points.inside, 0.0, TIE)
-            for closest_points in found
-        ]
-    )
+    distance = np.stack([one.distance + np.where(one.inside, 0.0, TIE) for one in found])
     values, within = (
-        np.stack([getattr(closest_points, name) for closest_points in found])
-        for name in ("values", "inside")
+        np.stack([one.values for one in found]),
+        np.stack([one.inside for one in found]),
     )
     row = np.arange(len(points))
     piece = np.argmin(distance, axis=0)
@@ -123,8 +113,8 @@ def _nearest(
 def _over_seam(points: Array, one: Array, other: Array, gap: float) -> NDArray[np.bool_]:
     """Points over a seam: both pieces are nearest there, and the point lies off neither end.
 
-    Over the outer side of a crease, or over the hair's breadth between two borders, no piece has
-    its foot inside.
+    Over the outer side of a crease, or over the hair's breadth between two borders, the closest
+    point of no piece lies inside it.
     """
     together = np.linalg.norm(one[:, 2:5] - other[:, 2:5], axis=1) <= 2.0 * gap
     away = points - one[:, 2:5]

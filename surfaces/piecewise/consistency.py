@@ -1,4 +1,4 @@
-"""Which pieces hang together, and which to turn over so that they share one outside."""
+"""Which pieces are connected, and which to turn over so that they share one outside."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from surfaces.surface import SurfaceError
 
 
 def groups_of(count: int, seams: Sequence[Seam]) -> tuple[tuple[int, ...], ...]:
-    """Which of `count` pieces hang together."""
+    """The connected groups of `count` pieces."""
     group = list(range(count))
     for seam in seams:
         a, b = (group[k] for k in seam.pieces)

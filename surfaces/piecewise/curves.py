@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from surfaces.piecewise.adjacency import Joints
+    from surfaces.piecewise.adjacency import SeamPairs
     from surfaces.piecewise.piecewise_surface import Piecewise
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ JUMP = 3.0  # times the step along the straight line: there closest points jump
 
 def curves_across(
     surface: Piecewise,
-    joints: Joints,
+    seam_pairs: SeamPairs,
     start: Array,
     end: Array,
     t: Array,
@@ -38,7 +38,7 @@ def curves_across(
 
     Args:
         surface: the pieces.
-        joints: where the cells of each pair touch.
+        seam_pairs: where the cells of each pair touch.
         start: (m, 3) m, centres of the first cells.
         end: (m, 3) m, centres of the second cells.
         t: (k,) places on the curves.
@@ -51,23 +51,28 @@ def curves_across(
     points, normals = found.places.reshape(lines.shape), found.normals.reshape(lines.shape)
     steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
     even = np.linalg.norm(end - start, axis=2) * np.diff(t)
-    over = (joints.creases > SMOOTH) | (steps > JUMP * even).any(axis=1)
+    over = (seam_pairs.creases > SMOOTH) | (steps > JUMP * even).any(axis=1)
     if over.any():
         points[over], normals[over] = _over_the_border(
-            surface, joints.rows(over), start[over], end[over], t, pieces
+            surface, seam_pairs.rows(over), start[over], end[over], t, pieces
         )
     return points, normals
 
 
 def _over_the_border(
-    surface: Piecewise, joints: Joints, start: Array, end: Array, t: Array, pieces: tuple[int, int]
+    surface: Piecewise,
+    seam_pairs: SeamPairs,
+    start: Array,
+    end: Array,
+    t: Array,
+    pieces: tuple[int, int],
 ) -> tuple[Array, Array]:
     """Straight to the border and straight on, each part on its piece."""
-    middle = joints.crossings[:, None]
+    middle = seam_pairs.crossings[:, None]
     before, after = (np.linalg.norm(part - middle, axis=2) for part in (start, end))
     share = before / np.maximum(before + after, 1e-300)
     points, normals = np.empty((2, len(start), len(t), 3))
-    between = joints.normals.mean(axis=1)
+    between = seam_pairs.normals.mean(axis=1)
     first = t <= share
     for k, (piece, centre, part) in enumerate(
         zip(pieces, (start, end), (first, ~first), strict=True)
@@ -77,7 +82,7 @@ def _over_the_border(
         along = run / np.maximum(length, 1e-300)
         lines = centre + along[..., None] * (middle - centre)
         found = surface.nearest(lines[part], [piece])
-        turn = np.broadcast_to((between - joints.normals[:, k])[:, None], lines.shape)
+        turn = np.broadcast_to((between - seam_pairs.normals[:, k])[:, None], lines.shape)
         normal = found.normals + along[part][:, None] * turn[part]
         points[part] = found.places
         size = np.linalg.norm(normal, axis=1, keepdims=True)

@@ -27,18 +27,18 @@ Ints = NDArray[np.int64]
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
 SHARE = 1e-3  # [1], and the same as a share of the shortest border
 WIDEST = 0.02  # [1], what may be asked for, as a share of the shortest border
-CREASE = math.radians(2.0)  # seams that bend by more are told of
+CREASE = math.radians(2.0)  # seams that bend by more are reported
 MOST_PIECES = 200
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Piecewise(Surface):
-    """Patches joined along seams; outward is where the first piece of each joined group says."""
+    """Patches joined along seams; outward is that of the first piece of each joined group."""
 
     kind: ClassVar[str] = "piecewise"
 
     pieces: tuple[Patch, ...]
-    """In the frame of the whole. Their own `side` says nothing."""
+    """In the own frame of the joined surface. Their own `side` is not used."""
     turned: tuple[bool, ...]
     """Whether each piece's own normal is turned over."""
     gap: float
@@ -76,7 +76,7 @@ class Piecewise(Surface):
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
-        """The pieces that hang together, each group in order."""
+        """The connected pieces, each group in order."""
         return groups_of(len(self.pieces), self.seams)
 
     @cached_property
@@ -99,10 +99,10 @@ class Piecewise(Surface):
         return found._replace(piece=np.asarray(some, dtype=np.int64)[found.piece])
 
     def closest(self, points: ArrayLike) -> ClosestPoint:
-        """The feet of `points` (..., 3) m on the nearest piece; see `ClosestPoint`.
+        """The points of the closest piece to `points` (..., 3) m; see `ClosestPoint`.
 
-        u and v are NaN: pieces count them each in its own way. Over the outer side of a crease the
-        foot lies on the seam, and `height` is the whole distance. Beyond a free border `height` is
+        u and v are NaN: each piece has its own. Over the outer side of a crease the closest point
+        lies on the seam, and `height` is the distance. Beyond a free border `height` is
         the part of the distance along the normal there, and `inside` is False.
         """
         points = points_of(points)
@@ -145,17 +145,17 @@ def piecewise(
 ) -> Piecewise:
     """Several patches joined into one surface along the borders that they share.
 
-    Borders are found by geometry: wherever two of different pieces run along each other, on their
-    whole length or a part of it. The first piece of each joined group says where outward is; others
-    are turned over where they say otherwise, and `notes` tells which. Pieces that lie on each other
+    Borders are found by geometry: wherever two of different pieces run along each other, on all
+    or a part of their length. The first piece of each joined group defines outward; others are
+    turned over where they disagree, and `notes` names them. Pieces that lie on each other
     are refused; that they do not cut through each other is not checked.
 
     Args:
-        pieces: patches of any kinds, placed in the frame of the whole. Their own `side` says
-            nothing.
+        pieces: patches of any kinds, placed in the frame of the joined surface. Their own `side`
+            is not used.
         side: 'outside' for a tool on the outward side, 'inside' for one on the other.
-        position: (3,) m, origin of the frame of the whole in the root frame.
-        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the frame of the whole.
+        position: (3,) m, origin of the surface's frame in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
         gap: m, how far apart the borders of a seam may be; None for 0.1 mm, and at most a
             thousandth of the shortest border.
 
@@ -183,8 +183,8 @@ def piecewise(
             "in part; leave one of them out, or cut it back to the seam"
         )
     found = survey(patches, width)
-    if found.crowded:
-        names = ", ".join(f"pieces[{k}]" for k in found.crowded)
+    if found.overfull:
+        names = ", ".join(f"pieces[{k}]" for k in found.overfull)
         raise SurfaceError(
             f"piecewise: {names} share one seam; a surface has two sides of a seam at most; leave "
             "one of them out"

@@ -43,10 +43,10 @@ class Side:
         """u and v at s, a share of the fixed parameter's range away from the border."""
         ranges = self.patch.u_range, self.patch.v_range
         low, high = ranges[self.fixed]
-        still = high - inward * (high - low) if self.upper else low + inward * (high - low)
+        fixed = high - inward * (high - low) if self.upper else low + inward * (high - low)
         low, high = ranges[1 - self.fixed]
-        runs, stands = low + s * (high - low), np.full(np.shape(s), still)
-        return (stands, runs) if self.fixed == 0 else (runs, stands)
+        along, across = low + s * (high - low), np.full(np.shape(s), fixed)
+        return (across, along) if self.fixed == 0 else (along, across)
 
     def point(self, s: Array) -> Array:
         """(k, 3) m."""
@@ -169,7 +169,7 @@ class Survey(NamedTuple):
     """How the borders of several pieces lie to each other."""
 
     seams: tuple[Seam, ...]
-    crowded: tuple[int, ...]
+    overfull: tuple[int, ...]
     """Three pieces or more that share one stretch of border; empty where none do."""
 
 

@@ -25,7 +25,7 @@ class Outlines:
     """(L + 1,) where each loop begins, and the end of the last."""
     cells: NDArray[np.int64]
     """(L,) the cell of each loop, in rising order; a cell has several if it has holes, and none
-    if it is a whole closed surface."""
+    if it is a closed surface."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays."""

@@ -24,7 +24,7 @@ from surfaces.surface import SurfaceError
 
 FACES_PER_CELL = 80
 MOST_CELLS = 20_000
-_RIM = 0.6  # cells: how far outside the border counts as a seed
+_BORDER = 0.6  # cells: how far outside the border counts as a seed
 _MOVING = 10  # rounds in which seeds move
 _MOST_MOVING = 40  # as long as areas are more uneven than
 _UNEVEN = 0.12  # this, std / mean
@@ -118,7 +118,7 @@ def cluster_faces(
     centre, area = graph.centre / unit, graph.area / unit**2
     piece_area = np.bincount(graph.piece, weights=area)
     target = np.repeat(piece_area / quota, quota)
-    seeds = far_seeds(graph.across, whole_steps(step), graph.piece, quota, units(_RIM))
+    seeds = far_seeds(graph.across, whole_steps(step), graph.piece, quota, units(_BORDER))
     labels = _lloyd(graph, step, edge, centre, area, target, seeds)
     smooth(graph.across, whole_steps(edge), area, target, labels)
     return labels

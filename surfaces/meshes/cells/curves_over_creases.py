@@ -22,7 +22,7 @@ from surfaces.meshes.normals import sharp_edges
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Shares = Callable[[Ints, Array], Array]
-"""From pairs (m, 2) and points (m, k, 3) m to (m, k), see `MeshSurface.rim_share`."""
+"""From pairs (m, 2) and points (m, k, 3) m to (m, k), see `MeshSurface.crease_share`."""
 
 SAMPLES = 4  # for each cubic
 TRACED = 257  # places on the line to a corner, to find its strip

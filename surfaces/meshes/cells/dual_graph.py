@@ -41,7 +41,7 @@ def face_graph(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceG
         faces: (F, 3) vertex indices, counter-clockwise seen from outside.
 
     Raises:
-        SurfaceError: an edge has more than two faces, or two that run along it the same way.
+        SurfaceError: an edge has more than two faces, or both run along it in one direction.
     """
     partner = edge_partners(faces)
     across = np.where(partner >= 0, partner // 3, NONE)

@@ -152,8 +152,8 @@ class MeshCells(Cells):
         return self.surface.from_crease(*self._closest_places(pairs, points, everywhere))
 
     def _crease_shares(self, pairs: Ints, points: Array) -> Array:
-        """(m, k) see `MeshSurface.rim_share`, closest to points (m, k, 3) m."""
-        return self.surface.rim_share(*self._closest_faces(pairs, points))
+        """(m, k) see `MeshSurface.crease_share`, closest to points (m, k, 3) m."""
+        return self.surface.crease_share(*self._closest_faces(pairs, points))
 
     def _closest_places(self, pairs: Ints, points: Array, everywhere: bool) -> tuple[Ints, Array]:
         """Faces (k,) and weights (k, 3) on them closest to points (k, 3) m; see `distances`."""
@@ -229,18 +229,9 @@ class MeshCells(Cells):
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""
-        mean = (self.areas[:, None] * self.normals).sum(axis=0)
-        _, _, axes = np.linalg.svd(self.centres - self.centres.mean(axis=0))
-        up = mean if np.linalg.norm(mean) > 0.1 * self.areas.sum() else axes[-1]
-        up = up / np.linalg.norm(up)
-        right = axes[0] - (axes[0] @ up) * up
-        if np.linalg.norm(right) < 1e-6:
-            right = axes[1] - (axes[1] @ up) * up
-        right = right / np.linalg.norm(right)
-        flat = np.column_stack([right, -np.cross(up, right)])  # y runs down
-        middle = self.centres.mean(axis=0)
+        flat, middle = self.seen_from_outside()
         rotation, position = self.surface.rotation, self.surface.position
-        none = np.empty((0, 3))  # of a cell that is a whole closed surface
+        none = np.empty((0, 3))  # of a cell that is a closed surface
         loops = [
             max(self.figures.outlines.of(k), key=_length, default=none) for k in range(len(self))
         ]
@@ -288,6 +279,6 @@ def _figures(surface: MeshSurface, labels: Ints) -> Figures:
 
     mesh = surface.mesh
     normals = np.empty_like(mesh.vertices)
-    normals[mesh.faces.ravel()] = surface.rim_normals.reshape(-1, 3)
+    normals[mesh.faces.ravel()] = surface.crease_normals.reshape(-1, 3)
     made = figures(mesh.vertices, mesh.faces, normals, labels)
     return replace(made, normals=surface.normals_at(made.faces, made.weights) @ surface.rotation)

@@ -1,4 +1,4 @@
-"""What is to be known of each cell of a mesh: centre, normal, area, flatness, neighbours."""
+"""Properties of each cell of a mesh: centre, normal, area, flatness, neighbours."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def figures(
 
 
 def coarse(figures: Figures) -> str:
-    """Say which share of the cells is too large for the curvature, and what would do; or "".
+    """The share of the cells that is too large for the curvature, and a size that is not; or "".
 
     A cell is too large where a normal in it leans more than `MOST_TURN_DEG` from its mean. Smaller
     cells mend that, unless the surface has a crease.
@@ -151,7 +151,7 @@ def coarse(figures: Figures) -> str:
         parts.append(
             f"{_share(creased)} folded over a crease of up to "
             f"{math.degrees(float(figures.crease.max())):.0f} degrees, which no smaller cell "
-            "removes: their one centre speaks for both sides; cut the surface there for cells that "
+            "removes: their centre stands for both sides; cut the surface there for cells that "
             "end at it"
         )
     return "; ".join(parts)

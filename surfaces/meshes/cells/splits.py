@@ -1,4 +1,4 @@
-"""The two ways a triangle is split: halved at its longest edge, or cut across like a ladder."""
+"""Two kinds of splits of a triangle: halved at its longest edge, or cut across like a ladder."""
 
 from __future__ import annotations
 

@@ -136,7 +136,7 @@ def _next_split(
 
 
 def _too_many() -> SurfaceError:
-    """What is said instead of filling the memory."""
+    """Raised instead of filling the memory."""
     return SurfaceError(
         f"cells this small need more than {MOST_FACES:,} triangles; ask for larger cells, or "
         "mesh the part again with triangles of even size instead of long needles"

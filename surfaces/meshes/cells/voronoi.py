@@ -1,7 +1,7 @@
 """Compiled loops that cut a graph of faces into cells: seeds far apart, and floods from them.
 
-Distances are rounded to whole numbers before they are compared, and equal ones are told apart by
-their index. So the cells of a regular mesh, where many distances are the same, do not hang on the
+Distances are rounded to whole numbers before they are compared, and equal ones are ordered by
+their index. So the cells of a regular mesh, where many distances are the same, do not depend on the
 last digit: a turned mesh gets the same cells.
 """
 
@@ -92,7 +92,7 @@ def _settle(across, step, distance, heap, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def far_seeds(across, step, piece, quota, rim):  # type: ignore[no-untyped-def]
+def far_seeds(across, step, piece, quota, border):  # type: ignore[no-untyped-def]
     """Seeds as far from each other as one after the other can be chosen.
 
     Args:
@@ -100,7 +100,7 @@ def far_seeds(across, step, piece, quota, rim):  # type: ignore[no-untyped-def]
         step: (F, 3) whole numbers, the lengths of these steps.
         piece: (F,) connected piece of each face.
         quota: (P,) seeds of each piece, from 1 to its number of faces.
-        rim: whole number: the border of the mesh counts as a seed this far outside. So seeds keep
+        border: whole number: the mesh's border counts as a seed this far outside. So seeds keep
             half as far from it as from each other, and are as dense there as elsewhere.
 
     Returns:
@@ -112,8 +112,8 @@ def far_seeds(across, step, piece, quota, rim):  # type: ignore[no-untyped-def]
     size = 0
     for face in range(count):
         if across[face].min() < 0:
-            distance[face] = rim
-            size = push(heap, size, (rim << _BITS) | face)
+            distance[face] = border
+            size = push(heap, size, (border << _BITS) | face)
     _settle(across, step, distance, heap, size)
     seeds = np.empty(quota.sum(), dtype=np.int64)
     end = np.cumsum(quota)
@@ -145,7 +145,7 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
     """Every face gets the label of the seed that reaches it first; lengths in cells.
 
     A face goes to the seed with the least straight distance from its anchor, less its offset;
-    where the way over the surface is much longer than straight, that way counts. A label spreads
+    where the path over the surface is much longer than straight, its length counts. A label spreads
     from face to face only, so each cell is connected. Faces wait in buckets by distance.
 
     Args:
@@ -189,12 +189,12 @@ def flood(across, step, centre, seeds, anchors, offsets, labels):  # type: ignor
             dx = centre[other, 0] - anchors[n, 0]
             dy = centre[other, 1] - anchors[n, 1]
             dz = centre[other, 2] - anchors[n, 2]
-            way = walked[face] + step[face, k]
-            far = max(math.sqrt(dx * dx + dy * dy + dz * dz), way / DETOUR)
+            path = walked[face] + step[face, k]
+            far = max(math.sqrt(dx * dx + dy * dy + dz * dz), path / DETOUR)
             key = units(max(far - offsets[n] + _SHIFT, 0.0))
             if key < best[other]:
                 best[other] = key
-                walked[other] = way
+                walked[other] = path
                 labels[other] = n
                 place = max(min(key >> _WIDTH, _BUCKETS - 1), bucket)
                 waiting[size], following[size], first[place] = other, first[place], size
@@ -248,7 +248,7 @@ def smooth(across, edge, area, target, labels):  # type: ignore[no-untyped-def]
 
     Such a face can leave without tearing its cell. It goes to the neighbour it shares the longest
     border with, so that all borders together get shorter with each move; hence it ends. No cell
-    may stray far from its target: along a wedge, borders would slide to the tip.
+    may deviate far from its target: along a wedge, borders would slide to the tip.
 
     Args:
         across: (F, 3) faces across the edges, or -1.

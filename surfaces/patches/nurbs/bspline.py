@@ -30,8 +30,8 @@ Array = NDArray[np.float64]
 class SplinePatch(SmoothPatch):
     """u and v count as the knots do; the outward normal is along S_u x S_v.
 
-    With the points' rows (u) along x and their columns (v) along y, outward is +z. Its feet lie on
-    the patch, never beyond its borders.
+    With the points' rows (u) along x and their columns (v) along y, outward is +z. Its closest
+    points lie on the patch, never beyond its borders.
     """
 
     kind: ClassVar[str] = "bspline"
@@ -70,7 +70,7 @@ class SplinePatch(SmoothPatch):
         return rectangle_areas(self.net.element, u0, u1, v0, v1, *breaks)
 
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
-        """By search; see `surfaces.foot_search`."""
+        """By search; see `surfaces.patches.closest_point`."""
         x = self.net.search.nearest(points)
         normal = self.net.normal(x)
         away = points - self.net.point(x)

@@ -20,7 +20,7 @@ _COLUMNS = ["row", "column", "x", "y", "z"]
 
 
 class NetFile(NamedTuple):
-    """What a file says of a B-spline patch, as the arguments of `bspline`; not yet checked."""
+    """The arguments of `bspline` as a file gives them; not yet checked."""
 
     points: Any
     degree: Any

@@ -1,4 +1,4 @@
-"""SplineMap: a tensor-product B-spline, plain or rational, with its derivatives and its feet."""
+"""SplineMap: a tensor-product B-spline, plain or rational, its derivatives and closest points."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
-_FEWEST_SAMPLES = 48  # along each parameter, for starts of the search for feet
+_FEWEST_SAMPLES = 48  # along each parameter, for starts of the search for closest points
 _SAMPLES = 3  # for each degree in each span
 _MOST_SAMPLES = 600
 _JOINED = 1e-9  # of the extent: ends this near are one place

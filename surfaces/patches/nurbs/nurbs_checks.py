@@ -101,7 +101,7 @@ def checked_knots(name: str, knots: Any, count: int, degree: int, faults: list[s
         worst = values[np.argmax(np.where(inner, times + 1, times))]
         faults.append(
             f"{name} must hold no knot more than {degree} times, {degree + 1} times at its ends; "
-            f"{worst:g} stands there too often, and the patch would break apart there"
+            f"{worst:g} is there more often, and the patch would break apart there"
         )
         return clamped
     return found

@@ -118,7 +118,7 @@ def test_a_hollow_edge_folds(standoff):
     surface = mesh(roof(-60), position=(0.5, -0.15, 0.3))
     verdict = check(load_robot("ur5"), surface.cells(36), Task(standoff=standoff, cone_deg=60))
     assert verdict.answer is Answer.UNDECIDED
-    assert "hollow" in verdict.message or "nearer than the standoff" in verdict.message
+    assert "concave" in verdict.message or "nearer than the standoff" in verdict.message
 
 
 def test_a_hollow_edge_that_is_touched_is_no_hindrance():

@@ -115,9 +115,9 @@ def test_a_crease_keeps_its_faces_flat():
         fine.corner_normals, np.repeat(fine.mesh.face_normals[:, None], 3, axis=1), atol=1e-9
     )
     at = np.zeros((len(fine.mesh.vertices), 3))
-    at[fine.mesh.faces.ravel()] = fine.rim_normals.reshape(-1, 3)
-    np.testing.assert_array_equal(at[fine.mesh.faces], fine.rim_normals)
-    flat = np.abs(fine.rim_normals - fine.mesh.face_normals[:, None]).max(axis=(1, 2)) < 1e-9
+    at[fine.mesh.faces.ravel()] = fine.crease_normals.reshape(-1, 3)
+    np.testing.assert_array_equal(at[fine.mesh.faces], fine.crease_normals)
+    flat = np.abs(fine.crease_normals - fine.mesh.face_normals[:, None]).max(axis=(1, 2)) < 1e-9
     assert 0.75 < fine.mesh.face_areas[flat].sum() / fine.mesh.area < 1.0
     assert "crease" in " ".join(cells.notes)
 

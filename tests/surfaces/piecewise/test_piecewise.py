@@ -125,7 +125,9 @@ def test_feet_are_those_of_the_whole(name):
     rng = np.random.default_rng(3)
     low, high = whole.centres.min(axis=0) - 0.1, whole.centres.max(axis=0) + 0.1
     points = rng.uniform(low, high, (600, 3))
-    points = np.concatenate([points, parts.joints.crossings + 0.01 * parts.joints.normals[:, 0]])
+    points = np.concatenate(
+        [points, parts.seam_pairs.crossings + 0.01 * parts.seam_pairs.normals[:, 0]]
+    )
     one, other = whole.surface.closest(points), parts.surface.closest(points)
     assert (one.inside == other.inside).all()
     some = one.inside
@@ -183,7 +185,7 @@ def test_long_sides_against_short_ones():
                 assert not 0.0 < shared < 0.02  # so that no pair is a matter of taste
                 if shared > 0.0:
                     expected.add((cells.index(0, rows[0], j), cells.index(other, rows[other], k)))
-    across = {tuple(pair) for pair in cells.joints.pairs.tolist() if cells.piece[pair[0]] == 0}
+    across = {tuple(pair) for pair in cells.seam_pairs.pairs.tolist() if cells.piece[pair[0]] == 0}
     assert across == expected
     assert cells.curves.deviations.max() < 1e-6
 
@@ -193,7 +195,7 @@ def test_pieces_that_meet_in_a_point_are_not_joined():
     assert surface.seams == ()
     assert surface.groups == ((0,), (1,))
     assert "touch nowhere (0; 1)" in surface.notes[0]
-    assert len(surface.cells((3, 3)).joints.pairs) == 0
+    assert len(surface.cells((3, 3)).seam_pairs.pairs) == 0
 
 
 @pytest.mark.parametrize(("apart", "joined"), [(0.0, True), (0.9e-4, True), (1.1e-4, False)])
@@ -201,7 +203,7 @@ def test_borders_join_within_the_gap(apart, joined):
     surface = piecewise([plane((0, 1), (0, 1)), plane((1 + apart, 2), (0, 1))])
     assert len(surface.seams) == joined
     cells = surface.cells((3, 3))
-    assert len(cells.joints.pairs) == (7 if joined else 0)
+    assert len(cells.seam_pairs.pairs) == (7 if joined else 0)
     closest_point, _ = cells.curves.at(np.arange(len(cells.pairs)), np.full(len(cells.pairs), 0.5))
     on = surface.closest(closest_point)
     assert on.inside.all()
@@ -250,7 +252,7 @@ def test_a_crease_is_told_with_its_angle(angle):
     assert len(surface.notes) == 1
     assert f"crease of up to {abs(angle):g} degrees" in surface.notes[0]
     cells = surface.cells((3, 4))
-    assert cells.joints.creases == pytest.approx(math.radians(abs(angle)), abs=1e-9)
+    assert cells.seam_pairs.creases == pytest.approx(math.radians(abs(angle)), abs=1e-9)
     # Courses across it stray by at least half of the angle, those along it by nothing.
     deviations = cells.curves.deviations[:, 1]
     across = cells.piece[cells.pairs[:, 0]] != cells.piece[cells.pairs[:, 1]]
@@ -294,7 +296,7 @@ def test_a_full_turn_stacked_on_a_full_turn():
     )
     assert surface.notes == ()
     cells = surface.cells((9, 3))
-    met = np.bincount(cells.joints.pairs.ravel(), minlength=len(cells))
+    met = np.bincount(cells.seam_pairs.pairs.ravel(), minlength=len(cells))
     assert sorted(set(met.tolist())) == [0, 2]
     assert (met > 0).sum() == 18
     assert cells.curves.deviations.max() < 1e-5
@@ -322,8 +324,8 @@ def test_a_rigid_motion_moves_everything_along():
         assert (here.neighbours.indices == there.neighbours.indices).all()
         assert here.centres @ turn.T + shift == pytest.approx(there.centres, abs=1e-12)
         assert here.normals @ turn.T == pytest.approx(there.normals, abs=1e-12)
-        assert here.joints.crossings @ turn.T + shift == pytest.approx(
-            there.joints.crossings, abs=1e-12
+        assert here.seam_pairs.crossings @ turn.T + shift == pytest.approx(
+            there.seam_pairs.crossings, abs=1e-12
         )
         assert here.curves.derivative_bounds == pytest.approx(
             there.curves.derivative_bounds, abs=1e-7
@@ -418,5 +420,5 @@ def test_one_piece_and_pieces_without_cells():
     assert alone.curves.deviations.max() < 1e-12
     some = split_hood(0.5).cells([(0, 3), (2, 3)])
     assert len(some) == 6
-    assert len(some.joints.pairs) == 0
+    assert len(some.seam_pairs.pairs) == 0
     assert len(piecewise([plane((0, 1), (0, 1))]).cells((0, 3))) == 0

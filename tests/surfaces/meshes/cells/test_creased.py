@@ -152,9 +152,9 @@ def test_the_normal_turns_no_faster_than_is_said(name):
     cells = mesh(PARTS[name]()).cells(50)
     surface = cells.surface
     rng = np.random.default_rng(3)
-    creased = np.flatnonzero((surface.corner_normals != surface.rim_normals).any(axis=(1, 2)))
+    creased = np.flatnonzero((surface.corner_normals != surface.crease_normals).any(axis=(1, 2)))
     face = rng.choice(creased, 20_000)
-    on_crease = (surface.corner_normals[face] != surface.rim_normals[face]).any(axis=2)
+    on_crease = (surface.corner_normals[face] != surface.crease_normals[face]).any(axis=2)
     weights = rng.dirichlet([1, 1, 1], len(face)) * np.where(on_crease, 20.0, 1.0)
     weights /= weights.sum(axis=1, keepdims=True)
     step = 1e-4 * rng.normal(size=(len(face), 3))
