@@ -100,9 +100,9 @@ def nearest_on_ellipsoid(axes: Array, points: Array, toward: Array) -> Array:
     The closest point to p is x_i = e_i^2 p_i / (s + d_i) with d_i = e_i^2 - e^2, e the least
     semi-axis, and s the root of g(s) = |e_i p_i / (s + d_i)| - 1 on s > 0, where g falls.
     1 / |...| is concave and rises, so that Newton's method on it comes up to the root from the left
-    without passing it (the secular equation of trust regions). Where g < 0 down to s = 0, p lies on the plane across
-    the shortest axis, near the centre: then s = 0, and what is missing on x along that axis may
-    have either sign.
+    without passing it (the secular equation of trust regions). Where g < 0 down to s = 0, p lies on
+    the plane across the shortest axis, near the centre: then s = 0, and what is missing on x along
+    that axis may have either sign.
 
     Args:
         axes: (3,) m, semi-axes.
