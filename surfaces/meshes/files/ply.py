@@ -1,8 +1,8 @@
 """PLY, binary and text: a header that names its own columns, then the rows.
 
-trimesh was tried and is not used here. It takes text rows that are cut short, too long or no whole
-numbers without a word, and reads no binary file with triangles beside other polygons, as Blender
-writes them. Behind the header, which is checked anyway, a table is one numpy type.
+trimesh's reader is not used here: it takes text rows that are cut short, too long or no integers
+without a word, and refuses binary files with triangles beside other polygons, as Blender writes
+them. Behind the header, which has to be checked anyway, a table is one numpy type.
 """
 
 from __future__ import annotations
