@@ -39,7 +39,7 @@ class Fault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """The sentence without key and place."""
+        """The sentence without key and place: what was expected, and what was found."""
         if self.expected.startswith("must "):
             return f"{self.expected}, {self.fault}"
         return f"{self.fault}; {self.expected}" if self.expected else self.fault
@@ -57,9 +57,10 @@ class Fault(NamedTuple):
 
 
 def worded(fault: Fault, after_key: str = " ") -> str:
-    """A fault as one sentence: its place, its key, what was expected and what was found."""
-    sentence = f"{fault.key}{after_key}{fault.message}" if fault.key else fault.message
-    return f"{fault.place}: {sentence}" if fault.place else sentence
+    """A fault as one sentence: its key, its place, what was expected and what was found."""
+    if not fault.place:
+        return f"{fault.key}{after_key}{fault.message}" if fault.key else fault.message
+    return ": ".join(part for part in (fault.key, fault.place, fault.message) if part)
 
 
 class CoverableError(ValueError):
@@ -142,7 +143,14 @@ class Checks:
             value: what was given; `MISSING` where nothing was.
             expected: "must be ...".
         """
-        self.faults.append(wrong(key, value, expected))
+        if value is MISSING:
+            self.keep(Fault(key, "is missing", expected=f"it {expected}"))
+        else:
+            self.keep(Fault(key, f"got {shown(value)}", expected=expected))
+
+    def keep(self, fault: Fault) -> None:
+        """Keep a fault."""
+        self.faults.append(fault)
 
     def number(
         self, key: str, value: object, expected: str, low: float = -math.inf, high: float = math.inf
@@ -172,7 +180,7 @@ class Checks:
             and low <= int(value) <= high
         ):
             return int(value)
-        some = f">= {low}" if high == LARGEST_WHOLE else f"in {low} .. {high:,}"
+        some = f">= {low} (64 bits)" if high == LARGEST_WHOLE else f"in {low} .. {high:,}"
         either = f"{or_word} or " if or_word else ""
         self.wrong(key, value, f"must be {either}a whole number {some}")
         return low
@@ -183,12 +191,47 @@ class Checks:
             if isinstance(value, str) and value == option:
                 return option
         expected = f"must be {alternatives([repr(option) for option in options])}"
-        self.wrong(key, value, expected)
         guess = close(value, options)
         if guess:
-            last = self.faults[-1]
-            self.faults[-1] = last._replace(fault=f"{last.fault}; did you mean {guess}?")
+            self.keep(Fault(key, f"got {shown(value)}; did you mean {guess}?", expected=expected))
+        else:
+            self.wrong(key, value, expected)
         return options[0]
+
+    def numbers(self, key: str, value: Any, count: int, expected: str) -> list[float] | None:
+        """Some finite numbers; None after a fault."""
+        items = value.tolist() if hasattr(value, "tolist") else value
+        if isinstance(items, Sequence) and not isinstance(items, (str, bytes)):
+            found = [real(item) for item in items]
+            if len(found) == count and all(map(math.isfinite, found)):
+                return found
+        self.wrong(key, value, expected)
+        return None
+
+    def interval(
+        self, key: str, value: Any, unit: str, after_fault: tuple[float, float] = (0.0, 1.0)
+    ) -> tuple[float, float]:
+        """Two finite numbers, the first below the second."""
+        expected = f"must be a pair (low, high) of finite numbers with low < high ({unit})"
+        found = self.numbers(key, value, 2, expected)
+        if found is None:
+            return after_fault
+        low, high = found
+        if low < high:
+            return low, high
+        what = "an empty range" if low == high else "the wrong way round"
+        self.keep(Fault(key, f"got {shown(value)}, {what}", expected=expected))
+        return after_fault
+
+    def direction(self, key: str, value: Any) -> list[float]:
+        """Three finite numbers that are not all zero; of any length."""
+        expected = "must be three finite numbers that are not all zero, such as (0, 0, 1)"
+        found = self.numbers(key, value, 3, expected)
+        if found is not None and max(map(abs, found)) >= 1e-12:
+            return found
+        if found is not None:
+            self.wrong(key, value, expected)
+        return [0.0, 0.0, 1.0]
 
     def done(self) -> None:
         """Raise if anything was wrong.
@@ -198,13 +241,6 @@ class Checks:
         """
         if self.faults:
             raise self.error(self.faults, self.source)
-
-
-def wrong(key: str, value: object, expected: str) -> Fault:
-    """The fault that an argument is not as it must be, or that it is `MISSING`."""
-    if value is MISSING:
-        return Fault(key, "is missing", expected=f"it {expected}")
-    return Fault(key, f"got {shown(value)}", expected=expected)
 
 
 def real(value: object) -> float:
@@ -230,6 +266,11 @@ def shown(value: object) -> str:
         return "a whole number of thousands of digits"
     text = text if text.isprintable() else " ".join(text.split())
     return text if len(text) <= LONGEST_SHOWN else text[:60] + "..." + text[-15:]
+
+
+def printable(key: str) -> str:
+    """A key for a message."""
+    return key if key.isprintable() and 0 < len(key) <= 60 else shown(key)
 
 
 def close(value: Any, options: Sequence[str]) -> str:

@@ -1,3 +1,4 @@
+from .arguments import check_arguments as check_arguments
 from .chain import Chain as Chain
 from .chain import frames as frames
 from .chain import jacobians as jacobians

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from numbers import Real
 from typing import TYPE_CHECKING, NamedTuple
 
 from numpy.typing import ArrayLike
@@ -93,9 +91,7 @@ def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> N
             continue
         unit = "m" if joint.kind == "prismatic" else "rad"
         low, high = joint.limits
-        if isinstance(value, bool) or not isinstance(value, Real):
-            faults.append(f"lock holds joint {joint_name!r} at {value!r}, not a number ({unit})")
-        elif not (math.isfinite(value) and low <= value <= high):
+        if not low <= value <= high:
             faults.append(
                 f"lock holds joint {joint_name!r} at {value:g} {unit}, outside its limits "
                 f"{low:g} .. {high:g} {unit}"

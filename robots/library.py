@@ -19,6 +19,7 @@ from types import MappingProxyType
 
 from numpy.typing import ArrayLike
 
+from robots.arguments import check_arguments
 from robots.errors import RobotError
 from robots.joint_selection import suggestion
 from robots.robot import Robot
@@ -92,6 +93,7 @@ def load_robot(
     from robots.pinocchio_model import robot_from_urdf
     from robots.urdf import check_urdf
 
+    check_arguments(approach_axis, lock, f"robot {os.fspath(name_or_path)!r}")
     info = _find(name_or_path)
     if isinstance(package_dirs, (str, os.PathLike)):
         package_dirs = (package_dirs,)

@@ -1,5 +1,5 @@
 from .adjacency import components as components
-from .arguments import table as table
+from .arguments import check_pose as check_pose
 from .cells import Cells as Cells
 from .cells import Triangles as Triangles
 from .meshes import MeshSurface as MeshSurface

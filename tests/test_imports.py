@@ -21,7 +21,7 @@ MOST_MODULES = 20  # of one folder
 ORDER = """
 coverable_errors
 coverable_files
-robots: errors chain reach robot kinematics
+robots: errors arguments chain reach robot kinematics
 robots.urdf
 robots: joint_selection pinocchio_model library
 surfaces: surface cells adjacency cell_curves curve_fitting arguments

@@ -9,8 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from coverable_errors import Fault, alternatives, close, printable
 from feasibility.cases.edits import as_read, make_absolute, override
-from feasibility.cases.robot_table import RobotPart, read_robot
+from feasibility.cases.robot_table import RobotPart, in_robot_table, read_robot
 from feasibility.cases.surface_kinds import CLOSED_FORM_KINDS
 from feasibility.cases.surface_table import (
     SurfacePart,
@@ -18,13 +19,7 @@ from feasibility.cases.surface_table import (
     named_file,
     read_surface,
 )
-from feasibility.cases.table_reader import (
-    CaseError,
-    Fault,
-    alternatives,
-    close,
-    printable,
-)
+from feasibility.cases.table_reader import CaseError
 from feasibility.cases.task_tables import read_search, read_task
 from feasibility.cases.toml import TomlError, parse_toml, toml_document
 from feasibility.safe_files import FileError, read_regular, shown_path
@@ -34,8 +29,6 @@ from feasibility.task import Task
 if TYPE_CHECKING:
     from robots import Robot
     from surfaces import Cells
-
-__all__ = ["Case", "CaseError", "Fault", "Setup", "builtin_cases", "load_case"]
 
 BUILT_IN = Path(__file__).with_name("built_in.toml")
 LARGEST_FILE = 256 * 1024  # bytes
@@ -81,11 +74,11 @@ class Case:
         """
         from robots import RobotError
 
-        faults, robot, cells = [], None, None
+        faults, robot, cells = list[Fault](), None, None
         try:
             robot = self.robot.build()
         except RobotError as error:
-            faults.append(Fault("robot", str(error)))
+            faults += in_robot_table(error)
         try:
             cells = self.surface.cut()
         except CaseError as error:
@@ -258,5 +251,5 @@ def _robot_faults(part: RobotPart | None) -> list[Fault]:
     try:
         part.build()
     except RobotError as error:
-        return [Fault("robot", str(error))]
+        return in_robot_table(error)
     return []

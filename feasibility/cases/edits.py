@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from typing import Any
 
-from feasibility.cases.table_reader import Fault, shown
+from coverable_errors import Fault, shown
 from feasibility.cases.toml import TomlError, parse_setting
 
 

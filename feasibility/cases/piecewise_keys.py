@@ -6,9 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, cast
 
-from feasibility.cases.patch_keys import MOST_CELLS, PATCHES, build_patch, read_grid, read_patch
+from coverable_errors import MISSING
+from feasibility.cases.patch_keys import (
+    MOST_CELLS,
+    PATCHES,
+    build_patch,
+    frozen_values,
+    read_grid,
+    read_patch,
+    try_patch,
+)
 from feasibility.cases.surface_kinds import OWN_KEYS, foreign_keys
-from feasibility.cases.table_reader import ORIGIN, CaseError, Fault, Section, Triple
+from feasibility.cases.table_reader import ORIGIN, CaseError, Section, Triple, frozen
 
 if TYPE_CHECKING:
     from surfaces.patches import Patch
@@ -26,7 +35,7 @@ class PiecePart:
     """The kind's own keys, as in `SurfacePart`."""
     cells: tuple[int, int]
     position: Triple = ORIGIN
-    """m, in the frame of the whole."""
+    """m, in the frame of the surface."""
     rpy_deg: Triple = ORIGIN
 
     def table(self) -> dict[str, Any]:
@@ -49,23 +58,21 @@ class PiecePart:
 
 
 def read_pieces(section: Section) -> dict[str, Any]:
-    """The values of the keys of a piecewise surface; those left out or wrong are missing.
+    """The values of the keys of a piecewise surface.
 
     What needs no file is built to try it.
     """
-    values: dict[str, Any] = {}
-    expected = f"1 to {MOST_PIECES} tables [[{section.name}.pieces]], a patch each"
-    if section.wants("pieces", expected, required=True):
-        entries = section.table["pieces"]
-        if isinstance(entries, list) and 1 <= len(entries) <= MOST_PIECES:
-            found = [_piece(section, k, entry) for k, entry in enumerate(entries)]
-            values["pieces"] = tuple(piece for piece in found if piece is not None)
-        else:
-            section.wrong("pieces", expected)
-    gap = section.positive("gap", "a number > 0 (metres), how far apart two borders may be")
-    if gap is not None:
-        values["gap"] = gap
-    pieces = values.get("pieces", ())
+    values = section.take("pieces", "gap")
+    if "gap" in values:
+        section.positive("gap", values["gap"])
+    entries = values.get("pieces", MISSING)
+    if not isinstance(entries, list) or not 1 <= len(entries) <= MOST_PIECES:
+        if section.is_table:
+            tables = f"1 to {MOST_PIECES} tables [[{section.name}.pieces]], a patch each"
+            section.wrong("pieces", entries, f"must be {tables}")
+        return values
+    found = [_piece(section, k, entry) for k, entry in enumerate(entries)]
+    pieces = values["pieces"] = tuple(piece for piece in found if piece is not None)
     if sum(piece.cells[0] * piece.cells[1] for piece in pieces) > MOST_CELLS:
         section.fault("pieces", f"make more than {MOST_CELLS:,} cells; use coarser grids")
     return values
@@ -91,8 +98,7 @@ def build_pieces(values: Mapping[str, Any], pose: Mapping[str, Any]) -> Piecewis
     try:
         return piecewise(patches, gap=values.get("gap"), **pose)
     except SurfaceError as error:
-        message = str(error).removeprefix("piecewise: ")
-        raise CaseError(Fault("surface", message)) from error
+        raise CaseError([fault.renamed({}, "surface") for fault in error.faults]) from error
 
 
 def cut_pieces(surface: Piecewise, values: Mapping[str, Any]) -> PieceCells:
@@ -106,36 +112,23 @@ def cut_pieces(surface: Piecewise, values: Mapping[str, Any]) -> PieceCells:
     try:
         return surface.cells([piece.cells for piece in values["pieces"]])
     except SurfaceError as error:
-        raise CaseError(Fault("surface.pieces", str(error))) from error
+        raise CaseError([fault._replace(key="surface.pieces") for fault in error.faults]) from error
 
 
-def _piece(whole: Section, k: int, entry: Any) -> PiecePart | None:
+def _piece(section: Section, k: int, entry: Any) -> PiecePart | None:
     """One entry; None where it has faults."""
-    place = f"{whole.name}.pieces[{k}]"
-    section = Section(place, entry, whole.faults)
-    before = len(whole.faults)
-    kind = section.choice("kind", tuple(PATCHES), required=True)
-    position = section.numbers("position", 3, "three finite numbers (metres)")
-    rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
+    place = f"{section.name}.pieces[{k}]"
+    piece = Section(place, entry, section.faults)
+    before = len(section.faults)
+    kind = piece.word("kind", tuple(PATCHES), required=True)
+    pose = piece.take("position", "rpy_deg")
     if kind is None:  # which other keys belong here is not known
         return None
-    values = read_patch(section, kind)
-    cells = read_grid(section)
-    own_side = f"is that of the whole; write it as {whole.name}.side, and leave it out here"
-    section.done({**foreign_keys(kind), "side": own_side})
-    if len(whole.faults) > before or cells is None:
+    values = read_patch(piece, kind)
+    cells = read_grid(piece)
+    own_side = f"is that of all pieces; write it as {section.name}.side, and leave it out here"
+    piece.refuse_others({**foreign_keys(kind), "side": own_side})
+    try_patch(piece, kind, values, pose)
+    if len(section.faults) > before or cells is None:
         return None
-    part = PiecePart(
-        kind=kind,
-        values=values,
-        cells=cells,
-        position=cast("Triple", position or ORIGIN),
-        rpy_deg=cast("Triple", rpy_deg or ORIGIN),
-    )
-    if "file" not in values:
-        try:
-            part.build(place)
-        except CaseError as error:
-            whole.faults += error.faults
-            return None
-    return part
+    return PiecePart(kind, frozen_values(values), cells, **frozen(pose))

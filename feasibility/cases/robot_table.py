@@ -6,23 +6,13 @@ import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
-from feasibility.cases.table_reader import (
-    DEG,
-    METRES,
-    Fault,
-    Pair,
-    Section,
-    Triple,
-    is_number,
-    is_text,
-    printable,
-    shown,
-)
+from coverable_errors import Fault, printable, shown
+from feasibility.cases.table_reader import DEG, METRES, Pair, Section, Triple, frozen, is_text
 
 if TYPE_CHECKING:
-    from robots import Robot
+    from robots import Robot, RobotError
 
 URDF_ENDINGS = (".urdf", ".xml", ".xacro")
 
@@ -72,25 +62,33 @@ class RobotPart:
         kinds = dict(zip(robot.joint_names, robot.joint_kinds, strict=True))
         in_degrees = robot.joint_names if isinstance(self.limits_deg, tuple) else self.limits_deg
         faults = [
-            f"limits_deg gives degrees for joint {joint!r}, which slides; use limits_m"
+            Fault("limits_deg", f"gives degrees for joint {joint!r}, which slides; use limits_m")
             for joint in in_degrees or ()
             if kinds[joint] == "prismatic"
         ]
         faults += [
-            f"limits_m gives metres for joint {joint!r}, which turns; use limits_deg"
+            Fault("limits_m", f"gives metres for joint {joint!r}, which turns; use limits_deg")
             for joint in self.limits_m or ()
             if kinds[joint] != "prismatic"
         ]
         if faults:
-            raise RobotError(f"robot {robot.name!r}: " + "; ".join(faults))
+            raise RobotError(faults, f"robot {robot.name!r}")
         return robot
 
     def _limits(self) -> str | list[Pair] | dict[str, Pair] | None:
-        """What `load_robot` is told about limits, rad or m."""
+        """The limits as `load_robot` takes them, rad or m."""
         if isinstance(self.limits_deg, tuple):
             return [_radians(pair) for pair in self.limits_deg]
         named = {joint: _radians(pair) for joint, pair in (self.limits_deg or {}).items()}
         return self.limits or {**named, **(self.limits_m or {})} or None
+
+
+def in_robot_table(error: RobotError) -> list[Fault]:
+    """What loading an arm says, as faults of the [robot] table."""
+    return [
+        fault._replace(place=": ".join(part for part in (error.source, fault.place) if part))
+        for fault in (fault.renamed({}, "robot") for fault in error.faults)
+    ]
 
 
 def _radians(pair: Pair) -> Pair:
@@ -99,7 +97,9 @@ def _radians(pair: Pair) -> Pair:
 
 
 def read_robot(table: Any, faults: list[Fault]) -> RobotPart | None:
-    """Read the [robot] table; None where it has faults."""
+    """Read the [robot] table; None where it has faults. No URDF is read for it."""
+    from robots import check_arguments
+
     section = Section("robot", table, faults)
     before = len(faults)
     name = section.text("name", "the name of a robot; `coverable robots` lists them")
@@ -110,110 +110,82 @@ def read_robot(table: Any, faults: list[Fault]) -> RobotPart | None:
         section.fault("name", "is missing; expected the name of a robot, or urdf = a URDF file")
     if name is not None and (os.sep in name or name.lower().endswith(URDF_ENDINGS)):
         section.fault("name", f"must be a name, got the path {shown(name)}; write urdf = it")
+    values = section.take("approach_axis", "lock")
+    if not isinstance(values.get("lock", {}), Mapping):
+        lock = "a table of joints and values (rad or m), such as { joint7 = 0.0 }"
+        section.wrong("lock", values.pop("lock"), f"must be {lock}")
+    section.make(check_arguments, values)
     part = RobotPart(
         name=name,
         urdf=None if urdf is None else os.path.abspath(os.path.expanduser(urdf)),
         package_dirs=_package_dirs(section),
         tool_frame=section.text("tool_frame", "the name of a link"),
-        approach_axis=_axis(section),
-        lock=_lock(section),
         limits=section.text("limits", "the name of a limit set of the robot"),
         limits_deg=_limits_deg(section),
         limits_m=_limits_by_name(section, "limits_m", METRES),
+        **frozen(values),
     )
+    _refuse_contradictions(section)
+    section.refuse_others()
+    return part if len(faults) == before else None
+
+
+def _refuse_contradictions(section: Section) -> None:
+    """Limits that are given twice, or for a joint that is held."""
+    table = section.table
     for other in ("limits_deg", "limits_m"):
-        if "limits" in section.table and other in section.table:
+        if "limits" in table and other in table:
             section.fault("limits", f"contradicts robot.{other}; give one of the two")
-    if isinstance(part.limits_deg, tuple) and part.limits_m is not None:
+    if isinstance(table.get("limits_deg"), list) and "limits_m" in table:
         section.fault(
             "limits_m",
             "contradicts the list in robot.limits_deg, which is for arms whose joints all turn; "
             "give both by joint name",
         )
-    for joint in sorted(_names(section, "lock") & (_names(section, "limits_deg", "limits_m"))):
+    in_degrees, in_metres = _names(table.get("limits_deg")), _names(table.get("limits_m"))
+    for joint in sorted(_names(table.get("lock")) & (in_degrees | in_metres)):
         section.fault(f"lock.{printable(joint)}", "contradicts the limits given for that joint")
-    both = _names(section, "limits_deg") & _names(section, "limits_m")
-    for joint in sorted(both):
+    for joint in sorted(in_degrees & in_metres):
         section.fault(f"limits_m.{printable(joint)}", "contradicts robot.limits_deg of that joint")
-    section.done()
-    return part if len(faults) == before else None
 
 
-def _names(section: Section, *keys: str) -> set[str]:
-    """Joints that are named in tables of the section."""
-    return {
-        str(joint)
-        for key in keys
-        if isinstance(section.table.get(key), Mapping)
-        for joint in section.table[key]
-    }
+def _names(value: Any) -> set[str]:
+    """Joints that a table names."""
+    return set(value) if isinstance(value, Mapping) else set()
 
 
 def _package_dirs(section: Section) -> tuple[str, ...]:
     """Folders, made absolute."""
-    expected = 'an array of folders, such as ["meshes"], relative to the case file'
-    if not section.wants("package_dirs", expected, required=False):
-        return ()
-    value = section.table["package_dirs"]
+    value = section.take("package_dirs").get("package_dirs", [])
     if not isinstance(value, list) or not all(map(is_text, value)):
-        section.wrong("package_dirs", expected)
+        folders = 'an array of folders, such as ["meshes"], relative to the case file'
+        section.wrong("package_dirs", value, f"must be {folders}")
         return ()
     return tuple(os.path.abspath(os.path.expanduser(folder)) for folder in value)
 
 
-def _axis(section: Section) -> tuple[float, float, float] | None:
-    """The approach axis: three numbers, not all zero."""
-    expected = "three finite numbers that are not all zero, such as [0, 0, 1]"
-    axis = section.numbers("approach_axis", 3, expected)
-    if axis is not None and sum(value * value for value in axis) ** 0.5 <= 1e-9:
-        section.wrong("approach_axis", expected)
-        return None
-    return cast("tuple[float, float, float] | None", axis)
-
-
-def _lock(section: Section) -> dict[str, float]:
-    """Joints held at a value."""
-    expected = "a table of joints and values (rad or m), such as { joint7 = 0.0 }"
-    if not section.wants("lock", expected, required=False):
-        return {}
-    value = section.table["lock"]
-    if not isinstance(value, Mapping):
-        section.wrong("lock", expected)
-        return {}
-    for joint, held in value.items():
-        if not is_number(held):
-            section.fault(
-                f"lock.{printable(joint)}", f"must be a finite number (rad or m), got {shown(held)}"
-            )
-    return {joint: float(held) for joint, held in value.items() if is_number(held)}
-
-
 def _limits_deg(section: Section) -> tuple[Pair, ...] | dict[str, Pair] | None:
     """Limits of all joints in order, or of some by name."""
-    if isinstance(section.table.get("limits_deg"), Mapping):
+    value = section.table.get("limits_deg")
+    if value is None or isinstance(value, Mapping):
         return _limits_by_name(section, "limits_deg", DEG)
-    expected = "an array of [low, high] in degrees, one per joint, or a table by joint name"
-    if not section.wants("limits_deg", expected, required=False):
-        return None
-    value = section.table["limits_deg"]
+    section.has("limits_deg")
     if not isinstance(value, list) or not value:
-        section.wrong("limits_deg", expected)
+        pairs = "an array of [low, high] in degrees, one per joint, or a table by joint name"
+        section.wrong("limits_deg", value, f"must be {pairs}")
         return None
-    pairs = [section.pair(f"limits_deg[{i}]", pair, DEG) for i, pair in enumerate(value)]
-    return tuple(pair for pair in pairs if pair is not None)
+    return tuple(section.interval(f"limits_deg[{i}]", pair, DEG) for i, pair in enumerate(value))
 
 
 def _limits_by_name(section: Section, key: str, unit: str) -> dict[str, Pair] | None:
     """Limits of some joints by name."""
-    expected = f"a table of joints and [low, high] in {unit}, such as {{ joint4 = [-1, 1] }}"
-    if not section.wants(key, expected, required=False):
-        return None
-    value = section.table[key]
-    if not isinstance(value, Mapping):
-        section.wrong(key, expected)
+    value = section.take(key).get(key)
+    if value is not None and not isinstance(value, Mapping):
+        some = f"a table of joints and [low, high] in {unit}, such as {{ joint4 = [-1, 1] }}"
+        section.wrong(key, value, f"must be {some}")
         return None
     pairs = {
-        joint: section.pair(f"{key}.{printable(joint)}", pair, unit)
-        for joint, pair in value.items()
+        joint: section.interval(f"{key}.{printable(joint)}", pair, unit)
+        for joint, pair in (value or {}).items()
     }
-    return {joint: pair for joint, pair in pairs.items() if pair is not None} or None
+    return pairs or None

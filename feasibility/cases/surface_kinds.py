@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from coverable_errors import alternatives
 from feasibility.cases.mesh_keys import MESH_KEYS
 from feasibility.cases.patch_keys import PATCHES, patch_keys
-from feasibility.cases.table_reader import DEG, METRES, alternatives
+from feasibility.cases.table_reader import DEG, METRES
 
 PIECES_KEYS = ("pieces", "gap")
 OWN_KEYS: Mapping[str, tuple[str, ...]] = {

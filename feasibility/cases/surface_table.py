@@ -7,11 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
+from coverable_errors import Fault
 from feasibility.cases.mesh_keys import build_mesh, cut_mesh, read_count, read_mesh_keys
-from feasibility.cases.patch_keys import PATCHES, build_patch, read_grid, read_patch
+from feasibility.cases.patch_keys import (
+    PATCHES,
+    build_patch,
+    frozen_values,
+    read_grid,
+    read_patch,
+    try_patch,
+)
 from feasibility.cases.piecewise_keys import PiecePart, build_pieces, cut_pieces, read_pieces
 from feasibility.cases.surface_kinds import OWN_KEYS, foreign_keys
-from feasibility.cases.table_reader import ORIGIN, CaseError, Fault, Section, Triple
+from feasibility.cases.table_reader import ORIGIN, CaseError, Section, Triple, frozen
 
 if TYPE_CHECKING:
     from surfaces import Cells, Surface
@@ -91,29 +99,24 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
     Patches that need no file are built to try them; files are read, and pieces joined, by
     `SurfacePart.build` only.
     """
+    from surfaces import check_pose
+
     section = Section("surface", table, faults)
     before = len(faults)
-    kind = section.choice("kind", tuple(OWN_KEYS), required=True)
-    side = section.choice("side", ("inside", "outside"))
-    position = section.numbers("position", 3, "three finite numbers (metres)")
-    rpy_deg = section.numbers("rpy_deg", 3, "three finite numbers (degrees)")
+    kind = section.word("kind", tuple(OWN_KEYS), required=True)
+    pose = section.take("side", "position", "rpy_deg")
     if kind is None:  # which other keys belong here is not known
+        section.make(check_pose, pose)
         return None
     values, cells = _values(section, kind)
-    section.done(_hints(kind))
+    section.refuse_others(_hints(kind))
+    if kind in PATCHES:
+        try_patch(section, kind, values, pose)
+    else:
+        section.make(check_pose, pose)
     if len(faults) > before:
         return None
-    part = SurfacePart(
-        kind=kind,
-        values=values,
-        cells=cells,
-        side=cast(Literal["inside", "outside"], side or "inside"),
-        position=cast("Triple", position or ORIGIN),
-        rpy_deg=cast("Triple", rpy_deg or ORIGIN),
-    )
-    if kind in PATCHES and "file" not in values:
-        faults += faults_of_building(part)
-    return part if len(faults) == before else None
+    return SurfacePart(kind, frozen_values(values), cells, **frozen(pose))
 
 
 def faults_of_building(part: SurfacePart) -> list[Fault]:

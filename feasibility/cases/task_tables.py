@@ -22,7 +22,7 @@ def read_task(table: Any, faults: list[Fault]) -> Task | None:
             "normal is used",
         )
     section.later("roll_deg", "leave it out: the roll about the approach direction is free")
-    section.done()
+    section.refuse_others()
     return section.make(Task, values)
 
 
@@ -30,5 +30,5 @@ def read_search(table: Any, faults: list[Fault]) -> Search | None:
     """Read the [search] table; None where it has faults."""
     section = Section("search", table, faults)
     values = section.take(*Search.__dataclass_fields__)
-    section.done()
+    section.refuse_others()
     return section.make(Search, values)

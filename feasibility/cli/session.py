@@ -52,7 +52,8 @@ def open_case(
         FileError: an output cannot be written.
     """
     with progress_bar() as progress:
-        from feasibility.cases import CaseError, Fault, load_case
+        from coverable_errors import Fault
+        from feasibility.cases import CaseError, load_case
         from feasibility.notices import compiling_notice
 
         progress.settle()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from feasibility.cases import shown
+from coverable_errors import shown
 from feasibility.results.archive import Archive
 
 

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import ArgumentError, CoverableError, worded
-from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, shown
+from coverable_errors import ArgumentError, CoverableError, shown, worded
+from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError
 from feasibility.results.archive import Archive, ArchiveError, write_archive
 from feasibility.results.result_fields import Fields
 from feasibility.results.result_graph import pack_graph, ragged, unpack_graph, unpack_ragged

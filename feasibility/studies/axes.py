@@ -6,15 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from coverable_errors import LARGEST_WHOLE, Fault, alternatives, close, is_number, printable, shown
 from feasibility.cases import (
-    Fault,
     Section,
-    alternatives,
-    close,
-    is_number,
     is_text,
-    printable,
-    shown,
 )
 
 POSES = {"position": ("x", "y", "z"), "rpy_deg": ("roll", "pitch", "yaw")}
@@ -84,9 +79,9 @@ def read_variation(table: Any, faults: list[Fault]) -> Variation:
     ranges: list[Range] = []
     if section.has("robots"):
         _read_robots(section, axes)
-    sampler = section.choice("sampler", SAMPLERS)
-    count = _whole(section, "count", f"a whole number of samples in 1 .. {MOST_VALUES}", 1)
-    seed = _whole(section, "seed", "a whole number >= 0", 0)
+    sampler = section.word("sampler", SAMPLERS)
+    count = _whole(section, "count", 1, MOST_VALUES)
+    seed = _whole(section, "seed", 0)
     for name, key, value in _flattened(section):
         place = f"vary.{name}.{printable(key)}"
         if name == "surface" and key in POSES and isinstance(value, Mapping):
@@ -103,15 +98,10 @@ def read_variation(table: Any, faults: list[Fault]) -> Variation:
     return Variation(tuple(axes), tuple(ranges), (count or 1) if ranges else 0, seed or 0)
 
 
-def _whole(section: Section, key: str, expected: str, least: int) -> int | None:
-    """A whole number in a range."""
-    value = section.whole(key, expected)
-    if value is None:
-        return None
-    if value < least or (key == "count" and value > MOST_VALUES):
-        section.wrong(key, expected)
-        return None
-    return value
+def _whole(section: Section, key: str, low: int, high: int = LARGEST_WHOLE) -> int | None:
+    """A whole number in a range; None where it is left out."""
+    written = section.take(key)
+    return section.whole(key, written[key], low, high) if written else None
 
 
 def _flattened(section: Section) -> list[tuple[str, str, Any]]:
@@ -161,7 +151,7 @@ def _read_robots(section: Section, axes: list[Axis]) -> None:
     expected = 'an array of robots, such as ["ur5", { name = "puma560", limits = "set-1" }]'
     value = section.table["robots"]
     if not isinstance(value, list) or not value or len(value) > MOST_VALUES:
-        section.wrong("robots", expected)
+        section.wrong("robots", value, f"must be {expected}")
         return
     tables: list[Any] = []
     for k, robot in enumerate(value):
@@ -226,8 +216,9 @@ def _read_values(
             axes.append(Axis(label, place, path, tuple(value)))
         return
     if isinstance(value, Mapping) and value.keys() == {"range"}:
-        pair = Section(place, value, faults).pair("range", value["range"], "the key's own unit")
-        if pair is not None:
+        before = len(faults)
+        pair = Section(place, value, faults).interval("range", value["range"], "the key's own unit")
+        if len(faults) == before:
             ranges.append(Range(label, place, path, *pair))
         return
     if isinstance(value, Mapping) and value.keys() == {"from", "to", "steps"}:
@@ -240,13 +231,12 @@ def _read_steps(
     label: str, place: str, path: tuple[str | int, ...], section: Section, axes: list[Axis]
 ) -> None:
     """Evenly spaced values, both ends among them, from the first to the last: up or down."""
-    start = section.number("from", "a finite number")
-    end = section.number("to", "a finite number")
-    steps = section.whole("steps", f"a whole number in 2 .. {MOST_VALUES}")
-    if steps is not None and not 2 <= steps <= MOST_VALUES:
-        section.wrong("steps", f"a whole number in 2 .. {MOST_VALUES}")
-        return
-    if start is None or end is None or steps is None:
+    before = len(section.faults)
+    start, end = (
+        section.number(key, section.table[key], "must be a finite number") for key in ("from", "to")
+    )
+    steps = section.whole("steps", section.table["steps"], 2, MOST_VALUES)
+    if len(section.faults) > before:
         return
     if start == end:
         section.fault("to", f"must differ from from = {start:g}; an empty range has no steps")

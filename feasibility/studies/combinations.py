@@ -10,15 +10,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from coverable_errors import Fault, shown
 from feasibility.cases import (
     Case,
     CaseError,
-    Fault,
     as_read,
     faults_of_building,
+    in_robot_table,
     parse_toml,
     read_surface,
-    shown,
     toml_document,
     toml_key,
     toml_value,
@@ -143,7 +143,7 @@ class Refused:
         alike = [f"{label} = {v}" for label, v in self.said.items() if len(self.seen[label]) == 1]
         more = f" ({self.count} combinations with that)" if self.count > 1 else ""
         place = f"vary: with {', '.join(alike)}: " if alike else "vary: "
-        return Fault(f"{place}{self.first.key}", f"{self.first.message}{more}")
+        return Fault(f"{place}{self.first.key}", f"{self.first.message}{more}", self.first.place)
 
 
 def cause_of(message: str) -> str:
@@ -205,11 +205,11 @@ def faults_of(tables: Tables) -> list[Fault]:
         case = case_of(tables)
     except CaseError as error:
         return list(error.faults)
-    found = []
+    found: list[Fault] = []
     try:
         arm_of(case)
     except RobotError as error:
-        found.append(Fault("robot", str(error)))
+        found += in_robot_table(error)
     if "file" in case.surface.values:
         table = {key: value for key, value in case.surface.table().items() if value is not None}
         found += _faults_of_file(toml_document({"surface": {**table, **HOME}}))

@@ -25,19 +25,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from coverable_errors import Fault, close, printable, shown
 from feasibility.cases import (
     LARGEST_FILE,
     CaseError,
-    Fault,
     Section,
     TomlError,
     as_read,
-    close,
     load_case,
     make_absolute,
     parse_toml,
-    printable,
-    shown,
     toml_key,
 )
 from feasibility.safe_files import FileError, read_regular, shown_path
@@ -180,7 +177,7 @@ def _read_base(
             own[title] = dict(section.table[title])
         elif title in section.table:
             section.fault(title, f"must be a table, got {shown(section.table[title])}")
-    section.done()
+    section.refuse_others()
     make_absolute(own, base_dir)
     for title, keys in own.items():
         # Another arm or another kind of surface has other keys: it replaces the whole table.
@@ -230,20 +227,20 @@ def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
         return faults_of(tables)
 
     known = tried(-1, None)
-    for key, message in ((fault.key, fault.message) for fault in known):
-        places = [f"{e.place}[0]" for e, _ in entries if _covers(e.path, key)]
-        faults.append(Fault(_join(places[0], key) if places else f"base.{key}", message))
+    for fault in known:
+        places = [f"{e.place}[0]" for e, _ in entries if _covers(e.path, fault.key)]
+        place = _join(places[0], fault.key) if places else f"base.{fault.key}"
+        faults.append(fault._replace(key=place))
     for n, (entry, values) in enumerate(entries):
         alike: dict[tuple[str, str], list[int]] = {}
         for k, value in enumerate(values[1:], start=1):
             for fault in tried(n, value):
                 if fault in known:
                     continue
-                key, message = fault.key, fault.message
-                same = alike.setdefault((key, cause_of(message)), [])
+                same = alike.setdefault((fault.key, cause_of(fault.message)), [])
                 same.append(k)
                 if len(same) <= MOST_ALIKE:
-                    faults.append(Fault(_join(f"{entry.place}[{k}]", key), message))
+                    faults.append(fault._replace(key=_join(f"{entry.place}[{k}]", fault.key)))
         faults += [
             Fault(entry.place, _more(key, same[MOST_ALIKE:]))
             for (key, _), same in alike.items()

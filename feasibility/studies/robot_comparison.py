@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from feasibility.cases import Case, CaseError, Fault, as_read, toml_document
+from coverable_errors import Fault
+from feasibility.cases import Case, CaseError, as_read, toml_document
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies.outcome import arm_of, cut_of, finite, merit, outcome_of

@@ -1,5 +1,8 @@
 from .mesh_surface import MeshSurface as MeshSurface
 from .mesh_surface import mesh as mesh
+from .selection import checked_box as checked_box
+from .selection import checked_cone as checked_cone
+from .selection import checked_plane as checked_plane
 from .selection import cut_box as cut_box
 from .selection import cut_plane as cut_plane
 from .selection import faces_within_cone as faces_within_cone

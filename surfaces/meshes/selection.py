@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import Fault, shown
 from surfaces.arguments import Checks
 from surfaces.meshes.repair import one_fan_each, weld_distance
 from surfaces.meshes.triangle_mesh import Floats, Ints, TriangleMesh
@@ -31,10 +35,7 @@ def cut_plane(mesh: TriangleMesh, point: ArrayLike, normal: ArrayLike) -> Triang
         >>> cut_plane(mesh, point=(0, 0.5, 0), normal=(0, 1, 0))
         TriangleMesh(1 faces, 0.125 m^2, 0.5 x 0.5 x 0 m)
     """
-    checks = Checks("cut by a plane")
-    through = checks.vector("point", point, "metres")
-    direction = _direction(checks, "normal", normal)
-    checks.done()
+    through, direction = checked_plane(point, normal)
     vertices, faces = _clipped(mesh, through, direction)
     where = f"the plane through {_listed(through)} with normal {_listed(direction)}"
     note = f"cut by {where}: {{faces}} faces, {{area:.4g}} of {{before:.4g}} m^2 kept"
@@ -52,11 +53,7 @@ def cut_box(mesh: TriangleMesh, low: ArrayLike, high: ArrayLike) -> TriangleMesh
     Raises:
         SurfaceError: bad numbers, or nothing is left.
     """
-    checks = Checks("cut by a box")
-    least, most = checks.vector("low", low, "metres"), checks.vector("high", high, "metres")
-    if not checks.faults and not (least < most).all():
-        checks.faults.append(f"low must be below high in each coordinate, got {low!r}, {high!r}")
-    checks.done()
+    least, most = checked_box(low, high)
     where = f"the box {_listed(least)} .. {_listed(most)}"
     result = mesh
     for direction in np.eye(3):
@@ -83,12 +80,7 @@ def faces_within_cone(
     Raises:
         SurfaceError: bad numbers, or no such face.
     """
-    checks = Checks("faces within a cone")
-    axis = _direction(checks, "direction", direction)
-    angle = checks.positive("half_angle_deg", half_angle_deg)
-    if angle > 180.0:
-        checks.faults.append(f"half_angle_deg must be at most 180, got {half_angle_deg!r}")
-    checks.done()
+    axis, angle = checked_cone(direction, half_angle_deg)
     # By both sine and cosine, which is exact near 0 and 180 degrees too.
     sine = np.linalg.norm(np.cross(mesh.face_normals, axis), axis=1)
     leaning = np.degrees(np.arctan2(sine, mesh.face_normals @ axis))
@@ -197,15 +189,53 @@ def _clipped(mesh: TriangleMesh, point: Floats, normal: Floats) -> tuple[Floats,
     return vertices, np.concatenate(faces)
 
 
-def _direction(checks: Checks, name: str, value: ArrayLike) -> Floats:
-    """A unit vector."""
-    vector = checks.vector(name, value, "a direction")
-    largest = float(np.abs(vector).max())
-    if not checks.faults and largest < 1e-12:
-        checks.faults.append(f"{name} must not be zero, got {value!r}")
-    # Scaled first, so that squares neither vanish nor overflow.
-    vector = vector / max(largest, 1e-12)
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)
+def checked_plane(point: Any, normal: Any) -> tuple[Floats, Floats]:
+    """The point (3,) m and the unit normal (3,) of a plane.
+
+    Raises:
+        SurfaceError: with everything that is wrong.
+    """
+    checks = Checks("cut by a plane")
+    through = checks.vector("point", point, "metres")
+    direction = _unit(checks.direction("normal", normal))
+    checks.done()
+    return through, direction
+
+
+def checked_box(low: Any, high: Any) -> tuple[Floats, Floats]:
+    """The corners (3,) m of a box.
+
+    Raises:
+        SurfaceError: with everything that is wrong.
+    """
+    checks = Checks("cut by a box")
+    least, most = checks.vector("low", low, "metres"), checks.vector("high", high, "metres")
+    if not checks.faults and not (least < most).all():
+        got = f"got {shown(low)} and {shown(high)}"
+        below = "must be below the opposite corner in each coordinate"
+        checks.keep(Fault("low", got, expected=below))
+    checks.done()
+    return least, most
+
+
+def checked_cone(direction: Any, half_angle_deg: Any) -> tuple[Floats, float]:
+    """The unit axis (3,) and the half angle (degrees) of a cone.
+
+    Raises:
+        SurfaceError: with everything that is wrong.
+    """
+    checks = Checks("faces within a cone")
+    axis = _unit(checks.direction("direction", direction))
+    expected = "must be a number > 0 and <= 180 (degrees)"
+    angle = checks.number("half_angle_deg", half_angle_deg, expected, math.ulp(0.0), 180.0)
+    checks.done()
+    return axis, angle
+
+
+def _unit(direction: list[float]) -> Floats:
+    """A direction at length 1; scaled first, so that squares neither vanish nor overflow."""
+    vector = np.array(direction) / max(map(abs, direction))
+    return vector / float(np.linalg.norm(vector))
 
 
 def _listed(point: Floats) -> str:

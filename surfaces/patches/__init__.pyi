@@ -6,6 +6,7 @@ from .cylinder import cylinder as cylinder
 from .ellipsoid import ellipsoid as ellipsoid
 from .grid_cells import GridCells as GridCells
 from .grid_cells import closed_form_grid as closed_form_grid
+from .grid_cells import grid_counts as grid_counts
 from .hyperboloid import hyperboloid as hyperboloid
 from .nurbs import bspline as bspline
 from .nurbs import read_net as read_net

@@ -10,7 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.arguments import LARGEST_RATIO, ORIGIN, Checks, real
+from coverable_errors import Fault
+from surfaces.arguments import LARGEST_RATIO, ORIGIN, Checks
 from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
@@ -100,20 +101,20 @@ def cone(
     """
     check = Checks("cone")
     radius = check.positive("radius", radius)
-    low, high = check.interval("height", height)
-    steep = real(slope)
-    if not abs(steep) <= LARGEST_RATIO:
-        check.faults.append(
-            f"slope must be a number in {-LARGEST_RATIO:g} .. {LARGEST_RATIO:g} (metres of radius "
-            f"for a metre of height), got {slope!r}"
-        )
-        steep = 0.0
+    low, high = check.length("height", height)
+    steep = check.number(
+        "slope",
+        slope,
+        f"must be a number in {-LARGEST_RATIO:g} .. {LARGEST_RATIO:g} (metres of radius for a "
+        "metre of height)",
+        -LARGEST_RATIO,
+        LARGEST_RATIO,
+    )
     ends = (radius + steep * low, radius + steep * high)
     if not check.faults and not min(ends) * LARGEST_RATIO > max(ends):
-        check.faults.append(
-            f"height must end before the apex at z = {-radius / steep:g} (metres), where no normal "
-            f"is; got {height!r}, where the radius runs from {ends[0]:g} to {ends[1]:g}"
-        )
+        got = f"got {height!r}, where the radius runs from {ends[0]:g} to {ends[1]:g}"
+        apex = f"must end before the apex at z = {-radius / steep:g} (metres), where no normal is"
+        check.keep(Fault("height", got, expected=apex))
     made = Cone(
         u_range=check.angles("angle_deg", angle_deg),
         v_range=(low, high),

@@ -76,7 +76,7 @@ def cylinder(
     check = Checks("cylinder")
     made = Cylinder(
         u_range=check.angles("angle_deg", angle_deg),
-        v_range=check.interval("height", height),
+        v_range=check.length("height", height),
         radius=check.positive("radius", radius),
         **check.pose(side, position, rpy_deg),
     )

@@ -168,7 +168,7 @@ def ellipsoid(
     axes = check.vector("semi_axes", semi_axes, "metres")
     a, b, c = (check.positive(f"semi_axes[{k}]", e) for k, e in enumerate(axes.tolist()))
     longest = max(a, b, c)
-    check.ratio("longest / shortest of semi_axes", longest / min(a, b, c), "use a plane")
+    check.ratio("semi_axes", "each other", longest / min(a, b, c), "use a plane")
     made = Ellipsoid(
         u_range=check.polar("polar_deg", polar_deg),
         v_range=check.angles("azimuth_deg", azimuth_deg),

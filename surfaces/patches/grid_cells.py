@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import operator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours, grid_neighbours
+from surfaces.arguments import Checks
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
 from surfaces.curve_fitting import fitted_curves
@@ -50,7 +50,7 @@ class GridCells(Cells):
         Raises:
             SurfaceError: nu or nv is not a whole number >= 0.
         """
-        nu, nv = _count("nu", nu), _count("nv", nv)
+        nu, nv = grid_counts(nu, nv)
         u_edges = np.linspace(*surface.u_range, nu + 1)
         v_edges = np.linspace(*surface.v_range, nv + 1)
         areas = surface.area(u_edges[:-1, None], u_edges[1:, None], v_edges[:-1], v_edges[1:])
@@ -171,8 +171,9 @@ class GridCells(Cells):
         Raises:
             SurfaceError: `samples` is not a whole number >= 1.
         """
-        if _count("samples", samples) == 0:
-            raise SurfaceError("samples must be a whole number >= 1, got 0")
+        checks = Checks("outlines")
+        checks.whole("samples", samples, 1)
+        checks.done()
         t = np.arange(samples) / samples
         zero, one = np.zeros(samples), np.ones(samples)
         du = np.concatenate([zero, t, one, 1.0 - t, [0.0]]) - 0.5
@@ -284,12 +285,13 @@ def _bin(values: Array, limits: tuple[float, float], count: int) -> Ints:
     return np.where(np.isnan(part), -1, part).astype(np.int64)
 
 
-def _count(name: str, value: Any) -> int:
-    """A whole number >= 0, or a clear error."""
-    try:
-        count = operator.index(value)
-    except TypeError:
-        count = -1
-    if count < 0 or isinstance(value, bool):
-        raise SurfaceError(f"{name} must be a whole number >= 0, got {value!r}")
-    return count
+def grid_counts(nu: Any, nv: Any) -> tuple[int, int]:
+    """The numbers of cells along u and v.
+
+    Raises:
+        SurfaceError: they are not whole numbers >= 0.
+    """
+    checks = Checks("grid")
+    counts = checks.whole("nu", nu, 0), checks.whole("nv", nv, 0)
+    checks.done()
+    return counts

@@ -130,10 +130,12 @@ def hyperboloid(
     """
     check = Checks("hyperboloid")
     waist, flare = check.positive("waist", waist), check.positive("flare", flare)
-    check.ratio("waist / flare", waist / flare, "beyond that use a cylinder or a plane")
+    check.ratio(
+        "flare", "the radius of the waist", waist / flare, "beyond that use a cylinder or a plane"
+    )
     made = Hyperboloid(
         u_range=check.angles("angle_deg", angle_deg),
-        v_range=check.interval("height", height),
+        v_range=check.length("height", height),
         waist=waist,
         flare=flare,
         **check.pose(side, position, rpy_deg),

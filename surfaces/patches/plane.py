@@ -67,8 +67,8 @@ def plane(
     """
     check = Checks("plane")
     made = Plane(
-        u_range=check.interval("width", width),
-        v_range=check.interval("length", length),
+        u_range=check.length("width", width),
+        v_range=check.length("length", length),
         **check.pose(side, position, rpy_deg),
     )
     check.done()

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.patches.revolution_profile import Profile
@@ -122,7 +123,7 @@ def revolution(
     points = metres("profile", profile, (None, 2), expected, 2 * MOST_POINTS, check.faults)
     curve = Profile(np.array([[1.0, 0.0], [1.0, 1.0]]) if points is None else points)
     if len(curve.points) < 2:
-        check.faults.append(f"profile must hold {expected}, got {len(curve.points)}")
+        check.keep(Fault("profile", f"got {len(curve.points)}", expected=f"must hold {expected}"))
     elif not check.faults:
         check.faults += curve.faults()
     made = Revolution(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import Fault
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 
 if TYPE_CHECKING:
@@ -90,35 +91,38 @@ class Profile:
         line = self.fractions(_SAMPLES)
         return ClosestPointSearch(lambda x: self.at(x[:, 0]), jet, (line,), (False,))
 
-    def faults(self) -> list[str]:
+    def faults(self) -> list[Fault]:
         """What keeps the curve from making a smooth surface; empty if nothing does."""
         extent = float(np.abs(self.points - self.points.mean(axis=0)).max())
         spots = self._spot_faults(extent)
         if spots:
             return spots
         return [
-            fault
-            for fault in (self._axis_fault(), self._speed_fault(), self._crossing_fault())
-            if fault
+            Fault("profile", text)
+            for text in (self._axis_fault(), self._speed_fault(), self._crossing_fault())
+            if text
         ]
 
-    def _spot_faults(self, extent: float) -> list[str]:
+    def _spot_faults(self, extent: float) -> list[Fault]:
         """Faults of the points themselves."""
         faults = []
         r = self.points[:, 0]
         low = np.flatnonzero(r < _LEAST * max(extent, float(r.max())))
         for k in low.tolist():
             if r[k] != 0.0 or 0 < k < len(r) - 1:
-                faults.append(
-                    f"profile[{k}] must keep clear of the axis (r > 0), where only the first and "
-                    f"the last point may be (r = 0); got r = {r[k]:g}"
+                expected = (
+                    "must keep clear of the axis (r > 0), where only the first and the last point "
+                    "may be (r = 0)"
                 )
+                faults.append(Fault(f"profile[{k}]", f"got r = {r[k]:g}", expected=expected))
         steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
         for k in np.flatnonzero(steps <= _LEAST * extent).tolist():
-            faults.append(f"profile[{k + 1}] must differ from profile[{k}]; leave one of them out")
+            text = "is the point before it; leave one of them out"
+            faults.append(Fault(f"profile[{k + 1}]", text))
         ends = np.linalg.norm(self.points[0] - self.points[-1])
         if len(r) > 2 and not faults and ends <= _LEAST * extent:
-            faults.append("profile must not end where it begins; use a torus, or two profiles")
+            text = "must not end where it begins; use a torus, or two profiles"
+            faults.append(Fault("profile", text))
         return faults
 
     def _axis_fault(self) -> str:
@@ -132,7 +136,7 @@ class Profile:
             if radius(lowest) <= _LEAST * float(self.points[:, 0].max()):
                 r, z = self.at(lowest)
                 return (
-                    f"profile must stay clear of the axis between its points; the smooth curve "
+                    f"must stay clear of the axis between its points; the smooth curve "
                     f"reaches r = {r:g} near z = {z:g}; add points there"
                 )
         return ""
@@ -159,7 +163,7 @@ class Profile:
         place = self.knots[wrong_way[0][0]] if wrong_way else s[worst]
         r, z = self.at(np.asarray(place))
         return (
-            f"profile must not turn back on itself; the smooth curve does near (r, z) = "
+            f"must not turn back on itself; the smooth curve does near (r, z) = "
             f"({r:.4g}, {z:.4g}); space the points evenly, or add some there"
         )
 
@@ -181,7 +185,7 @@ class Profile:
             return ""
         r, z = a[i[np.argmax(crossing)]]
         return (
-            f"profile must not cross itself; the smooth curve does near (r, z) = "
+            f"must not cross itself; the smooth curve does near (r, z) = "
             f"({r:.4g}, {z:.4g}); add points there, or cut it into two surfaces"
         )
 

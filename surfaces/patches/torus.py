@@ -97,12 +97,10 @@ def torus(
     check = Checks("torus")
     ring, tube = check.positive("ring", ring), check.positive("tube", tube)
     if not check.faults:
-        check.ratio("ring / tube", ring / tube, "beyond that use a cylinder")
+        check.ratio("tube", "the radius of the ring", ring / tube, "beyond that use a cylinder")
         if not tube < ring:
-            check.faults.append(
-                f"tube must be less than ring ({ring:g} metres), or the torus cuts through "
-                f"itself; got {tube:g}"
-            )
+            expected = f"must be less than ring ({ring:g} metres), or the torus cuts through itself"
+            check.wrong("tube", tube, expected)
     made = Torus(
         u_range=check.angles("u_deg", u_deg),
         v_range=check.angles("v_deg", v_deg),

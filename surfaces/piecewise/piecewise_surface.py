@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches import Patch
 from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
@@ -172,22 +173,24 @@ def piecewise(
         True
     """
     check = Checks("piecewise")
-    patches = _patches(pieces, check.faults)
+    patches = _patches(pieces, check)
     width = _gap(gap, patches, check)
     pose = check.pose(side, position, rpy_deg)
     check.done()
     sheets = on_each_other(patches, width)
     if sheets:
         raise SurfaceError(
-            f"piecewise: pieces[{sheets[0]}] and pieces[{sheets[1]}] lie on each other, at least "
-            "in part; leave one of them out, or cut it back to the seam"
+            f"pieces[{sheets[0]}] and pieces[{sheets[1]}] lie on each other, at least in part; "
+            "leave one of them out, or cut it back to the seam",
+            "piecewise",
         )
     found = survey(patches, width)
     if found.overfull:
         names = ", ".join(f"pieces[{k}]" for k in found.overfull)
         raise SurfaceError(
-            f"piecewise: {names} share one seam; a surface has two sides of a seam at most; leave "
-            "one of them out"
+            f"{names} share one seam; a surface has two sides of a seam at most; leave one of them "
+            "out",
+            "piecewise",
         )
     return Piecewise(
         pieces=patches,
@@ -198,19 +201,20 @@ def piecewise(
     )
 
 
-def _patches(pieces: Any, faults: list[str]) -> tuple[Patch, ...]:
+def _patches(pieces: Any, check: Checks) -> tuple[Patch, ...]:
     """The pieces; none after a fault."""
-    expected = f"pieces must be a list of 1 to {MOST_PIECES} patches, such as surfaces.plane makes"
+    a_patch = "such as surfaces.plane makes"
     if not isinstance(pieces, Sequence) or not 1 <= len(pieces) <= MOST_PIECES:
         size = f"{len(pieces)} of them" if isinstance(pieces, Sequence) else type(pieces).__name__
-        faults.append(f"{expected}, got {size}")
+        expected = f"must be a list of 1 to {MOST_PIECES} patches, {a_patch}"
+        check.keep(Fault("pieces", f"got {size}", expected=expected))
         return ()
-    wrong = [k for k, piece in enumerate(pieces) if not isinstance(piece, Patch)]
-    faults += [
-        f"pieces[{k}] must be a patch, such as surfaces.plane makes, got {type(pieces[k]).__name__}"
-        for k in wrong
-    ]
-    return () if wrong else tuple(pieces)
+    found = tuple(piece for piece in pieces if isinstance(piece, Patch))
+    for k, piece in enumerate(pieces):
+        if not isinstance(piece, Patch):
+            got = f"got {type(piece).__name__}"
+            check.keep(Fault(f"pieces[{k}]", got, expected=f"must be a patch, {a_patch}"))
+    return found if len(found) == len(pieces) else ()
 
 
 def _gap(gap: Any, patches: tuple[Patch, ...], check: Checks) -> float:
@@ -220,8 +224,6 @@ def _gap(gap: Any, patches: tuple[Patch, ...], check: Checks) -> float:
         return min(GAP, SHARE * shortest)
     width = check.positive("gap", gap)
     if patches and width > WIDEST * shortest:
-        check.faults.append(
-            f"gap must be at most a fiftieth of the shortest border, {WIDEST * shortest:.3g} m, "
-            f"got {gap!r}"
-        )
+        shortest_border = f"the shortest border, {WIDEST * shortest:.3g} m"
+        check.wrong("gap", gap, f"must be at most a fiftieth of {shortest_border}")
     return width

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import Fault, shown
 from surfaces.meshes.cells.dual_graph import FaceGraph, face_graph
 from surfaces.meshes.cells.subdivision import MOST_FACES, Subdivision, subdivide
 from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps
@@ -211,18 +212,20 @@ def _number_of_cells(total: float, count: int | None, size: float | None) -> int
         SurfaceError: see `cells_for`.
     """
     side = math.sqrt(total)
-    hint = f"for this part of {total:.3g} m^2, size = {side / 14:.2g} (m) makes about 200 cells"
+    hint = f"in this part of {total:.3g} m^2, cells of {side / 14:.2g} m make about 200"
     if (count is None) == (size is None):
-        raise SurfaceError(f"give either count or size of the cells; {hint}")
+        raise SurfaceError(Fault("count", "is needed, or size, and not both", expected=hint))
     if size is not None:
         if isinstance(size, bool) or not (math.isfinite(size) and size > 0.0):
-            raise SurfaceError(f"size must be a finite number > 0 (metres), got {size!r}; {hint}")
+            got = f"got {shown(size)}; {hint}"
+            raise SurfaceError(Fault("size", got, expected="must be a finite number > 0 (metres)"))
         ideal = total / size**2
         count = max(round(ideal), 1) if ideal < 1e9 else 10**9
     number = _whole(count)
     if not 1 <= number <= MOST_CELLS:
-        what = f"count = {number}" if size is None else f"size = {size:g} m, so {number:,} cells"
-        raise SurfaceError(f"a mesh can have 1 to {MOST_CELLS:,} cells, got {what}; {hint}")
+        key, got = ("count", "got") if size is None else ("size", f"got {size:g} m, which makes")
+        expected = f"must make 1 to {MOST_CELLS:,} cells"
+        raise SurfaceError(Fault(key, f"{got} {number:,}; {hint}", expected=expected))
     return number
 
 
@@ -233,5 +236,6 @@ def _whole(value: Any) -> int:
     except TypeError:
         number = None
     if number is None or isinstance(value, bool):
-        raise SurfaceError(f"count must be a whole number >= 1, got {value!r}")
+        got = f"got {shown(value)}"
+        raise SurfaceError(Fault("count", got, expected="must be a whole number >= 1"))
     return number

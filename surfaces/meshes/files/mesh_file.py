@@ -14,7 +14,7 @@ from typing import BinaryIO
 import numpy as np
 
 from coverable_files import FileFault, open_regular, reason
-from surfaces.arguments import real
+from surfaces.arguments import Checks
 from surfaces.meshes.files.glb import read_glb
 from surfaces.meshes.files.obj import read_obj
 from surfaces.meshes.files.off import read_off
@@ -77,8 +77,8 @@ def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> Trian
             file's name, the place and what would do.
     """
     name = repr(Path(os.fsdecode(path)).name[:100])
-    unit = metres_per_unit(scale, name)
     try:
+        unit = metres_per_unit(scale)
         raw = _read(path)
         with np.errstate(over="ignore"):  # infinite coordinates are refused next
             vertices = raw.vertices * unit
@@ -87,10 +87,10 @@ def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> Trian
             return mesh
         return _with_likely_unit(mesh)
     except (FileFault, SurfaceError) as error:
-        raise SurfaceError(f"{name}: {error}") from error
+        raise SurfaceError(error.faults, name) from error
 
 
-def metres_per_unit(scale: float | None, name: str) -> float:
+def metres_per_unit(scale: float | None, name: str = "") -> float:
     """The scale as a number, 1 where none is given; `name` says of what.
 
     Raises:
@@ -98,12 +98,10 @@ def metres_per_unit(scale: float | None, name: str) -> float:
     """
     if scale is None:
         return 1.0
-    unit = real(scale)
-    if not 1e-9 <= unit <= 1e9:
-        raise SurfaceError(
-            f"scale must be a number > 0 (metres per unit of {name}), within 1e-9 .. 1e9, "
-            f"got {scale!r}"
-        )
+    checks = Checks(name)
+    expected = "must be a number in 1e-09 .. 1e+09 (metres per unit; 0.001 for millimetres)"
+    unit = checks.number("scale", scale, expected, 1e-9, 1e9)
+    checks.done()
     return unit
 
 

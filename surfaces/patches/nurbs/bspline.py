@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks, table
 from surfaces.patches.nurbs.nurbs import SplineMap
 from surfaces.patches.nurbs.nurbs_checks import (
@@ -136,7 +137,7 @@ def _spline_map(
     knots: Any,
     weights: Any,
     ranges: tuple[Any, Any],
-    faults: list[str],
+    faults: list[Fault],
 ) -> SplineMap | None:
     """The spline, or None after a fault."""
     net = checked_points(points, faults)
@@ -150,7 +151,8 @@ def _spline_map(
     if knots is None:
         knots = (None, None)
     if not isinstance(knots, Sequence) or isinstance(knots, (str, bytes)) or len(knots) != 2:
-        faults.append("knots must be two lists of numbers, of u and of v, or None")
+        expected = "must be two lists of numbers that never fall, of u and of v"
+        faults.append(Fault("knots", f"got {shown(knots)}", expected=expected))
         return None
     lines = (
         checked_knots("knots[0]", knots[0], shape[0], p, faults),
@@ -165,12 +167,12 @@ def _spline_map(
     if faults:
         return None
     made = SplineMap(net, checked, lines, (p, q), (low[0], low[1]), (high[0], high[1]))
-    faults += regularity_faults(made)
+    faults += [Fault("", text) for text in regularity_faults(made)]
     return made
 
 
 def _range(
-    name: str, wanted: Any, full: tuple[float, float], faults: list[str]
+    name: str, wanted: Any, full: tuple[float, float], faults: list[Fault]
 ) -> tuple[float, float]:
     """The part of the knots' range to keep."""
     if wanted is None:
@@ -181,6 +183,7 @@ def _range(
         return full
     low, high = pair.tolist()
     if not full[0] <= low < high <= full[1]:
-        faults.append(f"{name} must be {expected}, low < high, got {wanted!r}")
+        got = f"got {shown(wanted)}"
+        faults.append(Fault(name, got, expected=f"must be {expected}, low < high"))
         return full
     return low, high

@@ -49,17 +49,17 @@ def read_net(path: str | os.PathLike[str]) -> NetFile:
     name = repr(file.name if len(file.name) <= 100 else file.name[:100] + "...")
     suffix = file.suffix.lower()
     if suffix not in (".json", ".csv"):
-        raise SurfaceError(f"{name}: a control net must be a .json or a .csv file")
+        raise SurfaceError("a control net must be a .json or a .csv file", name)
     try:
         data = read_regular(path, MOST_BYTES, "a control net (.json or .csv)")
         text = data.decode("utf-8-sig")
         return _from_json(text) if suffix == ".json" else _from_csv(text)
     except UnicodeDecodeError as error:
-        raise SurfaceError(f"{name}: is not text in UTF-8, at byte {error.start}") from error
+        raise SurfaceError(f"is not text in UTF-8, at byte {error.start}", name) from error
     except RecursionError as error:
-        raise SurfaceError(f"{name}: is nested too deep for a control net") from error
+        raise SurfaceError("is nested too deep for a control net", name) from error
     except (ValueError, csv.Error) as error:
-        raise SurfaceError(f"{name}: {error}") from error
+        raise SurfaceError(str(error), name) from error
 
 
 def _from_json(text: str) -> NetFile:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import Fault, shown
 from surfaces.arguments import LARGEST_RATIO, metres, table
 from surfaces.patches.nurbs.nurbs import SplineMap
 
@@ -22,13 +23,13 @@ _SAMPLES = 8  # in each span
 _MOST_SAMPLES = 600  # along each parameter, if that leaves two for each span
 
 
-def checked_points(points: Any, faults: list[str]) -> Array | None:
+def checked_points(points: Any, faults: list[Fault]) -> Array | None:
     """The control net (m, n, 3), or None after a fault."""
     expected = "rows of points (x, y, z) in metres, such as 4 x 4 x 3"
     return metres("points", points, (None, None, 3), expected, 3 * MOST_POINTS, faults)
 
 
-def checked_degree(degree: Any, shape: tuple[int, ...], faults: list[str]) -> tuple[int, int]:
+def checked_degree(degree: Any, shape: tuple[int, ...], faults: list[Fault]) -> tuple[int, int]:
     """The two degrees, each less than the number of points along it."""
     try:
         p, q = (operator.index(value) for value in degree)
@@ -37,20 +38,18 @@ def checked_degree(degree: Any, shape: tuple[int, ...], faults: list[str]) -> tu
     except (TypeError, ValueError):
         p, q = 0, 0
     if not (1 <= p <= MOST_DEGREE and 1 <= q <= MOST_DEGREE):
-        faults.append(
-            f"degree must be two whole numbers in 1 .. {MOST_DEGREE}, along u and v, got {degree!r}"
-        )
+        expected = f"must be two whole numbers in 1 .. {MOST_DEGREE}, along u and v"
+        faults.append(Fault("degree", f"got {shown(degree)}", expected=expected))
         return 1, 1
     for name, order, count in (("rows", p, shape[0]), ("columns", q, shape[1])):
         if count <= order:
-            faults.append(
-                f"points must have at least {order + 1} {name} for the degree {order}, "
-                f"got {count}; add points or lower the degree"
-            )
+            expected = f"must have at least {order + 1} {name} for the degree {order}"
+            got = f"got {count}; add points or lower the degree"
+            faults.append(Fault("points", got, expected=expected))
     return p, q
 
 
-def checked_weights(weights: Any, shape: tuple[int, ...], faults: list[str]) -> Array | None:
+def checked_weights(weights: Any, shape: tuple[int, ...], faults: list[Fault]) -> Array | None:
     """The weights (m, n), or None where none are given or after a fault."""
     if weights is None:
         return None
@@ -60,15 +59,14 @@ def checked_weights(weights: Any, shape: tuple[int, ...], faults: list[str]) -> 
         return None
     if found.min() <= 0.0 or found.max() > LARGEST_RATIO * found.min():
         i, j = np.unravel_index(int(np.argmin(found)), found.shape)
-        faults.append(
-            f"weights must be > 0 and differ by a factor of at most {LARGEST_RATIO:g}, "
-            f"got {found.min():g} at weights[{i}][{j}] and {found.max():g} as the largest"
-        )
+        expected = f"must be > 0 and differ by a factor of at most {LARGEST_RATIO:g}"
+        got = f"got {found.min():g} at [{i}][{j}] and {found.max():g} as the largest"
+        faults.append(Fault("weights", got, expected=expected))
         return None
     return found
 
 
-def checked_knots(name: str, knots: Any, count: int, degree: int, faults: list[str]) -> Array:
+def checked_knots(name: str, knots: Any, count: int, degree: int, faults: list[Fault]) -> Array:
     """A knot vector (count + degree + 1,); clamped and uniform over 0..1 where none is given."""
     clamped = np.concatenate(
         [np.zeros(degree), np.linspace(0.0, 1.0, max(count - degree + 1, 2)), np.ones(degree)]
@@ -83,26 +81,27 @@ def checked_knots(name: str, knots: Any, count: int, degree: int, faults: list[s
     steps = np.diff(found)
     if (steps < 0.0).any():
         k = int(np.argmax(steps < 0.0))
-        faults.append(
-            f"{name} must never fall, got {found[k]:g} and then {found[k + 1]:g} at {name}[{k + 1}]"
-        )
+        got = f"got {found[k]:g} and then {found[k + 1]:g} at [{k + 1}]"
+        faults.append(Fault(name, got, expected="must never fall"))
         return clamped
     low, high = found[degree], found[count]
     gaps = steps[steps > 0.0]
     if not low < high or gaps.min() < _KNOT_GAP * (found[-1] - found[0]):
-        faults.append(
-            f"{name} must span a range from {name}[{degree}] to {name}[{count}], its knots equal "
-            f"or at least {_KNOT_GAP:g} of it apart; got {low:g} .. {high:g}"
+        expected = (
+            f"must span a range from [{degree}] to [{count}], its knots equal or at least "
+            f"{_KNOT_GAP:g} of it apart"
         )
+        faults.append(Fault(name, f"got {low:g} .. {high:g}", expected=expected))
         return clamped
     values, times = np.unique(found, return_counts=True)
     inner = (values > low) & (values < high)
     if (times > degree + 1).any() or (inner & (times > degree)).any():
         worst = values[np.argmax(np.where(inner, times + 1, times))]
-        faults.append(
-            f"{name} must hold no knot more than {degree} times, {degree + 1} times at its ends; "
+        text = (
+            f"must hold no knot more than {degree} times, {degree + 1} times at its ends; "
             f"{worst:g} is there more often, and the patch would break apart there"
         )
+        faults.append(Fault(name, text))
         return clamped
     return found
 

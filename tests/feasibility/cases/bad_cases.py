@@ -129,7 +129,7 @@ def more(kind, line, key, *words):
     return Bad(surface(SURFACES[kind] + line), f"surface.{key}" if key else "surface", words)
 
 
-MORE = "must be [low, high] in "
+PAIR = "must be a pair (low, high) of finite numbers with low < high "
 
 BAD_CASES = {
     # the file as a whole
@@ -176,7 +176,7 @@ BAD_CASES = {
         'limits = "set-1"', "limits_deg = { joint4 = [9, 9] }", "robot.limits_deg.joint4", "empty"
     ),
     "limits NaN": changed(
-        'limits = "set-1"', "limits_deg = [[-90, nan]]", "robot.limits_deg[0]", "two finite numbers"
+        'limits = "set-1"', "limits_deg = [[-90, nan]]", "robot.limits_deg[0]", "finite numbers"
     ),
     "limits infinite": changed(
         'limits = "set-1"', "limits_deg = [[-inf, inf]]", "robot.limits_deg[0]", "finite"
@@ -213,7 +213,7 @@ BAD_CASES = {
     "axis is flat": added("robot", "approach_axis = [0, 1]", "robot.approach_axis", "three finite"),
     "folders": added("robot", 'package_dirs = "meshes"', "robot.package_dirs", "an array of"),
     # surface
-    "no kind": changed('kind = "sphere"\n', "", "surface.kind", "is missing", '"plane"'),
+    "no kind": changed('kind = "sphere"\n', "", "surface.kind", "is missing", "'plane'"),
     "misspelt kind": changed('"sphere"', '"shpere"', "surface.kind", 'did you mean "sphere"?'),
     "kind is a list": changed('"sphere"', '["sphere"]', "surface.kind", "must be"),
     "mesh key": added("surface", "cell_size = 0.1", "surface.cell_size", "belongs to a mesh"),
@@ -232,9 +232,9 @@ BAD_CASES = {
     "radius is a date": changed("radius = 1.0", "radius = 2026-01-01", "surface.radius", "date"),
     "range reversed": changed("[10, 90]", "[90, 10]", "surface.u_deg", "the wrong way round"),
     "range empty": changed("[10, 90]", "[10, 10.0]", "surface.u_deg", "an empty range"),
-    "range of three": changed("[10, 90]", "[10, 20, 90]", "surface.u_deg", MORE + "degrees"),
-    "range beyond the pole": changed("[10, 90]", "[10, 190]", "surface", "u_deg must lie in 0"),
-    "more than a turn": changed("[10, 180]", "[0, 400]", "surface", "v_deg must span at most"),
+    "range of three": changed("[10, 90]", "[10, 20, 90]", "surface.u_deg", PAIR + "(degrees)"),
+    "range beyond the pole": changed("[10, 90]", "[10, 190]", "surface.u_deg", "must lie in 0"),
+    "more than a turn": changed("[10, 180]", "[0, 400]", "surface.v_deg", "must span at most"),
     "metres for degrees": changed("u_deg = [10, 90]", "u = [0, 1]", "surface.u", "write u_deg"),
     "degrees for metres": Bad(
         PLANE.format('kind = "plane"\nu_deg = [0, 90]\nv = [0, 1]\n'),
@@ -250,39 +250,43 @@ BAD_CASES = {
         PLANE.format(
             'kind = "hyperboloid"\nradius = 1.0\nflare = 1e-9\nu_deg = [0, 90]\nv = [0, 1]\n'
         ),
-        "surface",
-        ("radius / flare",),
+        "surface.flare",
+        ("must be within a factor of 1e+06 of the radius",),
     ),
     "side": changed('"inside"', '"in side"', "surface.side", 'did you mean "inside"?'),
     "position": added("surface", "position = [0, 0]", "surface.position", "three finite numbers"),
     "rotation": added("surface", 'rpy_deg = "up"', "surface.rpy_deg", "three finite numbers"),
     "cells missing": changed("cells = [9, 10]\n", "", "surface.cells", "is missing"),
     "cells as a count": changed("[9, 10]", "90", "surface.cells", "two whole numbers"),
-    "cells as floats": changed("[9, 10]", "[9.0, 10.0]", "surface.cells", "two whole numbers"),
-    "cells negative": changed("[9, 10]", "[-9, 10]", "surface.cells", "two whole numbers"),
-    "cells true": changed("[9, 10]", "[true, 10]", "surface.cells", "two whole numbers"),
+    "cells as floats": changed("[9, 10]", "[9.0, 10.0]", "surface.cells[1]", "a whole number"),
+    "cells negative": changed("[9, 10]", "[-9, 10]", "surface.cells[0]", "a whole number >= 0"),
+    "cells true": changed("[9, 10]", "[true, 10]", "surface.cells[0]", "got True"),
     "too many cells": changed("[9, 10]", "[9000, 10000]", "surface.cells", "coarser grid"),
-    "cells without end": changed(
-        "[9, 10]", f"[0, 0x{'F' * 9000}]", "surface.cells", "coarser grid"
-    ),
+    "cells without end": changed("[9, 10]", f"[0, 0x{'F' * 9000}]", "surface.cells[1]", "64 bits"),
     # other kinds of surface
     "slope missing": wrong("cone", "slope = -0.5\n", "", "slope", "is missing", "metres of radius"),
     "slope beyond reason": wrong("cone", "-0.5", "1e7", "slope", "1e+06", "got 10000000.0"),
     "slope is text": wrong("cone", "-0.5", '"steep"', "slope", "got 'steep'"),
-    "apex": wrong("cone", "[0.0, 0.3]", "[0.0, 0.5]", "", "v must end before the apex", "z = 0.4"),
+    "apex": wrong("cone", "[0.0, 0.3]", "[0.0, 0.5]", "v", "must end before the apex", "z = 0.4"),
     "slope of a sphere": added("surface", "slope = 1", "surface.slope", "belongs to a cone"),
-    "tube too thick": wrong("torus", "0.125", "0.5", "", "tube must be less than ring"),
+    "tube too thick": wrong("torus", "0.125", "0.5", "tube", "must be less than ring"),
     "tube missing": wrong("torus", "tube = 0.125\n", "", "tube", "is missing"),
-    "torus more than a turn": wrong("torus", "[-180, 180]", "[-180, 190]", "", "v_deg must span"),
+    "torus more than a turn": wrong("torus", "[-180, 180]", "[-180, 190]", "v_deg", "must span"),
     "torus with a radius": more("torus", "radius = 1", "radius", "not to a torus"),
     "two semi-axes": wrong("ellipsoid", "[1.0, 0.8, 0.5]", "[1.0, 0.8]", "semi_axes", "three"),
-    "semi-axis zero": wrong("ellipsoid", "0.8", "0", "semi_axes", "> 0"),
-    "ellipsoid beyond the pole": wrong("ellipsoid", "[10, 90]", "[10, 181]", "", "u_deg must lie"),
-    "flat ellipsoid": wrong("ellipsoid", "0.5]", "1e-9]", "", "semi_axes must lie in"),
+    "semi-axis zero": wrong("ellipsoid", "0.8", "0", "semi_axes[1]", "> 0"),
+    "ellipsoid beyond the pole": wrong("ellipsoid", "[10, 90]", "[10, 181]", "u_deg", "must lie"),
+    "flat ellipsoid": wrong("ellipsoid", "0.5]", "1e-9]", "semi_axes", "within a factor of 1e+06"),
     "profile of one point": wrong(
-        "revolution", "[[0.2, 0.0], [0.3, 0.2], [0.1, 0.5]]", "[[0.2, 0.0]]", "", "profile must"
+        "revolution",
+        "[[0.2, 0.0], [0.3, 0.2], [0.1, 0.5]]",
+        "[[0.2, 0.0]]",
+        "profile",
+        "must hold points",
     ),
-    "profile through the axis": wrong("revolution", "[0.3, 0.2]", "[-0.3, 0.2]", "", "profile"),
+    "profile through the axis": wrong(
+        "revolution", "[0.3, 0.2]", "[-0.3, 0.2]", "profile[1]", "clear of the axis"
+    ),
     "profile with NaN": wrong("revolution", "[0.3, 0.2]", "[nan, 0]", "profile[1][0]", "got nan"),
     "profile is ragged": wrong("revolution", "[0.3, 0.2]", "[0.3]", "profile", "rows of one"),
     "profile is text": wrong(
@@ -298,19 +302,19 @@ BAD_CASES = {
     "net folds": wrong("bspline", "[1, 0, 0.2], [1, 1, 0]", "[9, 0, 0], [-9, 1, 0]", "", "patch"),
     "degree of one": wrong("bspline", "[2, 2]\n", "[2]\n", "degree", "two whole numbers"),
     "degree zero": wrong("bspline", "[2, 2]\n", "[0, 2]\n", "degree", "1 .. 9"),
-    "degree too high": wrong("bspline", "[2, 2]\n", "[3, 2]\n", "", "lower the degree"),
-    "knots of u only": more("bspline", "knots = [[0, 0, 0, 1, 1, 1]]", "knots", "two arrays"),
+    "degree too high": wrong("bspline", "[2, 2]\n", "[3, 2]\n", "points", "lower the degree"),
+    "knots of u only": more("bspline", "knots = [[0, 0, 0, 1, 1, 1]]", "knots", "two lists"),
     "knots that fall": more(
-        "bspline", "knots = [[0, 0, 0, 1, 0, 1], [0, 0, 0, 1, 1, 1]]", "", "must never fall"
+        "bspline", "knots = [[0, 0, 0, 1, 0, 1], [0, 0, 0, 1, 1, 1]]", "knots[0]", "must never fall"
     ),
     "knots with NaN": more(
-        "bspline", "knots = [[0, nan], [0, 0, 0, 1, 1, 1]]", "knots[0][1]", "got nan"
+        "bspline", "knots = [[0, 0, 0, nan, 1, 1], [0, 0, 0, 1, 1, 1]]", "knots[0][3]", "got nan"
     ),
     "weights negative": more(
-        "bspline", "weights = [[1, 1, 1], [1, -1, 1], [1, 1, 1]]", "", "weights must be > 0"
+        "bspline", "weights = [[1, 1, 1], [1, -1, 1], [1, 1, 1]]", "weights", "must be > 0"
     ),
     "weights are a number": more("bspline", "weights = 2", "weights", "must be a list"),
-    "range of no knots": more("bspline", "u = [0, 2]", "", "u must be a pair"),
+    "range of no knots": more("bspline", "u = [0, 2]", "u", "must be a pair"),
     "range of knots in degrees": more("bspline", "u_deg = [0, 1]", "u_deg", "write u in the num"),
     "missing net": Bad(
         surface('kind = "bspline"\nfile = "no/net.json"\ncells = [3, 4]'),
@@ -346,14 +350,14 @@ BAD_CASES = {
     "piece is a mesh": Bad(
         surface('kind = "piecewise"\npieces = [{ kind = "mesh" }]'),
         "surface.pieces[0].kind",
-        ('"bspline", got',),
+        ("'bspline', got",),
     ),
     "piece with a side": wrong(
         "piecewise",
         "position = [1, 0, 0]",
         'side = "inside"',
         "pieces[1].side",
-        "is that of the whole",
+        "is that of all pieces",
     ),
     "piece without cells": wrong(
         "piecewise", "[1, 0, 0], cells = [2, 3]", "[1, 0, 0]", "pieces[1].cells", "is missing"
@@ -373,12 +377,12 @@ BAD_CASES = {
             'kind = "piecewise"\npieces = [{ kind = "sphere", radius = 1, u_deg = [0, 181], '
             "v_deg = [0, 9], cells = [1, 1] }]"
         ),
-        "surface.pieces[0]",
-        ("u_deg must lie in",),
+        "surface.pieces[0].u_deg",
+        ("must lie in",),
     ),
     "cells of the whole": more("piecewise", "cells = [2, 3]", "cells", "in each of surface.pieces"),
     "gap": more("piecewise", "gap = 0", "gap", "> 0"),
-    "gap too wide": more("piecewise", "gap = 0.5", "", "gap must be at most a fiftieth"),
+    "gap too wide": more("piecewise", "gap = 0.5", "gap", "must be at most a fiftieth"),
     "pieces of a sphere": added("surface", "pieces = []", "surface.pieces", "a piecewise surface"),
     "too many cells in all": wrong(
         "piecewise",
@@ -402,7 +406,7 @@ BAD_CASES = {
     "mesh is a device": wrong("mesh", "part.stl", "/dev/zero", "file", "not a regular file"),
     "mesh is a number": wrong("mesh", '"part.stl"', "3", "file", "must be the path of a mesh"),
     "no side": wrong("mesh", 'side = "outside"\n', "", "side", "where the faces look to"),
-    "cells of a grid": wrong("mesh", "12", "[3, 4]", "cells", "one whole number", "cell_size"),
+    "cells of a grid": wrong("mesh", "12", "[3, 4]", "cells", "a whole number in 1 .. 20,000"),
     "cells of a mesh missing": wrong("mesh", "cells = 12\n", "", "cells", "or cell_size = 0.05"),
     "no cell": wrong("mesh", "12", "0", "cells", "1 .. 20,000"),
     "too many cells of a mesh": wrong("mesh", "12", "20_001", "cells", "1 .. 20,000"),
@@ -413,9 +417,11 @@ BAD_CASES = {
     "scale is text": more("mesh", 'scale = "mm"', "scale", "got 'mm'"),
     "mesh with a radius": more("mesh", "radius = 1", "radius", "belongs to", "not to a mesh"),
     "mesh with angles": more("mesh", "u_deg = [0, 1]", "u_deg", "belongs to", "not to a mesh"),
-    "box reversed": more("mesh", "box = [[0, 0, 0], [1, 0, 1]]", "box", "first below the second"),
+    "box reversed": more(
+        "mesh", "box = [[0, 0, 0], [1, 0, 1]]", "box[0]", "below the opposite corner"
+    ),
     "box of one corner": more("mesh", "box = [[0, 0, 0]]", "box", "[[x0, y0, z0], [x1, y1, z1]]"),
-    "box infinite": more("mesh", "box = [[0, 0, 0], [inf, 1, 1]]", "box", "got [["),
+    "box infinite": more("mesh", "box = [[0, 0, 0], [inf, 1, 1]]", "box[1]", "got [inf"),
     "cut is a list": more("mesh", "cut = [0, 0, 1]", "cut", "must be a table"),
     "cut without a normal": more("mesh", "cut = { point = [0, 0, 0] }", "cut.normal", "missing"),
     "cut along nothing": more(

@@ -309,7 +309,7 @@ def test_limits_must_fit_the_joints(tmp_path, limits, words):
     case = load_case(write(tmp_path, text.replace('limits = "set-1"', limits)))
     with pytest.raises(CaseError) as caught:
         case.build()
-    assert [fault.key for fault in caught.value.faults] == ["robot"]
+    assert {fault.key.partition(".")[0] for fault in caught.value.faults} == {"robot"}
     assert words in str(caught.value)
 
 

@@ -14,19 +14,19 @@ from small_cases import small_case, small_verdict
 from surface_files import MESH, NET, POINTS, cube, mesh_case, net_case, sheet, write_stl
 
 import surfaces
+from coverable_errors import Fault
 from feasibility import check
 from feasibility.cases import (
     CLOSED_FORM_KINDS,
     OWN_KEYS,
     Case,
-    Fault,
     as_read,
     load_case,
     read_surface,
 )
 from feasibility.cases.case import CaseError
 from feasibility.cases.mesh_keys import MOST_MESH_CELLS
-from feasibility.cases.patch_keys import PATCHES, STEEPEST
+from feasibility.cases.patch_keys import PATCHES
 from feasibility.cases.piecewise_keys import MOST_PIECES
 from feasibility.results import load_result, save_result
 from feasibility.results.result_file import ResultError
@@ -99,11 +99,10 @@ def test_the_kinds_are_those_that_are_tested():
 
 
 def test_caps_are_those_of_the_surfaces():
-    from surfaces.arguments import LARGEST_RATIO
     from surfaces.meshes.cells.clustering import MOST_CELLS
     from surfaces.piecewise.piecewise_surface import MOST_PIECES as MOST
 
-    assert (MOST_MESH_CELLS, STEEPEST, MOST_PIECES) == (MOST_CELLS, LARGEST_RATIO, MOST)
+    assert (MOST_MESH_CELLS, MOST_PIECES) == (MOST_CELLS, MOST)
 
 
 def test_a_rational_net_with_knots_and_a_range():
@@ -259,7 +258,7 @@ def test_reading_a_case_opens_no_file(tmp_path):
         assert Case.from_toml(case.to_toml()) == case
         with pytest.raises(CaseError, match=r"surface\.file: .*no such file") as caught:
             case.build()
-        assert str(tmp_path) in caught.value.faults[0].message
+        assert str(tmp_path) in caught.value.faults[0].place
 
 
 def test_paths_of_surfaces_are_relative_to_the_case_file(tmp_path, monkeypatch):
@@ -312,7 +311,7 @@ MESH_FAULTS = {
     ),
     "no such face": (sheet, "faces = [50, 99]", "faces", ("the faces are 0 .. 49",)),
     "pieces": (lambda: sheets(13, 1.0), "", "cells", ("12 cells are too few for 13 separate",)),
-    "fine cells": (sheet, "cell_size = 1e-4", "cell_size", ("1 to 20,000", "cell_size = ")),
+    "fine cells": (sheet, "cell_size = 1e-4", "cell_size", ("1 to 20,000", "make about 200")),
 }
 
 

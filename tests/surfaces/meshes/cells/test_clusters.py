@@ -121,9 +121,9 @@ def test_a_face_each():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({}, "either count or size"),
-        ({"count": 5, "size": 0.1}, "either count or size"),
-        ({"count": 0}, "1 to 20,000 cells, got count = 0"),
+        ({}, "count is needed, or size, and not both"),
+        ({"count": 5, "size": 0.1}, "count is needed, or size, and not both"),
+        ({"count": 0}, "count must make 1 to 20,000 cells, got 0"),
         ({"count": 20_001}, "1 to 20,000 cells"),
         ({"count": 2.5}, "whole number"),
         ({"count": True}, "whole number"),

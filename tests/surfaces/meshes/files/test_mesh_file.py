@@ -220,7 +220,7 @@ def test_a_scale_that_is_given_is_believed(tmp_path):
 def test_a_scale_that_is_none_is_refused(scale, tmp_path):
     path = tmp_path / "part.stl"
     path.write_bytes(w.stl(corpus.V, corpus.F))
-    with pytest.raises(SurfaceError, match=r"scale must be a number > 0 .*'part.stl'"):
+    with pytest.raises(SurfaceError, match=r"'part.stl': scale must be a number in 1e-09 .. "):
         read_mesh(path, scale=scale)
 
 
