@@ -33,7 +33,7 @@ class Samples:
         curvature = surface.bounds(0.0).curvature
         reach = share / curvature if curvature > 0 else 1.0
         while not np.isfinite(surface.bounds(0.0, reach / share).curvature):
-            reach /= 1.1  # stay where every point has one foot
+            reach /= 1.1  # stay where every point has one closest point
         self.height = rng.uniform(-reach, reach, count)
         self.normal = surface.normal(self.u, self.v)
         self.closest_point = surface.point(self.u, self.v)

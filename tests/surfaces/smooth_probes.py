@@ -77,7 +77,7 @@ def least_distance(surface, point, u_range, v_range, count=121):
 
 
 def same_surface(one, other, tolerance=0.0):
-    """Both give the same points, normals and feet."""
+    """Both give the same points, normals and closest points."""
     u, v = random_parameters(one, 200)
     points = one.point(u, v) + 0.01 * one.normal(u, v)
     a, b = one.closest(points), other.closest(points)

@@ -35,7 +35,7 @@ def size_of(surface):
 
 
 def whole_ranges(surface):
-    """Ranges that hold the foot of every point near the patch, past the seams on both sides."""
+    """Ranges that hold all closest points near the patch, past the seams on both sides."""
     around = (-1.0, math.tau + 1.0)
     if surface.kind == "cone":
         apex = -surface.radius / surface.slope
@@ -128,7 +128,7 @@ def test_no_point_of_the_whole_surface_is_nearer_than_the_foot(shape):
     assert not closest_point.inside[~ordinary].any()
 
 
-def test_inside_marks_exactly_the_feet_on_the_patch(shape):
+def test_inside_marks_exactly_the_closest_points_on_the_patch(shape):
     (u0, u1), (v0, v1) = shape.u_range, shape.v_range
     rng = np.random.default_rng(11)
     u = u0 + (u1 - u0) * rng.uniform(-0.3, 1.3, 3000)
@@ -181,7 +181,7 @@ def test_a_ball_is_an_ellipsoid_and_a_cone_of_slope_zero_is_a_cylinder():
 
 
 @pytest.mark.parametrize("axes", [(0.4, 0.9, 0.6), (0.9, 0.6, 0.4), (0.7, 0.3, 0.3), (1, 1, 0.01)])
-def test_ellipsoid_feet_near_the_planes_where_normals_meet(axes):
+def test_ellipsoid_closest_points_near_the_planes_where_normals_meet(axes):
     whole = ellipsoid(axes, polar_deg=(0, 180), azimuth_deg=(0, 360))
     rng = np.random.default_rng(2)
     points = rng.uniform(-1, 1, (40, 3)) * axes
@@ -195,7 +195,7 @@ def test_ellipsoid_feet_near_the_planes_where_normals_meet(axes):
     assert closest_point.inside.all()
 
 
-def test_a_foot_of_two_is_taken_on_the_patch():
+def test_a_closest_point_of_two_is_taken_on_the_patch():
     for low, high in ((0, 60), (120, 180)):
         half = ellipsoid((1.0, 0.8, 0.3), polar_deg=(low, high), azimuth_deg=(20, 70))
         point = [0.1, 0.1, 0.0]
@@ -209,7 +209,7 @@ def test_a_foot_of_two_is_taken_on_the_patch():
     assert torus(0.4, 0.1, (100, 200), (140, 200)).closest([-0.4, 0.0, 0.0]).inside
 
 
-def test_points_past_the_apex_have_their_foot_there_and_outside():
+def test_points_past_the_apex_have_their_closest_point_there_and_outside():
     spike = cone(0.5, -0.5, (0, 360), (0, 0.8))
     closest_point = spike.closest([[0.0, 0.0, 1.5], [0.05, 0.1, 2.0]])
     assert closest_point.v == pytest.approx([1.0, 1.0])

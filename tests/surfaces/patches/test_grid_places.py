@@ -1,4 +1,4 @@
-"""Where in a grid a place lies, and what a grid that closes says of itself."""
+"""Where in a grid a place lies, and which ends of a grid are closed."""
 
 from __future__ import annotations
 

@@ -73,7 +73,9 @@ def test_closest_recovers_parameters_height_and_normal(patch, samples):
     assert np.abs((closest_point.v - samples.v) * lever).max() < 2e-13
 
 
-def test_any_point_is_foot_plus_height_along_normal_and_no_patch_point_is_nearer(patch, samples):
+def test_any_point_is_closest_point_plus_height_along_normal_and_no_patch_point_is_nearer(
+    patch, samples
+):
     rng = np.random.default_rng(1)
     size = np.ptp(samples.closest_point, axis=0).max()
     points = np.concatenate([
@@ -94,7 +96,7 @@ def test_any_point_is_foot_plus_height_along_normal_and_no_patch_point_is_nearer
 
 
 @pytest.mark.parametrize("kind", [cylinder, sphere, hyperboloid])
-def test_points_without_a_unique_foot_get_one_on_the_patch(kind):
+def test_points_without_a_unique_closest_point_get_one_on_the_patch(kind):
     made = {
         cylinder: lambda: cylinder(0.4, (100, 200), (1, 2)),
         sphere: lambda: sphere(0.4, (30, 60), (100, 200)),
@@ -108,7 +110,7 @@ def test_points_without_a_unique_foot_get_one_on_the_patch(kind):
     ) + closest_point.height * closest_point.normal == pytest.approx(np.array(point), abs=1e-15)
 
 
-def test_a_foot_at_the_pole_lies_on_an_open_patch_that_reaches_it():
+def test_a_closest_point_at_the_pole_lies_on_an_open_patch_that_reaches_it():
     quarter = sphere(0.7, (0, 90), (100, 190), position=(0.1, 0.2, 0.3), rpy_deg=(10, 20, 30))
     over = quarter.point(0.0, np.linspace(0, 6, 20)) + 0.2 * quarter.normal(0.0, 0.0)
     closest_point = quarter.closest(over)
@@ -116,7 +118,7 @@ def test_a_foot_at_the_pole_lies_on_an_open_patch_that_reaches_it():
     assert np.abs(closest_point.u).max() < 1e-15
 
 
-def test_hyperboloid_foot_is_exact_far_off_and_near_the_focal_curve():
+def test_hyperboloid_closest_point_is_exact_far_off_and_near_the_focal_curve():
     horn = hyperboloid(0.5, 0.4, (0, 360), (-5, 5))
     rng = np.random.default_rng(3)
     z = np.concatenate([rng.uniform(-5, 5, 3000), [0.0, 1e-300, -1e-12]])
@@ -134,7 +136,7 @@ def test_hyperboloid_foot_is_exact_far_off_and_near_the_focal_curve():
     assert (closest_point.v * z >= 0).all()
 
 
-def test_inside_marks_exactly_the_feet_on_the_patch():
+def test_inside_marks_exactly_the_closest_points_on_the_patch():
     horn = hyperboloid(0.5, 0.5, angle_deg=(120, 240), height=(0.1, 0.5))
     u, v = np.meshgrid(np.radians(np.arange(0.5, 360)), np.linspace(-0.5, 1, 301), indexing="ij")
     closest_point = horn.closest(horn.point(u, v) - 0.01 * horn.normal(u, v))

@@ -1,4 +1,4 @@
-"""Piecewise surfaces: seams by geometry, one outside, feet, cells and the ways across seams."""
+"""Piecewise surfaces: seams by geometry, one outside, closest points, cells and curves."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_a_patch_in_pieces_has_the_cells_and_neighbours_of_the_whole(name):
 
 
 @pytest.mark.parametrize("name", WHOLE, ids=str)
-def test_the_courses_of_pieces_run_on_the_whole(name):
+def test_the_curves_of_pieces_run_on_the_joined_surface(name):
     whole, parts = cut_alike(name)
     curves = parts.curves
     pair = np.repeat(np.arange(len(parts.pairs)), 23)
@@ -120,7 +120,7 @@ def test_the_courses_of_pieces_run_on_the_whole(name):
 
 
 @pytest.mark.parametrize("name", WHOLE, ids=str)
-def test_feet_are_those_of_the_whole(name):
+def test_closest_points_are_those_of_one_patch(name):
     whole, parts = cut_alike(name)
     rng = np.random.default_rng(3)
     low, high = whole.centres.min(axis=0) - 0.1, whole.centres.max(axis=0) + 0.1
@@ -214,7 +214,7 @@ def test_borders_join_within_the_gap(apart, joined):
 
 @pytest.mark.parametrize("order", list(itertools.permutations(range(4))), ids=str)
 def test_pieces_are_turned_to_one_outside(order):
-    """A chain with two of four upside down, in every order: all as the first says."""
+    """A chain with two of four upside down, in every order: all as the first defines."""
     quarter = [(90 * k, 90 * k + 90) for k in range(4)]
     round_pieces = [cylinder(0.3, ends, (0, 0.5)) for ends in quarter]
 
@@ -253,12 +253,12 @@ def test_a_crease_is_told_with_its_angle(angle):
     assert f"crease of up to {abs(angle):g} degrees" in surface.notes[0]
     cells = surface.cells((3, 4))
     assert cells.seam_pairs.creases == pytest.approx(math.radians(abs(angle)), abs=1e-9)
-    # Courses across it stray by at least half of the angle, those along it by nothing.
+    # Curves across it deviate by at least half of the angle, those along it by nothing.
     deviations = cells.curves.deviations[:, 1]
     across = cells.piece[cells.pairs[:, 0]] != cells.piece[cells.pairs[:, 1]]
     assert (deviations[across] >= 2.0 * math.sin(0.25 * math.radians(abs(angle)))).all()
     assert deviations[~across].max() < 1e-12
-    # And what they say holds against the surface's own nearest places.
+    # And their deviations hold against the surface's own closest points.
     pair = np.repeat(np.arange(len(cells.pairs)), 23)
     closest_point, normal = cells.curves.at(pair, np.tile(np.linspace(0, 1, 23), len(cells.pairs)))
     on = surface.closest(closest_point)

@@ -1,4 +1,4 @@
-"""Parts of meshes: exact areas, whatever way the cut runs."""
+"""Parts of meshes: exact areas, however the cut runs."""
 
 import mesh_corpus as corpus
 import mesh_writers as w

@@ -1,4 +1,4 @@
-"""Courses lie on their surfaces, meet the centres, and their bends bound what they do."""
+"""Curves lie on their surfaces, meet the centres, and keep their bounds."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ def cells(request):
 
 
 def places(cells, count=23):
-    """Every course at `count` places that are no multiples of anything."""
+    """Every curve at `count` places that are no multiples of anything."""
     t = np.linspace(0.0, 1.0, count)
     return np.repeat(np.arange(len(cells.curves)), count), np.tile(t, len(cells.curves))
 
 
-def test_courses_run_from_centre_to_centre(cells):
+def test_curves_run_from_centre_to_centre(cells):
     """One for each pair, from the smaller index to the larger, normals too."""
     curves = cells.curves
     assert len(curves) == len(cells.pairs)
@@ -41,7 +41,7 @@ def test_courses_run_from_centre_to_centre(cells):
         np.testing.assert_allclose(normal, cells.normals[cells.pairs[:, column]], atol=1e-12)
 
 
-def test_courses_lie_on_the_patch_within_what_they_say(cells):
+def test_curves_lie_on_the_patch_within_their_deviations(cells):
     """Heights and normals at 23 places each, against the surface's own nearest points."""
     which, t = places(cells)
     closest_point, normal = cells.curves.at(which, t)
@@ -106,8 +106,8 @@ def test_turning_is_the_largest_curvature_of_the_offset():
     assert flat.curves.curvature(0.1).max() < 1e-12
 
 
-def test_a_rigid_motion_moves_the_courses_along(cells):
-    """Feet and normals turn with the surface; bends and strays stay."""
+def test_a_rigid_motion_moves_the_curves_along(cells):
+    """Closest points and normals turn with the surface; bounds and deviations stay."""
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     moved = cells.surface.moved(turn, [0.3, -0.2, 0.1]).cells(*cells.shape)
     which, t = places(cells, 5)
@@ -120,7 +120,7 @@ def test_a_rigid_motion_moves_the_courses_along(cells):
     )
 
 
-def test_no_pairs_no_courses():
+def test_no_pairs_no_curves():
     """A single cell, or none."""
     for shape in ((1, 1), (0, 5)):
         curves = plane((0, 1), (0, 1)).cells(*shape).curves

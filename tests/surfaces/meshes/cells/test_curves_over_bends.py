@@ -1,4 +1,4 @@
-"""Ways over tight bends: no further off the surface than they say, and not backwards far above."""
+"""Curves over tight bends: within their deviations, and not backwards far above."""
 
 import mesh_patches
 import numpy as np
@@ -8,7 +8,7 @@ from surfaces.meshes import TriangleMesh, mesh
 
 
 def over_the_bend(cells):
-    """Courses that turn by more than 30 degrees."""
+    """Curves that turn by more than 30 degrees."""
     normals = cells.normals[cells.pairs]
     return np.flatnonzero((normals[:, 0] * normals[:, 1]).sum(axis=1) < np.cos(np.radians(30)))
 
@@ -17,7 +17,7 @@ def over_the_bend(cells):
     ("radius", "facets", "deviation"), [(0.006, 20, 0.02), (0.006, 5, 0.015), (0.02, 5, 0.006)]
 )
 def test_ways_over_a_bend_stay_as_near_to_the_surface_as_they_say(radius, facets, deviation):
-    """Against the nearest place of the whole surface, anywhere on the way."""
+    """Against the closest point of all of the surface, anywhere on the curve."""
     cells = mesh(TriangleMesh(*mesh_patches.folded_sheet(radius, facets))).cells(60)
     curves, which = cells.curves, over_the_bend(cells)
     assert len(which) >= 5
@@ -38,4 +38,4 @@ def test_a_target_far_above_a_bend_runs_forwards(radius, facets):
     some = which[curves.deviations[which, 1] < 0.03]
     assert len(some) > 0.8 * len(which)
     assert not curves.folds(0.15)[some].any()
-    assert curves.folds(-2.0 * radius)[some].any()  # on the hollow side
+    assert curves.folds(-2.0 * radius)[some].any()  # on the concave side

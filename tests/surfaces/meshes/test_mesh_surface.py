@@ -1,4 +1,4 @@
-"""Meshes as surfaces: nearest places, continuous normals, cells and the ways between them."""
+"""Meshes as surfaces: closest points, continuous normals, cells and the curves between them."""
 
 from __future__ import annotations
 
@@ -145,8 +145,8 @@ def test_cutting_leaves_the_surface_what_it_was(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_courses_of_a_mesh_lie_on_it_within_what_they_say(name):
-    """Feet at odd places, against the mesh; on smooth ones within a twentieth of a face."""
+def test_curves_of_a_mesh_lie_on_it_within_their_deviations(name):
+    """Points at odd places, against the mesh; on smooth ones within a twentieth of a face."""
     cells = surface_of(name).cells(60)
     curves = cells.curves
     which = np.repeat(np.arange(len(curves)), 17)
@@ -169,7 +169,7 @@ def test_courses_of_a_mesh_lie_on_it_within_what_they_say(name):
 
 
 def test_a_rigid_motion_moves_everything_along():
-    """The same cells, turned and shifted; courses too."""
+    """The same cells, turned and shifted; curves too."""
     surface = surface_of("hood")
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     shift = np.array([0.3, -0.2, 0.1])
@@ -181,7 +181,7 @@ def test_a_rigid_motion_moves_everything_along():
 
 
 def test_cells_pickle_and_are_the_same_again():
-    """Arrays and courses survive."""
+    """Arrays and curves survive."""
     cells = surface_of("dome").cells(30)
     again = pickle.loads(pickle.dumps(cells))
     np.testing.assert_array_equal(cells.centres, again.centres)

@@ -1,4 +1,4 @@
-"""Ways over creases: by the shortest corner, at rest where they bend, and never off the surface."""
+"""Curves over creases: over the corner of the shortest path, at rest there, on the surface."""
 
 import itertools
 
@@ -21,8 +21,8 @@ def roof(angle_deg, side=0.3):
     return TriangleMesh(np.array(vertices), [[0, 2, 3], [0, 3, 1], [0, 1, 5], [0, 5, 4]])
 
 
-def creased_courses(cells):
-    """Courses that come to rest, each as its pieces (4 k, 4, 6)."""
+def creased_curves(cells):
+    """Curves that come to rest, each as its pieces (4 k, 4, 6)."""
     curves = cells.curves
     which = np.flatnonzero(curves.creased)
     return which, [curves.cubics[curves.first[k] : curves.first[k + 1]] for k in which]
@@ -42,17 +42,17 @@ def test_a_way_crosses_the_crease_where_it_is_shortest(angle):
             for corner, share in zip(inwards, rng.uniform(0.05, 0.9, (2, 2)), strict=True)
         )
         found = _shortest(np.array([right, left]), edge[None], inwards[None])
-        ways = np.linalg.norm(along - right, axis=1) + np.linalg.norm(along - left, axis=1)
+        lengths = np.linalg.norm(along - right, axis=1) + np.linalg.norm(along - left, axis=1)
         at = np.linalg.norm(found - right) + np.linalg.norm(found - left)
-        assert at <= ways.min() + 1e-12
-        assert at == pytest.approx(ways.min(), abs=1e-7)
+        assert at <= lengths.min() + 1e-12
+        assert at == pytest.approx(lengths.min(), abs=1e-7)
         assert np.isnan(_shortest(np.array([right, 0.5 * right]), edge[None], inwards[None])).all()
 
 
 @pytest.mark.parametrize("name", ["roof 40", "roof 90", "roof 140", "box", "can"])
-def test_creased_courses_are_smooth_in_time_and_stay_on_the_surface(name):
+def test_creased_curves_are_smooth_in_time_and_stay_on_the_surface(name):
     cells = mesh(PARTS[name]()).cells(60)
-    which, pieces = creased_courses(cells)
+    which, pieces = creased_curves(cells)
     assert len(which) >= 5
     for cubics in pieces:
         ends = cubics.sum(axis=1)
@@ -78,8 +78,8 @@ def test_creased_courses_are_smooth_in_time_and_stay_on_the_surface(name):
 def can():
     """A round tin without its bottom."""
     turn = np.linspace(0, 2 * np.pi, 48, endpoint=False)
-    rim = 0.15 * np.column_stack([np.cos(turn), np.sin(turn)])
-    low, high = (np.column_stack([rim, np.full(48, z)]) for z in (-0.1, 0.1))
+    circle = 0.15 * np.column_stack([np.cos(turn), np.sin(turn)])
+    low, high = (np.column_stack([circle, np.full(48, z)]) for z in (-0.1, 0.1))
     k, after = np.arange(48), (np.arange(48) + 1) % 48
     wall = np.concatenate([np.column_stack([k, after, 48 + k]),
                            np.column_stack([after, 48 + after, 48 + k])])  # fmt: skip
@@ -101,7 +101,7 @@ PARTS = {
 
 
 @pytest.mark.parametrize("counts", [(1, 8, 4), (8, 4, 16), (4, 64, 1)])
-def test_the_last_fit_of_a_course_counts(counts):
+def test_the_last_fit_of_a_curve_counts(counts):
     """However many pieces it had before, the others keep theirs."""
     rng = np.random.default_rng(0)
     before, after, others = counts

@@ -93,8 +93,8 @@ def test_bounds_are_infinite_exactly_where_the_parallel_surface_folds(
     assert math.isinf(bounds.bend) == folds
 
 
-def test_a_finite_bound_means_that_feet_do_not_jump(patch):
-    """Just below the least height without a bound, every point still has the foot it came from."""
+def test_a_finite_bound_means_that_closest_points_do_not_jump(patch):
+    """Just below the least height without a bound, every closest point is still unique."""
     for sign in (-1.0, 1.0):
         low, high = 0.0, 1.0
         while np.isfinite(patch.bounds(sign * high).curvature) and high < 1e3:

@@ -1,4 +1,4 @@
-"""The compiled chart: the same foot as `Surface.closest`, and the cell that a foot falls in."""
+"""The compiled patch: the same closest point as `Surface.closest`, and the cell it falls in."""
 
 import math
 
@@ -12,7 +12,7 @@ from surfaces.patches import cell_at, closest_on_patch, plane
 from surfaces.patches.closed_form_kernels import wrap
 
 
-def test_foot_equals_closest_to_the_last_bit(patch, samples):
+def test_closest_point_equals_closest_to_the_last_bit(patch, samples):
     patch_kernel = patch.cells(7, 5).patch_kernel
     found = patch.closest(samples.point)
     for k in range(0, 2000, 20):
@@ -64,7 +64,7 @@ def test_a_closed_parameter_may_be_off_by_turns():
             assert cell_at(pipe.patch_kernel, pipe.u[k] + turns * math.tau, pipe.v[k]) == k
 
 
-def test_a_foot_follows_across_the_seam():
+def test_a_closest_point_follows_across_the_seam():
     pipe = cylinder(0.3, (-180, 180), (0, 1)).cells(10, 1)
     found = []
     for angle in np.radians(np.arange(171, 190, 2)):
@@ -75,7 +75,7 @@ def test_a_foot_follows_across_the_seam():
     assert found == [9] * 5 + [0] * 5
 
 
-def test_a_foot_beyond_an_open_range_stays_outside_on_the_nearer_side():
+def test_a_closest_point_beyond_an_open_range_stays_outside_on_the_nearer_side():
     shell = cylinder(1.0, (120, 240), (0, 1))
     for degrees, expected in [(121, 121), (239, 239), (250, 250), (110, 110), (1, 361), (-1, -1)]:
         angle = math.radians(degrees)

@@ -122,9 +122,9 @@ def test_neighbours_are_listed_clockwise_as_seen_with_u_down_and_v_right(surface
     down = surface.point(cells.u + step, cells.v) - surface.point(cells.u - step, cells.v)
     right = surface.point(cells.u, cells.v + step) - surface.point(cells.u, cells.v - step)
     for k in range(len(cells)):
-        ways = cells.centres[cells.neighbours.of(k)] - cells.centres[k]
-        x = ways @ right[k] / np.linalg.norm(right[k])
-        y = -ways @ down[k] / np.linalg.norm(down[k])
+        ahead = cells.centres[cells.neighbours.of(k)] - cells.centres[k]
+        x = ahead @ right[k] / np.linalg.norm(right[k])
+        y = -ahead @ down[k] / np.linalg.norm(down[k])
         # Clockwise from the left, so that a list that starts at the upper left rises from 0.
         angle = (np.pi - np.arctan2(y, x)) % (2 * np.pi)
         turned = (angle - angle[0]) % (2 * np.pi)

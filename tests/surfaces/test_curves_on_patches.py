@@ -1,4 +1,4 @@
-"""Courses over the new kinds: from centre to centre on the surface, across seams and poles too."""
+"""Curves over the new kinds: from centre to centre on the surface, across seams and poles too."""
 
 import math
 
@@ -25,7 +25,7 @@ PATCHES = {
 
 
 @pytest.mark.parametrize("name", PATCHES, ids=str)
-def test_courses_run_on_the_surface_and_the_short_way(name):
+def test_curves_run_on_the_surface_and_the_short_way(name):
     patch = PATCHES[name]
     cells = patch.cells(6, 9)
     curves = cells.curves
@@ -35,14 +35,14 @@ def test_courses_run_on_the_surface_and_the_short_way(name):
     on = patch.closest(closest_point)
     assert on.inside.all()
     assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
-    # The foot's own normal may lie across the course, where the surface bends more than along it.
+    # The normal there may turn across the curve, where the surface bends more than along it.
     apart = np.linalg.norm(normal - on.normal, axis=1)
     assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
     assert curves.deviations.max() < 2e-5
     ends = closest_point.reshape(-1, 21, 3)
     assert ends[:, 0] == pytest.approx(cells.centres[cells.pairs[:, 0]], abs=1e-14)
     assert ends[:, -1] == pytest.approx(cells.centres[cells.pairs[:, 1]], abs=1e-14)
-    # No course goes the long way round: it is at most as long as half a circle on its chord.
+    # No curve goes the long way round: it is at most as long as half a circle on its chord.
     travel = np.linalg.norm(np.diff(ends, axis=1), axis=2).sum(axis=1)
     chord = np.linalg.norm(ends[:, -1] - ends[:, 0], axis=1)
     assert (travel <= math.pi / 2 * chord).all()
@@ -52,7 +52,7 @@ def test_courses_run_on_the_surface_and_the_short_way(name):
 @pytest.mark.parametrize("name", ["cone", "torus", "hood"])
 @pytest.mark.parametrize("shape", [(1, 14), (14, 1)], ids=str)
 def test_a_single_row_counts_the_bend_to_its_side(name, shape):
-    """No other course shows how sharply the surface bends across these."""
+    """No other curve shows how sharply the surface bends across these."""
     patch = PATCHES[name]
     curves = patch.cells(*shape).curves
     pair = np.repeat(np.arange(len(curves)), 21)
@@ -65,16 +65,16 @@ def test_a_single_row_counts_the_bend_to_its_side(name, shape):
 
 
 @pytest.mark.parametrize("name", PATCHES, ids=str)
-def test_sharpness_is_the_largest_of_many_directions(name):
+def test_the_max_curvature_is_the_largest_of_many_directions(name):
     """Of 90 short steps in all directions from each centre."""
     patch = PATCHES[name]
     cells = patch.cells(4, 5)
-    way = np.linspace(0.0, math.pi, 90, endpoint=False)
+    angle = np.linspace(0.0, math.pi, 90, endpoint=False)
     widths = [np.ptp(patch.u_range), np.ptp(patch.v_range)]
     best = np.zeros(len(cells))
     for scale in (0.1, 1.0, 10.0):  # of parameters, whose units differ
-        du = 1e-5 * widths[0] * np.cos(way) * scale
-        dv = 1e-5 * widths[1] * np.sin(way)
+        du = 1e-5 * widths[0] * np.cos(angle) * scale
+        dv = 1e-5 * widths[1] * np.sin(angle)
         u, v = cells.u[:, None], cells.v[:, None]
         turn = patch.normal(u + du, v + dv) - patch.normal(u - du, v - dv)
         step = patch.point(u + du, v + dv) - patch.point(u - du, v - dv)

@@ -1,4 +1,4 @@
-"""The general search for feet, against the closed forms and against brute force."""
+"""The general search for closest points, against the closed forms and against brute force."""
 
 import math
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ def cylinder_jet(radius, x):
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Searched(SmoothPatch):
-    """A patch that has a closed form, but whose feet are searched for."""
+    """A patch that has a closed form, but whose closest points are searched for."""
 
     kind: ClassVar[str] = "searched"
     units: ClassVar[tuple[str, str]] = ("rad", "rad")
@@ -96,7 +96,7 @@ def both(request):
     return exact, searched(exact, lambda x: jet(radius, x))
 
 
-def test_feet_over_the_patch_are_those_of_the_closed_form(both):
+def test_closest_points_over_the_patch_are_those_of_the_closed_form(both):
     exact, found = both
     rng = np.random.default_rng(5)
     u, v = rng.uniform(*exact.u_range, 3000), rng.uniform(*exact.v_range, 3000)
@@ -126,7 +126,7 @@ def test_points_anywhere_get_the_nearest_point_of_the_patch(both):
     )
     expected = [least_distance(found, p, *ranges) for p in points]
     assert np.abs(distance - expected).max() < 1e-9
-    # A foot in the patch stands under its point; one on the border leans, and says so.
+    # The normal leads from one in the patch to its point; one on the border is not inside.
     whole = exact.closest(points)
     assert (closest_point.inside == (np.abs(np.abs(closest_point.height) - distance) < 1e-12)).all()
     assert (closest_point.inside >= whole.inside).all()
@@ -136,7 +136,7 @@ def test_points_anywhere_get_the_nearest_point_of_the_patch(both):
     )
 
 
-def test_a_point_off_the_border_has_its_foot_on_it_and_not_inside():
+def test_a_point_off_the_border_has_its_closest_point_on_it_and_not_inside():
     exact = cylinder(0.5, (-60, 100), (0.0, 0.9))
     found = searched(exact, lambda x: cylinder_jet(0.5, x))
     closest_point = found.closest(
@@ -190,7 +190,7 @@ def test_the_nearest_of_many_valleys_is_found_on_a_curve_in_the_plane():
     step = fine[1] - fine[0]
     for point, reached in zip(points, distance, strict=True):
         sampled = np.sqrt(((curve - point) ** 2).sum(1).min())
-        # A sample lies within half a step of the foot, sideways: the distance gains its square.
+        # A sample lies within half a step of it, sideways: the distance gains its square.
         assert reached <= sampled + 1e-12
         assert sampled - reached < (3.2 * step) ** 2 * (1 + 10 / max(sampled, 1e-9)) + 1e-12
     ends = found[(found[:, 0] == -6) | (found[:, 0] == 6)]

@@ -170,7 +170,7 @@ def test_nurbs_pipe_belt_and_ring_are_the_exact_quadrics():
         assert float(patch.area(*patch.u_range, *patch.v_range)) == pytest.approx(
             float(exact.area(*exact.u_range, *exact.v_range)), rel=1e-12
         )
-        # The feet of any points, found by search and by closed form.
+        # The closest points of any points, found by search and by closed form.
         w, z = random_parameters(exact, 2000, seed=4)
         height = np.random.default_rng(5).uniform(-0.15, 0.6, (2000, 1))
         points = exact.point(w, z) + height * exact.normal(w, z)
