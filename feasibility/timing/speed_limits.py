@@ -70,27 +70,26 @@ def motion_limits(
         >>> limits.velocity.tolist(), limits.acceleration.tolist()
         ([3.0, 3.0, 3.0, 3.0, 3.0, 3.0], [6.0, 6.0, 6.0, 6.0, 6.0, 6.0])
     """
-    faults = []
+    faults: list[str] = []
     speed = number(tool_speed)
     if not 0.0 < speed <= MOST:
         faults.append(
             f"the tool speed must be a positive number of metres per second, got {tool_speed!r}"
         )
-    fastest, fault = _per_joint(robot, "velocity", "rad/s or m/s", velocity)
     if velocity is None:
         fastest = robot.max_velocity
-        bad = ~((fastest > 0.0) & (fastest <= MOST))
-        names = [name for name, none in zip(robot.joint_names, bad, strict=True) if none]
-        fault = (
-            f"robot {robot.name!r} has no velocity limit for {', '.join(names)}; give velocity "
-            "(rad/s or m/s), one number for all joints or one for each"
-            if names
-            else ""
-        )
-    quickest, second = _per_joint(robot, "acceleration", "rad/s^2 or m/s^2", acceleration)
-    if acceleration is None:
-        quickest = fastest / ACCELERATION_TIME
-    faults += [text for text in (fault, second if acceleration is not None else "") if text]
+        known = (fastest > 0.0) & (fastest <= MOST)
+        names = [name for name, fine in zip(robot.joint_names, known, strict=True) if not fine]
+        if names:
+            faults.append(
+                f"robot {robot.name!r} has no velocity limit for {', '.join(names)}; give velocity "
+                "(rad/s or m/s), one number for all joints or one for each"
+            )
+    else:
+        fastest = _per_joint(robot, "velocity", "rad/s or m/s", velocity, faults)
+    quickest = fastest / ACCELERATION_TIME
+    if acceleration is not None:
+        quickest = _per_joint(robot, "acceleration", "rad/s^2 or m/s^2", acceleration, faults)
     if faults:
         raise PathError(faults)
     return MotionLimits(fastest, quickest, speed)
@@ -104,20 +103,16 @@ def number(value: object) -> float:
         return math.nan
 
 
-def _per_joint(robot: Robot, name: str, unit: str, value: ArrayLike | None) -> tuple[Array, str]:
-    """(n,) one number for each joint, and what is wrong with them."""
-    nothing = np.full(robot.n, math.nan)
-    if value is None:
-        return nothing, ""
-    form = f"{name} must be one positive number ({unit}), or {robot.n} for the joints"
+def _per_joint(robot: Robot, name: str, unit: str, value: ArrayLike, faults: list[str]) -> Array:
+    """(n,) one number for each joint; if something is wrong with them, it is added to `faults`."""
     try:
-        numbers = np.array(value, dtype=float)
-        numbers = np.broadcast_to(numbers, (robot.n,))
+        numbers = np.broadcast_to(np.array(value, dtype=float), (robot.n,))
     except (TypeError, ValueError):
-        return nothing, f"{form}, got {value!r}"
+        numbers = np.full(robot.n, math.nan)
     if not ((numbers > 0.0) & (numbers <= MOST)).all():
-        return nothing, f"{form}, got {value!r}"
-    return numbers, ""
+        form = f"{name} must be one positive number ({unit}), or {robot.n} for the joints"
+        faults.append(f"{form}, got {value!r}")
+    return numbers
 
 
 def fine_grid(robot: Robot, spline: BSpline, pieces: int) -> Array:
