@@ -99,7 +99,7 @@ def _choices(regions: Bools, least: tuple[int, ...]) -> Iterator[Ints]:
 def _regions(covers: Bools, pairs: Ints) -> tuple[Bools, Ints]:
     """(L, N) the largest connected regions of the rows, and the row (L,) that each is part of.
 
-    A patch inside a region that is contained in another one can carry the other's label, so only
+    A patch inside a region that is contained in another one can have the other's label, so only
     undominated regions are kept.
     """
     regions, rows = [], []

@@ -208,7 +208,7 @@ def _unwound(robot: Robot, walks: Sequence[Walk]) -> list[Walk]:
         fewest = move + SLACK * np.abs(turn)[:, None]  # of equal moves those with the fewest turns
         layers = [np.flatnonzero(walk == i) for i in range(count)]
         turns[:, j] = turn[_least_path(_Costs(move, fewest), [layers], 1.0)]
-    # Rounding must not carry a joint over its limit.
+    # Rounding must not move a joint past its limit.
     return [
         Walk(np.clip(w.q + TURN * t, robot.lower, robot.upper) if t.any() else w.q, w.cell)
         for w, t in zip(walks, turns, strict=True)

@@ -25,7 +25,7 @@ from surfaces import Cells
 KEPT = 4  # nodes that are kept over each cell of the route
 APART = 0.1  # [rad] or [m], a node nearer to a cheaper one than this is a copy of it
 FEWEST = 2  # nodes that are kept even where they are copies
-REVISIT = 20.0  # [rad], what a detour as long as the arm costs; revisits are dear
+REVISIT = 20.0  # [rad], what a detour as long as the arm costs; revisits are expensive
 START, GOAL = -1, -2  # nodes before those that a detour begins at, and behind those it ends at
 
 

@@ -1,4 +1,4 @@
-"""Questions about one case that cost less than a verdict, asked again and again by `explain`.
+"""Searches and proofs that cost less than a verdict, made again and again by `explain`.
 
 - `follow`: do configurations from a case nearby still project onto every cell's self-motion
   manifold? (A few evaluations a cell; a hint, not an answer.)

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 Kind = Literal["quintic", "cubic"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
-PLACES = 4  # at which each polynomial is looked at, its first end among them
+PLACES = 4  # at which each polynomial is evaluated, its first end among them
 HALVINGS = 3  # times that each polynomial is halved, so that its coefficients bound it closely
 
 
@@ -79,7 +79,7 @@ def values(points: Array, places: int) -> Array:
 
 
 def motion_between(run: Trajectory, kind: Kind, places: int) -> Walk:
-    """The polynomials looked at in some places each, as a motion that a replay can check."""
+    """The polynomials evaluated at some places each, as a motion that a replay can check."""
     q = np.vstack([values(coefficients(run, kind), places), run.q[-1:]])
     cell = np.full(len(q), -1, dtype=np.int64)
     cell[::places] = run.cell

@@ -166,7 +166,7 @@ def _turned(robot: Robot, cells: Cells, task: Task, walk: Walk) -> tuple[Curve |
             if shares.min() < SHARPEST:
                 return None, refused[0]
             curve = control_points(walk, shares)
-            # Only these and the ones next to them have changed; all are looked at again in the end.
+            # Only these and the ones next to them have changed; all are replayed again in the end.
             changed = sorted({near for k in refused for near in (k - 1, k, k + 1)} - {-1, last})
             refused = [k for k in changed if _refused(robot, cells, task, curve, k, k + 1)]
         refused = _refused(robot, cells, task, curve, 0, last)

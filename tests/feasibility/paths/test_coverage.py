@@ -346,7 +346,7 @@ def test_a_path_of_no_cells():
 def test_cells_that_cannot_be_reached_and_cells_that_are_none():
     verdict = paper_verdict("4d")
     missed = int(np.flatnonzero(~verdict.covered)[0])
-    with pytest.raises(PathError, match=r"no cell -1, 90;.*0 to 89.*cell .*cannot be reached"):
+    with pytest.raises(PathError, match=r"(?s)no cell -1, 90;.*0 to 89.*cell .*cannot be reached"):
         coverage_path(verdict, only=[missed, -1, 90])
 
 

@@ -423,7 +423,7 @@ def test_limits_that_are_none(what, value):
 
 
 def test_all_faults_at_once():
-    with pytest.raises(PathError, match=r"tool speed.*velocity must be.*acceleration must be"):
+    with pytest.raises(PathError, match=r"(?s)tool speed.*velocity must be.*acceleration must be"):
         motion_limits(load_robot("ur5"), -1, velocity=-1, acceleration=-1)
 
 
