@@ -1,14 +1,13 @@
 """A file of named arrays and one JSON text: a zip of .npy members, read without trusting it.
 
-`numpy.load` could read such a file too (it holds no pickles). It is not used, because it makes
-room for what a header claims before it looks whether the data is there.
+`numpy.load` without pickles reads it: numpy 2 refuses a header that claims more than there is
+before it makes room. What the members inflate to is looked up in the zip first.
 """
 
 from __future__ import annotations
 
 import io
 import json
-import math
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -27,6 +26,10 @@ LARGEST_FILE = 512 << 20  # bytes, as it lies on the disk
 LARGEST_CONTENT = 2 << 30  # bytes of all members, inflated
 LARGEST_TEXT = 64 << 20  # bytes of the JSON member, inflated
 MOST_MEMBERS = 64
+DAMAGED = (
+    zipfile.BadZipFile, zlib.error, ValueError, RuntimeError, EOFError, OSError, MemoryError,
+)  # fmt: skip
+"""What numpy and zipfile raise for a file that is none; NotImplementedError is a RuntimeError."""
 
 Dtype = type[np.float64] | type[np.int64]
 
@@ -68,7 +71,7 @@ class Archive:
     """An untrusted file that `write_archive` may have written, opened for reading."""
 
     def __init__(self, path: str | Path, what: str) -> None:
-        """Open a file and check its table of contents.
+        """Open a file; no more of it is read than its table of contents.
 
         Args:
             path: the file.
@@ -81,48 +84,39 @@ class Archive:
         try:
             data = read_regular(path, LARGEST_FILE, what)
         except FileError as error:
-            raise ArchiveError(str(error)) from error
+            raise ArchiveError(error.faults, error.source) from error
         try:
-            self._file = zipfile.ZipFile(io.BytesIO(data))
-            members = self._file.infolist()
-        except (zipfile.BadZipFile, NotImplementedError, ValueError, OSError) as error:
+            found = np.load(io.BytesIO(data), allow_pickle=False)
+        except DAMAGED as error:
             raise self.error(f"is not {what}: {error}") from error
+        if not isinstance(found, np.lib.npyio.NpzFile) or found.zip is None:
+            raise self.error(f"is not {what}: it holds one array")
+        self._file = found
+        members = found.zip.infolist()
         if len(members) > MOST_MEMBERS:
             raise self.error(f"holds {len(members)} members, more than {MOST_MEMBERS}; not {what}")
+        if len({member.filename for member in members}) < len(members):
+            raise self.error("holds a member twice")
         total = sum(member.file_size for member in members)
-        if total > LARGEST_CONTENT:
-            raise self.error(f"would inflate to {size(total)}, more than {size(LARGEST_CONTENT)}")
-        self._members: dict[str, zipfile.ZipInfo] = {}
-        for member in members:
-            if member.filename in self._members:
-                raise self.error(f"holds {member.filename!r} twice")
-            if member.flag_bits & 0x1:
-                raise self.error(f"holds {member.filename!r} encrypted")
-            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-                raise self.error(f"holds {member.filename!r} compressed in an unknown way")
-            self._members[member.filename] = member
+        text = sum(member.file_size for member in members if member.filename == TEXT_MEMBER)
+        if total > LARGEST_CONTENT or text > LARGEST_TEXT:
+            raise self.error(
+                f"would inflate to {size(total)}, {size(text)} of it text; at most "
+                f"{size(LARGEST_CONTENT)} and {size(LARGEST_TEXT)} are read"
+            )
 
     def error(self, message: str) -> ArchiveError:
         """An error that names the file."""
-        return ArchiveError(f"{self.name}: {message}")
+        return ArchiveError(message, self.name)
 
-    def _read(self, name: str, cap: int) -> bytes:
-        """One member, inflated to at most `cap` bytes, whatever its header says."""
-        member = self._members.get(name)
-        if member is None:
-            raise self.error(f"lacks {name!r}")
-        if member.file_size > cap:
-            raise self.error(f"{name!r} would inflate to {size(member.file_size)}; too large")
+    def _read(self, name: str) -> Any:
+        """One member: an array, or the bytes of anything else."""
         try:
-            with self._file.open(member) as stream:
-                data = stream.read(cap + 1)
-        except (zipfile.BadZipFile, zlib.error, NotImplementedError, EOFError, OSError) as error:
+            return self._file[name]
+        except KeyError as error:
+            raise self.error(f"lacks {name!r}") from error
+        except DAMAGED as error:
             raise self.error(f"{name!r} is damaged: {error}") from error
-        except (ValueError, RuntimeError) as error:
-            raise self.error(f"{name!r} cannot be read: {error}") from error
-        if len(data) != member.file_size:
-            raise self.error(f"{name!r} does not have the size that the file claims")
-        return data
 
     def meta(self) -> dict[str, Any]:
         """The JSON object.
@@ -134,18 +128,17 @@ class Archive:
         def refuse(constant: str) -> None:
             raise ValueError(f"{constant} is no JSON number")
 
+        data = self._read(TEXT_MEMBER)
         try:
-            meta = json.loads(self._read(TEXT_MEMBER, LARGEST_TEXT), parse_constant=refuse)
-        except (ValueError, RecursionError) as error:
-            if isinstance(error, ArchiveError):
-                raise
+            meta = json.loads(data, parse_constant=refuse)
+        except (ValueError, TypeError, RecursionError) as error:
             raise self.error(f"{TEXT_MEMBER!r} is not JSON: {error}") from error
         if not isinstance(meta, dict):
             raise self.error(f"{TEXT_MEMBER!r} is not a JSON object")
         return meta
 
     def array(self, name: str, dtype: Dtype, shape: tuple[int | None, ...]) -> NDArray[Any]:
-        """One array of finite numbers.
+        """One array of finite numbers, write-protected.
 
         Args:
             name: without the ending.
@@ -155,27 +148,18 @@ class Archive:
         Raises:
             ArchiveError: it is missing, damaged, or of another type or shape.
         """
-        data = self._read(f"{name}.npy", LARGEST_CONTENT)
-        stream = io.BytesIO(data)
-        try:
-            if np.lib.format.read_magic(stream) != (1, 0):
-                raise ValueError("it is of an unknown version")
-            found, fortran, kind = np.lib.format.read_array_header_1_0(stream)
-        except (ValueError, RecursionError, MemoryError, TypeError) as error:
-            raise self.error(f"{name!r} is no array: {error}") from error
-        if kind != np.dtype(dtype) or fortran:
-            raise self.error(f"{name!r} holds {kind}, not {np.dtype(dtype)} row by row")
-        fits = len(found) == len(shape) and all(
-            length >= 0 and wanted in (None, length)
-            for length, wanted in zip(found, shape, strict=True)
+        array = self._read(f"{name}.npy")
+        if not isinstance(array, np.ndarray):
+            raise self.error(f"{name!r} is no array")
+        if array.dtype != dtype:
+            raise self.error(f"{name!r} holds {array.dtype}, not {np.dtype(dtype)}")
+        fits = array.ndim == len(shape) and all(
+            wanted in (None, length) for length, wanted in zip(array.shape, shape, strict=True)
         )
         if not fits:
             wanted = " x ".join("any" if length is None else str(length) for length in shape)
-            raise self.error(f"{name!r} has the shape {found}, not {wanted}")
-        body = data[stream.tell() :]
-        if math.prod(found) * kind.itemsize != len(body):
-            raise self.error(f"{name!r} holds {len(body)} bytes, which is not {found} of {kind}")
-        array = np.frombuffer(body, dtype=kind).reshape(found)
+            raise self.error(f"{name!r} has the shape {array.shape}, not {wanted}")
         if dtype is np.float64 and not np.isfinite(array).all():
             raise self.error(f"{name!r} holds NaN or infinite values")
+        array.flags.writeable = False
         return array

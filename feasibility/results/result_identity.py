@@ -1,4 +1,4 @@
-"""Is the robot of a result file still the one that is loaded now?"""
+"""Are the robot and the cells of a result file still those that are loaded now?"""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from feasibility.results.result_fields import Fields
 from robots import Robot
 from surfaces import Cells
 
-CLOSE = 1e-9  # [m], [1]: tool point and axis of the same arm
+CLOSE = 1e-9  # [m], [1]: tool points, axes, centres and normals that count as the same
 
 
 def probes(robot: Robot) -> NDArray[np.float64]:
@@ -43,9 +43,6 @@ def check_robot(robot: Robot, fields: Fields, archive: Archive) -> None:
             f"was found for another {robot.name!r} than the one that is loaded now (its joints, "
             "limits or geometry have changed); run the check again"
         )
-
-
-CLOSE = 1e-9  # [m], [1]: centres and normals of the same cells
 
 
 def places(cells: Cells) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """Trajectories as files: CSV, JSON, and YAML shaped like a ROS `trajectory_msgs/JointTrajectory`.
 
-What is written is read back as the same numbers. Files are untrusted: they are read with a cap, as
-plain text, and every number is checked; nothing in them is ever run.
+CSV and JSON are read back as the same numbers; YAML is written for other programs alone. Files are
+untrusted: they are read with a cap, as plain text, and every number is checked.
 """
 
 from __future__ import annotations
@@ -15,18 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from feasibility.results.trajectory_checks import (
-    MOST_JOINTS,
-    MOST_SAMPLES,
-    names,
-    numbers,
-    raise_all,
-)
-from feasibility.results.trajectory_yaml import as_yaml, from_yaml
+from coverable_errors import ArgumentError, Checks, CoverableError, Fault
 from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
 from feasibility.timing import Trajectory
 
+MOST_SAMPLES = 1_000_000
+MOST_JOINTS = 64
 CAP = 64 << 20  # [bytes] largest file that is read
 FORMAT = "coverable trajectory 1"
 _SHAPES = {"velocities": "_velocity", "accelerations": "_acceleration"}
@@ -52,19 +48,22 @@ def check_ending(path: str | os.PathLike[str]) -> None:
 
 
 def load_trajectory(path: str | os.PathLike[str]) -> Trajectory:
-    """Read a trajectory that `save_trajectory` wrote.
+    """Read a trajectory that `save_trajectory` wrote as CSV or JSON.
 
     Raises:
         FileError: there is no such file, or it is not such a trajectory: all faults, with places.
     """
-    read = _of_ending(path, {"csv": from_csv, "json": from_json_text, "yaml": from_yaml})
-    data = read_regular(path, CAP, "a trajectory (.csv, .json or .yaml)")
+    name = shown_path(path)
+    read = _of_ending(path, {"csv": from_csv, "json": from_json_text, "yaml": None})
+    if read is None:
+        raise FileError("YAML is written only; load the trajectory from CSV or JSON", name)
+    data = read_regular(path, CAP, "a trajectory (.csv or .json)")
     try:
         return read(data.decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise FileError(f"is not text: {error.reason}", shown_path(path)) from error
-    except ValueError as error:
-        raise FileError(str(error), shown_path(path)) from error
+        raise FileError(f"is not text: {error.reason}", name) from error
+    except CoverableError as error:
+        raise FileError(error.faults, name) from error
 
 
 def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:
@@ -73,7 +72,7 @@ def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:
     ending = "yaml" if ending == "yml" else ending
     if ending not in known:
         raise FileError(
-            f"{shown_path(path)}: expected a name that ends in .csv, .json or .yaml (a trajectory)"
+            "expected a name that ends in .csv, .json or .yaml (a trajectory)", shown_path(path)
         )
     return known[ending]
 
@@ -104,35 +103,38 @@ def from_csv(text: str) -> Trajectory:
     """Read what `as_csv` wrote.
 
     Raises:
-        ValueError: it is something else.
+        ArgumentError: it is something else.
     """
     try:
         rows = list(csv.reader(io.StringIO(text), strict=True))
     except csv.Error as error:
-        raise ValueError(f"is not CSV: {error}") from error
+        raise ArgumentError(f"is not CSV: {error}") from error
     head = rows[0] if rows else []
     n = (len(head) - 3) // 3
     joints = tuple(head[1 : 1 + max(n, 0)])
     if n < 1 or n > MOST_JOINTS or head != _columns(joints):
-        raise ValueError(
+        raise ArgumentError(
             "line 1: expected the columns time, the joints, their velocities "
             "(joint_velocity), their accelerations (joint_acceleration), tool_speed, cell"
         )
     if len(rows) - 1 > MOST_SAMPLES:
-        raise ValueError(f"has more than {MOST_SAMPLES:,} samples")
-    faults: list[str] = []
+        raise ArgumentError(f"has more than {MOST_SAMPLES:,} samples")
+    checks = Checks("")
     table = np.full((len(rows) - 1, len(head) - 1), math.nan)
     cells = np.full(len(rows) - 1, -1, dtype=np.int64)
     for k, row in enumerate(rows[1:]):
         if len(row) != len(head):
-            faults.append(f"line {k + 2}: expected {len(head)} columns, found {len(row)}")
+            checks.keep(
+                Fault("", f"expected {len(head)} columns, found {len(row)}", f"line {k + 2}")
+            )
             continue
         try:
             table[k] = [float(word) for word in row[:-1]]
             cells[k] = int(row[-1]) if row[-1] else -1
         except (ValueError, OverflowError):
-            faults.append(f"line {k + 2}: expected numbers, and a whole number or nothing as cell")
-    raise_all(faults)
+            text = "expected numbers, and a whole number or nothing as cell"
+            checks.keep(Fault("", text, f"line {k + 2}"))
+    checks.done()
     columns = np.split(table, np.cumsum([1, n, n, n]), axis=1)
     return Trajectory(
         joints, columns[0][:, 0], columns[1], columns[2], columns[3], columns[4][:, 0], cells
@@ -162,46 +164,97 @@ def from_json_text(text: str) -> Trajectory:
     """Read what `as_json_text` wrote.
 
     Raises:
-        ValueError: it is something else.
+        ArgumentError: it is something else.
     """
     try:
         record = json.loads(text)
     except RecursionError as error:
-        raise ValueError("is nested too deeply for a trajectory") from error
+        raise ArgumentError("is nested too deeply for a trajectory") from error
     except ValueError as error:
-        raise ValueError(f"is not JSON: {error}") from error
+        raise ArgumentError(f"is not JSON: {error}") from error
     keys = {
         "format", "joint_names", "time", "positions", "velocities", "accelerations", "tool_speed",
         "cell",
     }  # fmt: skip
     if not isinstance(record, dict) or record.get("format") != FORMAT:
-        raise ValueError(f'expected an object with "format": "{FORMAT}"')
-    faults = [f"the key {key!r} is missing" for key in sorted(keys - set(record))]
-    faults += [f"there is an unknown key {key[:40]!r}" for key in sorted(set(record) - keys)]
-    raise_all(faults)
-    joints = names(record["joint_names"], "joint_names", faults)
-    k, n = len(record["time"]) if isinstance(record["time"], list) else 0, len(joints)
-    if k > MOST_SAMPLES:
-        faults.append(f"has more than {MOST_SAMPLES:,} samples")
-    raise_all(faults)
+        raise ArgumentError(f'expected an object with "format": "{FORMAT}"')
+    faults = [Fault(key, "is missing") for key in sorted(keys - set(record))]
+    faults += [Fault(key[:40], "is not known here") for key in sorted(set(record) - keys)]
+    if faults:
+        raise ArgumentError(faults)
+    checks = Checks()
+    joints, time, cells = record["joint_names"], record["time"], record["cell"]
+    named = isinstance(joints, list) and all(isinstance(name, str) for name in joints)
+    if not named or not 1 <= len(joints) <= MOST_JOINTS:
+        checks.wrong("joint_names", joints, f"must be a list of 1 to {MOST_JOINTS} names")
+    if not isinstance(time, list) or len(time) > MOST_SAMPLES:
+        checks.wrong("time", time, f"must be a list of at most {MOST_SAMPLES:,} numbers")
+    checks.done()
+    k, n = len(time), len(joints)
     arrays = {
-        key: numbers(record[key], shape, key, faults)
+        key: _array(checks, key, record[key], shape)
         for key, shape in (
             ("time", (k,)), ("positions", (k, n)), ("velocities", (k, n)),
             ("accelerations", (k, n)), ("tool_speed", (k,)),
         )
     }  # fmt: skip
-    cells = record["cell"]
     if not isinstance(cells, list) or len(cells) != k or not all(map(_is_cell, cells)):
-        faults.append(f"cell must be a list of {k} whole numbers >= 0, or null between centres")
-    raise_all(faults)
+        expected = f"must be a list of {k} whole numbers >= 0, or null between centres"
+        checks.wrong("cell", cells, expected)
+    checks.done()
     return Trajectory(
-        joints, arrays["time"], arrays["positions"], arrays["velocities"], arrays["accelerations"],
-        arrays["tool_speed"], np.array([-1 if c is None else c for c in cells], dtype=np.int64),
+        tuple(joints), arrays["time"], arrays["positions"], arrays["velocities"],
+        arrays["accelerations"], arrays["tool_speed"],
+        np.array([-1 if cell is None else cell for cell in cells], dtype=np.int64),
     )  # fmt: skip
+
+
+def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Numbers out of nested lists; whether they are finite, `Trajectory` says."""
+    try:
+        found = np.array(value if isinstance(value, list) else [])
+    except ValueError:  # rows of different lengths
+        found = np.array([], dtype=object)
+    if found.shape == shape and found.dtype.kind in "fiu":
+        return found.astype(float)
+    checks.wrong(key, value, f"must hold {' x '.join(map(str, shape))} numbers")
+    return np.zeros(shape)
 
 
 def _is_cell(value: object) -> bool:
     """Is it a flat index, or null?"""
     whole = isinstance(value, int) and not isinstance(value, bool)
     return value is None or (whole and 0 <= value < 2**62)  # type: ignore[operator]
+
+
+# -- YAML --------------------------------------------------------------------------------------
+
+
+def as_yaml(trajectory: Trajectory) -> str:
+    """The fields of a `trajectory_msgs/JointTrajectory`; times are rounded to nanoseconds.
+
+    Tool speed and cells, which the message has no fields for, stand there as comments.
+    """
+    lines = ["# trajectory_msgs/JointTrajectory, in radians, metres and seconds"]
+    lines += [
+        f"joint_names: {json.dumps(list(trajectory.joint_names), ensure_ascii=False)}",
+        "points:",
+    ]
+    rows = {
+        "positions": trajectory.q, "velocities": trajectory.dq, "accelerations": trajectory.ddq,
+    }  # fmt: skip
+    for k, cell in enumerate(trajectory.cell.tolist()):
+        nanoseconds = round(float(trajectory.time[k]) * 1e9)
+        seconds, rest = divmod(nanoseconds, 10**9)
+        mark = f"cell {cell}, " if cell >= 0 else ""
+        lines.append(f"- # {mark}tool_speed {float(trajectory.tool_speed[k])!r}")
+        for name, row in rows.items():
+            lines.append(f"  {name}: [{', '.join(map(_number, row[k].tolist()))}]")
+        lines.append(f"  time_from_start: {{sec: {seconds}, nanosec: {rest}}}")
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float) -> str:
+    """All digits of a number, with the point that YAML 1.1 wants: 1e-05 is text to it."""
+    text = repr(value)
+    return text.replace("e", ".0e") if "e" in text and "." not in text else text

@@ -17,18 +17,17 @@ from feasibility.results import save_trajectory
 from feasibility.results.trajectory_files import (
     as_csv,
     as_json_text,
+    as_yaml,
     from_csv,
     from_json_text,
     load_trajectory,
 )
-from feasibility.results.trajectory_yaml import as_yaml, from_yaml
 from feasibility.safe_files import FileError
 from feasibility.timing import Trajectory, motion_limits
 from feasibility.verdict import Walk
 
-ENDINGS = ("csv", "json", "yaml", "yml")
-READERS = {"csv": from_csv, "json": from_json_text, "yaml": from_yaml}
-WRITERS = {"csv": as_csv, "json": as_json_text, "yaml": as_yaml}
+ENDINGS = ("csv", "json")
+WRITERS = {"csv": as_csv, "json": as_json_text}
 
 
 def small_run(k=5, n=2, seed=0):
@@ -45,15 +44,11 @@ def small_run(k=5, n=2, seed=0):
     )
 
 
-def assert_same(one, other, to_nanoseconds=False):
-    """The same numbers, bit for bit; times perhaps only to half a nanosecond."""
+def assert_same(one, other):
+    """The same numbers, bit for bit."""
     assert one.joint_names == other.joint_names
-    for name in ("q", "dq", "ddq", "tool_speed", "cell"):
+    for name in ("time", "q", "dq", "ddq", "tool_speed", "cell"):
         assert np.array_equal(getattr(one, name), getattr(other, name))
-    if to_nanoseconds:
-        assert np.abs(one.time - other.time).max() <= 0.501e-9
-    else:
-        assert np.array_equal(one.time, other.time)
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
@@ -61,10 +56,10 @@ def assert_same(one, other, to_nanoseconds=False):
 def test_what_is_written_is_read_back(ending, seed, tmp_path):
     run = small_run(k=1 + seed, n=1 + seed, seed=seed)
     path = save_trajectory(tmp_path / f"run.{ending}", run)
-    assert_same(load_trajectory(path), run, ending in ("yaml", "yml"))
+    assert_same(load_trajectory(path), run)
 
 
-@pytest.mark.parametrize("ending", ["csv", "json", "yaml"])
+@pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize("name", ["4c", "5e", "ur5", "panda"])
 def test_a_trajectory_read_back_covers_the_surface_within_all_limits(name, ending, tmp_path):
     verdict = verdict_of(name)
@@ -114,7 +109,7 @@ def test_csv_names_its_columns():
     assert head[-2:] == ["tool_speed", "cell"]
 
 
-@pytest.mark.parametrize("ending", list(READERS))
+@pytest.mark.parametrize("ending", ENDINGS)
 def test_a_damaged_file_is_refused_or_whole(ending, tmp_path):
     rng = np.random.default_rng(11)
     text = WRITERS[ending](small_run(k=6))
@@ -137,7 +132,7 @@ def test_a_damaged_file_is_refused_or_whole(ending, tmp_path):
         assert (np.diff(run.time) > 0.0).all()
 
 
-@pytest.mark.parametrize("ending", list(READERS))
+@pytest.mark.parametrize("ending", ENDINGS)
 @pytest.mark.parametrize(
     "content",
     [b"", b"\x00" * 100, b"\xff\xfe", b"[" * 100_000, b"{}", b"a: &a [*a]", b"time,cell\n1,2\n"],
@@ -149,14 +144,11 @@ def test_other_files_are_refused(ending, content, tmp_path):
         load_trajectory(path)
 
 
-def test_objects_in_yaml_are_text_that_is_refused(tmp_path):
-    path = tmp_path / "evil.yaml"
-    path.write_text('!!python/object/apply:os.system ["true"]\n')
-    with pytest.raises(FileError, match="joint_names"):
-        load_trajectory(path)
-    line = as_yaml(small_run()).replace("- # ", '- !!python/object/apply:os.system ["true"] # ')
-    path.write_text(line)
-    with pytest.raises(FileError, match="line 4: expected a point"):
+@pytest.mark.parametrize("ending", ["yaml", "yml"])
+def test_yaml_is_written_only(ending, tmp_path):
+    path = save_trajectory(tmp_path / f"run.{ending}", small_run())
+    assert path.read_text(encoding="utf-8") == as_yaml(small_run())
+    with pytest.raises(FileError, match=r"written only; load the trajectory from CSV or JSON"):
         load_trajectory(path)
 
 
@@ -179,12 +171,14 @@ def test_numbers_that_are_none_are_refused(tmp_path):
         rows = as_csv(run).replace(repr(float(run.q[2, 1])), text, 1)
         with pytest.raises(ValueError, match="q must hold finite numbers"):
             from_csv(rows)
-    with pytest.raises(ValueError, match="the key 'cell' is missing; there is an unknown key 'x'"):
+    with pytest.raises(ValueError, match=r"(?s)cell is missing.*x is not known here"):
         from_json_text(json.dumps({k: v for k, v in record.items() if k != "cell"} | {"x": 1}))
     rows = as_csv(small_run()).splitlines()
     rows[2] = "x" + rows[2]
     rows[4] += ",1"
-    with pytest.raises(ValueError, match=r"line 3: expected numbers.*line 5: expected 9 columns"):
+    with pytest.raises(
+        ValueError, match=r"(?s)line 3: expected numbers.*line 5: expected 9 columns"
+    ):
         from_csv("\n".join(rows))
 
 
