@@ -275,11 +275,19 @@ def printable(key: str) -> str:
 
 def close(value: Any, options: Sequence[str]) -> str:
     """The option that `value` is most like, quoted; empty where none is."""
-    if not isinstance(value, str) or len(value) > 60:
-        return ""
-    same = [option for option in options if option.lower() == value.lower()]
-    found = same or get_close_matches(value, options, n=1, cutoff=0.6)
+    found = close_matches(value, options)
     return f'"{found[0]}"' if found else ""
+
+
+def close_matches(
+    value: Any, options: Iterable[str], most: int = 1, cutoff: float = 0.6
+) -> list[str]:
+    """At most `most` options that `value` was probably meant to be, the closest first."""
+    if not isinstance(value, str) or len(value) > 60:  # matching takes time; nobody misspells these
+        return []
+    options_by_lower = {option.lower(): option for option in options}
+    found = get_close_matches(value.strip().lower(), options_by_lower, most, cutoff)
+    return [options_by_lower[word] for word in found]
 
 
 def alternatives(options: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from numpy.typing import ArrayLike
 
+from coverable_errors import close_matches
 from robots.errors import RobotError
 
 if TYPE_CHECKING:
@@ -70,9 +71,7 @@ def _tool_frame(checked: CheckedUrdf, name: str, link: str | None) -> str:
 
 def suggestion(name: str, known: Sequence[str]) -> str:
     """Names that come close to `name`, or the known ones if none does."""
-    import difflib
-
-    close = difflib.get_close_matches(name, known, n=5, cutoff=0.5)
+    close = close_matches(name, known, most=5, cutoff=0.5)
     if close:
         return f"did you mean {' or '.join(repr(match) for match in close)}?"
     shown = ", ".join(list(known)[:MOST_NAMES])

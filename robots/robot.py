@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -121,14 +121,9 @@ class Robot:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle as a call of the constructor (mapping proxies do not pickle)."""
-        return (
-            Robot,
-            (
-                self.name, self.model, self.tool_frame, self.approach_axis, self.joint_names,
-                self.joint_kinds, self.lower, self.upper, self.max_velocity, dict(self.limit_sets),
-                self.urdf, self.package_dirs, dict(self.locked), self.notes,
-            ),
-        )  # fmt: skip
+        values = (getattr(self, item.name) for item in fields(self))
+        plain = (dict(value) if isinstance(value, Mapping) else value for value in values)
+        return Robot, tuple(plain)
 
     @property
     def n(self) -> int:

@@ -13,11 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
-from robots.urdf.attributes import MAX_LENGTH, Faults
 from robots.urdf.joints import JointInfo
 from robots.urdf.tree import read_links, read_tree, refuse_other_formats
 from robots.urdf.visuals import MeshFolders, Visual, read_visuals
-from robots.urdf.xml import Node, UrdfError, parse_xml, read_bytes, shown
+from robots.urdf.xml import MAX_LENGTH, Faults, Node, UrdfError, parse_xml, read_bytes, shown
 
 MAX_WARNINGS = 100
 

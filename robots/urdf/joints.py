@@ -1,13 +1,24 @@
-"""One <joint> of a URDF, checked."""
+"""One <joint> of a URDF and its limits, checked."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from robots.urdf.attributes import BadValue, Faults, Triple, name_of, numbers, only, triple
-from robots.urdf.joint_limits import read_limits
-from robots.urdf.xml import Node, nearest, shown
+from coverable_errors import close_matches
+from robots.urdf.xml import (
+    MAX_LENGTH,
+    BadValue,
+    Faults,
+    Node,
+    Triple,
+    name_of,
+    number,
+    only,
+    shown,
+    triple,
+)
 
 # fmt: off
 CHILDREN = (
@@ -17,6 +28,8 @@ CHILDREN = (
 # fmt: on
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 MIN_AXIS = 1e-6  # a shorter axis has no direction worth trusting
+FREE_TURN = MAX_LENGTH  # [rad] a revolute limit this wide (1e16 is the custom) means "none"
+LIKELY_DEGREES = 20.0  # [rad] three turns: a limit beyond it was probably meant in degrees
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -97,12 +110,12 @@ def read_joint(node: Node, faults: Faults) -> JointInfo | None:
     axis = _axis(axis_node, owner, faults)
     if len(faults.errors) > before or name is None or ends[0] is None or ends[1] is None:
         return None
-    limits = read_limits(node, limit, kind, owner, faults)
+    limits = _limits(node, limit, kind, owner, faults)
     mimic, mimic_fault = _mimic(mimic_node)
     fault = limits.fault or mimic_fault
     return JointInfo(
         name, limits.kind, ends[0], ends[1], xyz, rpy, axis, limits.lower, limits.upper,
-        limits.max_velocity, mimic, f"line {node.line}: {owner} {fault}" if fault else None,
+        _max_velocity(limit), mimic, f"line {node.line}: {owner} {fault}" if fault else None,
         node.line,
     )  # fmt: skip
 
@@ -122,8 +135,8 @@ def _kind(node: Node, owner: str, faults: Faults) -> str:
             "stands still, or a chain of prismatic and revolute joints",
         )
         return "fixed"
-    near = nearest(kind or "", KINDS)
-    did_you_mean = f" (did you mean {near!r}?)" if near else ""
+    near = close_matches(kind, KINDS)
+    did_you_mean = f" (did you mean {near[0]!r}?)" if near else ""
     what = "has no type" if kind is None else f"has the unknown type {shown(kind)}"
     faults.error(node, f"{owner} {what}; expected one of {', '.join(KINDS)}{did_you_mean}")
     return "fixed"
@@ -142,9 +155,9 @@ def _check_children(node: Node, owner: str, faults: Faults) -> None:
     for child in node.children:
         if child.tag in CHILDREN:
             continue
-        near = nearest(child.tag, CHILDREN, cutoff=0.75)
+        near = close_matches(child.tag, CHILDREN, cutoff=0.75)
         if near:
-            faults.error(child, f"{owner}: <{child.tag[:60]}> is no element; write <{near}>")
+            faults.error(child, f"{owner}: <{child.tag[:60]}> is no element; write <{near[0]}>")
         else:
             faults.warn(child, f"{owner}: the unknown element <{child.tag[:60]}> is ignored")
 
@@ -159,7 +172,7 @@ def _check_attributes(
         if attribute in known:
             continue
         what = f"{owner}: <{node.tag}> has the unknown attribute {shown(attribute)}"
-        if nearest(attribute, known) or "quat" in attribute.lower():
+        if close_matches(attribute, known) or "quat" in attribute.lower():
             faults.error(node, f"{what}; write {' and '.join(known)}")
         else:
             faults.warn(node, f"{what}, which is ignored")
@@ -209,10 +222,85 @@ def _mimic(node: Node | None) -> tuple[Mimic | None, str | None]:
     if not leader:
         return None, 'has a <mimic> without joint; write <mimic joint="..."/>, or lock the joint'
     try:
-        factors = [
-            numbers(node, attribute, 1)[0] if attribute in node.attributes else default
-            for attribute, default in (("multiplier", 1.0), ("offset", 0.0))
-        ]
+        return Mimic(leader, number(node, "multiplier", 1.0), number(node, "offset", 0.0)), None
     except BadValue as bad:
         return None, f"has a bad mimic: {bad}; correct it, or lock the joint"
-    return Mimic(leader, factors[0], factors[1]), None
+
+
+class Limits(NamedTuple):
+    """The interval that a joint may move in, as in `JointInfo`."""
+
+    kind: str
+    """The joint's kind; a revolute joint without real stops is continuous."""
+    lower: float | None
+    upper: float | None
+    fault: str | None = None
+
+
+def _limits(node: Node, limit: Node | None, kind: str, owner: str, faults: Faults) -> Limits:
+    """Check the limits of one joint, which messages call `owner`."""
+    if kind == "fixed":
+        return Limits(kind, 0.0, 0.0)
+    unit = "metres" if kind == "prismatic" else "radians"
+    remedy = f'write <limit lower="..." upper="..."/> in {unit}, or give its limits or lock it'
+    given = [a for a in ("lower", "upper") if limit is not None and a in limit.attributes]
+    if kind == "continuous":
+        if given:
+            faults.warn(
+                limit or node,
+                f"{owner} is continuous, so the limits written there are ignored; make it "
+                "revolute, or give it limits, if it has stops",
+            )
+        return Limits(kind, -math.inf, math.inf)
+    nothing = (kind, None, None)
+    if limit is None or not given:
+        what = "no <limit>" if limit is None else "a <limit> without lower and upper"
+        return Limits(*nothing, f"is {kind} and has {what}; {remedy}")
+    try:
+        lower, upper = (number(limit, end, 0.0, bound=math.inf) for end in ("lower", "upper"))
+    except BadValue as bad:
+        return Limits(*nothing, f"has a bad limit: {bad}; {remedy}")
+    if kind == "revolute" and lower <= -FREE_TURN and upper >= FREE_TURN:
+        faults.warn(limit, f"{owner} has limits beyond 1,600 turns and is read as continuous")
+        return Limits("continuous", -math.inf, math.inf)
+    if max(abs(lower), abs(upper)) > MAX_LENGTH:
+        return Limits(
+            *nothing, fault=f"has limits [{lower:g}, {upper:g}] {unit}, no real stops; {remedy}"
+        )
+    if lower >= upper:
+        what = "it is locked" if lower == upper else "lower lies above upper"
+        if len(given) == 1:
+            what += f" (a missing limit counts as 0; only {given[0]} is written)"
+        return Limits(*nothing, f"has limits [{lower:g}, {upper:g}]: {what}; {remedy}")
+    if len(given) == 1:
+        missing = "upper" if given == ["lower"] else "lower"
+        faults.warn(limit, f"{owner} has no {missing} limit; URDF's default of 0 is used")
+    if kind == "revolute" and max(abs(lower), abs(upper)) > LIKELY_DEGREES:
+        faults.warn(
+            limit,
+            f"{owner} has limits [{lower:g}, {upper:g}], read in radians; were degrees meant?",
+        )
+    if _has_narrower_soft_limits(node, lower, upper):
+        faults.soft_limits.append(owner.removeprefix("joint "))
+    return Limits(kind, lower, upper)
+
+
+def _max_velocity(limit: Node | None) -> float | None:
+    """The velocity limit; one that makes no sense counts as missing: only timing needs it."""
+    try:
+        value = 0.0 if limit is None else number(limit, "velocity", 0.0, bound=math.inf)
+    except BadValue:
+        return None
+    return value if value > 0.0 else None
+
+
+def _has_narrower_soft_limits(node: Node, lower: float, upper: float) -> bool:
+    """Whether the joint's controller would stop it earlier than its limits do."""
+    soft = node.first("safety_controller")
+    if soft is None:
+        return False
+    try:
+        low, high = number(soft, "soft_lower_limit", 0.0), number(soft, "soft_upper_limit", 0.0)
+    except BadValue:
+        return False  # soft limits are only compared, never used
+    return (low, high) != (0.0, 0.0) and (low > lower + 1e-9 or high < upper - 1e-9)

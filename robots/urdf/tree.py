@@ -6,10 +6,10 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import replace
 
-from robots.urdf.attributes import Faults, name_of
+from coverable_errors import close_matches
 from robots.urdf.joints import JointInfo, read_joint
 from robots.urdf.visuals import leaves_package
-from robots.urdf.xml import Node, UrdfError, nearest, shown
+from robots.urdf.xml import Faults, Node, UrdfError, name_of, shown
 
 # Native readers recurse along a chain: 4,000 links overflow a stack of 8 MB, 250 one of 0.5 MB.
 MAX_LINKS = 1000
@@ -58,7 +58,7 @@ def read_links(robot: Node, faults: Faults) -> dict[str, Node]:
     """The <link> elements by name, in the order of the file."""
     for node in robot.children:
         known = node.tag in ("link", "joint")
-        if not known and nearest(node.tag, ("link", "joint"), cutoff=0.85):
+        if not known and close_matches(node.tag, ("link", "joint"), cutoff=0.85):
             faults.error(node, f"<{node.tag}> is no element of URDF; write <link> or <joint>")
     nodes = robot.all("link")
     if not nodes:

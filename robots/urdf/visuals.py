@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from robots.urdf.attributes import BadValue, Faults, Triple, numbers, triple
-from robots.urdf.xml import Node, shown
+from robots.urdf.xml import BadValue, Faults, Node, Triple, numbers, shown, triple
 
 # .gltf and the like pull in other files.
 MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".off", ".glb")
@@ -175,7 +175,7 @@ def read_visuals(robot: Node, folders: MeshFolders, faults: Faults) -> tuple[Vis
         material.attributes.get("name", ""): _rgba(material) for material in robot.all("material")
     }
     visuals: list[Visual] = []
-    problems: dict[str, list[str]] = {}  # what is wrong, "name :: reason" -> where
+    problems: dict[str, dict[str, str]] = {}  # reason -> shape -> shape and its first link
     shapes = [
         (link.attributes["name"], node) for link in robot.all("link") for node in link.all("visual")
     ]
@@ -183,18 +183,16 @@ def read_visuals(robot: Node, folders: MeshFolders, faults: Faults) -> tuple[Vis
         try:
             visuals.append(_visual(node, link, folders, colours))
         except BadValue as bad:
-            problems.setdefault(str(bad), []).append(f"of link {shown(link)} (line {node.line})")
+            what, _, why = str(bad).rpartition(" :: ")
+            case = f"{what} of link {shown(link)} (line {node.line})".strip()
+            problems.setdefault(why, {}).setdefault(what, case)
     if len(shapes) > MAX_VISUALS:
         faults.warnings.append(
             f"not drawn: {len(shapes) - MAX_VISUALS:,} shapes over {MAX_VISUALS:,}"
         )
-    grouped: dict[str, list[str]] = {}
-    for reason, owners in problems.items():
-        what, _, why = reason.rpartition(" :: ")
-        grouped.setdefault(why, []).append(f"{what} {owners[0]}".strip())
-    for why, cases in grouped.items():
+    for why, cases in problems.items():
         more = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
-        faults.warnings.append(f"not drawn: {cases[0]}{more}: {why}")
+        faults.warnings.append(f"not drawn: {next(iter(cases.values()))}{more}: {why}")
     return tuple(visuals)
 
 
@@ -210,7 +208,7 @@ def _visual(node: Node, link: str, folders: MeshFolders, colours: dict[str, Rgba
     except KeyError as missing:
         raise BadValue(f"a <{shapes[0].tag}> :: has no {missing.args[0]}") from None
     origin = np.eye(4)
-    origin[:3, :3] = rotation(rpy)
+    origin[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()  # about fixed axes
     origin[:3, 3] = xyz
     origin.flags.writeable = False
     material = node.first("material")
@@ -260,15 +258,3 @@ def _rgba(material: Node) -> Rgba | None:
     except BadValue:
         return None
     return tuple(min(max(part, 0.0), 1.0) for part in (red, green, blue, alpha))  # type: ignore[return-value]
-
-
-def rotation(rpy: Triple) -> NDArray[np.float64]:
-    """(3, 3) rotation matrix Rz(yaw) Ry(pitch) Rx(roll): URDF's fixed-axis angles, rad."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
