@@ -1,8 +1,8 @@
-"""Where on the courses a given motion is, found from the motion alone, for its replay.
+"""Match a motion to the curves between cell centres, from the motion alone, for its replay.
 
 Between two marked waypoints a walk either stays over one cell, or goes to a neighbouring cell along
-the course between the two. For each waypoint in between, the place on that course is taken that is
-nearest to the tool point. Any places would do for a proof; these show the least error.
+the curve between the two. Each waypoint in between is matched to the point of that curve that is
+nearest to the tool point. Any points would do for a proof; these show the least error.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from surfaces import Cells
 
 Array = NDArray[np.float64]
 
-GUESSES = 4  # places tried first on each piece of a course
-REFINEMENTS = 16  # Newton steps from the best of them, at most
-SETTLED = 1e-7  # [1] of a course: a step so small is the last
+GUESSES = 4  # parameters tried first on each piece of a curve
+NEWTON_STEPS = 16  # from the best of them, at most
+CONVERGED = 1e-7  # [1] of a curve: a step this small is the last
 BLOCK = 4096  # waypoints at once, to bound the memory
-LOOKS = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # places on each piece that are compared
-MOST_LOOKS = 400  # times that many places on a course over a mesh
-ARRIVED = 0.02  # [1] share of the tolerance: a tool point so near to a centre is at it
-STAYS = -1  # in place of a course
+SAMPLES = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # on each piece, compared with the surface
+MOST_PARTS = 400  # of a curve over a mesh, each with these samples
+ARRIVED = 0.02  # [1] share of the tolerance: a tool point this near to a centre is at it
+STAYS = -1  # in place of a curve: the walk stays over one cell
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Following:
-    """A walk of m waypoints beside the targets that it follows."""
+class CurveMatch:
+    """A walk of m waypoints compared with the targets that it follows."""
 
     error: Array
     """(m,) m, distance of each tool point from its target point."""
@@ -39,18 +39,19 @@ class Following:
     """(m,) |a - b| of tool axis and approach direction."""
     derivative_bounds: Array
     """(m - 1, 3) largest second derivatives of target point and approach direction along each
-    segment, by the segment's own parameter in 0..1; and how fast the direction turns along the
-    target surface there, 1/m."""
+    segment, by the segment's own parameter in 0..1; and the curvature of the target surface
+    there, 1/m: how fast the direction turns along it."""
     deviations: Array
-    """(m - 1, 2) how far target point and approach direction are from the surface's own."""
+    """(m - 1, 2) bounds on how far target point and approach direction deviate from those of the
+    surface."""
     centre_curvature: float
-    """1/m, how fast the direction turns next to the cells' centres."""
+    """1/m, the same curvature next to the cells' centres."""
     fault: str
-    """What makes the walk no motion along courses; empty when nothing does."""
+    """Why the walk is no motion along curves between neighbouring cells; empty when it is."""
 
 
-def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> Following:
-    """Lay a walk beside the courses of its cells.
+def match_to_curves(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> CurveMatch:
+    """Match each waypoint of a walk to a point of the curves between its cells.
 
     Args:
         cells: the cells.
@@ -61,31 +62,31 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     """
     m = len(points)
     segments = np.zeros((max(m - 1, 0), 3))
-    nothing = Following(np.zeros(m), np.zeros(m), segments, segments[:, :2], 0.0, "")
+    unmatched = CurveMatch(np.zeros(m), np.zeros(m), segments, segments[:, :2], 0.0, "")
     if m == 0:
-        return nothing
+        return unmatched
     marks = np.flatnonzero(walk.cell >= 0)
     if len(marks) == 0 or marks[0] != 0 or marks[-1] != m - 1:
-        return _faulty(nothing, "the motion begins or ends away from every cell's centre")
+        return replace(unmatched, fault="the motion begins or ends away from every cell's centre")
     start, end = walk.cell[marks[:-1]], walk.cell[marks[1:]]
     curve = _curves(cells, start, end)
     if (curve < STAYS).any():
         k = int(np.flatnonzero(curve < STAYS)[0])
         names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
-        return _faulty(nothing, f"the motion goes from cell {names}, which do not touch")
+        return replace(unmatched, fault=f"the motion goes from cell {names}, which do not touch")
     tolerance = task.effective_tolerance
     curves = target_curves(cells, task.standoff, tolerance)
 
-    # Each segment, and each waypoint between marks, belongs to one stretch from mark to mark.
-    stretch = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
-    backwards = (start > end)[stretch]
+    # Each segment, and each waypoint between marks, belongs to one section from mark to mark.
+    section = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
+    backwards = (start > end)[section]
     inner = np.flatnonzero(walk.cell < 0)
-    along = inner[curve[stretch[inner]] != STAYS]
-    places, arrived = np.zeros(m), walk.cell >= 0
-    places[along], arrived[along] = _places(
-        curves, curve[stretch[along]], points[along], ARRIVED * tolerance
+    along = inner[curve[section[inner]] != STAYS]
+    t, arrived = np.zeros(m), walk.cell >= 0
+    t[along], arrived[along] = _matched_parameters(
+        curves, curve[section[along]], points[along], ARRIVED * tolerance
     )
-    t0, t1 = places[:-1].copy(), places[1:].copy()
+    t0, t1 = t[:-1].copy(), t[1:].copy()
     t0[marks[:-1]] = backwards[marks[:-1]]
     t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
 
@@ -95,23 +96,23 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
         aims.points[walk.cell[marks]],
         aims.approaches[walk.cell[marks]],
     )
-    still = inner[curve[stretch[inner]] == STAYS]
-    over = start[stretch[still]]
+    still = inner[curve[section[inner]] == STAYS]
+    over = start[section[still]]
     target[still], approach[still] = aims.points[over], aims.approaches[over]
-    target[along], approach[along] = _at(curves, curve[stretch[along]], places[along])
+    target[along], approach[along] = _at(curves, curve[section[along]], t[along])
 
     derivative_bounds, deviations = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
     derivative_bounds[:, 2] = curves.centre_curvature
-    # A motion over one centre, at the end of a course, is none along it.
-    stands = (t0 == t1) & arrived[:-1] & arrived[1:]
-    moves = np.flatnonzero((curve[stretch] != STAYS) & ~stands)
-    used, which = np.unique(curve[stretch[moves]], return_inverse=True)
+    # A self-motion over one centre, at the end of a curve, does not move along it.
+    at_rest = (t0 == t1) & arrived[:-1] & arrived[1:]
+    moves = np.flatnonzero((curve[section] != STAYS) & ~at_rest)
+    used, which = np.unique(curve[section[moves]], return_inverse=True)
     derivative_bounds[moves] = _derivative_bounds(
-        curves, curve[stretch[moves]], t0[moves], t1[moves]
+        curves, curve[section[moves]], t0[moves], t1[moves]
     )
     found, fault = _deviations(cells, task.standoff, used, tolerance)
     deviations[moves] = found[which]
-    return Following(
+    return CurveMatch(
         error=np.linalg.norm(points - target, axis=1),
         chord=np.linalg.norm(axes - approach, axis=1),
         derivative_bounds=derivative_bounds,
@@ -121,26 +122,21 @@ def follow(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> 
     )
 
 
-def _faulty(following: Following, fault: str) -> Following:
-    """The same with a fault."""
-    return replace(following, fault=fault)
-
-
 def _curves(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
-    """(k,) the course between two cells; STAYS where they are one, less where there is none."""
+    """(k,) the curve between two cells; STAYS where they are one, less where there is none."""
     pairs, count = cells.pairs, len(cells)
     keys = pairs[:, 0] * count + pairs[:, 1]
-    asked = np.minimum(start, end) * count + np.maximum(start, end)
-    row = np.searchsorted(keys, asked)
+    wanted = np.minimum(start, end) * count + np.maximum(start, end)
+    row = np.searchsorted(keys, wanted)
     known = row < len(keys)
-    known[known] = keys[row[known]] == asked[known]
+    known[known] = keys[row[known]] == wanted[known]
     return np.where(start == end, STAYS, np.where(known, row, STAYS - 1))
 
 
 def _pieces(
     curves: TargetCurves, curve: NDArray[np.int64], t: Array
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
-    """Piece (k,) that holds at t, place s (k,) on it, and number of pieces (k,) of the course."""
+    """Piece (k,) that t falls into, s (k,) on it, and number of pieces (k,) of the curve."""
     count = np.diff(curves.first)[curve]
     piece = np.clip((t * count).astype(np.int64), 0, count - 1)
     return curves.first[curve] + piece, t * count - piece, count
@@ -158,21 +154,21 @@ def _powers(s: Array) -> Array:
     return np.column_stack([np.ones(len(s)), s, s * s, s * s * s])
 
 
-def _places(
+def _matched_parameters(
     curves: TargetCurves, curve: NDArray[np.int64], points: Array, near: float
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """(k,) t on each course for a tool point, and whether that is at one of its centres.
+    """(k,) t on each curve for a tool point, and whether that is at one of its centres.
 
-    A tool point so `near` (m) to a centre is taken to be there, which puts it off by that way;
-    only where that is less than what it strays beside the course.
+    A tool point within `near` (m) of a centre may be taken to be there, which costs up to that
+    distance; this is done only where the deviation bound of the curve costs more.
     """
     t = _nearest(curves, curve, points)
     arrived = np.zeros(len(curve), dtype=bool)
     pays = curves.deviations[curve, 1] > curves.centre_curvature * near
-    for place in (0.0, 1.0):
-        centre, _ = _at(curves, curve, np.full(len(curve), place))
+    for end in (0.0, 1.0):
+        centre, _ = _at(curves, curve, np.full(len(curve), end))
         there = pays & (np.linalg.norm(points - centre, axis=1) <= near)
-        t[there], arrived[there] = place, True
+        t[there], arrived[there] = end, True
     return t, arrived
 
 
@@ -185,24 +181,24 @@ def _slopes(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> Array:
 
 
 def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> Array:
-    """(k,) t of the place on each course that is nearest to a point."""
+    """(k,) t of the point on each curve that is closest to a tool point."""
     t = np.empty(len(curve))
     counts = np.diff(curves.first)[curve]
     for count in np.unique(counts):
         alike = np.flatnonzero(counts == count)
-        # Not where two pieces meet: a course may be at rest there, and Newton's method with it.
+        # Not where two pieces join: a curve may have zero speed there, where Newton's method fails.
         inner = (np.arange(GUESSES * count) + 0.5) / (GUESSES * count)
         grid = np.concatenate([[0.0], inner, [1.0]])
         for first in range(0, len(alike), BLOCK):
             some = alike[first : first + BLOCK]
-            places, _ = _at(curves, np.repeat(curve[some], len(grid)), np.tile(grid, len(some)))
-            away = places.reshape(len(some), len(grid), 3) - points[some, None]
+            tried, _ = _at(curves, np.repeat(curve[some], len(grid)), np.tile(grid, len(some)))
+            away = tried.reshape(len(some), len(grid), 3) - points[some, None]
             t[some] = grid[np.argmin((away**2).sum(axis=2), axis=1)]
-    # Newton's steps, shortened where one leads further away: next to a place where a course is at
-    # rest they go too far.
+    # Newton steps, shortened where one leads further away: they overshoot next to a point where a
+    # curve has zero speed.
     left, width = np.arange(len(t)), 1.0 / (GUESSES * counts)
     off = _at(curves, curve, t)[0] - points
-    for _ in range(REFINEMENTS):
+    for _ in range(NEWTON_STEPS):
         slope = _slopes(curves, curve[left], t[left])
         square = (slope**2).sum(axis=1)
         step = (off[left] * slope).sum(axis=1)
@@ -213,7 +209,7 @@ def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> A
         nearer = (there**2).sum(axis=1) < (off[left] ** 2).sum(axis=1)
         t[left[nearer]], off[left[nearer]] = tried[nearer], there[nearer]
         width[left[~nearer]] = 0.25 * np.abs(step[~nearer])
-        left = left[np.abs(step) > SETTLED]
+        left = left[np.abs(step) > CONVERGED]
         if len(left) == 0:
             break
     return t
@@ -222,7 +218,7 @@ def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> A
 def _derivative_bounds(
     curves: TargetCurves, curve: NDArray[np.int64], t0: Array, t1: Array
 ) -> Array:
-    """(k, 3) see `Following.derivative_bounds`, of segments from t0 to t1 on courses."""
+    """(k, 3) see `CurveMatch.derivative_bounds`, of segments from t0 to t1 on curves."""
     low, _, _ = _pieces(curves, curve, np.minimum(t0, t1))
     high, _, _ = _pieces(curves, curve, np.maximum(t0, t1))
     known = np.column_stack([curves.derivative_bounds, curves.curvature])
@@ -230,7 +226,7 @@ def _derivative_bounds(
     for ahead in range(1, int((high - low).max(initial=0)) + 1):
         piece = np.minimum(low + ahead, high)
         most = np.maximum(most, known[piece])
-    with np.errstate(invalid="ignore"):  # a fold, and no way at all: NaN, which is refused
+    with np.errstate(invalid="ignore"):  # a fold, and t0 = t1: NaN, which is refused
         most[:, :2] *= ((t1 - t0) ** 2)[:, None]
     return most
 
@@ -238,25 +234,25 @@ def _derivative_bounds(
 def _deviations(
     cells: Cells, standoff: float, used: NDArray[np.int64], tolerance: float
 ) -> tuple[Array, str]:
-    """How far target points and directions of courses are from the surface's, and a fault.
+    """Bounds on how far the targets of curves deviate from the surface's, and a fault.
 
-    The surface itself is asked for its nearest points, at places that the fit of the courses did
-    not look at; what the courses say of themselves counts where it is more. On a mesh the places
-    are half a tolerance apart, and the targets are compared with the triangles themselves too,
-    which may be nearer to them than the standoff: a thorn beside the course, another part of the
-    mesh, or facets that are not square to the interpolated normal.
+    The curves are compared with their closest points on the surface, at samples that their fit did
+    not use; the curves' own deviation bounds count where they are larger. On a mesh the samples are
+    half a tolerance apart, and the targets are compared with the triangles themselves too, which
+    may be nearer to them than the standoff: a thorn beside the curve, another part of the mesh, or
+    facets that are not square to the interpolated normal.
     """
     curves, surface = cells.curves, cells.surface
-    owner, t = _looks(cells, used, 0.5 * tolerance)
-    closest_point, normal = curves.at(used[owner], t)
-    closest_points = surface.closest(closest_point)
+    owner, t = _samples(cells, used, 0.5 * tolerance)
+    point, normal = curves.at(used[owner], t)
+    closest = surface.closest(point)
     deviations = curves.deviations[used].copy()
-    np.maximum.at(deviations[:, 0], owner, np.abs(closest_points.height))
-    np.maximum.at(deviations[:, 1], owner, np.linalg.norm(normal - closest_points.normal, axis=1))
+    np.maximum.at(deviations[:, 0], owner, np.abs(closest.height))
+    np.maximum.at(deviations[:, 1], owner, np.linalg.norm(normal - closest.normal, axis=1))
     if not np.isfinite(deviations).all():
-        return deviations, "a course between two cells is not known"
-    if not closest_points.inside.all():
-        return deviations, "a course between two cells leaves the surface"
+        return deviations, "the curve between two cells is not known"
+    if not closest.inside.all():
+        return deviations, "the curve between two cells leaves the surface"
     deviations[:, 0] += standoff * deviations[:, 1]
     if surface.mean_edge_length > 0.0:
         found = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)
@@ -265,23 +261,25 @@ def _deviations(
         if not found.off.max(initial=0.0) <= tolerance:
             away = found.away.min()
             return deviations, (
-                f"on its way the tool point would come within {1e3 * away:.3g} mm of the "
-                f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something stands out "
-                "of it there, or its facets are too coarse for this standoff"
+                f"between centres the tool point would come within {1e3 * away:.3g} mm of the "
+                f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something protrudes "
+                "there, or its facets are too coarse for this standoff"
             )
     return deviations, ""
 
 
-def _looks(cells: Cells, used: NDArray[np.int64], apart: float) -> tuple[NDArray[np.int64], Array]:
-    """Places (k,) to look at: which of the used courses, and t on it."""
+def _samples(
+    cells: Cells, used: NDArray[np.int64], apart: float
+) -> tuple[NDArray[np.int64], Array]:
+    """Samples (k,) to compare: which of the used curves, and t on it."""
     curves = cells.curves
     count = np.diff(curves.first)[used]
     if cells.surface.mean_edge_length > 0.0:
         ends = cells.centres[cells.pairs[used]]
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        fine = np.ceil(length / apart / len(LOOKS)).astype(np.int64)
-        count = np.maximum(count, np.minimum(fine, MOST_LOOKS))
+        fine = np.ceil(length / apart / len(SAMPLES)).astype(np.int64)
+        count = np.maximum(count, np.minimum(fine, MOST_PARTS))
     owner = np.repeat(np.arange(len(used)), count)
     part = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    t = ((part[:, None] + LOOKS) / count[owner][:, None]).reshape(-1)
-    return np.repeat(owner, len(LOOKS)), t
+    t = ((part[:, None] + SAMPLES) / count[owner][:, None]).reshape(-1)
+    return np.repeat(owner, len(SAMPLES)), t

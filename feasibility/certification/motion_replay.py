@@ -1,11 +1,11 @@
 """The independent replay: what must accept a motion before the word "feasible" is said.
 
-It shares no code with the search but the courses between cell centres, and compares these with the
-surface's own nearest points and normals (`feasibility.following`). Besides, it knows Pinocchio's
-frame placements and joint Jacobians, and the bound between samples; it sees only the walk, not how
-it was found. The bound is derived in `feasibility.segment`; here it is evaluated again from
-Pinocchio's Jacobian: the column of joint j moved to the tool point has the length r_j (the lever
-arm), and the length of its turn of the axis is s_j.
+It shares no code with the search but the curves between cell centres, and compares these with the
+surface's own closest points and normals (`feasibility.certification.curve_matching`). Besides, it
+uses Pinocchio's frame placements and joint Jacobians, and the bound between samples; it sees only
+the walk, not how it was found. The bound D is derived in `feasibility.roadmap.segment_bound`; here
+it is evaluated again from Pinocchio's Jacobian: the linear part of column j, moved to the tool
+point, has the length r_j (the lever arm), and |z_j x a| = s_j for its angular part z_j.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.curve_matching import follow
+from feasibility.certification.curve_matching import match_to_curves
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
 from robots import Kinematics, Robot
@@ -26,7 +26,7 @@ CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on metres and u
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Placements:
-    """What Pinocchio says of m configurations."""
+    """What Pinocchio computes for m configurations."""
 
     points: NDArray[np.float64]
     """(m, 3) tool points, m."""
@@ -39,7 +39,7 @@ class Placements:
 
 
 def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
-    """Ask Pinocchio for tool points, axes and lever arms at q (m, n)."""
+    """Tool points, axes and lever arms at q (m, n) by Pinocchio."""
     kinematics = Kinematics(robot)
     points, axes = kinematics.tools(q)
     linear, angular = np.split(kinematics.twists(q).transpose(0, 2, 1), 2, axis=2)
@@ -61,7 +61,7 @@ def second_derivatives(
         steps: (m, n) absolute joint changes; of bent segments, bounds on |dq/ds|, s from 0 to 1.
         prismatic: (n,) which joints slide.
         levers: (m + 1, n) r_j (or s_j) at the ends of the segments.
-        cap: no lever is ever longer than this (1 for sines, inf for lengths).
+        cap: upper bound of every lever (1 for sines, inf for lengths).
         bent: (m, n) bounds on the joints' own |d^2q/ds^2|; each adds that times its lever.
 
     Returns:
@@ -102,7 +102,7 @@ def _peaks(
 
 
 def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
-    """What makes a walk no motion of this arm over these cells; empty when nothing does."""
+    """Why a walk is no motion of this arm over these cells; empty when it is one."""
     if walk.q.ndim != 2 or walk.q.shape[1] != robot.n or walk.cell.shape != walk.q.shape[:1]:
         return (
             f"waypoints of shape {walk.q.shape} and cells of shape {walk.cell.shape} are no "
@@ -121,7 +121,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     Args:
         robot: the arm.
         cells: the cells.
-        task: the task; its tolerance and cone are taken as they are.
+        task: the task; its tolerance and cone are used exactly.
         walk: the motion.
         needed: (N,) cells that must be visited.
 
@@ -134,31 +134,30 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     tolerance = task.effective_tolerance
     cone_chord = task.cone_chord
     poses = placements(robot, walk.q)
-    beside = follow(cells, task, walk, poses.points, poses.axes)
-    if beside.fault:
-        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), beside.fault)
+    matched = match_to_curves(cells, task, walk, poses.points, poses.axes)
+    if matched.fault:
+        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), matched.fault)
     steps = np.abs(np.diff(walk.q, axis=0))
     derivative_bound = (
         second_derivatives(steps, robot.prismatic, poses.levers, np.inf)
-        + beside.derivative_bounds[:, 0]
+        + matched.derivative_bounds[:, 0]
     )
-    turn = (
+    axis_bound = (
         second_derivatives(steps, robot.prismatic, poses.sines, 1.0)
-        + beside.derivative_bounds[:, 1]
+        + matched.derivative_bounds[:, 1]
     )
-    error, chord, lateral_curvature = beside.error, beside.chord, beside.derivative_bounds[:, 2]
+    error, chord, curvature = matched.error, matched.chord, matched.derivative_bounds[:, 2]
     with np.errstate(invalid="ignore", over="ignore"):  # a fold: inf * 0 is NaN, and refused
-        turn = turn + lateral_curvature * derivative_bound
-        # At the tool point's own foot the normal is another than at its target.
-        before, after = (
-            chord[:-1] + lateral_curvature * error[:-1],
-            chord[1:] + lateral_curvature * error[1:],
-        )
-    deviated = _peaks(error[:-1], error[1:], derivative_bound) + beside.deviations[:, 0]
-    tilted = _peaks(before, after, turn) + beside.deviations[:, 1]
+        axis_bound = axis_bound + curvature * derivative_bound
+        # The cone is to hold at the tool point's closest point on the surface, where the normal
+        # differs from the one at its target.
+        before = chord[:-1] + curvature * error[:-1]
+        after = chord[1:] + curvature * error[1:]
+    deviated = _peaks(error[:-1], error[1:], derivative_bound) + matched.deviations[:, 0]
+    tilted = _peaks(before, after, axis_bound) + matched.deviations[:, 1]
     position = np.max(deviated, initial=np.max(error, initial=0.0))
-    alone = chord + beside.centre_curvature * error if len(chord) == 1 else chord
-    worst = np.max(tilted, initial=np.max(alone, initial=0.0))
+    at_waypoints = chord + matched.centre_curvature * error if len(chord) == 1 else chord
+    worst = np.max(tilted, initial=np.max(at_waypoints, initial=0.0))
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
         waypoints=len(walk.q),
@@ -173,7 +172,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     if not margin >= 0.0:
         refusals.append(f"a joint passes its limit by {-margin:.3g}")
     if not position <= tolerance:
-        refusals.append(f"the tool point strays {position:.3g} m, more than {tolerance:.3g} m")
+        refusals.append(f"the tool point deviates by {position:.3g} m, more than {tolerance:.3g} m")
     if not worst <= cone_chord + CLOSE_TO_ZERO:
         refusals.append(
             f"the tool axis tilts {np.degrees(certificate.max_angle):.4f} deg, "
@@ -181,7 +180,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
         )
     at = walk.cell >= 0
     if not (position <= tolerance and worst <= cone_chord + CLOSE_TO_ZERO) and (
-        (beside.error[at] > tolerance).any() or (beside.chord[at] > cone_chord).any()
+        (matched.error[at] > tolerance).any() or (matched.chord[at] > cone_chord).any()
     ):
         refusals.append("a marked waypoint is not at its cell's centre target")
     if not visited[needed].all():

@@ -76,7 +76,9 @@ def replay_tree(
     if not closest_point.inside.all():
         faults.append("the tool point leaves the patch")
     if not error <= steps.tolerance:
-        faults.append(f"the tool point strays {error:.3g} m, beyond {steps.tolerance:.3g} m")
+        faults.append(
+            f"the tool point deviates by {error:.3g} m, more than {steps.tolerance:.3g} m"
+        )
     if task.cone_deg < 180.0 and not angle <= task.cone:
         faults.append(f"the tool axis tilts {np.degrees(angle):.4f} degrees out of the cone")
 

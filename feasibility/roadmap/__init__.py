@@ -1,6 +1,4 @@
-"""The complete search: configurations over cells, certified motions between them, proofs,
-causes.
-"""
+"""The complete search: a roadmap of certified motions, proofs of infeasibility, and causes."""
 
 from lazy_loader import attach_stub
 

@@ -1,4 +1,7 @@
-"""What the compiled search reads: arm, surface and task as plain arrays, and its working memory."""
+"""What the compiled search reads: arm, surface and task as plain arrays, and its working memory.
+
+Here too are the kernels that set the target of a step, and evaluate the arm against it.
+"""
 
 from __future__ import annotations
 
@@ -14,19 +17,20 @@ from robots import Chain, Robot, frames
 from surfaces import Cells
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
-NEWTON_CONE = 1e-4  # [1] share of the cone that it costs, by way of the turning of the normal
-ORDINARY = 0.01  # [1] share of the rim that an ordinary course may stray
-# The replay takes the place on the course that is nearest to the tool point, up to twice `near`
-# from the one aimed at, and wants the cone to hold at the tool point's own foot.
-LATERAL = 0.05  # [1] share of a piece by which that nearest place may lie off the one aimed at
-CENTRE_SHARE = (
-    0.999  # [1] share of the tolerance that motions over a centre may use: courses stray too
-)
-SPARE = 1.1  # [1] courses over a mesh may stray that much more where the replay looks than was seen
-NEAR_COSTS = 3.0  # [1], times `near` and the turning of the normal: what that may cost of the rim
+NEWTON_CONE = 1e-4  # [1] share of the cone chord that this may cost, by the surface's curvature
+ORDINARY = 0.01  # [1] share of the cone chord that an ordinary curve may deviate by
+# The replay matches a waypoint to the curve's closest point, up to twice `near` from the one aimed
+# at, and wants the cone to hold at the tool point's closest point on the surface.
+BESIDE = 0.05  # [1] share of a piece by which that closest point may lie off the one aimed at
+NEAR_COST = 3.0  # [1], times `near` and the curvature: what that may cost of the cone chord
+CENTRE_SHARE = 0.999  # [1] of the tolerance, for self-motions: curves deviate at the centres too
+MESH_FACTOR = 1.1  # [1] larger deviation of curves over a mesh at the replay's samples
 
-# Why a motion stopped: the constraint that left no room.
+# Why a motion stopped: the constraint that left no margin.
 NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD = 0, 1, 2, 3, 4, 5
+
+# In place of a number of waypoints: the motion stopped short, or the array of waypoints is full.
+STOPPED, OVERFLOW = -1, -2
 
 HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
 
@@ -44,61 +48,60 @@ class SearchArrays(NamedTuple):
     approaches: NDArray[np.float64]
     """(N, 3) approach directions of the cell centres."""
     first_piece: NDArray[np.int64]
-    """(M + 1,) where the pieces of each course begin, see `surfaces.curves`."""
+    """(M + 1,) where the pieces of each curve begin, see `surfaces.cell_curves`."""
     targets: NDArray[np.float64]
     """(P, 4, 6) cubics of target point and approach direction along each piece."""
     derivative_bounds: NDArray[np.float64]
-    """(P, 3) largest second derivatives of both (m, 1) by t, inf where the offset folds; and how
-    fast the approach direction turns along the target surface (1/m)."""
+    """(P, 3) largest second derivatives of both (m, 1) by t, inf where the offset folds; and the
+    curvature of the target surface (1/m): how fast the approach direction turns along it."""
     deviations: NDArray[np.float64]
-    """(M, 2) how far both may be from the surface's own on each course (m, 1)."""
+    """(M, 2) bounds on how far both deviate from the surface's own on each curve (m, 1)."""
     cone_chord: float
-    """2 sin(alpha / 2): the largest |a - b|; inf when every direction will do."""
+    """2 sin(alpha / 2): the largest |a - b|; inf when every direction is allowed."""
     tolerance: float
     """m."""
     inner_cone_chord: float
-    """What motions over one cell's centre keep to of the rim, less what follows from `near`."""
+    """The part of the cone chord that self-motions over a cell's centre may use: less what
+    ordinary curves deviate, and less what `near` costs."""
     curvature: float
-    """1/m, how fast the approach direction turns next to the cells' centres, at most."""
+    """1/m, the largest curvature of the target surface next to the cells' centres."""
     near: float
-    """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_RIM."""
+    """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_CONE."""
     scale: float
-    """m, length that turns metres into comparable radians (the arm's reach)."""
+    """m, the length that makes metres comparable to radians (the arm's reach)."""
 
 
 def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
-    """Gather arm, cells and task for the compiled search."""
+    """Arm, cells and task as arrays for the compiled search."""
     tolerance = task.effective_tolerance
     targets = task.targets(cells)
-    waypoints = target_curves(cells, task.standoff, tolerance)
+    curves = target_curves(cells, task.standoff, tolerance)
     cone_chord = task.cone_chord
-    deviations = waypoints.deviations[:, 1]
+    deviations = curves.deviations[:, 1]
     ordinary = (
         float(deviations[deviations <= ORDINARY * cone_chord].max(initial=0.0))
         if cone_chord < np.inf
         else 0.0
     )
     near = NEWTON * tolerance
-    if waypoints.centre_curvature > 0.0 and cone_chord < np.inf:
-        near = min(near, NEWTON_CONE * cone_chord / waypoints.centre_curvature)
+    if curves.centre_curvature > 0.0 and cone_chord < np.inf:
+        near = min(near, NEWTON_CONE * cone_chord / curves.centre_curvature)
     return SearchArrays(
         chain=robot.chain,
         lower=np.array(robot.lower),
         upper=np.array(robot.upper),
         points=np.ascontiguousarray(targets.points),
         approaches=np.ascontiguousarray(targets.approaches),
-        first_piece=waypoints.first,
-        targets=waypoints.cubics,
-        derivative_bounds=np.column_stack([waypoints.derivative_bounds, waypoints.curvature]),
-        deviations=waypoints.deviations * (SPARE if cells.surface.mean_edge_length else 1.0),
+        first_piece=curves.first,
+        targets=curves.cubics,
+        derivative_bounds=np.column_stack([curves.derivative_bounds, curves.curvature]),
+        deviations=curves.deviations * (MESH_FACTOR if cells.surface.mean_edge_length else 1.0),
         cone_chord=cone_chord,
         tolerance=float(tolerance),
-        inner_cone_chord=float(
-            cone_chord - ordinary - NEAR_COSTS * waypoints.centre_curvature * near
-        ),
-        curvature=waypoints.centre_curvature,
+        inner_cone_chord=float(cone_chord - ordinary - NEAR_COST * curves.centre_curvature * near),
+        curvature=curves.centre_curvature,
         near=float(near),
-        # A gantry may have no links at all: its strokes are as good as any length then.
+        # A gantry may have no links: any length will do then.
         scale=float(np.linalg.norm(robot.chain.translations, axis=1).sum()) or 1.0,
     )
 
@@ -125,7 +128,7 @@ class Work(NamedTuple):
     rhs: NDArray[np.float64]
     """(4,)"""
     secondary_step: NDArray[np.float64]
-    """(n,) where the free directions would like to go."""
+    """(n,) the step that the secondary objective asks for, to be taken in the free directions."""
     step: NDArray[np.float64]
     """(n,)"""
     held: NDArray[np.bool_]
@@ -136,10 +139,11 @@ class Work(NamedTuple):
     """(2, 3) target point and approach direction."""
     derivative_bound: NDArray[np.float64]
     """(5,) largest second derivatives of target point and approach direction over the present
-    step, by its own parameter in 0..1, zero while the target stands still; how fast the direction
-    turns there (1/m); and how fast the target goes by that parameter at both ends (m)."""
-    room: NDArray[np.float64]
-    """(2,) what the present step keeps to of tolerance (m) and rim; 0 where it has no room."""
+    step, by its own parameter in 0..1, zero while the target is at rest; the curvature of the
+    target surface there (1/m); and the target's speed by that parameter at both ends (m)."""
+    allowance: NDArray[np.float64]
+    """(2,) what the present step may use of the tolerance (m) and of the cone chord; 0 where
+    nothing is left."""
     counts: NDArray[np.int64]
     """(1,) forward kinematics evaluated."""
     stop_reason: NDArray[np.int64]
@@ -164,7 +168,7 @@ def work_for(n: int) -> Work:
         trial=np.zeros(n),
         target=np.zeros((2, 3)),
         derivative_bound=np.zeros(5),
-        room=np.zeros(2),
+        allowance=np.zeros(2),
         counts=np.zeros(1, dtype=np.int64),
         stop_reason=np.zeros(2, dtype=np.int64),
     )
@@ -186,14 +190,14 @@ def place(arrays, work, slot, q):  # type: ignore[no-untyped-def]
 
 @kernel
 def look_at(arrays, work, target, approach):  # type: ignore[no-untyped-def]
-    """Set `work.target`, and let it stand still."""
+    """Set `work.target`, at rest."""
     work.derivative_bound[0] = 0.0
     work.derivative_bound[1] = 0.0
     work.derivative_bound[2] = arrays.curvature
     work.derivative_bound[3] = 0.0
     work.derivative_bound[4] = 0.0
-    work.room[0] = CENTRE_SHARE * arrays.tolerance
-    work.room[1] = arrays.inner_cone_chord
+    work.allowance[0] = CENTRE_SHARE * arrays.tolerance
+    work.allowance[1] = arrays.inner_cone_chord
     for k in range(3):
         work.target[0, k] = target[k]
         work.target[1, k] = approach[k]
@@ -215,7 +219,7 @@ def accept(work):  # type: ignore[no-untyped-def]
 
 @kernel
 def aim(arrays, work, curve, t):  # type: ignore[no-untyped-def]
-    """Set `work.target` to the place on a course at t in [0, 1]."""
+    """Set `work.target` to the target of a curve at t in [0, 1]."""
     first = arrays.first_piece[curve]
     count = arrays.first_piece[curve + 1] - first
     piece = min(np.int64(t * count), count - 1)
@@ -230,7 +234,7 @@ def aim(arrays, work, curve, t):  # type: ignore[no-untyped-def]
 
 @kernel
 def speed_at(arrays, curve, t):  # type: ignore[no-untyped-def]
-    """How far the target goes along a course for each unit of t, at t, m."""
+    """Speed of the target along a curve by t, at t in [0, 1], m."""
     first = arrays.first_piece[curve]
     count = arrays.first_piece[curve + 1] - first
     piece = min(np.int64(t * count), count - 1)
@@ -247,11 +251,14 @@ def speed_at(arrays, curve, t):  # type: ignore[no-untyped-def]
 
 @kernel
 def bounds_between(arrays, work, curve, t0, t1):  # type: ignore[no-untyped-def]
-    """Set `work.derivative_bound` and `work.room` for a step along a course from t0 to t1, either way."""
+    """Set `work.derivative_bound` and `work.allowance` for a step along a curve.
+
+    The step goes from t0 to t1, in either direction.
+    """
     first = arrays.first_piece[curve]
     count = arrays.first_piece[curve + 1] - first
-    low = min(np.int64(max(min(t0, t1) * count - LATERAL, 0.0)), count - 1)
-    high = min(np.int64(max(t0, t1) * count + LATERAL), count - 1)
+    low = min(np.int64(max(min(t0, t1) * count - BESIDE, 0.0)), count - 1)
+    high = min(np.int64(max(t0, t1) * count + BESIDE), count - 1)
     for part in range(3):
         most = 0.0
         for piece in range(low, high + 1):
@@ -259,15 +266,15 @@ def bounds_between(arrays, work, curve, t0, t1):  # type: ignore[no-untyped-def]
         work.derivative_bound[part] = most * (t1 - t0) ** 2 if part < 2 else most
     work.derivative_bound[3] = speed_at(arrays, curve, t0) * abs(t1 - t0)
     work.derivative_bound[4] = speed_at(arrays, curve, t1) * abs(t1 - t0)
-    # No more room than over the centres, and no less on an ordinary course: every configuration
-    # that works over a cell can set out from it.
+    # Never more than self-motions may use, and as much on an ordinary curve: every configuration
+    # that is valid over a cell can start from it.
     lost = (
         arrays.cone_chord
         - arrays.deviations[curve, 1]
-        - NEAR_COSTS * work.derivative_bound[2] * arrays.near
+        - NEAR_COST * work.derivative_bound[2] * arrays.near
     )
-    work.room[0] = max(arrays.tolerance - arrays.deviations[curve, 0], 0.0)
-    work.room[1] = max(min(arrays.inner_cone_chord, lost), 0.0)
+    work.allowance[0] = max(arrays.tolerance - arrays.deviations[curve, 0], 0.0)
+    work.allowance[1] = max(min(arrays.inner_cone_chord, lost), 0.0)
 
 
 @kernel

@@ -7,14 +7,15 @@ at most
     sum_j r_j h_j                          from p(c)                (first order)
     D / 2 = 1/2 sum_j r_j h_j (h_j + 2 sum_{i<j} h_i)   from p(c) + J d    (second order)
 
-and likewise for the axis, with sines s_j in place of r_j (see `feasibility.segment` for D). A
-box is discarded when the target is further than that, less the tolerance; or when, seen along one
-of a few directions, no d in the box can bring p(c) + J d close enough. Along a direction every
-joint's interval can also be cut down to what the others leave open; thin boxes follow, which is
-why the widths may become very small before a box is called undecided.
+and likewise for the axis, with sines s_j in place of r_j (D is that of
+`feasibility.roadmap.segment_bound`). A box is discarded when the target is further than that plus
+the tolerance; or when, projected onto one of a few directions, no d in the box can bring
+p(c) + J d close enough. Along a direction every joint's interval can also be contracted to what the
+others leave open. This makes boxes thin, which is why their widths may become very small before a
+box is called undecided.
 
-Joints that turn freely, or by a full turn or more, are searched over one turn: the tool cannot
-tell the difference. Proofs concern the centre of a cell, with its tolerance and its cone.
+Joints with a range of a full turn or more are searched over one turn: other windings place the tool
+alike. Proofs concern the centre of a cell, with its tolerance and its cone.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ from feasibility.roadmap.arrays import NEXT, SearchArrays, Work, look_at, place
 from robots import jacobians
 
 THINNEST = 1e-6  # [rad], [m]: a box with no wider joint that moves the tool is left undecided
-STACK = 512  # boxes that may wait; depth first, so their number grows with the depth only
-ROUNDING = 1e-12  # [m], [1]: what double arithmetic may get wrong in a cut
+STACK = 512  # most boxes on the stack; depth first, so their number grows with the depth only
+ROUNDING = 1e-12  # [m], [1]: error of double arithmetic in a cut
 _DIRECTIONS = np.array(
     [
         [1.0, 0.0, 0.0],
@@ -47,7 +48,7 @@ _DIRECTIONS /= np.linalg.norm(_DIRECTIONS, axis=1)[:, None]
 
 
 class Ruling(IntEnum):
-    """What branch and bound says of a cell."""
+    """The outcome of branch and bound over a cell."""
 
     OPEN = 0
     """Boxes are left: call again to go on."""
@@ -60,14 +61,14 @@ class Ruling(IntEnum):
 
 
 class Boxes(NamedTuple):
-    """Boxes that wait, last in first out."""
+    """A stack of boxes to be examined."""
 
     low: NDArray[np.float64]
     """(STACK, n)"""
     high: NDArray[np.float64]
     """(STACK, n)"""
     counts: NDArray[np.int64]
-    """(2,) boxes waiting; boxes looked at so far."""
+    """(2,) boxes on the stack; boxes examined so far."""
 
 
 def root_box(arrays: SearchArrays) -> Boxes:
@@ -159,7 +160,7 @@ def _reach_of_box(arrays, work, half, longest, lever, sine):  # type: ignore[no-
 
 @kernel
 def _static_levers(arrays, longest):  # type: ignore[no-untyped-def]
-    """The longest lever that each joint can ever have: the links behind it, stretched out."""
+    """The longest lever that each joint can have: the links behind it, stretched out."""
     total = 0.0
     for j in range(longest.shape[0] - 1, -1, -1):
         link = arrays.chain.translations[j + 1]
@@ -189,7 +190,7 @@ def _shrink(arrays, work, low, high, longest, lever, sine, directions):  # type:
 
     Returns:
         1 when nothing is left, 2 when its centre (slot 1) is a solution, 0 otherwise; and whether
-        the tool point, rather than the axis, is nearer to ruling it out.
+        the tool point, rather than the axis, is closer to ruling it out.
     """
     n = low.shape[0]
     q, half = np.empty(n), np.empty(n)
@@ -247,15 +248,15 @@ def _shrink(arrays, work, low, high, longest, lever, sine, directions):  # type:
 
 @kernel
 def branch_and_bound(arrays, work, target, approach, boxes, most, directions, found):  # type: ignore[no-untyped-def]
-    """Look at up to `most` boxes; see `Ruling` for what comes back.
+    """Examine up to `most` boxes; returns the value of a `Ruling`.
 
     Args:
-        problem: the `SearchArrays`.
+        arrays: the `SearchArrays`.
         work: the `Work`.
         target: (3,) target point of the cell.
         approach: (3,) approach direction of the cell.
-        boxes: the `Boxes` that wait; start from `root_box`.
-        most: boxes to look at before coming back with OPEN.
+        boxes: the `Boxes` on the stack; start from `root_box`.
+        most: boxes to examine before returning OPEN.
         directions: (m, 3) unit directions for the cuts.
         found: (n,) receives the configuration when the ruling is REACHED, and the one that could
             not be ruled out when it is UNKNOWN.
@@ -280,7 +281,7 @@ def branch_and_bound(arrays, work, target, approach, boxes, most, directions, fo
             return 2
         if code == 1:
             continue
-        # Split the joint that moves most what is nearest to ruling the box out.
+        # Split the joint with most effect on the constraint that is closest to ruling the box out.
         for_point, for_axis = (1.0, 0.05) if by_point else (0.05, 1.0)
         worst, largest = -1, 0.0
         for j in range(n):
@@ -309,11 +310,11 @@ def branch_and_bound(arrays, work, target, approach, boxes, most, directions, fo
 def rule(
     arrays: SearchArrays, work: Work, cell: int, boxes: Boxes, most: int
 ) -> tuple[Ruling, NDArray[np.float64]]:
-    """Look at up to `most` more boxes for one cell.
+    """Examine up to `most` more boxes for one cell.
 
     Returns:
-        The ruling, and a configuration (n,) that covers the cell when it is REACHED, or comes
-        within a hair of it when it is UNKNOWN.
+        The ruling, and a configuration (n,) that covers the cell when it is REACHED, or may nearly
+        do so when it is UNKNOWN.
     """
     found = np.empty(len(arrays.lower))
     code = branch_and_bound(

@@ -1,8 +1,9 @@
-"""Where components meet between cell centres.
+"""Bridges: connecting two components between cell centres.
 
 Two sheets of configurations (two flips of a wrist, say) may touch only where the arm passes a
-singularity, and that place may lie between the centres. So two nodes over neighbouring cells are
-both followed to a place on the way between their centres, and a self-motion is tried there.
+singularity, and the target of that singularity may lie between the centres. So two nodes over
+neighbouring cells are both tracked to a point of the curve between their centres, and a self-motion
+is tried there.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ from feasibility.roadmap.graph import NODES, WAYPOINTS, Roadmap, add_edge, root_
 from feasibility.roadmap.self_motion import connect
 from feasibility.roadmap.tracking import MOST_STEPS, track
 
-NARROWEST, WIDEST = 0.1, 0.9  # [1] share of the way between two centres where a meeting is tried
-Room = Callable[[int], Roadmap]
-"""Makes sure that so many rows of `waypoints` and an edge fit, and returns the roadmap."""
+NARROWEST, WIDEST = 0.1, 0.9  # [1] of the curve between two centres: where a bridge is tried
+Reserve = Callable[[int], Roadmap]
+"""Makes space for so many rows of `waypoints` and an edge, and returns the roadmap."""
 
 
 def nearest_pairs(
@@ -28,20 +29,20 @@ def nearest_pairs(
 ) -> NDArray[np.int64]:
     """(k, 2) nodes of two components over neighbouring cells, the nearest first.
 
-    Near means that the motion from one to the other would do little to the tool, see
-    `fibre.effects`; at a singularity two sheets are near though their joints are far apart.
+    Near means that a motion from one to the other would move the tool little, see
+    `self_motion.effects`; at a singularity two sheets are near although their joints are far apart.
     """
     nodes = np.arange(roadmap.counters[NODES])
     roots = np.array([root_of(roadmap, slot) for slot in range(len(roadmap.parent))])
     here = roots[roadmap.component[nodes]]
-    held = []
+    node_over = []
     for component in (one, other):
         node = np.full(len(roadmap.first_node), -1)
         mine = nodes[here == component]
         node[roadmap.cell[mine]] = mine
-        held.append(node)
+        node_over.append(node)
     both = np.vstack([pairs, pairs[:, ::-1]])
-    x, y = held[0][both[:, 0]], held[1][both[:, 1]]
+    x, y = node_over[0][both[:, 0]], node_over[1][both[:, 1]]
     found = (x >= 0) & (y >= 0)
     x, y = x[found], y[found]
     effect = 0.5 * (roadmap.effect[x] + roadmap.effect[y])
@@ -50,25 +51,25 @@ def nearest_pairs(
 
 
 def bridge(
-    arrays: SearchArrays, work: Work, room: Room, x: int, y: int, curve: int, share: float
+    arrays: SearchArrays, work: Work, reserve: Reserve, x: int, y: int, curve: int, share: float
 ) -> bool:
-    """Try to join two nodes over neighbouring cells at a place between their centres.
+    """Try to connect two nodes over neighbouring cells at a point between their centres.
 
     Args:
-        problem: the problem.
+        arrays: the search's arrays.
         work: working memory.
-        room: see `Room`.
+        reserve: see `Reserve`.
         x: node over one cell.
         y: node over a neighbour of it.
-        course: the course between the two cells.
-        share: where on it.
+        curve: the curve between the two cells.
+        share: parameter of the point on it, in [0, 1].
 
     Returns:
         True when an edge was added and the components are one now.
     """
-    roadmap = room(0)
+    roadmap = reserve(0)
     aim(arrays, work, curve, share)
-    place, approach = work.target[0].copy(), work.target[1].copy()
+    target, approach = work.target[0].copy(), work.target[1].copy()
     starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)
     waypoints, ends = [], []
     for node, start in ((x, starts[0]), (y, starts[1])):
@@ -79,12 +80,12 @@ def bridge(
             return False
         waypoints.append(rows[:count])
         ends.append(q)
-    turn = _self_motion(arrays, work, place, approach, ends)
-    if turn is None:
+    between = _self_motion(arrays, work, target, approach, ends)
+    if between is None:
         return False
-    # From x to the place, the self-motion, and back along the way from y.
-    motion = np.vstack([waypoints[0], turn, waypoints[1][-2::-1], roadmap.q[y][None]])
-    roadmap = room(len(motion))
+    # From x to the point, the self-motion there, and the motion from y backwards.
+    motion = np.vstack([waypoints[0], between, waypoints[1][-2::-1], roadmap.q[y][None]])
+    roadmap = reserve(len(motion))
     first = roadmap.counters[WAYPOINTS]
     roadmap.waypoints[first : first + len(motion)] = motion
     add_edge(roadmap, x, y, len(motion))
@@ -95,18 +96,18 @@ def bridge(
 def _self_motion(
     arrays: SearchArrays,
     work: Work,
-    place: NDArray[np.float64],
+    target: NDArray[np.float64],
     approach: NDArray[np.float64],
     ends: list[NDArray[np.float64]],
 ) -> NDArray[np.float64] | None:
-    """(k, n) waypoints over one place from the first configuration to the second; None if none."""
+    """(k, n) waypoints over one target from the first configuration to the second, or None."""
     rows = np.empty((CONNECT_STEPS + 1, len(ends[0])))
     for a, b in ((0, 1), (1, 0)):
         q = ends[a].copy()
-        count, reached = connect(arrays, work, place, approach, q, ends[b], rows, 0, CONNECT_STEPS)
+        count, reached = connect(arrays, work, target, approach, q, ends[b], rows, 0, CONNECT_STEPS)
         if reached and a == 0:
             return rows[:count]
         if reached:
-            # Backwards: from the first one, over what lies before it, to the second one.
+            # The motion leads from the second to the first configuration: reverse it.
             return np.vstack([rows[: count - 1][::-1], ends[1][None]])
     return None

@@ -25,7 +25,7 @@ from feasibility.verdict import Replay, Walk
 
 
 def complete_search(problem: Problem, search: Search, clock: Clock) -> Found:
-    """Search until one component of the roadmap covers every cell, or nothing new turns up.
+    """Search until one component of the roadmap covers every cell, or rounds gain nothing more.
 
     Args:
         problem: arm, cells and task.
@@ -49,7 +49,7 @@ def complete_search(problem: Problem, search: Search, clock: Clock) -> Found:
 
 
 def _found(problem: Problem, exploration: Exploration, in_time: bool) -> Found:
-    """The best component, and what is to be said of it."""
+    """The best component, and the sentences about it."""
     total = len(problem.cells)
     complete = exploration.complete and total > 0
     walk = covering_walk(exploration.roadmap, exploration.best) if complete else None
@@ -68,7 +68,7 @@ def _found(problem: Problem, exploration: Exploration, in_time: bool) -> Found:
             "rounds": exploration.rounds,
         },
         motion=walk,
-        replay=None if walk is None else partial(_judged, problem, walk),
+        replay=None if walk is None else partial(_replayed, problem, walk),
         accepted="One continuous motion of {waypoints} waypoints visits every cell centre; "
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
         refused="A motion over every cell was found, but the independent replay refuses it: "
@@ -76,21 +76,21 @@ def _found(problem: Problem, exploration: Exploration, in_time: bool) -> Found:
         proof="" if complete else _proof(problem, exploration),
         unfinished="" if complete else _unfinished(problem, exploration, in_time),
         exhausted=f"The search ended without a covering motion {problem.within}: "
-        f"{_missed(exploration)}; the best covers {covered} of {total} cells ({nodes} nodes, "
+        f"{_shortfall(exploration)}; the best covers {covered} of {total} cells ({nodes} nodes, "
         f"{exploration.rounds} rounds, seed {exploration.seed}).",
         make_graph=lambda: graph_of(exploration),
         make_causes=lambda: causes_of(exploration),
     )
 
 
-def _judged(problem: Problem, walk: Walk) -> Replay:
-    """The walk by Pinocchio: over every cell, whatever the search believes that it covers."""
+def _replayed(problem: Problem, walk: Walk) -> Replay:
+    """Replay the walk: it must visit every cell, whatever the search recorded as covered."""
     needed = np.ones(len(problem.cells), dtype=bool)
     return replay(problem.robot, problem.cells, problem.task, walk, needed)
 
 
 def _proof(problem: Problem, exploration: Exploration) -> str:
-    """What is proved, if anything is."""
+    """The sentence about proved cells; empty where none is."""
     proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
     if not proved:
         return ""
@@ -102,7 +102,7 @@ def _proof(problem: Problem, exploration: Exploration) -> str:
 
 
 def _unfinished(problem: Problem, exploration: Exploration, in_time: bool) -> str:
-    """What is known to be left untried; empty where nothing is."""
+    """Why the search was incomplete; empty where it was not."""
     if not in_time:
         return (
             f"The time limit ran out; the best single motion so far covers "
@@ -111,7 +111,7 @@ def _unfinished(problem: Problem, exploration: Exploration, in_time: bool) -> st
     return blocked_curves(problem.cells, problem.task)
 
 
-def _missed(exploration: Exploration) -> str:
+def _shortfall(exploration: Exploration) -> str:
     """Why the search ended without a covering motion."""
     missed = int((~exploration.reached).sum())
     if missed:

@@ -1,16 +1,16 @@
-"""Why a cell is missed: what would have to give for the arm to cover it.
+"""Why a cell is missed: which constraint must be relaxed for the arm to cover it, and by how much.
 
-A cell that no component reaches is asked three relaxed questions, each by Newton from random
-starts and a descent of what is in the way:
+For a cell that no component reaches three relaxed problems are solved, each by Newton from random
+starts and a descent on the constraint that was dropped:
 
 - joint limits and cone dropped: how near does the tool point get?   -> out of reach, by how much
 - only the cone dropped: how small does the angle get?               -> orientation, which angle
 - only the limits dropped: how little does a joint have to pass its limit?  -> which joint, how far
 
-Where dropping the cone or dropping the limits would each do, the cause is the cone if the tool
-point is reached inside the limits, and the detail names both. A cell that another component
-reaches is disconnected: the detail says what that component covers and what stops the motion. So is
-one where the arm turns out to fit after all, as after a search that was stopped early.
+Where dropping either the cone or the limits would be enough, the cause is the cone if the tool
+point is reached inside the limits, and the detail names both. A cell that another component reaches
+is disconnected: the detail says what that component covers and what stops the motion. So is a cell
+with a valid configuration that the search had not found, as after a search that was stopped early.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ from feasibility.roadmap.self_motion import connect
 from feasibility.verdict import Cause, CauseKind
 from robots import Kinematics, Robot, jacobians
 
-STARTS = 16  # Newton starts of each relaxed question
-MOST_EXAMINED = 400  # cells that are examined one by one
-ENOUGH = 5  # solutions among which the least violation is looked for
+STARTS = 16  # Newton starts for each relaxed problem
+MOST_EXAMINED = 400  # cells that are diagnosed one by one
+ENOUGH = 5  # solutions among which the least violation is taken
 UNPROVED = "not proved: off its target, within the tolerance, the tool point may do better"
 MOST_DECIMALS = 6
 
@@ -119,12 +119,12 @@ def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
 
 
 def _within(arrays: SearchArrays, cone_chord: float) -> SearchArrays:
-    """The same problem with another cone, asked at one cell's centre: nothing strays there."""
+    """The same arrays with another cone, for one cell's centre: no curve deviates there."""
     return arrays._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord)
 
 
 def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """q with each turning joint at the winding that passes its limits least."""
+    """q with each revolute joint at the winding that passes its limits least."""
     best, least = q, np.full(robot.n, np.inf)
     for k in (-1.0, 0.0, 1.0):
         value = q + np.where(robot.prismatic, 0.0, 2.0 * np.pi * k)
@@ -137,7 +137,7 @@ def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
 def _nearest_to_limits(
     exploration: Exploration, relaxed: SearchArrays, cell: int, solutions: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """(n,) the configuration over a cell that passes the limits least, among what is found."""
+    """(n,) the configuration over a cell that passes the limits least, among those found."""
     robot = exploration.robot
     waypoints = np.empty((64, robot.n))
     target, approach = relaxed.points[cell], relaxed.approaches[cell]
@@ -156,7 +156,7 @@ def _nearest_to_limits(
 
 
 def _one(exploration: Exploration) -> NDArray[np.float64]:
-    """Room for one solution."""
+    """An array for one solution."""
     return np.empty((1, exploration.robot.n))
 
 
@@ -194,7 +194,7 @@ def _past_limits(robot: Robot, q: NDArray[np.float64]) -> str:
 
 
 def decimals(value: float, bound: float, least: int) -> int:
-    """How many decimals, `least` or more, tell a value from the bound that it passes.
+    """Number of decimals, at least `least`, that distinguish a value from the bound it passes.
 
     Example:
         >>> decimals(3.02, 3.0, 1)
@@ -207,41 +207,41 @@ def decimals(value: float, bound: float, least: int) -> int:
 
 
 def diagnose(exploration: Exploration, cell: int) -> Cause:
-    """Why nothing reaches a cell.
+    """Why no component reaches a cell.
 
-    The questions are asked with the tool point at its target, as the search asks them. A proof
-    takes the whole tolerance into account; without one the detail says that this was not done.
+    The relaxed problems hold the tool point at its target, as the search does. A proof takes the
+    full tolerance into account; without one the detail says that this was not done.
 
     Args:
-        explorer: a finished search.
+        exploration: a finished search.
         cell: a cell that no component covers.
 
     Returns:
         The cause; proved where branch and bound or the reach bound ruled the cell out.
     """
     cause = _cause(exploration, cell)
-    told = cause.proved or cause.kind is CauseKind.DISCONNECTED
-    if told or not exploration.arrays.cone_chord > 0.0:
+    settled = cause.proved or cause.kind is CauseKind.DISCONNECTED
+    if settled or not exploration.arrays.cone_chord > 0.0:
         return cause
     return replace(cause, detail=f"{cause.detail}; {UNPROVED}")
 
 
 def _cause(exploration: Exploration, cell: int) -> Cause:
-    """The same without a word on what was not proved."""
+    """The cause, its detail without the remark that it is not proved."""
     arrays, robot, work = exploration.arrays, exploration.robot, exploration.work
     proved = exploration.rulings.get(cell) is Ruling.PROVED
     n = robot.n
     solutions = np.empty((ENOUGH, n))
-    curvature = ~robot.prismatic
+    revolute = ~robot.prismatic
     unlimited = arrays._replace(
-        lower=np.where(curvature, -np.inf, robot.lower),
-        upper=np.where(curvature, np.inf, robot.upper),
+        lower=np.where(revolute, -np.inf, robot.lower),
+        upper=np.where(revolute, np.inf, robot.upper),
     )
     slack_cone = _within(arrays, np.inf)
     anything = _within(unlimited, np.inf)
     guesses = exploration.guesses(STARTS)
     if not arrays.cone_chord > 0.0 and not proved:
-        detail = "a cone of 0 degrees leaves no room that a motion could be certified in"
+        detail = "a cone of 0 degrees leaves no margin in which a motion could be certified"
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
     if not _solve(anything, work, cell, guesses, _one(exploration)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
@@ -255,8 +255,8 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
         detail += (
             f"the arm reaches at most {reach:.{far}f} m"
             if away > reach
-            else f"inside its outer reach of {reach:.{far}f} m but where the arm cannot fold "
-            "itself to"
+            else f"within its outer reach of {reach:.{far}f} m, but no configuration brings the "
+            "tool point there"
         )
         return Cause(cell, CauseKind.OUT_OF_REACH, proved, detail)
     found = _solve(unlimited, work, cell, guesses, solutions)
@@ -269,7 +269,7 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
         angle = np.degrees(_smallest_angle(exploration, slack_cone, cell))
         alpha = np.degrees(2.0 * np.arcsin(min(0.5 * arrays.cone_chord, 1.0)))
         if angle <= alpha and not proved:
-            detail = "the arm can stand there, but the search ended before it found a motion to it"
+            detail = "the arm has a configuration there, but the search ended before it was reached"
             return Cause(cell, CauseKind.DISCONNECTED, False, detail)
         fine = decimals(angle, alpha, 1)
         detail = f"the tool tilts {angle:.{fine}f} deg there at best, the cone allows {alpha:g} deg"
@@ -282,7 +282,7 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
             robot, _nearest_to_limits(exploration, anything, cell, solutions[:found])
         )
         past = (
-            f"for the tool point alone {past}; inside the cone nothing was found at all"
+            f"for the tool point alone {past}; no configuration was found inside the cone"
             if past
             else "the target lies past the limits by no more than the tolerance"
         )
@@ -301,8 +301,8 @@ def disconnected(exploration: Exploration, cell: int) -> Cause:
     name = robot.joint_names[joint]
     reason = {
         LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
-        CONE: "the tool axis is stopped at the rim of the cone",
-        SINGULAR: "the arm is stopped at a singularity",
+        CONE: "the tool axis stops at the boundary of the cone",
+        SINGULAR: "the arm stops at a singularity",
         LONG: "the motion takes too many steps",
         FOLD: "the surface is creased, or its offset folds",
     }.get(code)
@@ -318,8 +318,8 @@ def disconnected(exploration: Exploration, cell: int) -> Cause:
 def causes_of(exploration: Exploration) -> tuple[Cause, ...]:
     """One cause for each cell that the best component misses, in order of index.
 
-    On fine grids `MOST_EXAMINED` cells, spread evenly, are examined one by one; the others are
-    given the cause of the nearest of them, not proved, and say so.
+    On fine grids `MOST_EXAMINED` cells, spread evenly, are diagnosed one by one. The others are
+    given the cause of the nearest of these, and their details say so.
 
     Raises:
         OutOfTime: the deadline passed.

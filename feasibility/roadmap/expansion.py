@@ -1,4 +1,8 @@
-"""How the roadmap grows: seeds, spreading over the surface, stirring a fibre, closing pairs."""
+"""How the roadmap grows: seeding a cell, spreading over the surface, self-motions, closing pairs.
+
+Steps 2 to 5 and 10 to 12 of the complete search. Each kernel connects nodes by motions certified by
+`feasibility.roadmap.segment_bound`.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
-from feasibility.roadmap.arrays import SearchArrays, Work
+from feasibility.roadmap.arrays import OVERFLOW, SearchArrays, Work
 from feasibility.roadmap.graph import (
     BUDGET,
     COMPONENTS,
@@ -30,15 +34,15 @@ from feasibility.roadmap.self_motion import SETTLE_STEPS, connect, settle
 from feasibility.roadmap.tracking import track
 
 MOST_FAILURES = np.int64(12)  # failed connections after which a pair of components is left alone
-MOST_RIVALS = 6  # other components that an arrival tries to join, the nearest first
+MOST_RIVALS = 6  # other components that a new configuration tries to join, the nearest first
 CONNECT_STEPS = np.int64(60)  # steps of one self-motion
-AIM_STEPS = np.int64(30)  # Newton steps that put a random point onto the fibre
+AIM_STEPS = np.int64(30)  # Newton steps that project a random configuration
 NOBODY, NONE = np.int64(-1), np.int64(0)
 FREE = np.bool_(False)  # a track without a goal
 
 
 @kernel
-def _rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyped-def]
+def _nearest_rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyped-def]
     """The node over `cell` nearest to q in a component that is neither `own` nor tried; or -1."""
     best, nearest = -1, np.inf
     node = roadmap.first_node[cell]
@@ -62,17 +66,17 @@ def _rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyped-def]
 def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-untyped-def]
     """Try to reach, by self-motion from q over `cell`, a node of another component.
 
-    Waypoints go to `waypoints` behind the `rows` rows that are pending there.
+    Waypoints go to `roadmap.waypoints` behind the `rows` rows that are pending there.
 
     Returns:
-        (node, rows written), or (-1, 0); (-1, -2) when `waypoints` is full.
+        (node, rows written), or (-1, 0); (-1, OVERFLOW) when `waypoints` is full.
     """
     tried = np.empty(MOST_RIVALS, dtype=np.int64)
     here = np.empty(q.shape[0])
     for k in range(MOST_RIVALS):
         tried[k] = -1
     for k in range(MOST_RIVALS):
-        node = _rival(roadmap, cell, q, own, tried, most)
+        node = _nearest_rival(roadmap, cell, q, own, tried, most)
         if node < 0:
             break
         tried[k] = root_of(roadmap, roadmap.component[node])
@@ -81,8 +85,8 @@ def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-un
             arrays, work, arrays.points[cell], arrays.approaches[cell], here, roadmap.q[node],
             roadmap.waypoints, roadmap.counters[WAYPOINTS] + rows, CONNECT_STEPS,
         )  # fmt: skip
-        if written == -2:
-            return -1, -2
+        if written == OVERFLOW:
+            return -1, OVERFLOW
         if reached:
             return node, written
         if own >= 0:
@@ -96,16 +100,15 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
     """Spread every queued node into the neighbouring cells that its component does not cover yet.
 
     Args:
-        problem: the `SearchArrays`.
-        work: the `Work`.
-        roadmap: the `Roadmap`.
+        arrays, work, roadmap: the `SearchArrays`, the `Work` and the `Roadmap`.
         indptr: (N + 1,) where each cell's neighbours begin in `indices`.
         indices: (k,) neighbours.
-        links: (k,) the course to each, see `Neighbours.links`.
-        budget: evaluations of the arm before coming back.
+        links: (k,) the curve to each, see `Neighbours.links`.
+        budget: evaluations of the arm before returning.
 
-    Returns DONE when the queue is empty, COVERED when a component covers every cell, BUDGET after
-    `budget` evaluations of the arm, FULL when an array has no room left; call again to go on.
+    Returns:
+        DONE when the queue is empty, COVERED when a component covers every cell, BUDGET after
+        `budget` evaluations of the arm, FULL when an array is full; call again to continue.
     """
     count = roadmap.counters
     cells = roadmap.first_node.shape[0]
@@ -133,7 +136,7 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
                 arrays, work, links[first + count[CURSOR]], begin, end, q, q, FREE,
                 roadmap.waypoints, count[WAYPOINTS],
             )  # fmt: skip
-            if rows == -2:
+            if rows == OVERFLOW:
                 return FULL
             count[CURSOR] += 1
             if rows < 0:
@@ -144,7 +147,7 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
                     roadmap.blocked[target, 2] = own
                 continue
             node, more = join(arrays, work, roadmap, target, q, own, rows, MOST_FAILURES)
-            if more == -2:
+            if more == OVERFLOW:
                 count[CURSOR] -= 1
                 return FULL
             if node >= 0:
@@ -163,12 +166,11 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
 def seed_cell(
     arrays: SearchArrays, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
 ) -> tuple[int, int]:
-    """Newton from guesses to configurations over one cell's centre; new ones become components.
+    """Project guesses onto the constraints over one cell; new configurations become components.
 
     Args:
-        problem: the `SearchArrays`.
-        work: the `Work`.
-        roadmap: the `Roadmap`; needs room for a node and a component per guess, see `grown`.
+        arrays, work: the `SearchArrays` and the `Work`.
+        roadmap: the `Roadmap`, with space for a node and a component per guess, see `grown`.
         cell: the cell.
         guesses: (k, n) configurations inside the limits.
 
@@ -200,29 +202,27 @@ def seed_cell(
 
 @kernel
 def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
-    """Explore the fibre over one cell from the nodes there, and join the components that meet.
+    """Explore the self-motion manifold over one cell, and merge the components that it connects.
 
-    A rapidly exploring tree for each component: the node nearest to a random point of the fibre
-    moves towards it as far as the fibre lets it, and from there tries to reach the other
+    A rapidly exploring random tree for each component: the node nearest to a random configuration
+    of the manifold moves towards it as far as it can, and from there tries to join the other
     components. New nodes are queued, because they may reach a neighbouring cell that the old ones
     could not.
 
     Args:
-        problem: the `SearchArrays`.
-        work: the `Work`.
-        roadmap: the `Roadmap`.
+        arrays, work, roadmap: the `SearchArrays`, the `Work` and the `Roadmap`.
         cell: the cell.
         guesses: (k, n) random configurations.
         most: failed connections after which two components are left alone.
 
     Returns:
-        (status, guesses used, mergers): status is DONE, or FULL when an array has no room.
+        (status, guesses used, mergers): status is DONE, or FULL when an array is full.
     """
     count = roadmap.counters
     merged = 0
     q = np.empty(guesses.shape[1])
     tried = np.empty(MOST_RIVALS, dtype=np.int64)
-    aimed = np.empty(guesses.shape[1])
+    goal = np.empty(guesses.shape[1])
     for g in range(guesses.shape[0]):
         for k in range(MOST_RIVALS):
             tried[k] = -1
@@ -232,28 +232,28 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
             if count[TAIL] + 2 > roadmap.queue.shape[0]:
                 return FULL, g, merged
             if k == 0:
-                # Aim at a point of the fibre: a random guess, put onto it.
-                put(aimed, guesses[g])
-                if not project_onto_cell(arrays, work, cell, aimed, AIM_STEPS):
+                # Head for a random configuration of the manifold.
+                put(goal, guesses[g])
+                if not project_onto_cell(arrays, work, cell, goal, AIM_STEPS):
                     break
-            node = _rival(roadmap, cell, aimed, NOBODY, tried, NONE)
+            node = _nearest_rival(roadmap, cell, goal, NOBODY, tried, NONE)
             if node < 0:
                 break
             own = root_of(roadmap, roadmap.component[node])
             tried[k] = own
             put(q, roadmap.q[node])
             rows, _ = connect(
-                arrays, work, arrays.points[cell], arrays.approaches[cell], q, aimed,
+                arrays, work, arrays.points[cell], arrays.approaches[cell], q, goal,
                 roadmap.waypoints, count[WAYPOINTS], CONNECT_STEPS,
             )  # fmt: skip
-            if rows == -2:
+            if rows == OVERFLOW:
                 return FULL, g, merged
             if rows < 2:
                 continue
             new = add_node(arrays, work, roadmap, cell, q, own)
             add_edge(roadmap, node, new, rows)
             rival, more = join(arrays, work, roadmap, cell, q, own, NONE, most)
-            if more == -2:
+            if more == OVERFLOW:
                 return FULL, g, merged
             if rival >= 0:
                 add_edge(roadmap, new, rival, more)
@@ -284,17 +284,16 @@ def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
 
 @kernel
 def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type: ignore[no-untyped-def]
-    """Try to join every neighbouring pair of cells inside one component by a motion of its own.
+    """Try to connect every neighbouring pair of cells inside one component by a motion of its own.
 
     Args:
-        problem: the `SearchArrays`.
-        work: the `Work`.
-        roadmap: the `Roadmap`; an edge that ends nowhere near a node makes a new one.
-        pairs: (M, 2) neighbouring cells, one for each course.
+        arrays, work: the `SearchArrays` and the `Work`.
+        roadmap: the `Roadmap`; a motion that cannot be connected to a node ends in a new one.
+        pairs: (M, 2) neighbouring cells, one for each curve.
         state: (M + 1,) 1 where the pair has an edge, 2 where none was found; the last entry is
-            the next pair to look at. Filled here.
+            the next pair to try. Filled here.
         component: the root component.
-        budget: evaluations of the arm before coming back.
+        budget: evaluations of the arm before returning.
 
     Returns:
         DONE, BUDGET or FULL, as `spread_out`.
@@ -325,7 +324,7 @@ def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type
                         arrays, work, k, begin, end, q, roadmap.q[b], attempt < 2,
                         roadmap.waypoints, count[WAYPOINTS],
                     )  # fmt: skip
-                    if rows == -2:
+                    if rows == OVERFLOW:
                         state[k] = 0
                         return FULL
                     if rows < 0:
@@ -335,7 +334,7 @@ def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type
                         arrays, work, arrays.points[j], arrays.approaches[j], q, roadmap.q[b],
                         roadmap.waypoints, count[WAYPOINTS] + rows, CONNECT_STEPS,
                     )  # fmt: skip
-                    if more == -2:
+                    if more == OVERFLOW:
                         state[k] = 0
                         return FULL
                     if reached:
@@ -343,7 +342,7 @@ def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type
                         state[k] = 1
                         break
                     if attempt == 3:
-                        # The motion leads there all the same, to a configuration of its own.
+                        # The motion reaches the cell, with a configuration of its own.
                         new = add_node(arrays, work, roadmap, j, arrival, component)
                         add_edge(roadmap, a, new, rows)
                         state[k] = 1

@@ -1,4 +1,4 @@
-"""One exploration in progress: the roadmap, what it covers, and the ways to make it grow."""
+"""One exploration in progress: the roadmap, what it covers, and the methods that make it grow."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ from feasibility.roadmap.graph import (
 from robots import Robot
 from surfaces import Cells
 
-BUDGET = 8_000  # evaluations of the arm between two looks at the clock
-GUESSES = 4  # of one stir
-BRIDGES = 6  # pairs of nodes that one round tries to join between two centres
-PATIENCE = 60  # failed connections of two components that stirring allows
+BUDGET = 8_000  # evaluations of the arm between two checks of the clock
+GUESSES = 4  # of one `explore_self_motions`
+BRIDGES = 6  # pairs of nodes that one round tries to bridge
+PATIENCE = 60  # failed connections of two components before `explore_self_motions` gives them up
 
 
 @dataclass
 class Exploration:
-    """The state of one search; `explore` drives it and `checking` reads it."""
+    """The state of one search; `explore` drives it and `complete_search` reads it."""
 
     robot: Robot
     cells: Cells
@@ -48,11 +48,11 @@ class Exploration:
     work: Work = field(init=False)
     roadmap: Roadmap = field(init=False)
     rulings: dict[int, Ruling] = field(default_factory=dict)
-    """What branch and bound said of the cells that it was asked about."""
+    """Outcomes of branch and bound, by cell."""
     boxes: int = 0
     rounds: int = 0
-    met: dict[tuple[int, int], int] = field(default_factory=dict)
-    """How often two nodes were tried for a meeting."""
+    tried: dict[tuple[int, int], int] = field(default_factory=dict)
+    """How often a bridge between two nodes was tried."""
     pairs: NDArray[np.int64] = field(init=False)
     """(M + 1,) state of each neighbouring pair, see `close_pairs`."""
 
@@ -66,11 +66,11 @@ class Exploration:
         wide = ~(upper - lower <= 2.0 * np.pi) & ~self.robot.prismatic
         bounded = np.isfinite(lower) & np.isfinite(upper)
         middle = 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0))
-        # A joint of more than a full turn is seeded over one turn: other windings are reached by
-        # motion, or not at all.
+        # A joint with a range of more than a full turn is seeded over one turn: other windings are
+        # reached by motion, or not at all.
         self.low: NDArray[np.float64] = np.where(wide, middle - np.pi, lower)
         self.high = np.where(wide, middle + np.pi, upper)
-        # A slide is seeded as far as the cells, the arm and its other slides reach.
+        # A prismatic joint is seeded as far as the cells, the arm and the other slides reach.
         ends = np.where(bounded & self.robot.prismatic, np.maximum(abs(lower), abs(upper)), 0.0)
         far = self.arrays.scale + np.abs(self.arrays.points).sum(axis=1).max(initial=0.0)
         far = far + ends.sum() - ends
@@ -104,7 +104,7 @@ class Exploration:
 
     @property
     def n_edges(self) -> int:
-        """Neighbouring pairs of cells that `close` found a motion for."""
+        """Neighbouring pairs of cells with a motion between them, found by `close`."""
         return int((self.pairs[:-1] == 1).sum())
 
     def roots(self) -> list[int]:
@@ -127,8 +127,8 @@ class Exploration:
         """
         self.clock.tick(int(self.roadmap.size[self.best]), len(self.cells), text)
 
-    def before_next_look(self) -> int:
-        """Evaluations of the arm that compiled loops may take before they come back to `tick`."""
+    def budget(self) -> int:
+        """Evaluations of the arm that compiled loops may use before they return to `tick`."""
         return BUDGET
 
     def guesses(self, k: int) -> NDArray[np.float64]:
@@ -145,7 +145,7 @@ class Exploration:
                 self.indptr,
                 self.indices,
                 self.links,
-                self.before_next_look(),
+                self.budget(),
             )
             if status == COVERED:
                 return True
@@ -157,7 +157,7 @@ class Exploration:
             self.tick("spreading over the surface")
 
     def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
-        """Seed a cell and spread what is new; returns how many guesses led onto the fibre."""
+        """Seed a cell and spread the new nodes; returns how many guesses could be projected."""
         found = 0
         for guess in guesses:
             self.roadmap = grown(self.roadmap)
@@ -168,7 +168,7 @@ class Exploration:
         return found
 
     def explore_self_motions(self, cell: int) -> None:
-        """Explore the fibre over one cell and spread what is new."""
+        """Explore the self-motion manifold over one cell and spread the new nodes."""
         guesses = self.guesses(GUESSES)
         while True:
             status, used, _ = explore_self_motions(
@@ -181,16 +181,16 @@ class Exploration:
         self.spread()
 
     def bridge(self, one: int, other: int) -> None:
-        """Try to join two components between cell centres, where they come nearest first."""
+        """Try to bridge two components between cell centres, the nearest nodes first."""
         tries = 0
         nodes = nearest_pairs(self.roadmap, self.cells.pairs, one, other)
         for x, y in nodes[: 2 * BRIDGES * (1 + self.rounds)].tolist():
-            if self.met.get((x, y), 0) > self.rounds // 4:
+            if self.tried.get((x, y), 0) > self.rounds // 4:
                 continue
-            self.met[x, y] = self.met.get((x, y), 0) + 1
+            self.tried[x, y] = self.tried.get((x, y), 0) + 1
             share = float(self.rng.uniform(NARROWEST, WIDEST))
             curve = self.curve(int(self.roadmap.cell[x]), int(self.roadmap.cell[y]))
-            if bridge(self.arrays, self.work, self.room, x, y, curve, share):
+            if bridge(self.arrays, self.work, self.reserve, x, y, curve, share):
                 self.spread()
                 return
             tries += 1
@@ -198,12 +198,12 @@ class Exploration:
                 return
 
     def curve(self, cell: int, other: int) -> int:
-        """The course between two neighbouring cells."""
+        """The curve between two neighbouring cells."""
         entries = slice(self.indptr[cell], self.indptr[cell + 1])
         return int(self.links[entries][self.indices[entries] == other][0])
 
     def join(self, state: NDArray[np.int64], component: int) -> None:
-        """Look for a motion of a component between every two neighbouring cells.
+        """Search a motion of a component between every two neighbouring cells.
 
         Args:
             state: (M + 1,) of each pair, see `close_pairs`; filled here.
@@ -219,7 +219,7 @@ class Exploration:
                 pairs,
                 state,
                 component,
-                self.before_next_look(),
+                self.budget(),
             )
             if status == DONE:
                 return
@@ -227,7 +227,7 @@ class Exploration:
                 self.roadmap = grown(self.roadmap)
             self.tick("joining neighbouring cells")
 
-    def room(self, rows: int) -> Roadmap:
+    def reserve(self, rows: int) -> Roadmap:
         """The roadmap, grown until an edge and so many rows of `waypoints` fit."""
         self.roadmap = grown(self.roadmap)
         while self.roadmap.counters[WAYPOINTS] + rows > len(self.roadmap.waypoints):
@@ -235,29 +235,29 @@ class Exploration:
         return self.roadmap
 
     def border(self, component: int) -> NDArray[np.int64]:
-        """Cells of a component that have a neighbour which it does not cover."""
+        """Cells of a component with a neighbour that it does not cover."""
         inside = self.covers(component)
         owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
         return np.unique(owners[inside[owners] & ~inside[self.indices]])
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
-        """Branch and bound on one cell; a configuration that it finds is planted."""
-        ruling, looked = Ruling.OPEN, int(boxes.counts[1])
+        """Branch and bound on one cell; a configuration that it finds becomes a seed."""
+        ruling, examined = Ruling.OPEN, int(boxes.counts[1])
         while ruling is Ruling.OPEN and boxes.counts[1] < most:
-            budget = min(most, self.before_next_look())
+            budget = min(most, self.budget())
             ruling, q = rule(self.arrays, self.work, cell, boxes, budget)
             self.tick("proving cells out of reach")
-        self.boxes += int(boxes.counts[1]) - looked
+        self.boxes += int(boxes.counts[1]) - examined
         self.rulings[cell] = ruling
-        # A box that is left undecided mostly straddles the tolerance: Newton starts well from it.
-        # (A slide without ends has boxes without a middle.)
+        # A box left undecided is mostly at the border of the tolerance: a good start for Newton.
+        # (Boxes of a prismatic joint without limits have no middle.)
         if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and np.isfinite(q).all():
             self.add_seeds(cell, wound(self.arrays, q)[None])
         return ruling
 
 
 def wound(arrays: SearchArrays, q: NDArray[np.float64]) -> NDArray[np.float64]:
-    """(n,) the same placement of the arm, joints brought inside their limits by full turns."""
+    """(n,) the same placement of the arm, with windings that bring joints inside their limits."""
     turn = np.where(arrays.chain.prismatic, 0.0, 2.0 * np.pi)
     q = q + turn * np.ceil(np.maximum(arrays.lower - q, 0.0) / (2.0 * np.pi))
     q = q - turn * np.ceil(np.maximum(q - arrays.upper, 0.0) / (2.0 * np.pi))

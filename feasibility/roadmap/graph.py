@@ -1,12 +1,12 @@
 """The roadmap of the complete search: (cell, configuration) nodes joined by certified motions.
 
-The paper keeps one configuration a cell, so its answer depends on where it starts. Here a cell may
-hold many nodes, one for each connected component that was found over it, and a union-find says
+The paper keeps one configuration per cell, so its answer depends on where it starts. Here a cell
+may hold many nodes, one for each connected component that was found over it, and a union-find tells
 which nodes one continuous motion can visit. A component that covers every cell is a covering
-motion; cells that no component shares with the best one are what the surface is missing.
+motion; the cells that the best component does not cover are the missed ones.
 
-The arrays live in Python and grow there; the compiled loops fill them and come back when an array
-is full, when their budget is spent (so that Ctrl-C and time limits work), or when they are done.
+The arrays are made and grown in Python; the compiled loops fill them and return when an array is
+full, when their budget is spent (so that Ctrl-C and time limits work), or when they are done.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from feasibility.roadmap.arrays import NEXT, place
 from feasibility.roadmap.self_motion import effects
 
 NODES, EDGES, WAYPOINTS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
-"""Places in `Roadmap.counters`."""
+"""Indices into `Roadmap.counters`."""
 DONE, BUDGET, FULL, COVERED = range(4)
-"""Why a compiled loop came back."""
+"""Why a compiled loop returned."""
 
 
 class Roadmap(NamedTuple):
@@ -34,7 +34,7 @@ class Roadmap(NamedTuple):
     q: NDArray[np.float64]
     """(nodes, n) the configuration of each node, over its cell's centre."""
     effect: NDArray[np.float64]
-    """(nodes, n) how much each joint moves the tool there, see `fibre.effects`."""
+    """(nodes, n) how much each joint moves the tool there, see `self_motion.effects`."""
     component: NDArray[np.int64]
     """(nodes,) the component slot that the node was made in; `root_of` gives the present one."""
     following: NDArray[np.int64]
@@ -42,10 +42,10 @@ class Roadmap(NamedTuple):
     first_node: NDArray[np.int64]
     """(N,) first node over each cell, -1 where there is none."""
     queue: NDArray[np.int64]
-    """(nodes,) nodes that are still to be spread from."""
+    """(nodes,) nodes to be spread to neighbouring cells, between HEAD and TAIL."""
     ends: NDArray[np.int64]
     """(edges, 2) nodes that each edge joins."""
-    way: NDArray[np.int64]
+    edge_rows: NDArray[np.int64]
     """(edges, 2) first row and number of rows of the edge's waypoints in `waypoints`."""
     waypoints: NDArray[np.float64]
     """(rows, n) waypoints of all edges; an edge's start is not among them, its end is."""
@@ -65,7 +65,7 @@ class Roadmap(NamedTuple):
 
 
 def empty_roadmap(cells: int, n: int) -> Roadmap:
-    """A roadmap without nodes, with room for one node a cell."""
+    """A roadmap without nodes, with space for one node per cell."""
     nodes = cells + 64
     components = 16
     return Roadmap(
@@ -77,7 +77,7 @@ def empty_roadmap(cells: int, n: int) -> Roadmap:
         first_node=np.full(cells, -1, dtype=np.int64),
         queue=np.empty(nodes, dtype=np.int64),
         ends=np.empty((4 * nodes, 2), dtype=np.int64),
-        way=np.empty((4 * nodes, 2), dtype=np.int64),
+        edge_rows=np.empty((4 * nodes, 2), dtype=np.int64),
         waypoints=np.empty((16 * nodes, n)),
         parent=np.arange(components),
         cover=np.zeros((components, cells), dtype=np.uint8),
@@ -89,12 +89,12 @@ def empty_roadmap(cells: int, n: int) -> Roadmap:
 
 
 def grown(roadmap: Roadmap) -> Roadmap:
-    """The same roadmap with room for more wherever an array is nearly full."""
+    """The same roadmap, with longer arrays wherever one is nearly full."""
 
-    def longer(array: NDArray, used: int, room: int) -> NDArray:
-        if used + room <= len(array):
+    def longer(array: NDArray, used: int, spare: int) -> NDArray:
+        if used + spare <= len(array):
             return array
-        result = np.zeros((2 * len(array) + room, *array.shape[1:]), dtype=array.dtype)
+        result = np.zeros((2 * len(array) + spare, *array.shape[1:]), dtype=array.dtype)
         result[: len(array)] = array
         return result
 
@@ -103,7 +103,7 @@ def grown(roadmap: Roadmap) -> Roadmap:
     for name in ("cell", "q", "effect", "component", "following"):
         fields[name] = longer(fields[name], count[NODES], 8)
     fields["queue"] = longer(fields["queue"], count[TAIL], 8)
-    for name in ("ends", "way"):
+    for name in ("ends", "edge_rows"):
         fields[name] = longer(fields[name], count[EDGES], 16)
     fields["waypoints"] = longer(fields["waypoints"], count[WAYPOINTS], 4096)
     slots = len(roadmap.parent)
@@ -119,7 +119,7 @@ def grown(roadmap: Roadmap) -> Roadmap:
 
 @kernel
 def root_of(roadmap, slot):  # type: ignore[no-untyped-def]
-    """The root component of a slot; paths are halved on the way."""
+    """The root component of a slot, with path halving."""
     while roadmap.parent[slot] != slot:
         roadmap.parent[slot] = roadmap.parent[roadmap.parent[slot]]
         slot = roadmap.parent[slot]
@@ -183,8 +183,8 @@ def add_edge(roadmap, x, y, rows):  # type: ignore[no-untyped-def]
     edge = count[EDGES]
     roadmap.ends[edge, 0] = x
     roadmap.ends[edge, 1] = y
-    roadmap.way[edge, 0] = count[WAYPOINTS]
-    roadmap.way[edge, 1] = rows
+    roadmap.edge_rows[edge, 0] = count[WAYPOINTS]
+    roadmap.edge_rows[edge, 1] = rows
     count[EDGES] += 1
     count[WAYPOINTS] += rows
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def graph_of(exploration: Exploration) -> nx.Graph:
-    """Graph G of the best component: every cell, and one motion for each pair that has any.
+    """Graph G of the best component: every cell, and one motion for each connected pair.
 
     Nodes carry `q` (n,), a configuration over the cell's centre, None for cells that the component
     misses. Edges carry `motion` (k, n), from the smaller cell index to the larger.
@@ -35,7 +35,7 @@ def graph_of(exploration: Exploration) -> nx.Graph:
 
 
 def pair_edges(exploration: Exploration) -> dict[tuple[int, int], int]:
-    """One edge of the best component for each pair of cells that has any."""
+    """One edge of the best component for each connected pair of cells."""
     roadmap, best = exploration.roadmap, exploration.best
     edges: dict[tuple[int, int], int] = {}
     for e in range(roadmap.counters[EDGES]):

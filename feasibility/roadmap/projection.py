@@ -1,4 +1,9 @@
-"""Newton onto the fibre: the least step that mends tool point and cone, inside the limits."""
+"""Projection onto the constraint manifold: tool point at its target, cone and limits obeyed.
+
+Newton's method, each step the least one that corrects tool point and cone inside the limits: joints
+that would pass a limit are held at it. The first step follows a secondary objective in the free
+directions. (Steps 2 and 6 of the complete search.)
+"""
 
 from __future__ import annotations
 
@@ -8,10 +13,10 @@ from feasibility.compiled import kernel
 from feasibility.roadmap.arrays import CONE, LIMIT, NEXT, SINGULAR, look_at, place
 from robots import jacobians
 
-COMFORT = 0.7  # [1] share of the cone that a step keeps to where it can
+COMFORT = 0.7  # [1] share of the cone chord that a step keeps to where it can
 LARGEST_STEP = 0.35  # [rad] or [m], largest change of one joint in one Newton step
 POINT, POINT_AND_CONE = np.int64(3), np.int64(4)  # rows of a step
-PROJECTION_SLACK = 1e-6  # [1] share of the cone that a landing keeps free
+PROJECTION_SLACK = 1e-6  # [1] share of the cone chord that the projection of a guess keeps free
 PROJECTION_STEPS = np.int64(60)
 
 
@@ -42,10 +47,10 @@ def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
 
 @kernel
 def least_step(arrays, work, q, m):  # type: ignore[no-untyped-def]
-    """The step nearest to `work.secondary_step` with rows @ step = rhs (first m rows), inside the limits.
+    """The step nearest to `work.secondary_step` with rows @ step = rhs, inside the limits.
 
-    Joints that would pass a limit are held at it, the furthest first, and the others take over.
-    Returns False when too few joints are left.
+    Only the first m rows count. Joints that would pass a limit are held at it, the furthest first,
+    and the others take over. Returns False when too few joints are left.
     """
     n = q.shape[0]
     a = np.empty((4, 4))
@@ -94,7 +99,7 @@ def least_step(arrays, work, q, m):  # type: ignore[no-untyped-def]
 
 @kernel
 def linearise(arrays, work, slot, chord_goal):  # type: ignore[no-untyped-def]
-    """Linearise at a slot: three position rows, and a cone row; returns its direction's norm.
+    """Linearise at a slot: three position rows, and a cone row; returns the norm of the cone row.
 
     The cone row is the derivative of c = |a - b|, which is well scaled for narrow cones too.
     """
@@ -130,15 +135,16 @@ def linearise(arrays, work, slot, chord_goal):  # type: ignore[no-untyped-def]
 
 @kernel
 def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-def]
-    """Newton from q (in place) onto the fibre over `work.target`; slot 1 holds the result.
+    """Project q (in place) onto the constraints over `work.target`; slot 1 holds the result.
 
-    The first step starts at what slot 1 holds for q, heads for `work.secondary_step`, and keeps well inside
-    the cone; `before` is |a - b| at the start of the step, from where it comes in gradually (inf
-    where that does not matter). Later steps are the least ones that mend the errors. Returns True
-    when the tool point is at its target to `arrays.near`, and the axis inside the cone.
+    The first step starts from slot 1's placement of q, heads for `work.secondary_step`, and keeps
+    well inside the cone; `before` is |a - b| at the start of the step, from where the axis is led
+    inwards gradually (inf where that does not matter). Later steps are the least ones that correct
+    the errors. Returns True when the tool point is within `arrays.near` of its target, and the axis
+    inside the cone.
     """
     n = q.shape[0]
-    inner = work.room[1]
+    inner = work.allowance[1]
     hard = inner * (1.0 - slack)
     last = np.inf
     for it in range(most):
@@ -147,7 +153,7 @@ def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-de
         chord = work.error[1, 1]
         goal = hard
         if it == 0:
-            # Come in from the rim by a part of what the target's motion costs anyway.
+            # Lead the axis inwards by a part of what the target's motion costs anyway.
             inwards = max(0.5 * (chord - before), 150.0 * slack * before)
             goal = min(hard, max(COMFORT * arrays.cone_chord, before - inwards))
         norm = linearise(arrays, work, NEXT, goal)
@@ -156,7 +162,7 @@ def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-de
         cone = chord > goal and usable
         done = least_step(arrays, work, q, POINT_AND_CONE if cone else POINT)
         if done and not cone and usable and chord > 0.3 * goal:
-            # Would the step leave the cone? Then do it again along the rim.
+            # Would the step leave the cone? Then repeat it along the boundary of the cone.
             predicted = 0.0
             for k in range(3):
                 change = work.axis[1, k] - work.target[1, k]
@@ -192,7 +198,7 @@ def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-de
 
 @kernel
 def project_onto_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
-    """Newton from a guess q (in place) onto the fibre over a cell's centre; True when it lands."""
+    """Project a guess q (in place) onto the constraints over a cell's centre; True on success."""
     look_at(arrays, work, arrays.points[cell], arrays.approaches[cell])
     place(arrays, work, NEXT, q)
     for j in range(q.shape[0]):

@@ -1,17 +1,18 @@
 """The complete search: does one component of the roadmap cover every cell?
 
-In this order, because each step is cheap where the next one is dear:
+In this order, because each step is much cheaper than the next:
 
 1. Seed a pivot cell in the middle, and spread each seed at once into the cells that its component
    does not cover yet. Most feasible cases end here.
-2. Rule on every cell that nothing has reached: branch and bound either proves that no
-   configuration covers it, or finds one (which becomes a seed).
-3. Rounds: seed cells that the best component misses; stir the fibres at the border of the largest
-   components, where a configuration may hide that reaches further; stir where two of them meet.
-   The search is exhausted when some rounds in a row have gained nothing.
+2. Branch and bound over every cell that no component has reached: it either proves that no
+   configuration covers the cell, or finds one (which becomes a seed).
+3. Rounds: seed cells that the best component misses; explore self-motions at the border of the
+   largest components, to find configurations that reach further; bridge two components, and explore
+   self-motions over cells that both cover. The search is exhausted when some rounds in a row have
+   gained nothing.
 
-The verdict does not lean on the order or on luck where a witness or a proof is at hand; where
-neither is, it says "exhausted", and what was tried.
+A verdict with a witness or a proof does not depend on the order or on chance; without either the
+verdict is "exhausted", and its message says what was tried.
 """
 
 from __future__ import annotations
@@ -27,22 +28,22 @@ from feasibility.roadmap.self_motion import margin_shares
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
 DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
-SETTLED_ROUNDS = 12  # the same once a proof has settled the verdict: only more cells are at stake
+SETTLED_ROUNDS = 12  # the same once a proof decides the verdict, and only more cells can be gained
 MOST_ROUNDS = 200
 SEEDS = 6  # guesses at a missed cell, each round
-FIRST_BOXES = 1000  # boxes for each cell that nothing has reached
+FIRST_BOXES = 1000  # boxes for each cell that no component has reached
 MORE_BOXES = 20_000  # boxes once Newton has failed there too
-DEEP_BOXES = 2_000_000  # boxes for the few cells that are looked at until one is proved
+DEEP_BOXES = 2_000_000  # boxes for the few cells that are examined until one is proved
 DEEP_CELLS = 3
-MOST_RULED = 500  # cells ruled on in a row without reaching any; on a fine grid the rest are alike
+MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid the rest are alike
 NEWTON_STARTS = 25
 
 
 def explore(exploration: Exploration) -> None:
-    """Run the search to its end; the explorer holds the result.
+    """Run the search to its end; the exploration holds the result.
 
     Raises:
-        OutOfTime: the deadline passed; what was found until then stands.
+        OutOfTime: the deadline passed; the exploration holds what was found until then.
     """
     if len(exploration.cells) == 0 or _pivot(exploration):
         return
@@ -55,10 +56,10 @@ def _pivot(exploration: Exploration) -> bool:
     pivot = exploration.cells.middle
     exploration.tick("looking for configurations")
     guesses = exploration.guesses(PIVOT_SEEDS)
-    room = margin_shares(exploration.arrays, exploration.work, pivot, guesses)
-    # The one with most room first: it is the least likely to get stuck.
-    for k in np.argsort(-room, kind="stable"):
-        if room[k] >= 0.0:
+    margins = margin_shares(exploration.arrays, exploration.work, pivot, guesses)
+    # The one with the largest margin first: it is the least likely to get stuck.
+    for k in np.argsort(-margins, kind="stable"):
+        if margins[k] >= 0.0:
             exploration.add_seeds(pivot, guesses[k : k + 1])
         if exploration.complete:
             return True
@@ -66,7 +67,7 @@ def _pivot(exploration: Exploration) -> bool:
 
 
 def _unreached(exploration: Exploration) -> None:
-    """Step 2: a ruling on every cell that nothing has reached."""
+    """Step 2: a ruling on every cell that no component has reached."""
     distance = exploration.robot.distance_from_base(exploration.arrays.points)
     beyond = distance > exploration.robot.reach + exploration.arrays.tolerance
     for cell in np.flatnonzero(beyond).tolist():
@@ -76,7 +77,7 @@ def _unreached(exploration: Exploration) -> None:
     for cell in evenly(np.flatnonzero(~exploration.reached & ~beyond)).tolist():
         if exploration.reached[cell]:
             fruitless = 0
-            continue  # reached from a cell ruled on before it
+            continue  # reached from a cell examined before it
         fruitless += 1
         if fruitless > MOST_RULED:
             break
@@ -91,7 +92,7 @@ def _unreached(exploration: Exploration) -> None:
             exploration.rule(cell, boxes, MORE_BOXES)
     if Ruling.PROVED in exploration.rulings.values():
         return
-    # One proof is enough for the verdict: look deeper at the furthest of what is left.
+    # One proof is enough for the verdict: examine the furthest of the remaining cells deeper.
     left = [
         c
         for c in open_boxes
@@ -103,29 +104,29 @@ def _unreached(exploration: Exploration) -> None:
 
 
 def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The same cells in an order whose every beginning is spread over all of them."""
+    """The same cells in an order of which every first part is spread over all of them."""
     golden = 0.5 * (np.sqrt(5.0) - 1.0)
     return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]
 
 
 def _rounds(exploration: Exploration) -> None:
-    """Step 3: rounds of seeding and stirring, until some in a row have gained nothing."""
+    """Step 3: rounds of seeding and exploring, until some in a row have gained nothing."""
     dry = 0
     enough = SETTLED_ROUNDS if Ruling.PROVED in exploration.rulings.values() else DRY_ROUNDS
     for _ in range(MOST_ROUNDS):
         roots = exploration.roots()
         if not roots or exploration.covered[exploration.reached].all():
-            return  # nothing is missed that anything reaches
-        before = _standing(exploration)
+            return  # the best component covers every cell that any component covers
+        before = _largest_sizes(exploration)
         _round(exploration, roots[:TOP])
         exploration.rounds += 1
-        dry = dry + 1 if _standing(exploration) == before else 0
+        dry = dry + 1 if _largest_sizes(exploration) == before else 0
         if exploration.complete or dry >= enough:
             return
 
 
-def _standing(exploration: Exploration) -> tuple[int, ...]:
-    """What a round must change to have gained something."""
+def _largest_sizes(exploration: Exploration) -> tuple[int, ...]:
+    """Sizes of the largest components; a round that changes none has gained nothing."""
     roots = exploration.roots()[:TOP]
     return tuple(int(exploration.roadmap.size[r]) for r in roots)
 
@@ -140,21 +141,21 @@ def _round(exploration: Exploration, top: list[int]) -> None:
 
 def improve(exploration: Exploration, components: list[int]) -> None:
     """Explore self-motions at the borders of some components, and bridge each two of them."""
-    rng, top = exploration.rng, components
-    for component in top:
+    rng = exploration.rng
+    for component in components:
         if exploration.complete:
             return
-        exploration.tick("stirring the borders of components")
+        exploration.tick("exploring self-motions at borders")
         border = exploration.border(component)
         if len(border):
             exploration.explore_self_motions(int(rng.choice(border)))
-    for a in range(len(top)):
+    for a in range(len(components)):
         for b in range(a):
-            one, other = (int(root_of(exploration.roadmap, top[k])) for k in (a, b))
-            # Every pair every round would cost too much where there are many.
-            if one == other or (len(top) > 3 and rng.random() > 0.3):
+            one, other = (int(root_of(exploration.roadmap, components[k])) for k in (a, b))
+            # Every pair in every round would cost too much where there are many.
+            if one == other or (len(components) > 3 and rng.random() > 0.3):
                 continue
-            exploration.tick("joining components where they meet")
+            exploration.tick("bridging components")
             exploration.bridge(one, other)
             shared = np.flatnonzero(exploration.covers(one) & exploration.covers(other))
             if exploration.complete:
@@ -164,7 +165,7 @@ def improve(exploration: Exploration, components: list[int]) -> None:
 
 
 def close(exploration: Exploration) -> None:
-    """Try to join every neighbouring pair of cells of the best component (graph G's edges).
+    """Try to connect every neighbouring pair of cells of the best component (graph G's edges).
 
     Raises:
         OutOfTime: the deadline passed.

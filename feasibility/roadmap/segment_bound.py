@@ -12,16 +12,20 @@ s_j = |z_j x a| in place of r_j bounds |a''| <= Da.
 
 A vector function whose second derivative is at most M stays within s (1 - s) M / 2 of its chord, so
 its norm is at most (1 - s) c0 + s c1 + s (1 - s) M / 2: see `peak`. Meanwhile the target moves
-along its course, a piecewise cubic with |T''| <= Tp and |b''| <= Tb (`work.derivative_bound`, zero where it
-stands still). So, with p - T and a - b as the vector functions,
+along its curve, a piecewise cubic with |T''| <= Tp and |b''| <= Tb (`work.derivative_bound`, zero
+where it is at rest). So, with p - T and a - b as the vector functions,
 
     |p - T|(s)  <= peak of both ends with M = D + Tp
     |a - b|(s)  <= peak of both ends with M = Da + Tb
 
-and |a - b| = 2 sin(angle / 2) compares with the cone exactly. The cone is to hold at the tool
-point's own foot, where the normal differs from the target's by at most kappa |p - T|, kappa the
-turning of the normal along the target surface: so M = Da + Tb + kappa (D + Tp). (What this adds at
-the ends is in `Work.room`.) Limits are convex: the ends decide.
+and |a - b| = 2 sin(angle / 2) compares with the cone chord 2 sin(alpha / 2) exactly. The cone is to
+hold at the tool point's closest point on the surface, where the normal differs from the target's by
+at most kappa |p - T|, kappa the largest curvature of the target surface:
+
+    |a - n|(s)  <= peak of both ends with M = Da + Tb + kappa (D + Tp)
+
+(`Work.allowance` is already less by what this adds at the ends.) Limits are convex: the ends
+decide.
 """
 
 from __future__ import annotations
@@ -78,28 +82,25 @@ def peak(a, b, most):  # type: ignore[no-untyped-def]
 
 @kernel
 def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
-    """Do point and cone hold on the whole straight segment from q0 (slot 0) to q1 (slot 1)?
+    """Do point and cone hold everywhere on the straight segment from q0 (slot 0) to q1 (slot 1)?
 
-    Slot 0 holds the errors against the target where it comes from, slot 1 against where it goes.
+    Slot 0 holds the errors against the target at the start of the segment, slot 1 at its end.
 
-    Returns the position bound over what motions keep to of the tolerance, and the cone bound over
-    what they keep to of the rim: both must be at most 1. NaN compares false, so it never
-    certifies.
+    Returns the position bound over the allowance of the tolerance, and the cone bound over that of
+    the cone chord: both must be at most 1. NaN compares false, so it never certifies.
     """
     total, total_axis = spread(arrays, work, q0, q1)
-    # The replay takes the nearest places of the course, up to twice the errors from those aimed at;
-    # where the target sets out from rest, s goes by the root of the way.
+    # The replay matches the ends to the curve's closest points, up to twice the errors from those
+    # aimed at; where the target starts from rest, s grows with the root of that distance.
     longer = 1.0
     for slot in range(2):
         error = work.error[slot, 0]
         speed = max(work.derivative_bound[3 + slot], np.sqrt(error * work.derivative_bound[0]))
         if speed > 0.0:
             longer += 2.0 * error / speed
-    way, turn = (
-        longer * longer * work.derivative_bound[0],
-        longer * longer * work.derivative_bound[1],
-    )
-    position = peak(work.error[0, 0], work.error[1, 0], total + way)
-    lateral_curvature = work.derivative_bound[2] * (total + way)
-    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + turn + lateral_curvature)
-    return position / work.room[0], cone / work.room[1]
+    target = longer * longer * work.derivative_bound[0]
+    approach = longer * longer * work.derivative_bound[1]
+    position = peak(work.error[0, 0], work.error[1, 0], total + target)
+    normal = work.derivative_bound[2] * (total + target)
+    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + approach + normal)
+    return position / work.allowance[0], cone / work.allowance[1]

@@ -1,8 +1,8 @@
-"""The fibre over one cell: the configurations that work there, and motions among them.
+"""Self-motions over one cell: motions on the manifold of the configurations that are valid there.
 
-Over one target the tool point stands still, the axis stays inside the cone, and what is left free
-(roll, tilt, redundancy) moves. A motion that `connect` returns is certified as it is made, see
-`feasibility.segment`.
+The tool point stays at one target, the axis stays inside the cone, and the free directions (roll,
+tilt, redundancy) move. A motion that `connect` returns is certified as it is made, see
+`feasibility.roadmap.segment_bound`. (Steps 3, 4, 7 and 13 of the complete search.)
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from feasibility.compiled import kernel
 from feasibility.roadmap.arrays import (
     HERE,
     NEXT,
+    OVERFLOW,
     SearchArrays,
     Work,
     accept,
@@ -24,7 +25,7 @@ from feasibility.roadmap.arrays import (
 from feasibility.roadmap.projection import PROJECTION_STEPS, linearise, project, project_onto_cell
 from feasibility.roadmap.segment_bound import segment_holds
 
-CONE_SLACK = 1e-3  # [1] share of the cone kept free by a full step; it shrinks with the step
+CONE_SLACK = 1e-3  # [1] share of the cone chord kept free by a full step; less by a shorter one
 NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
 SETTLE_STEPS = np.int64(40)  # of `settle`
 
@@ -33,8 +34,8 @@ SETTLE_STEPS = np.int64(40)  # of `settle`
 def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
     """How much a radian (or metre) of each joint moves the tool: lever over scale, plus sine.
 
-    Joint differences weighted so measure what a motion does to the tool: the free roll of a wrist,
-    or the swing of two joints about one common axis at a singularity, costs next to nothing.
+    Joint differences weighted in this way measure how much a motion moves the tool: the free roll
+    of a wrist, or opposite turns of two joints about a common axis at a singularity, weigh little.
     """
     for j in range(out.shape[0]):
         if arrays.chain.prismatic[j]:
@@ -52,7 +53,7 @@ def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
-    """Set `work.secondary_step` to lead away from limits and from the rim of the cone (slot 1's rows)."""
+    """Set `work.secondary_step` away from limits and the cone's boundary (by slot 1's cone row)."""
     n = q.shape[0]
     for j in range(n):
         half = 0.5 * (arrays.upper[j] - arrays.lower[j])
@@ -75,14 +76,14 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
 def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
     """Self-motion over one target from q (in place) towards the configuration `goal`.
 
-    Each step heads for the goal and is put back onto the fibre. It gives up when the way lags:
-    a step that does not bring the goal nearer by a good part of its length means that the fibre
-    bends away, and other waypoints (other nodes) have to be tried. What was gone until then
-    stands, and is certified.
+    Each step heads for the goal and is projected back onto the manifold. The motion ends early when
+    it falls behind: a step that brings the goal nearer by only a small part of its length means
+    that the manifold bends away, and other nodes have to be tried. The motion up to there is kept,
+    and is certified.
 
     Returns:
-        (rows, reached): number of waypoints written, -2 when `waypoints` is full; and whether the last
-        one is `goal`.
+        (rows, reached): number of waypoints written, OVERFLOW when `waypoints` is full; and whether
+        the last one is `goal`.
     """
     n = q.shape[0]
     look_at(arrays, work, target, approach)
@@ -101,7 +102,7 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
             position, cone = segment_holds(arrays, work, q, work.trial)
             if position <= 1.0 and cone <= 1.0:
                 if first + written >= waypoints.shape[0]:
-                    return -2, False
+                    return OVERFLOW, False
                 for j in range(n):
                     q[j] = goal[j]
                     waypoints[first + written, j] = q[j]
@@ -127,7 +128,7 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
             if left - remaining < 0.05 * size or allowed < remaining:
                 return written, False
             if first + written >= waypoints.shape[0]:
-                return -2, False
+                return OVERFLOW, False
             for j in range(n):
                 q[j] = work.trial[j]
                 waypoints[first + written, j] = q[j]
@@ -144,7 +145,7 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
 
 @kernel
 def settle(arrays, work, target, approach, q, most):  # type: ignore[no-untyped-def]
-    """Self-motion over one target that makes room: away from limits and the rim (q in place)."""
+    """Self-motion over one target (q in place) away from the limits and the cone's boundary."""
     n = q.shape[0]
     look_at(arrays, work, target, approach)
     place(arrays, work, HERE, q)
@@ -176,22 +177,23 @@ def settle(arrays, work, target, approach, q, most):  # type: ignore[no-untyped-
 def margin_shares(
     arrays: SearchArrays, work: Work, cell: int, guesses: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Put guesses (in place) onto the fibre over a cell, and say how much room each has.
+    """Project guesses (in place) onto the constraints over a cell, and measure their margins.
 
     Returns:
         (k,) the share of its half range, or of the cone, that the tightest constraint leaves free:
-        1 in the middle of everything, 0 at a limit or at the rim, -1 where Newton failed.
+        1 in the middle of all ranges, 0 at a limit or at the boundary of the cone, -1 where the
+        projection failed.
     """
     half = 0.5 * (arrays.upper - arrays.lower)
     ranged = (half > 0.0) & (half < np.inf)
-    room = np.full(len(guesses), -1.0)
+    margins = np.full(len(guesses), -1.0)
     for g, q in enumerate(guesses):
         if not project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
         settle(arrays, work, arrays.points[cell], arrays.approaches[cell], q, SETTLE_STEPS)
         off_middle = np.abs((q - arrays.lower)[ranged] / half[ranged] - 1.0)
-        room[g] = min(
+        margins[g] = min(
             max(0.0, 1.0 - work.error[0, 1] / arrays.cone_chord),
             (1.0 - off_middle).min(initial=np.inf),
         )
-    return room
+    return margins

@@ -1,12 +1,12 @@
 """One certified motion along the surface, from one cell's centre to its neighbour's.
 
-The way between the centres is a course (`surfaces.curves`), so that nothing here knows what kind
-of surface it is.
+The target moves along the curve between the centres (`surfaces.cell_curves`), so that nothing here
+depends on the kind of surface.
 
-The target moves, the arm follows: a predictor step, Newton on the tool point, and the free
-directions used to stay away from limits and from the rim of the cone, or to head for a goal
-configuration. A step is kept only when `feasibility.segment` shows that the straight joint segment
-obeys every constraint between its ends too; otherwise it is shortened.
+The arm follows: a predictor step, Newton on the tool point, and the free directions used to stay
+away from limits and from the boundary of the cone, or to head for a goal configuration. A step is
+kept only when `feasibility.roadmap.segment_bound` shows that the straight joint segment obeys every
+constraint between its ends too; otherwise it is shortened. (Step 6 of the complete search.)
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from feasibility.roadmap.arrays import (
     HERE,
     LONG,
     NEXT,
+    OVERFLOW,
     SINGULAR,
+    STOPPED,
     accept,
     aim,
     bounds_between,
@@ -31,14 +33,14 @@ from feasibility.roadmap.projection import linearise, project
 from feasibility.roadmap.segment_bound import segment_holds
 from feasibility.roadmap.self_motion import CONE_SLACK, margin_objective
 
-SMALLEST_STEP = 2.0**-7  # [1] share of the way between two centres below which a track gives up
+SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step ends the motion
 MOST_STEPS = 400  # accepted steps of one motion
 NEWTON_STEPS = np.int64(8)  # of one step
 
 
 @kernel
 def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
-    """How far apart two places of a course are, over the problem's scale."""
+    """Distance between the targets of a curve at two parameters, over `arrays.scale`."""
     aim(arrays, work, curve, begin)
     x, y, z = work.target[0, 0], work.target[0, 1], work.target[0, 2]
     aim(arrays, work, curve, end)
@@ -48,38 +50,39 @@ def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
 
 @kernel
 def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):  # type: ignore[no-untyped-def]
-    """Follow a course from `begin` to `end`, from q (in place).
+    """Follow a curve from `begin` to `end`, from q (in place).
 
     Args:
-        problem, work: the `Problem`, and the `Work` of this thread.
-        course: which course.
-        begin, end: places on it in [0, 1]: where q is now, and the one to reach, before or behind.
+        arrays, work: the `SearchArrays`, and the `Work` of this thread.
+        curve: which curve.
+        begin, end: parameters in [0, 1]: where q is now, and where to go, in either direction.
         q: (n,) configuration, moved to the end of the motion.
         goal, has_goal: (n,) configuration to head for, and whether there is one.
-        ways, first: (m, n) receives the waypoints after the start, from row `first` on.
+        waypoints, first: (m, n) receives the waypoints after the start, from row `first` on.
 
     Returns:
-        Number of waypoints written, or -1 when the motion stopped short (`work.stop_reason` says why)
-        and -2 when `waypoints` is full.
+        Number of waypoints written, STOPPED when the motion stopped short (`work.stop_reason` holds
+        the reason), or OVERFLOW when `waypoints` is full.
     """
     n = q.shape[0]
     size = span_of(arrays, work, curve, begin, end)
     aim(arrays, work, curve, begin)
     place(arrays, work, HERE, q)
     bounds_between(arrays, work, curve, begin, begin)
-    if not (work.error[0, 0] <= work.room[0] and work.error[0, 1] <= work.room[1]):
-        work.stop_reason[0] = SINGULAR if work.room[0] > 0.0 and work.room[1] > 0.0 else FOLD
-        return -1
+    allowance = work.allowance
+    if not (work.error[0, 0] <= allowance[0] and work.error[0, 1] <= allowance[1]):
+        work.stop_reason[0] = SINGULAR if allowance[0] > 0.0 and allowance[1] > 0.0 else FOLD
+        return STOPPED
     t, dt, written = 0.0, 1.0, 0
     for _ in range(MOST_STEPS):
         dt = min(dt, 1.0 - t)
         if 1.0 - t - dt < 0.1 * dt:
-            dt = 1.0 - t  # no sliver at the end
+            dt = 1.0 - t  # no tiny step at the end
         here, there = begin + t * (end - begin), begin + (t + dt) * (end - begin)
         bounds_between(arrays, work, curve, here, there)
-        if not (work.derivative_bound[0] < np.inf and work.room[0] > 0.0 and work.room[1] > 0.0):
+        if not (work.derivative_bound[0] < np.inf and allowance[0] > 0.0 and allowance[1] > 0.0):
             work.stop_reason[0] = FOLD
-            return -1
+            return STOPPED
         aim(arrays, work, curve, there)
         copy_slot(work)
         if has_goal:
@@ -91,11 +94,11 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
         put(work.trial, q)
         position, cone = np.inf, np.inf
         if project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
-            # Slot 0's errors are against the old target; they were stored when it was accepted.
+            # Slot 0's errors are against the previous target: stored when that step was accepted.
             position, cone = segment_holds(arrays, work, q, work.trial)
         if position <= 1.0 and cone <= 1.0:
             if first + written >= waypoints.shape[0]:
-                return -2
+                return OVERFLOW
             for j in range(n):
                 q[j] = work.trial[j]
                 waypoints[first + written, j] = q[j]
@@ -114,6 +117,6 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
                     work.stop_reason[0] = CONE
             dt *= factor
             if dt < SMALLEST_STEP:
-                return -1
+                return STOPPED
     work.stop_reason[0] = LONG
-    return -1
+    return STOPPED

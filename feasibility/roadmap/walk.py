@@ -1,4 +1,8 @@
-"""Walks: edges of one component strung together into one continuous motion over its cells."""
+"""Covering walks: edges of one component in a row, one continuous motion over its cells.
+
+The walk goes to the nearest cell that it has not visited, and among equally near ones by
+Warnsdorff's rule. (Step 8 of the complete search: the witness repeats stored edges.)
+"""
 
 from __future__ import annotations
 
@@ -57,7 +61,7 @@ def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
 
 @kernel
 def _filled(size, value):  # type: ignore[no-untyped-def]
-    """(size,) whole numbers, all the same."""
+    """(size,) integers, all the same."""
     result = np.empty(size, dtype=np.int64)
     for k in range(size):
         result[k] = value
@@ -80,7 +84,7 @@ def _appended(route, length, path):  # type: ignore[no-untyped-def]
 
 @kernel
 def _open_ends(roadmap, links, wanted, node):  # type: ignore[no-untyped-def]
-    """How many steps lead from a node to wanted cells."""
+    """Number of steps from a node to wanted cells."""
     count = 0
     for k in range(links.indptr[node], links.indptr[node + 1]):
         if wanted[roadmap.cell[links.steps[k, 0]]]:
@@ -92,8 +96,8 @@ def _open_ends(roadmap, links, wanted, node):  # type: ignore[no-untyped-def]
 def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ignore[no-untyped-def]
     """Signed edges of a shortest path to a node over a wanted cell, and that node.
 
-    Of several as near, the one with the fewest steps to wanted cells is taken (Warnsdorff's rule,
-    so that corners are not left behind).
+    Among equally near nodes the one with the fewest steps to wanted cells is taken (Warnsdorff's
+    rule, so that corners are not left behind).
 
     Args:
         roadmap: the `Roadmap`.
@@ -101,9 +105,9 @@ def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ign
         wanted: (N,) cells.
         here: where the path begins.
         turn: another number for each search, from 1 on.
-        search: (nodes, 4) for each node the last search that met it, zero at first, the step by
-            which it was met and the node before it; and the queue.
-        first: whether the first one is taken, more than one edge away.
+        search: (nodes, 4) for each node the last search that visited it, zero at first, the step
+            that led to it and the node before it; and the queue.
+        first: take the first node found that is more than one edge away, without the rule.
 
     Returns:
         No edges and -1 where there is no such node.
@@ -114,7 +118,7 @@ def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ign
     queue[0] = here
     stamp[here] = turn
     while head < tail:
-        if head == ring:  # all nodes up to the same distance have been met
+        if head == ring:  # all nodes up to this distance have been visited
             if found >= 0:
                 break
             ring = tail
@@ -147,7 +151,7 @@ def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ign
 def _route(roadmap, links, wanted, start, first):  # type: ignore[no-untyped-def]
     """Signed edges of a walk from a node through the wanted cells, always to the nearest one.
 
-    `wanted` (N,) is cleared where the walk passes; what no motion leads to stays.
+    `wanted` (N,) is cleared where the walk passes; cells that no motion leads to stay set.
     """
     nodes = links.inside.shape[0]
     remaining = 0
@@ -162,7 +166,7 @@ def _route(roadmap, links, wanted, start, first):  # type: ignore[no-untyped-def
             remaining -= 1
         if remaining == 0:
             break
-        # The cells left are another number each time.
+        # The number of cells left is different each time.
         path, here = _to_nearest(roadmap, links, wanted, here, remaining, search, first)
         route = _appended(route, length, path)
         length += path.shape[0]
@@ -174,7 +178,7 @@ def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
     """Waypoints and cell marks of a route."""
     total = 1
     for k in range(route.shape[0]):
-        total += roadmap.way[abs(route[k]) - 1, 1]
+        total += roadmap.edge_rows[abs(route[k]) - 1, 1]
     n = roadmap.q.shape[1]
     q = np.empty((total, n))
     cell = _filled(total, NONE)
@@ -183,7 +187,7 @@ def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
     row = 1
     for k in range(route.shape[0]):
         e = abs(route[k]) - 1
-        first, rows = roadmap.way[e, 0], roadmap.way[e, 1]
+        first, rows = roadmap.edge_rows[e, 0], roadmap.edge_rows[e, 1]
         if route[k] > 0:
             for i in range(rows):
                 put(q[row + i], roadmap.waypoints[first + i])
@@ -214,14 +218,14 @@ def covering_walk(roadmap: Roadmap, component: int) -> Walk:
         The walk; consecutive waypoints lie on certified segments of the roadmap's edges.
     """
     links = links_of(roadmap, component)
-    # From a node with the fewest steps, because corners are best begun with.
+    # Start at a node with the fewest steps: corners are best visited first.
     start = int(np.argmin(np.where(links.inside, np.diff(links.indptr), len(links.steps) + 1)))
     wanted = roadmap.cover[component].astype(bool)
     return Walk(*_string(roadmap, start, _route(roadmap, links, wanted, start, True)))
 
 
 def patch_walk(roadmap: Roadmap, links: Links, wanted: NDArray[np.bool_], start: int) -> Walk:
-    """One continuous motion through the wanted cells: the motion that paints one patch.
+    """One continuous motion through the wanted cells: the motion that covers one patch.
 
     It may lead over any cell of the component; only the wanted ones have to be visited.
 
@@ -246,6 +250,6 @@ def patch_walk(roadmap: Roadmap, links: Links, wanted: NDArray[np.bool_], start:
 
 def edge_motion(roadmap: Roadmap, edge: int) -> NDArray[np.float64]:
     """(k, n) waypoints of one edge, from its first node to its second, both included."""
-    first, rows = roadmap.way[edge]
+    first, rows = roadmap.edge_rows[edge]
     start = roadmap.q[roadmap.ends[edge, 0]]
     return np.vstack([start[None], roadmap.waypoints[first : first + rows]])

@@ -18,29 +18,29 @@ class SharedLock(Protocol):
         """Give it back."""
 
 
-def warm_up_in_turn(gate: SharedLock, say: Callable[[], None]) -> None:
+def warm_up_in_turn(lock: SharedLock, say: Callable[[], None]) -> None:
     """`warm_up` in one of several new processes: one of them compiles, the others load the result.
 
     Args:
-        gate: what they share.
+        lock: shared by these processes.
         say: called in the process that compiles, if that takes long.
     """
-    first = gate.acquire(False)
+    first = lock.acquire(False)
     if not first:
-        gate.acquire()  # the first one is through
-        gate.release()
+        lock.acquire()  # waits until the first process is done
+        lock.release()
     try:
         with compiling_notice(say=say):
             warm_up()
     finally:
         if first:
-            gate.release()
+            lock.release()
 
 
 def warm_up() -> None:
     """Load (or compile) the kernels of the complete search, by a search over two small cells.
 
-    What it does is thrown away; afterwards timings tell of the search, not of the compiler.
+    Its result is discarded; timings afterwards are those of the search, without the compiler.
     """
     global _warm
     if _warm:

@@ -37,10 +37,10 @@ class LimitedExploration(Exploration):
         if self.work.counts[0] > self.most:
             raise OutOfTime
 
-    def before_next_look(self) -> int:
-        """No more than is left; see `Exploration.before_next_look`."""
+    def budget(self) -> int:
+        """No more than is left; see `Exploration.budget`."""
         left = self.most - float(self.work.counts[0])
-        return int(min(super().before_next_look(), max(left, LEAST)))
+        return int(min(super().budget(), max(left, LEAST)))
 
     def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
         """Add seeds, unless the limit is reached; see `Exploration.add_seeds`."""

@@ -173,14 +173,14 @@ def target_near(surface: Surface, standoff: float, point: Floats) -> tuple[Float
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Deviation:
-    """How far a motion strays from the target surface and from the approach direction."""
+    """How far a motion deviates from the target surface and from the approach direction."""
 
     distance: Floats
     """(k,) m."""
     chord: Floats
     """(k,) |a - b|."""
     on_patch: NDArray[np.bool_]
-    """(k,) whether the foot lies on the patch."""
+    """(k,) whether the closest point lies on the patch."""
 
 
 def deviation(surface: Surface, standoff: float, points: Floats, axes: Floats) -> Deviation:

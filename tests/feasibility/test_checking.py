@@ -402,7 +402,7 @@ def test_a_motion_refused_by_a_hair_is_looked_for_again(monkeypatch):
     monkeypatch.setattr(problem, "NARROWER", 1.0)
     again = checking.check(robot, cells, task)
     assert again.answer == "undecided"
-    assert "refuses it: the tool point strays" in again.message
+    assert "refuses it: the tool point deviates" in again.message
     assert again.witness is None
 
 

@@ -1,7 +1,7 @@
 """Motions over sharp edges and tight bends, looked at by the exact distance from the triangles.
 
-Over a convex edge the tool goes round in an arc of the standoff. The nearest place of a convex body
-tells the true approach direction too: from the tool point to its foot.
+Over a convex edge the tool goes round in an arc of the standoff. The closest point of a convex body
+gives the true approach direction too: from the tool point to that point.
 """
 
 from __future__ import annotations
@@ -49,14 +49,14 @@ TASKS = {
 
 
 def nearest(triangles, points):
-    """Nearest places (k, 3) on triangles (m, 3, 3), trying each."""
-    best, places = np.full(len(points), np.inf), np.empty_like(points)
+    """Closest points (k, 3) on triangles (m, 3, 3), trying each."""
+    best, closest = np.full(len(points), np.inf), np.empty_like(points)
     for corners in triangles:
         found = closest_point(np.repeat(corners[None], len(points), axis=0), points)
         away = np.linalg.norm(found - points, axis=1)
         nearer = away < best
-        best[nearer], places[nearer] = away[nearer], found[nearer]
-    return places
+        best[nearer], closest[nearer] = away[nearer], found[nearer]
+    return closest
 
 
 @pytest.mark.parametrize(
@@ -83,11 +83,11 @@ def assert_held(verdict, part, position, lean):
         [(walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share).reshape(-1, 6), walk.q[-1:]]
     )
     tips, axes = tools(verdict.robot, q)
-    closest_point = nearest(part.vertices[part.faces] + position, tips)
-    away = np.linalg.norm(tips - closest_point, axis=1)
+    closest = nearest(part.vertices[part.faces] + position, tips)
+    away = np.linalg.norm(tips - closest, axis=1)
     tolerance = 1e-3 if task.tolerance is None else task.tolerance
     assert np.abs(away - task.standoff).max() <= tolerance
-    cosine = ((closest_point - tips) * axes).sum(axis=1) / away
+    cosine = ((closest - tips) * axes).sum(axis=1) / away
     assert np.arccos(np.clip(cosine, -1, 1)).max() <= task.cone + lean
     assert set(walk.cell[walk.cell >= 0].tolist()) == set(range(len(verdict.cells)))
 
@@ -113,7 +113,7 @@ def test_a_motion_over_a_rounded_edge_far_smaller_than_the_standoff(
 
 
 @pytest.mark.parametrize("standoff", [0.01, 0.05])
-def test_a_hollow_edge_folds(standoff):
+def test_a_concave_edge_folds(standoff):
     """In a trough the tool would have to be in two places: at its distance from either side."""
     surface = mesh(roof(-60), position=(0.5, -0.15, 0.3))
     verdict = check(load_robot("ur5"), surface.cells(36), Task(standoff=standoff, cone_deg=60))
@@ -121,7 +121,7 @@ def test_a_hollow_edge_folds(standoff):
     assert "concave" in verdict.message or "nearer than the standoff" in verdict.message
 
 
-def test_a_hollow_edge_that_is_touched_is_no_hindrance():
+def test_a_concave_edge_that_is_touched_is_no_hindrance():
     """Without a standoff the tool point stays on the surface, and the axis turns on the edge."""
     surface = mesh(roof(-60), position=(0.5, -0.15, 0.3))
     verdict = check(load_robot("ur5"), surface.cells(36), Task(standoff=0.0, cone_deg=60))

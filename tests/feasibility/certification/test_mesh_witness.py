@@ -1,8 +1,8 @@
 """Witnesses over meshes, looked at again between their waypoints by a reader of its own.
 
-Pinocchio places the tool; the nearest places are those on the triangles as they were given, before
-any repair, split or cut, found by trying every triangle that can be nearest. Nothing of `surfaces`
-is asked, and nothing of the courses that the search and its replay follow.
+Pinocchio places the tool; the closest points are those on the triangles as they were given, before
+any repair, split or cut, found by trying every triangle that can be nearest. `surfaces` is not
+used, nor the curves that the search and its replay follow.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from surfaces import cylinder, rotation_from_rpy
 from surfaces.meshes import TriangleMesh, mesh
 
 PER_SEGMENT = 10
-SETTLED = 1e-7  # m, how far the last turn may move a foot
-TURNS = 60  # of the search for a foot
+SETTLED = 1e-7  # m, how far the last iteration may move a closest point
+ITERATIONS = 60  # of the search for a closest point
 
 
-class Places(NamedTuple):
+class ClosestPoints(NamedTuple):
     points: np.ndarray
     """(k, 3) m."""
     normals: np.ndarray
@@ -33,7 +33,7 @@ class Places(NamedTuple):
 
 
 class Reader:
-    """Nearest places on triangles, and normals weighted by the angles at each vertex."""
+    """Closest points on triangles, and normals weighted by the angles at each vertex."""
 
     def __init__(self, vertices, faces):
         self.corners = vertices[faces]
@@ -55,11 +55,11 @@ class Reader:
         self.vertices = cKDTree(vertices[np.unique(faces)])
 
     def nearest(self, points):
-        """The nearest of all places to `points` (k, 3)."""
+        """The closest of all points to `points` (k, 3)."""
         most = self.vertices.query(points)[0] + 1e-12
         rows, faces = [], []
         for some, tree, radius in self.sizes:
-            # A triangle with its middle farther off than this cannot hold the nearest place.
+            # A triangle with its middle farther off than this cannot hold the closest point.
             found = tree.query_ball_point(points, most + radius)
             rows.append(np.repeat(np.arange(len(points)), [len(f) for f in found]))
             faces.append(some[np.concatenate(found).astype(np.int64)])
@@ -68,26 +68,26 @@ class Reader:
         order = np.lexsort((away, row))
         first = order[np.searchsorted(row[order], np.arange(len(points)))]
         weights, face = weights[first], face[first]
-        return Places(
+        return ClosestPoints(
             np.einsum("kc,kci->ki", weights, self.corners[face]),
             _unit(np.einsum("kc,kci->ki", weights, self.normals[face])),
         )
 
     def closest_points(self, points, height):
-        """Where x + height n(x) comes nearest to `points`, by turns.
+        """Where x + height n(x) comes nearest to `points`, by iteration.
 
         The distance left over bounds that to the target surface from above, wherever this ends.
         """
-        closest_point = self.nearest(points)
+        closest = self.nearest(points)
         moving = np.arange(len(points))
-        for _ in range(TURNS):
-            again = self.nearest(points[moving] - height * closest_point.normals[moving])
-            step = np.linalg.norm(again.points - closest_point.points[moving], axis=1)
-            closest_point.points[moving], closest_point.normals[moving] = again
+        for _ in range(ITERATIONS):
+            again = self.nearest(points[moving] - height * closest.normals[moving])
+            step = np.linalg.norm(again.points - closest.points[moving], axis=1)
+            closest.points[moving], closest.normals[moving] = again
             moving = moving[step > SETTLED]
             if len(moving) == 0:
                 break
-        return closest_point
+        return closest
 
 
 def _unit(vectors):
@@ -95,7 +95,7 @@ def _unit(vectors):
 
 
 def _on_triangles(points, corners):
-    """Weights (k, 3) of the place of each triangle nearest to its point, and how far it is."""
+    """Weights (k, 3) of each triangle's closest point to its point, and their distance."""
     a, b, c = corners.swapaxes(0, 1)
     across = np.cross(b - a, c - a)
     square = np.einsum("ki,ki->k", across, across)
@@ -134,10 +134,10 @@ def assert_held(verdict, vertices, faces):
     tips, axes = tools(robot, q)
     tips, axes = (tips - surface.position) @ surface.rotation, axes @ surface.rotation
     sign = surface.side_sign
-    closest_point = Reader(vertices, faces).closest_points(tips, sign * task.standoff)
-    targets = closest_point.points + sign * task.standoff * closest_point.normals
+    closest = Reader(vertices, faces).closest_points(tips, sign * task.standoff)
+    targets = closest.points + sign * task.standoff * closest.normals
     assert np.linalg.norm(tips - targets, axis=1).max() <= tolerance
-    assert angles(axes, -sign * closest_point.normals).max() <= task.cone + 1e-6
+    assert angles(axes, -sign * closest.normals).max() <= task.cone + 1e-6
     marked = walk.cell >= 0
     assert set(walk.cell[marked].tolist()) == set(range(len(cells)))
     aims = task.targets(cells).points[walk.cell[marked]]
@@ -223,7 +223,7 @@ THIN = [
 
 @pytest.mark.parametrize("case", THIN)
 def test_the_cone_holds_along_a_thin_rod_where_the_tool_point_is(case):
-    """A rod bends across the way only; a tool point to the side of it meets another normal."""
+    """A rod curves across the motion only; a tool point to its side has another normal."""
     name, radius, length, rpy, position, side, standoff, cone = case
     rod = cylinder(radius, (-10, 10), (0.0, length), side=side, rpy_deg=rpy, position=position)
     verdict = check(load_robot(name), rod.cells(1, 3), Task(standoff=standoff, cone_deg=cone))
@@ -246,8 +246,8 @@ def thorny_plate():
     points = np.column_stack([x.ravel(), y.ravel()])
     tip, turns = np.array(THORN), np.arange(6) * np.pi / 3
     points = points[np.linalg.norm(points - tip, axis=1) > 2e-3]
-    closest_point = tip + 5e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
-    points = np.concatenate([points, closest_point, tip[None]])
+    base = tip + 5e-4 * np.column_stack([np.cos(turns), np.sin(turns)])
+    points = np.concatenate([points, base, tip[None]])
     faces = Delaunay(points).simplices.astype(np.int64)
     a, b, c = (points[faces[:, k]] for k in range(3))
     turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])

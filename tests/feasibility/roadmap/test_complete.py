@@ -108,13 +108,13 @@ def test_a_cap_with_its_pole(rows: int, columns: int) -> None:
 @pytest.mark.parametrize("high", [180, 210], ids=["open", "closed"])
 @pytest.mark.parametrize("arm", [PUMA, UR5], ids=["puma560", "ur5"])
 def test_coarse_rings_stay_on_their_patch(arm: Robot, high: float, columns: int) -> None:
-    """Between far centres the straight line leaves the ring, and so would its feet."""
+    """Between far centres the straight line leaves the ring; so would its closest points."""
     ring = sphere(0.7, (30, 60), (-150, high))
     verdict = check(arm.with_limits(FREE), ring.cells(3, columns), Task(0.02, 60))
     assert_feasible(verdict)
 
 
-def test_a_whole_sphere_outside_is_not_within_reach_but_its_near_side_is() -> None:
+def test_a_full_sphere_from_outside_is_reached_on_its_near_side() -> None:
     ball = sphere(0.15, (0, 180), (-180, 180), "outside", (0.55, 0.3, 0.3))
     verdict = check(PUMA, ball.cells(6, 8), Task(0.02, 60))
     assert verdict.answer is not Answer.UNDECIDED
@@ -197,7 +197,7 @@ def test_targets_at_the_wrist_singularity(q_deg: tuple[float, ...], cone_deg: fl
 
 
 def test_targets_at_full_stretch_are_reached_and_those_beyond_proved() -> None:
-    """The middle of a plate is as far as the arm reaches; its rim is further."""
+    """Targets at, beyond and short of the distance at which the arm is stretched out."""
     q = np.zeros((3, 6))
     q[:, 2] = -math.atan2(0.7, 0.1) + np.array([0.0, 0.05, -0.05])  # first: in one line
     points, _ = tools(PUMA, q)
@@ -242,7 +242,7 @@ def test_a_target_over_the_shoulder_singularity() -> None:
     ],
     ids=["sphere", "plane", "cylinder", "hyperboloid"],
 )
-def test_a_surface_wholly_out_of_reach_is_proved_so(patch: Surface) -> None:
+def test_a_surface_out_of_reach_is_proved_so(patch: Surface) -> None:
     for arm in (PUMA, UR5):
         verdict = check(arm, patch.cells(4, 5), Task(0.01, 45))
         assert (verdict.answer, verdict.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)

@@ -39,7 +39,7 @@ def roadmap_of(graph, cells, cell_of=None, rng=None):
     """
     rng = np.random.default_rng(0) if rng is None else rng
     robot = planar_arm(2)
-    problem = arrays_of(robot, plane((-1, 1), (-1, 1)).cells(1, 1), Task(0.0, 30))
+    arrays = arrays_of(robot, plane((-1, 1), (-1, 1)).cells(1, 1), Task(0.0, 30))
     work = work_for(2)
     roadmap = empty_roadmap(cells, 2)
     slot_of = {}
@@ -50,7 +50,7 @@ def roadmap_of(graph, cells, cell_of=None, rng=None):
     for x in range(len(graph)):
         roadmap = grown(roadmap)
         cell = x if cell_of is None else cell_of[x]
-        add_node(problem, work, roadmap, cell, rng.random(2), slot_of[x])
+        add_node(arrays, work, roadmap, cell, rng.random(2), slot_of[x])
     for x, y in graph.edges:
         roadmap = grown(roadmap)
         rows = int(rng.integers(1, 5))
@@ -148,8 +148,8 @@ def test_only_the_component_asked_for():
         assert sorted(order) == list(expected)
 
 
-def test_a_component_that_does_not_hang_together_is_no_walk():
-    """Nodes said to be one component without motions between them: nothing is made up."""
+def test_a_component_that_is_not_connected_gives_no_covering_walk():
+    """Nodes marked as one component without motions between them: no motion is invented."""
     graph = nx.disjoint_union(nx.path_graph(3), nx.path_graph(3))
     roadmap, _ = roadmap_of(graph, 6)
     roadmap.component[:6] = 0

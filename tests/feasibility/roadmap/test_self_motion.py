@@ -1,4 +1,4 @@
-"""Motions over one cell: certified all the way, and ending exactly where they say."""
+"""Self-motions over one cell: certified everywhere, and ending exactly at their goals."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
 from feasibility import Task, check
 from feasibility.certification import replay
 from feasibility.roadmap import Exploration, arrays_of, connect, margin_shares, work_for
+from feasibility.roadmap.arrays import OVERFLOW
 from feasibility.roadmap.self_motion import settle
 from feasibility.verdict import Walk
 from surfaces import plane
@@ -17,14 +18,14 @@ from surfaces import plane
 
 @pytest.fixture(params=QUESTIONS)
 def over_a_cell(request):
-    """Robot, cells, task, problem, work, a cell, configurations on its fibre, and their room."""
+    """Robot, cells, task, arrays, work, a cell, configurations over it, and their margins."""
     robot, cells, task = question(request.param)
-    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
+    arrays, work = arrays_of(robot, cells, task), work_for(robot.n)
     rng = np.random.default_rng(4)
     cell = len(cells) // 2
     guesses = rng.uniform(*finite_limits(robot), (60, robot.n))
-    room = margin_shares(problem, work, cell, guesses)
-    return robot, cells, task, problem, work, cell, guesses[room >= 0.0], room[room >= 0.0]
+    margins = margin_shares(arrays, work, cell, guesses)
+    return robot, cells, task, arrays, work, cell, guesses[margins >= 0.0], margins[margins >= 0.0]
 
 
 def refusal(robot, cells, task, q, cell):
@@ -34,9 +35,9 @@ def refusal(robot, cells, task, q, cell):
     return replay(robot, cells, task, Walk(q, marks), np.zeros(len(cells), dtype=bool)).refusal
 
 
-def test_room_is_what_the_tightest_constraint_leaves(over_a_cell):
-    """Configurations are on the fibre and inside the limits, and have the room that is stated."""
-    robot, cells, task, _, _, cell, found, room = over_a_cell
+def test_the_margin_is_what_the_tightest_constraint_leaves(over_a_cell):
+    """Configurations obey all constraints, and have the margins that are stated."""
+    robot, cells, task, _, _, cell, found, margins = over_a_cell
     assert len(found) > 8
     target = task.targets(cells)
     points, axes = tools(robot, found)
@@ -45,61 +46,69 @@ def test_room_is_what_the_tightest_constraint_leaves(over_a_cell):
     half = 0.5 * (robot.upper - robot.lower)
     free = np.minimum(found - robot.lower, robot.upper - found) / half
     expected = np.minimum(1.0 - chord / (2.0 * np.sin(task.cone / 2.0)), free.min(axis=1))
-    np.testing.assert_allclose(room, expected, atol=1e-9)
+    np.testing.assert_allclose(margins, expected, atol=1e-9)
     assert (expected >= -1e-12).all()
 
 
 def test_connect_ends_exactly_at_its_goal(over_a_cell):
-    """Between all pairs of ten configurations, and to places further along the same motion."""
-    robot, cells, task, problem, work, cell, found, _ = over_a_cell
-    ways = np.empty((200, robot.n))
-    joined, halves, met = 0, 0, 0
+    """Between all pairs of ten configurations, and to waypoints of the same motion."""
+    robot, cells, task, arrays, work, cell, found, _ = over_a_cell
+    waypoints = np.empty((200, robot.n))
+    joined, halves, repeated = 0, 0, 0
     for a in found[:10]:
         for b in found[:10]:
             q = a.copy()
             rows, reached = connect(
-                problem, work, problem.points[cell], problem.approaches[cell], q, b, ways, 3, 60
+                arrays, work, arrays.points[cell], arrays.approaches[cell], q, b, waypoints, 3, 60
             )
             assert rows >= 0
-            motion = np.vstack([a[None], ways[3 : 3 + rows]])
+            motion = np.vstack([a[None], waypoints[3 : 3 + rows]])
             assert (q == motion[-1]).all()
             assert reached == (rows > 0 and bool((motion[-1] == b).all()))
             assert not refusal(robot, cells, task, motion, cell)
             joined += reached
             if rows < 3 or reached:
                 continue
-            # Half of a motion that went somewhere can be made in one go, or in a few.
+            # Half of a motion that was made can be made again.
             goal = motion[len(motion) // 2]
             q = a.copy()
             rows, reached = connect(
-                problem, work, problem.points[cell], problem.approaches[cell], q, goal, ways, 0, 60
+                arrays,
+                work,
+                arrays.points[cell],
+                arrays.approaches[cell],
+                q,
+                goal,
+                waypoints,
+                0,
+                60,
             )
-            assert not refusal(robot, cells, task, np.vstack([a[None], ways[:rows]]), cell)
-            assert not reached or (ways[rows - 1] == goal).all()
+            assert not refusal(robot, cells, task, np.vstack([a[None], waypoints[:rows]]), cell)
+            assert not reached or (waypoints[rows - 1] == goal).all()
             halves += 1
-            met += reached
+            repeated += reached
     assert joined >= 10
-    assert met >= 0.8 * halves
+    assert repeated >= 0.8 * halves
 
 
-def test_connect_says_when_there_is_no_room_for_waypoints(over_a_cell):
-    """-2, and nothing is written beyond the end."""
-    robot, _, _, problem, work, cell, found, _ = over_a_cell
-    ways = np.full((5, robot.n), 7.0)
+def test_connect_reports_that_the_waypoints_are_full(over_a_cell):
+    """Nothing is written beyond the end."""
+    robot, _, _, arrays, work, cell, found, _ = over_a_cell
+    waypoints = np.full((5, robot.n), 7.0)
     q = found[0].copy()
     rows, reached = connect(
-        problem, work, problem.points[cell], problem.approaches[cell], q, q.copy(), ways, 5, 60
+        arrays, work, arrays.points[cell], arrays.approaches[cell], q, q.copy(), waypoints, 5, 60
     )
-    assert (rows, reached) == (-2, False)
-    assert (ways == 7.0).all()
+    assert (rows, reached) == (OVERFLOW, False)
+    assert (waypoints == 7.0).all()
 
 
-def test_settling_stays_on_the_fibre_and_gains_room(over_a_cell):
-    """From each configuration to one that is no worse, inside limits and cone."""
-    robot, cells, task, problem, work, cell, found, _ = over_a_cell
+def test_settling_obeys_every_constraint(over_a_cell):
+    """From each configuration to one inside limits and cone, over the same target."""
+    robot, cells, task, arrays, work, cell, found, _ = over_a_cell
     for a in found[:10]:
         q = a.copy()
-        settle(problem, work, problem.points[cell], problem.approaches[cell], q, 40)
+        settle(arrays, work, arrays.points[cell], arrays.approaches[cell], q, 40)
         assert not refusal(robot, cells, task, q[None], cell)
         assert (q >= robot.lower).all()
         assert (q <= robot.upper).all()
@@ -117,7 +126,7 @@ def test_settling_stays_on_the_fibre_and_gains_room(over_a_cell):
     ],
 )
 def test_a_slide_whose_stroke_lies_far_out(stroke, tool, feasible):
-    """Guesses stay inside the limits, wherever these are; what is out of reach is so by proof."""
+    """Guesses stay inside the limits, wherever these are; what is out of reach is proved so."""
     robot = robot_of([joint(1, "prismatic", axis=(1, 0, 0), limits=(-1, 1)), joint(2)])
     robot = robot.with_limits({"j1": stroke})
     cells = plane((tool - 0.1, tool + 0.1), (-1e-4, 1e-4), side="outside").cells(3, 1)

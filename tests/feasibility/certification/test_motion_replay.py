@@ -24,9 +24,9 @@ SIMPLE = ("puma, tube", "ur5, plate")
 SEARCH = ("compiled", "roadmap", "paper", "checking")
 
 
-def part_of(module, room):
-    """Is this the room, or something in it?"""
-    return module == room or module.startswith(room + ".")
+def part_of(module, package):
+    """Is this the package, or something in it?"""
+    return module == package or module.startswith(package + ".")
 
 
 @cache
@@ -109,7 +109,7 @@ def test_a_waypoint_that_is_off_by_one_and_a_half_tolerances(name, share):
         q[row] += np.linalg.lstsq(jacobian, point + away - now, rcond=1e-6)[0]
     (now,), _ = tools(robot, q[row : row + 1])
     assert np.linalg.norm(now - point - away) < 1e-6
-    assert "strays" in ask(name, q).refusal
+    assert "deviates" in ask(name, q).refusal
 
 
 def test_removed_waypoints(name):
@@ -130,14 +130,14 @@ def test_a_cut_across_the_walk(name):
     q, cell = np.vstack([walk.q, first]), np.append(walk.cell, walk.cell[0])
     neighbours = question(name)[1].neighbours.of(int(walk.cell[-1]))
     refusal = ask(name, q, cell).refusal
-    assert ("strays" if walk.cell[0] in neighbours else "do not touch") in refusal
-    # Back to a neighbour of the last cell, but to another of its own configurations: no way at all.
+    assert ("deviates" if walk.cell[0] in neighbours else "do not touch") in refusal
+    # Out to a configuration off the surface, and back to the last cell.
     q, cell = np.vstack([walk.q, last + 0.3, last]), np.append(walk.cell, [-1, walk.cell[-1]])
-    assert "strays" in ask(name, q, cell).refusal
+    assert "deviates" in ask(name, q, cell).refusal
 
 
 def test_a_motion_that_ends_between_centres(name):
-    """What lies before the first mark or behind the last belongs to no course."""
+    """What lies before the first mark or behind the last belongs to no curve."""
     walk = witness(name)
     q, cell = np.vstack([walk.q, walk.q[-1:]]), np.append(walk.cell, -1)
     assert "away from every cell's centre" in ask(name, q, cell).refusal
@@ -145,7 +145,7 @@ def test_a_motion_that_ends_between_centres(name):
 
 
 def test_limits_are_exact(name):
-    """Limits that the motion keeps to the last bit are kept; 1e-6 less is too little."""
+    """Limits that the motion just reaches are obeyed; 1e-6 less is too little."""
     robot, cells, task = question(name)
     walk = witness(name)
     needed = np.ones(len(cells), dtype=bool)
@@ -174,8 +174,8 @@ def test_tolerance_and_cone_are_those_of_the_task(name):
     tilted = ask(name, cone_deg=cone - 0.01)
     assert "tilts" in tilted.refusal
     # The tolerance also sets the band over which the surface's curvature is bounded.
-    deviated = ask(name, tolerance=0.99 * figures.max_position_error)
-    assert "strays" in deviated.refusal
+    loose = ask(name, tolerance=0.99 * figures.max_position_error)
+    assert "deviates" in loose.refusal
 
 
 def test_marks_are_checked(name):
@@ -193,14 +193,12 @@ def test_marks_are_checked(name):
     assert any(words in ask(name, cell=swapped).refusal for words in misplaced)
     missing = np.where(walk.cell == walk.cell[other], -1, walk.cell)
     unmarked = ask(name, cell=missing).refusal
-    assert any(words in unmarked for words in ("never visited", "strays", *misplaced))
-    centre_curvature = Walk(walk.q[:1], walk.cell[:1])
+    assert any(words in unmarked for words in ("never visited", "deviates", *misplaced))
+    still = Walk(walk.q[:1], walk.cell[:1])
     needed = np.zeros(len(cells), dtype=bool)
     needed[[walk.cell[0], walk.cell[other]]] = True
     robot, _, task = question(name)
-    assert (
-        replay(robot, cells, task, centre_curvature, needed).refusal == "1 cells are never visited"
-    )
+    assert replay(robot, cells, task, still, needed).refusal == "1 cells are never visited"
     for impossible in (len(cells), -2, 10**9):
         bad = walk.cell.copy()
         bad[first] = impossible
@@ -237,7 +235,7 @@ def test_a_turn_more_in_one_joint(name):
     assert refused >= robot.n - 2
 
 
-def test_what_is_not_a_number_or_not_a_walk(name):
+def test_walks_that_are_malformed(name):
     """NaN and infinity anywhere, shapes that do not fit, nothing at all: refusals, not errors."""
     walk = witness(name)
     for bad in (np.nan, np.inf, -np.inf):
@@ -253,15 +251,15 @@ def test_what_is_not_a_number_or_not_a_walk(name):
 
 
 def test_one_waypoint_for_one_cell():
-    """A motion that stands still covers one cell, and nothing but that cell."""
+    """A motion of one waypoint covers one cell, and only that cell."""
     robot, cells, task = question("puma, dome")
     walk = witness("puma, dome")
     row = int(np.flatnonzero(walk.cell == 7)[0])
-    centre_curvature = Walk(walk.q[row : row + 1], np.array([7]))
+    still = Walk(walk.q[row : row + 1], np.array([7]))
     needed = np.zeros(len(cells), dtype=bool)
-    assert not replay(robot, cells, task, centre_curvature, ~needed).accepted
+    assert not replay(robot, cells, task, still, ~needed).accepted
     needed[7] = True
-    outcome = replay(robot, cells, task, centre_curvature, needed)
+    outcome = replay(robot, cells, task, still, needed)
     assert outcome.accepted
     twice = Walk(walk.q[[row, row]], np.array([7, 7]))
     again = replay(robot, cells, task, twice, needed)
@@ -299,7 +297,7 @@ def test_a_motion_beside_its_target_is_refused():
         assert outcome.certificate.max_position_error == pytest.approx(beside, abs=1e-12)
 
 
-def test_a_surface_that_folds_certifies_nothing_but_standing_still():
+def test_over_a_fold_only_a_single_waypoint_is_certified():
     """A standoff as large as the radius: no bound on the normals holds, so no motion passes."""
     arm = robot_of([joint(i, "prismatic", axis=np.eye(3)[i - 1]) for i in (1, 2, 3)])
     cells = sphere(0.1, (0, 180), (-180, 180), side="inside").cells(4, 4)
@@ -322,12 +320,13 @@ def test_it_shares_no_code_with_the_search():
             imported |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
     search = {f"feasibility.{module}" for module in SEARCH}
     search |= {"robots.chain", "robots.Chain", "surfaces.patches.closed_form_kernels", "numba"}
-    assert not {name for name in imported if any(part_of(name, room) for room in search)}
+    assert not {name for name in imported if any(part_of(name, package) for package in search)}
     module = "feasibility.certification.motion_replay"
     shown = subprocess.run(
         [sys.executable, "-c", f"import sys, {module}; print(*sys.modules)"],
         capture_output=True, text=True, check=True, cwd=path.parents[2],
     )  # fmt: skip
     loaded = set(shown.stdout.split())
-    assert "feasibility.certification.motion_replay" in loaded
-    assert not {m for m in loaded if any(part_of(m, f"feasibility.{room}") for room in SEARCH)}
+    assert module in loaded
+    search = {f"feasibility.{module}" for module in SEARCH}
+    assert not {name for name in loaded if any(part_of(name, package) for package in search)}

@@ -1,4 +1,4 @@
-"""Tracks between neighbouring centres, and every motion that a search stores, replayed."""
+"""Motions between neighbouring centres, and every motion that a search stores, replayed."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from feasibility.roadmap import (
     track,
     work_for,
 )
+from feasibility.roadmap.arrays import STOPPED
 from feasibility.roadmap.graph import EDGES
 from feasibility.verdict import Walk
 
@@ -29,50 +30,50 @@ def refusal(robot, cells, task, q, first, last):
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
-def test_tracks_end_over_the_next_centre(name):
+def test_motions_end_over_the_next_centre(name):
     """From several configurations over every cell into every neighbour."""
     robot, cells, task = question(name)
-    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
+    arrays, work = arrays_of(robot, cells, task), work_for(robot.n)
     targets = task.targets(cells)
     rng = np.random.default_rng(5)
-    ways = np.empty((500, robot.n))
+    waypoints = np.empty((500, robot.n))
     arrived = 0
     for cell in range(0, len(cells), 2):
         guesses = rng.uniform(*finite_limits(robot), (6, robot.n))
-        starts = guesses[margin_shares(problem, work, cell, guesses) >= 0.0]
+        starts = guesses[margin_shares(arrays, work, cell, guesses) >= 0.0]
         entries = slice(*cells.neighbours.indptr[cell : cell + 2])
         links = cells.neighbours.links[entries]
         for other, curve in zip(cells.neighbours.of(cell), links, strict=True):
             begin, end = (0.0, 1.0) if cell < other else (1.0, 0.0)
             for start in starts[:2]:
                 q = start.copy()
-                rows = track(problem, work, curve, begin, end, q, q, False, ways, 0)
+                rows = track(arrays, work, curve, begin, end, q, q, False, waypoints, 0)
                 if rows < 0:
-                    assert rows == -1
+                    assert rows == STOPPED
                     assert work.stop_reason[0] > 0
                     continue
                 arrived += 1
-                motion = np.vstack([start[None], ways[:rows]])
+                motion = np.vstack([start[None], waypoints[:rows]])
                 assert (q == motion[-1]).all()
                 (point,), _ = tools(robot, q[None])
-                assert np.linalg.norm(point - targets.points[other]) <= problem.near + 1e-12
+                assert np.linalg.norm(point - targets.points[other]) <= arrays.near + 1e-12
                 assert refusal(robot, cells, task, motion, cell, other) == ""
     assert arrived > 20
 
 
-def test_a_track_does_not_start_off_its_target():
-    """A start that is not where it is said to be is no motion."""
+def test_a_motion_does_not_start_off_its_target():
+    """A start that is not over the given point of the curve is refused."""
     robot, cells, task = question("ur5, plate")
-    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
-    ways = np.empty((500, robot.n))
+    arrays, work = arrays_of(robot, cells, task), work_for(robot.n)
+    waypoints = np.empty((500, robot.n))
     q = np.zeros(robot.n)
-    assert track(problem, work, 0, 0.0, 1.0, q, q, False, ways, 0) == -1
+    assert track(arrays, work, 0, 0.0, 1.0, q, q, False, waypoints, 0) == STOPPED
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
 @pytest.mark.parametrize("seed", [0, 1])
 def test_every_motion_that_a_search_stores_holds(name, seed):
-    """Spread, stirred and closed: each edge runs from node to node, and the replay accepts it."""
+    """Spread, explored and closed: each edge runs from node to node, and the replay accepts it."""
     robot, cells, task = question(name)
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), seed)
     explore(exploration)

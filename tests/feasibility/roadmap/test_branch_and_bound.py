@@ -1,4 +1,4 @@
-"""Branch and bound proves nothing that an arm can do, and proves what it plainly cannot."""
+"""Branch and bound never rules out a configuration that exists, and proves plain impossibility."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def one_target(point, approach, rng):
 
 
 def ruling(robot, cells, task, boxes=BOXES):
-    """What branch and bound says of the only cell, what it found, and how many boxes it took."""
-    problem = arrays_of(robot, cells, task)
-    waiting = root_box(problem)
-    said, found = rule(problem, work_for(robot.n), 0, waiting, boxes)
-    return said, found, int(waiting.counts[1])
+    """The ruling on the only cell, the configuration found, and the number of boxes."""
+    arrays = arrays_of(robot, cells, task)
+    stack = root_box(arrays)
+    outcome, found = rule(arrays, work_for(robot.n), 0, stack, boxes)
+    return outcome, found, int(stack.counts[1])
 
 
 @cache
@@ -81,9 +81,9 @@ def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
     """60 targets an arm: 480 in all, from configurations that may be at limits or singular.
 
     The target is as far off as the tolerance allows and as tilted as the cone allows (0 to 180
-    degrees), so that a bound that is too tight by a hair would be found out. The joints are held
-    to boxes about the configuration, 1e-3 to 2 rad wide, which branch and bound gets through; the
-    configuration may be at their borders. Boxes beside it are proved often enough to show this.
+    degrees), so that a bound that is slightly too tight would be found. The joints are held
+    to boxes about the configuration, 1e-3 to 2 rad wide, which branch and bound can finish; the
+    configuration may be at their borders. Boxes beside it are often proved, which shows this.
     """
     robot = some_arm(name)
     rng = np.random.default_rng(sum(name.encode()))
@@ -92,10 +92,10 @@ def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
         q = random_configuration(robot, rng)
         (point,), (axis,) = tools(robot, q[None])
         task = Task(0.0, (0.0, 0.01, 5.0, 45.0, 120.0, 180.0)[k % 6], (1e-3, 1e-5, 0.02)[k % 3])
-        deviation = rng.normal(size=3)
-        deviation *= 0.999 * task.tolerance / np.linalg.norm(deviation)
+        offset = rng.normal(size=3)
+        offset *= 0.999 * task.tolerance / np.linalg.norm(offset)
         approach = tilted(axis, 0.9999 * task.cone, rng)
-        cells = one_target(point + deviation, approach, rng)
+        cells = one_target(point + offset, approach, rng)
         width = 10.0 ** rng.uniform(-3.0, 0.3)
         share = np.clip(rng.uniform(-0.3, 1.3, robot.n), 0.0, 1.0)
         low = q - share * width
@@ -104,10 +104,10 @@ def test_what_an_arm_reaches_is_never_proved_out_of_reach(name):
         assert outcome is not Ruling.PROVED, (q.tolist(), box.lower, box.upper, task)
         if outcome is Ruling.REACHED:
             (there,), (held,) = tools(robot, found[None])
-            assert np.linalg.norm(there - point - deviation) <= task.tolerance + 1e-12
+            assert np.linalg.norm(there - point - offset) <= task.tolerance + 1e-12
             assert np.arccos(np.clip(held @ approach, -1, 1)) <= task.cone + 1e-7
-        aside = np.column_stack([low, low + width]) + 1.5 * width + 0.05
-        beside.append(ruling(robot.with_limits(aside), cells, task)[0])
+        shifted = np.column_stack([low, low + width]) + 1.5 * width + 0.05
+        beside.append(ruling(robot.with_limits(shifted), cells, task)[0])
     assert beside.count(Ruling.PROVED) >= 20
     assert ruling(robot, cells, task)[0] is not Ruling.PROVED
 
@@ -146,11 +146,11 @@ def test_newton_finds_nothing_where_there_is_a_proof(name):
         if ruling(robot, cells, task)[0] is not Ruling.PROVED:
             continue
         proved += 1
-        problem, work = arrays_of(robot, cells, task), work_for(robot.n)
+        arrays, work = arrays_of(robot, cells, task), work_for(robot.n)
         low = np.maximum(robot.lower, -np.pi)
         high = np.minimum(robot.upper, np.pi)
         guesses = rng.uniform(low, high, (25, robot.n))
-        assert (margin_shares(problem, work, 0, guesses) == -1.0).all()
+        assert (margin_shares(arrays, work, 0, guesses) == -1.0).all()
     assert 5 <= proved < 60
 
 
@@ -219,13 +219,13 @@ def test_limits_are_real_intervals_and_full_turns_are_not_cut(limits, inside, ou
     for angles, expected in ((inside, Ruling.REACHED), (outside, Ruling.PROVED)):
         for angle in np.radians(angles):
             target = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
-            said = ruling(robot, one_target(target, np.array([0.0, 0.0, 1.0]), rng), task)[0]
-            at_limit = expected is Ruling.REACHED and said is Ruling.UNKNOWN
-            assert said is expected or at_limit, (np.degrees(angle), said)
+            outcome = ruling(robot, one_target(target, np.array([0.0, 0.0, 1.0]), rng), task)[0]
+            at_limit = expected is Ruling.REACHED and outcome is Ruling.UNKNOWN
+            assert outcome is expected or at_limit, (np.degrees(angle), outcome)
 
 
 @pytest.mark.parametrize("limits", [(10, 371), (190, 560), (-350, 20), (1000, 1400)])
-def test_what_branch_and_bound_finds_is_planted_at_its_winding(limits):
+def test_what_branch_and_bound_finds_is_seeded_at_its_winding(limits):
     """It searches one turn about zero; the limits may lie elsewhere. The seed must not be lost."""
     rng = np.random.default_rng(11)
     robot = robot_of(
@@ -239,8 +239,8 @@ def test_what_branch_and_bound_finds_is_planted_at_its_winding(limits):
         target = 0.5 * np.array([np.cos(angle), np.sin(angle), 0.0])
         cells = one_target(target, np.array([0.0, 0.0, 1.0]), rng)
         exploration = Exploration(robot, cells, arrays_of(robot, cells, Task(0.0, 180, 1e-2)), 0)
-        said = exploration.rule(0, root_box(exploration.arrays), BOXES)
-        assert said in (Ruling.REACHED, Ruling.UNKNOWN)
+        outcome = exploration.rule(0, root_box(exploration.arrays), BOXES)
+        assert outcome in (Ruling.REACHED, Ruling.UNKNOWN)
         assert exploration.reached[0]
 
 
@@ -255,7 +255,7 @@ def test_a_continuous_joint_turns_all_the_way():
 
 
 def test_a_slide_without_ends_proves_nothing():
-    """Boxes of infinite width are not split to nothing: the ruling stays unknown."""
+    """Boxes of infinite width cannot be split to the end: the ruling stays unknown."""
     rng = np.random.default_rng(10)
     for limits in (FREE, (0.0, np.inf), (-np.inf, 1.0)):
         robot = robot_of(
@@ -269,5 +269,5 @@ def test_a_slide_without_ends_proves_nothing():
             q = np.array([np.clip(x, *limits), 0.4])
             (point,), _ = tools(robot, q[None])
             cells = one_target(point, np.array([0.0, 0.0, 1.0]), rng)
-            said = ruling(robot, cells, Task(0.0, 180, 1e-3))[0]
-            assert said is not Ruling.PROVED
+            outcome = ruling(robot, cells, Task(0.0, 180, 1e-3))[0]
+            assert outcome is not Ruling.PROVED

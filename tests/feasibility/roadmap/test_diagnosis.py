@@ -1,4 +1,4 @@
-"""Causes: each missed cell says why, and the figures in it are those of the geometry."""
+"""Causes: each missed cell has one, and the figures in it are those of the geometry."""
 
 from __future__ import annotations
 
@@ -64,10 +64,10 @@ def test_orientation_says_the_smallest_angle_that_could_be_had() -> None:
     assert kinds(verdict) == {CauseKind.ORIENTATION}
     points, approaches = verdict.task.targets(verdict.cells)
     for cause in verdict.causes:
-        said = number(r"tilts ([0-9.]+) deg", cause.detail)
+        reported = number(r"tilts ([0-9.]+) deg", cause.detail)
         best = smallest_angle(points[cause.cell], approaches[cause.cell])
-        assert best - 0.1 <= said <= best + 1.5  # found by bisection, from random starts
-        assert said > 20.0
+        assert best - 0.1 <= reported <= best + 1.5  # found by bisection, from random starts
+        assert reported > 20.0
 
 
 def smallest_angle(point: np.ndarray, approach: np.ndarray) -> float:
@@ -124,8 +124,8 @@ def test_causes_are_made_once_and_in_order() -> None:
         assert "inf" not in cause.detail
 
 
-def test_a_search_that_was_stopped_blames_nothing_that_is_not_so() -> None:
-    """Every cell of this plate can be covered: no cause may say what would have to give."""
+def test_a_search_that_was_stopped_reports_no_false_cause() -> None:
+    """Every cell of this plate can be covered: no cause may name a constraint."""
     plate = plane((0.3, 0.6), (-0.2, 0.2), position=(0, 0, 0.2), side="outside")
     task = Task(0.02, 45)
     assert check(PUMA, plate.cells(3, 4), task).feasible
@@ -134,4 +134,4 @@ def test_a_search_that_was_stopped_blames_nothing_that_is_not_so() -> None:
     assert len(stopped.causes) == int((~stopped.covered).sum()) > 0
     assert kinds(stopped) == {CauseKind.DISCONNECTED}
     assert not any(cause.proved for cause in stopped.causes)
-    assert all("can stand there" in cause.detail for cause in stopped.causes)
+    assert all("has a configuration there" in cause.detail for cause in stopped.causes)

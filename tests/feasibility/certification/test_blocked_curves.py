@@ -1,4 +1,4 @@
-"""What is said where no motion can go from cell to cell, whatever the arm."""
+"""Curves between cells that no arm can follow, and the message about them."""
 
 from __future__ import annotations
 
@@ -26,26 +26,27 @@ def zigzag(*turns_deg: float) -> TriangleMesh:
     return TriangleMesh(np.array(vertices), faces)
 
 
-def told(text: str) -> int:
+def reported_parts(text: str) -> int:
+    """The number of parts in the message."""
     found = re.search(r"leaves (\d+) parts", text)
     return 1 if found is None else int(found[1])
 
 
 @pytest.mark.parametrize("turns", [(-70,), (60, -70), (-70, -60), (-60, 50, -60), (50, 50)])
-def test_the_parts_that_closed_ways_leave_are_counted(turns: tuple[int, ...]) -> None:
-    """A motion goes round outer edges, not into hollow ones."""
+def test_the_parts_that_blocked_curves_leave_are_counted(turns: tuple[int, ...]) -> None:
+    """A motion goes round convex edges, not into concave ones."""
     cells, task = mesh(zigzag(*turns)).cells(60), Task(standoff=0.02, cone_deg=60)
     text = blocked_curves(cells, task)
-    ways = target_curves(cells, task.standoff, 1e-3)
-    usable = ~ways.folded & (ways.deviations[:, 0] < 1e-3) & (ways.deviations[:, 1] < 1.0)
+    curves = target_curves(cells, task.standoff, 1e-3)
+    usable = ~curves.folded & (curves.deviations[:, 0] < 1e-3) & (curves.deviations[:, 1] < 1.0)
     graph = nx.Graph(cells.pairs[usable].tolist())
     graph.add_nodes_from(range(len(cells)))
-    assert told(text) == nx.number_connected_components(graph)
-    assert told(text) >= 1 + sum(turn < 0 for turn in turns)
-    assert (told(text) == 1) == (min(turns) > 0)
-    assert ("no arm's motion joins" in text) == (told(text) > 1)
+    assert reported_parts(text) == nx.number_connected_components(graph)
+    assert reported_parts(text) >= 1 + sum(turn < 0 for turn in turns)
+    assert (reported_parts(text) == 1) == (min(turns) > 0)
+    assert ("no arm's motion joins" in text) == (reported_parts(text) > 1)
 
 
-def test_where_every_way_is_open_nothing_is_said() -> None:
+def test_no_message_where_no_curve_is_blocked() -> None:
     for cells in (plane((0, 1), (0, 1)).cells(3, 4), sphere(0.5, (20, 80), (0, 90)).cells(4, 4)):
         assert blocked_curves(cells, Task(standoff=0.02, cone_deg=30)) == ""

@@ -1,4 +1,4 @@
-"""Motions over meshes that a hunt found to be nearer to the triangles than they may be."""
+"""Motions over edges of meshes that once came nearer to the triangles than they may."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ CASES = {
     "right": (roof(90), Task(0.05, 45, 3e-4), 20),
     "blunt": (roof(45), Task(0.02, 20, 3e-4), 12),
     "smooth": (roof(25), Task(0.03, 30, 1e-3), 12),
-    "hollow": (roof(-20), Task(0.03, 30, 1e-3), 12),
+    "concave": (roof(-20), Task(0.03, 30, 1e-3), 12),
 }
 
 
@@ -35,16 +35,16 @@ def test_a_certificate_bounds_how_far_a_motion_is_from_the_triangles(name: str) 
     share = np.arange(PER_SEGMENT)[:, None] / PER_SEGMENT
     q = walk.q[:-1, None] * (1 - share) + walk.q[1:, None] * share
     tips, axes = tools(verdict.robot, np.concatenate([q.reshape(-1, 6), walk.q[-1:]]))
-    closest_point = nearest(part.vertices[part.faces] + surface.position, tips)
-    away = np.linalg.norm(tips - closest_point, axis=1)
+    closest = nearest(part.vertices[part.faces] + surface.position, tips)
+    away = np.linalg.norm(tips - closest, axis=1)
     assert np.abs(away - task.standoff).max() <= certificate.max_position_error
-    if name not in ("smooth", "hollow"):  # where normals are interpolated
-        cosine = ((closest_point - tips) * axes).sum(axis=1) / away
+    if name not in ("smooth", "concave"):  # where normals are interpolated
+        cosine = ((closest - tips) * axes).sum(axis=1) / away
         assert np.arccos(np.clip(cosine, -1, 1)).max() <= certificate.max_angle + 1e-9
 
 
 @pytest.mark.parametrize("angle", [95, 120, 150, 170])
-def test_what_is_over_a_sharp_edge_is_outside(angle: int) -> None:
+def test_a_point_over_a_sharp_edge_is_outside(angle: int) -> None:
     """It may lie under the plane of either face."""
     surface = mesh(roof(angle)).cells(20).surface
     turn = np.radians(np.linspace(-0.49, 0.49, 25) * angle)
@@ -56,8 +56,8 @@ def test_what_is_over_a_sharp_edge_is_outside(angle: int) -> None:
 
 
 @pytest.mark.parametrize("angle", [25, 60, 120, 150])
-def test_the_cells_of_a_course_say_what_the_whole_mesh_says(angle: int) -> None:
-    """Where nothing else is near: the search asks the former, the replay the latter."""
+def test_the_cells_of_a_curve_agree_with_the_full_mesh(angle: int) -> None:
+    """Where nothing else is near: the search uses the former, the replay the latter."""
     cells = mesh(roof(angle)).cells(20)
     t = (np.arange(32) + 0.5) / 32
     places = np.repeat(np.arange(len(cells.pairs)), len(t)), np.tile(t, len(cells.pairs))

@@ -32,7 +32,7 @@ CYLINDER = cylinder(1.0, (-90, 90), (-1, 1), side="outside")
 
 
 def far_plane():
-    """A surface for those who only want to know how the tool moves."""
+    """A surface for tests of the tool's motion alone."""
     return plane((-1, 1), (-1, 1)).cells(1, 1)
 
 
@@ -49,7 +49,7 @@ def random_segments(rng, arms, per_arm):
 
 
 def test_second_derivatives_bound_the_sag_of_every_segment():
-    """2,400 segments of 80 arms: the tool point and the axis stay as near their chords as D says.
+    """2,400 segments of 80 arms: the tool point and the axis stay as near their chords as D allows.
 
     The bound is not loose either: some segment uses all of it, and half of them 15 per cent.
     """
@@ -58,11 +58,11 @@ def test_second_derivatives_bound_the_sag_of_every_segment():
     previous = None
     for robot, q0, q1 in random_segments(rng, 80, 30):
         if robot is not previous:
-            problem, work = arrays_of(robot, far_plane(), Task(0.0, 30)), work_for(robot.n)
+            arrays, work = arrays_of(robot, far_plane(), Task(0.0, 30)), work_for(robot.n)
             previous = robot
-        place(problem, work, 0, q0)
-        place(problem, work, 1, q1)
-        derivative_bounds = spread(problem, work, q0, q1)
+        place(arrays, work, 0, q0)
+        place(arrays, work, 1, q1)
+        derivative_bounds = spread(arrays, work, q0, q1)
         s, q = between(q0, q1, 32)
         for values, derivative_bound, ratios in zip(
             tools(robot, q), derivative_bounds, (used, used_axis), strict=True
@@ -84,17 +84,17 @@ def test_levers_hold_where_they_are_longer_in_the_middle_than_at_the_ends():
     Ends: the second joint at -+bend, so that the tool is as near to the first axis at both.
     """
     robot = planar_arm(2, (-3.1, 3.1))
-    problem, work = arrays_of(robot, far_plane(), Task(0.0, 30)), work_for(2)
+    arrays, work = arrays_of(robot, far_plane(), Task(0.0, 30)), work_for(2)
     worst = 0.0
-    for derivative_bound in np.linspace(0.05, 3.1, 60):
+    for bend in np.linspace(0.05, 3.1, 60):
         for turn in (0.01, 0.1, 1.0, 3.0):
             for q0, q1 in (
-                (np.array([0.0, -derivative_bound]), np.array([turn, derivative_bound])),
-                (np.array([turn, -derivative_bound]), np.array([0.0, derivative_bound])),
+                (np.array([0.0, -bend]), np.array([turn, bend])),
+                (np.array([turn, -bend]), np.array([0.0, bend])),
             ):
-                place(problem, work, 0, q0)
-                place(problem, work, 1, q1)
-                bound, _ = spread(problem, work, q0, q1)
+                place(arrays, work, 0, q0)
+                place(arrays, work, 1, q1)
+                bound, _ = spread(arrays, work, q0, q1)
                 s, q = between(q0, q1, 200)
                 points, _ = tools(robot, q)
                 chord = (1.0 - s[:, None]) * points[0] + s[:, None] * points[-1]
@@ -124,20 +124,20 @@ def test_peak_is_the_largest_value():
         assert np.isnan(peak(*values))
 
 
-def two_cells(surface, closest_points):
+def two_cells(surface, parameters):
     """Two neighbouring cells of a patch with their centres at given parameters (2, 2)."""
-    (u0, v0), (u1, v1) = closest_points
+    (u0, v0), (u1, v1) = parameters
     u, v = np.array([u0, u1]), np.array([v0, v1])
     return GridCells(
         surface, surface.point(u, v), surface.normal(u, v), np.ones(2), (1, 2), u=u, v=v
     )
 
 
-def surface_segment(rng, robot, kind, task, share, deviations, longest, onto):
+def surface_segment(rng, robot, kind, task, share, offsets, longest, onto):
     """A segment that starts near a random target surface, axis at a share of the cone.
 
-    Its targets run along a course from the foot of one end to the foot of the other. Returns
-    problem, work, cells, q0, q1 (slots 0 and 1 hold both ends), or None where Newton does not
+    Its targets run along a curve from the closest point of one end to that of the other. Returns
+    arrays, work, cells, q0, q1 (slots 0 and 1 hold both ends), or None where Newton does not
     bring the second end onto the surface.
     """
     surface = random_surface(rng, kind)
@@ -149,44 +149,44 @@ def surface_segment(rng, robot, kind, task, share, deviations, longest, onto):
     (point,), (axis,) = tools(robot, q0[None])
     approach = tilted(axis, share * min(task.cone, 3.1), rng)
     turn = turn_onto(-sign * normal, approach, rng)
-    deviation = rng.normal(size=3)
-    deviation *= rng.choice(deviations) * task.tolerance / np.linalg.norm(deviation)
-    surface = surface.moved(turn, point + deviation - turn @ target)
+    offset = rng.normal(size=3)
+    offset *= rng.choice(offsets) * task.tolerance / np.linalg.norm(offset)
+    surface = surface.moved(turn, point + offset - turn @ target)
     q1 = q0 + rng.normal(size=robot.n) * 10.0 ** rng.uniform(-3.0, longest)
     (away,), _ = tools(robot, q1[None])
-    closest_points = surface.closest(np.array([surface.point(u, v), away]))
-    cells = two_cells(surface, np.column_stack([closest_points.u, closest_points.v]))
-    problem, work = arrays_of(robot, cells, task), work_for(robot.n)
-    aim(problem, work, 0, 1.0)
-    place(problem, work, 1, q1)
-    bounds_between(problem, work, 0, 0.0, 1.0)
+    closest = surface.closest(np.array([surface.point(u, v), away]))
+    cells = two_cells(surface, np.column_stack([closest.u, closest.v]))
+    arrays, work = arrays_of(robot, cells, task), work_for(robot.n)
+    aim(arrays, work, 0, 1.0)
+    place(arrays, work, 1, q1)
+    bounds_between(arrays, work, 0, 0.0, 1.0)
     if onto:
         work.secondary_step[:] = 0.0
-        if not project(problem, work, q1, 1e-6, np.inf, 60):
+        if not project(arrays, work, q1, 1e-6, np.inf, 60):
             return None
-        place(problem, work, 1, q1)
-    aim(problem, work, 0, 0.0)
-    place(problem, work, 0, q0)
-    return problem, work, cells, q0, q1
+        place(arrays, work, 1, q1)
+    aim(arrays, work, 0, 0.0)
+    place(arrays, work, 0, q0)
+    return arrays, work, cells, q0, q1
 
 
-def beside_the_course(robot, cells, task, q0, q1, samples):
-    """Distance from the moving target, and |a - b| there and at the tool point's own foot."""
+def beside_the_curve(robot, cells, task, q0, q1, samples):
+    """Distance from the moving target, and |a - b| there and at the tool's closest point."""
     s, q = between(q0, q1, samples)
     points, axes = tools(robot, q)
-    closest_point, normal = cells.curves.at(np.zeros(len(s), dtype=np.int64), s)
+    on_curve, normal = cells.curves.at(np.zeros(len(s), dtype=np.int64), s)
     sign = cells.surface.side_sign
-    distance = np.linalg.norm(points - closest_point - sign * task.standoff * normal, axis=1)
+    distance = np.linalg.norm(points - on_curve - sign * task.standoff * normal, axis=1)
     chord = np.linalg.norm(axes + sign * normal, axis=1)
     return distance, chord, deviation(cells.surface, task.standoff, points, axes).chord
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_a_segment_that_is_said_to_hold_holds_everywhere(kind):
+def test_a_segment_that_is_accepted_holds_everywhere(kind):
     """700 segments at either side of 35 random surfaces in any pose, 40 samples each.
 
-    Whatever `segment_holds` lets pass stays within tolerance and cone at every sample, and within
-    the share that it states. It lets a fair part pass, and some use at least half of what it
+    Every segment that `segment_holds` accepts stays within tolerance and cone at every sample, and
+    within the share that it states. It accepts a fair part, and some use at least half of what it
     allows the tool point beyond the errors of the ends.
     """
     rng = np.random.default_rng(KINDS.index(kind))
@@ -201,22 +201,22 @@ def test_a_segment_that_is_said_to_hold_holds_everywhere(kind):
             )
             if made is None:
                 continue
-            problem, work, cells, q0, q1 = made
-            position, cone = segment_holds(problem, work, q0, q1)
+            arrays, work, cells, q0, q1 = made
+            position, cone = segment_holds(arrays, work, q0, q1)
             tried += 1
             if not (position <= 1.0 and cone <= 1.0):
                 continue
             passed += 1
-            distance, chord, own = beside_the_course(robot, cells, task, q0, q1, 40)
-            assert distance.max() <= position * work.room[0] + ROUNDING
+            distance, chord, own = beside_the_curve(robot, cells, task, q0, q1, 40)
+            assert distance.max() <= position * work.allowance[0] + ROUNDING
             assert distance.max() <= task.tolerance
             if task.cone_deg < 180.0:
-                assert chord.max() <= cone * work.room[1] + ROUNDING
+                assert chord.max() <= cone * work.allowance[1] + ROUNDING
                 ends = max(work.error[0, 0], work.error[1, 0])
-                if ends <= problem.near:  # as everywhere in a search
+                if ends <= arrays.near:  # as everywhere in a search
                     angle = 2.0 * np.arcsin(np.minimum(0.5 * own, 1.0))
                     assert angle.max() <= task.cone + 1e-9
-            grown = position * work.room[0] - max(distance[0], distance[-1])
+            grown = position * work.allowance[0] - max(distance[0], distance[-1])
             if grown > 1e-7:
                 worst = max(worst, (distance.max() - max(distance[0], distance[-1])) / grown)
     assert tried > 300
@@ -228,7 +228,7 @@ def test_a_segment_that_is_said_to_hold_holds_everywhere(kind):
 def test_the_cone_holds_on_long_segments(kind):
     """450 segments with a tolerance of 0.15 m, so that they may be long, and cones beyond 90 deg.
 
-    There a normal that bulges between the ends turns away from the axis, and the bound must know.
+    There a normal that bulges between the ends turns away from the axis: the bound covers that.
     """
     rng = np.random.default_rng(10 + KINDS.index(kind))
     passed = 0
@@ -236,16 +236,16 @@ def test_the_cone_holds_on_long_segments(kind):
         robot = random_arm(rng)
         for _ in range(15):
             task = Task(0.01, float(rng.choice([45.0, 100.0, 150.0, 178.0])), 0.15)
-            problem, work, cells, q0, q1 = surface_segment(
+            arrays, work, cells, q0, q1 = surface_segment(
                 rng, robot, kind, task, rng.uniform(0.5, 1.0), (0.0, 0.3), 0.1, False
             )
-            position, cone = segment_holds(problem, work, q0, q1)
+            position, cone = segment_holds(arrays, work, q0, q1)
             if not position <= 1.0:
                 continue
             passed += 1
-            distance, chord, _ = beside_the_course(robot, cells, task, q0, q1, 20)
-            assert distance.max() <= position * work.room[0] + ROUNDING
-            assert chord.max() <= cone * work.room[1] + ROUNDING
+            distance, chord, _ = beside_the_curve(robot, cells, task, q0, q1, 20)
+            assert distance.max() <= position * work.allowance[0] + ROUNDING
+            assert chord.max() <= cone * work.allowance[1] + ROUNDING
     assert passed > 150
 
 
@@ -256,44 +256,44 @@ def test_a_normal_that_bulges_away_from_a_fixed_axis(surface, half):
 
     The bound covers the middle, and the growth from the ends to it is at least 0.2 of what the
     bound allows for (the most that a bound by the ends' norms alone can do here is 0.43, and as
-    much again is for the tool point's own foot).
+    much again is for the normal at the tool point's closest point).
     """
     gantry = robot_of([joint(i, "prismatic", axis=np.eye(3)[i - 1]) for i in (1, 2, 3)], (1, 0, 0))
     at = {"sphere": lambda a: (0.5 * np.pi, a), "cylinder": lambda a: (a, 0.0)}[surface.kind]
     cells = two_cells(surface, (at(-half), at(half)))
     # The approach direction is -x where the surface's outward normal is +x.
-    problem = arrays_of(gantry, cells, Task(0.0, 179.0, 0.1))
+    arrays = arrays_of(gantry, cells, Task(0.0, 179.0, 0.1))
     work = work_for(3)
     q0, q1 = (np.array([np.cos(a), np.sin(a), 0.0]) for a in (-half, half))
     for slot, q in enumerate((q0, q1)):
-        aim(problem, work, 0, float(slot))
-        place(problem, work, slot, q)
-    bounds_between(problem, work, 0, 0.0, 1.0)
-    position, cone = segment_holds(problem, work, q0, q1)
+        aim(arrays, work, 0, float(slot))
+        place(arrays, work, slot, q)
+    bounds_between(arrays, work, 0, 0.0, 1.0)
+    position, cone = segment_holds(arrays, work, q0, q1)
     assert position * 0.1 >= 1.0 - np.cos(half)
     assert position * 0.1 <= 1.2 * (1.0 - np.cos(half))
     end = 2.0 * np.cos(half / 2.0)
-    assert cone * work.room[1] >= 2.0 - ROUNDING
-    assert (2.0 - end) / (cone * work.room[1] - end) > 0.2
+    assert cone * work.allowance[1] >= 2.0 - ROUNDING
+    assert (2.0 - end) / (cone * work.allowance[1] - end) > 0.2
 
 
 def test_nothing_that_is_not_a_number_passes():
     """NaN or infinity in a joint, or a surface that folds, never certifies a segment."""
     robot = planar_arm(3)
-    problem, work = arrays_of(robot, far_plane(), Task(0.0, 180, 1.0)), work_for(3)
+    arrays, work = arrays_of(robot, far_plane(), Task(0.0, 180, 1.0)), work_for(3)
     q = np.array([0.1, 0.2, 0.3])
-    look_at(problem, work, np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    place(problem, work, 0, q)
-    place(problem, work, 1, q)
-    position, cone = segment_holds(problem, work, q, q)
+    look_at(arrays, work, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    place(arrays, work, 0, q)
+    place(arrays, work, 1, q)
+    position, cone = segment_holds(arrays, work, q, q)
     assert position <= 1.0
     assert cone == 0.0
     for bad in (np.nan, np.inf):
         wrong = np.array([0.1, bad, 0.3])
-        place(problem, work, 1, wrong)
-        position, cone = segment_holds(problem, work, q, wrong)
+        place(arrays, work, 1, wrong)
+        position, cone = segment_holds(arrays, work, q, wrong)
         assert not (position <= 1.0 and cone <= 1.0)
-    place(problem, work, 1, q)
+    place(arrays, work, 1, q)
     work.derivative_bound[:] = np.inf
-    position, cone = segment_holds(problem, work, q, q + 1e-9)
+    position, cone = segment_holds(arrays, work, q, q + 1e-9)
     assert not (position <= 1.0 and cone <= 1.0)

@@ -1,4 +1,4 @@
-"""What is handed over from Python: every fault is named, and what would do."""
+"""Arguments from Python: every fault is named, with the values that would be accepted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Verdicts and certificates that a hunt over random cases found to be wrong."""
+"""Verdicts and certificates that were once wrong, found by random cases."""
 
 from __future__ import annotations
 
@@ -23,18 +23,18 @@ def ball_cell() -> GridCells:
     return ball.cells(1, 1)
 
 
-def tilt_at_foot(robot: Robot, q: NDArray[np.float64]) -> float:
-    """Angle (rad) between the tool axis and the inward normal of the ball at the tool's foot."""
+def tilt_at_closest_point(robot: Robot, q: NDArray[np.float64]) -> float:
+    """Angle (rad) between the tool axis and the ball's inward normal at the closest point."""
     point, axis = Kinematics(robot).tool(q)
     normal = (point - CENTRE) / np.linalg.norm(point - CENTRE)
     return float(2.0 * np.arcsin(0.5 * np.linalg.norm(axis + normal)))
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_certificate_of_a_single_cell_bounds_the_tilt_at_the_tool_points_own_foot(
+def test_certificate_of_a_single_cell_bounds_the_tilt_at_the_closest_point(
     seed: int,
 ) -> None:
-    """Beside the centre of the only cell the normal turns like anywhere else."""
+    """Beside the centre of the only cell the normal turns as anywhere else."""
     robot = load_robot("ur5")
     # Beside the centre by 4 mm, but along the normal of the centre.
     beside = plane(
@@ -49,14 +49,14 @@ def test_certificate_of_a_single_cell_bounds_the_tilt_at_the_tool_points_own_foo
     task = Task(STANDOFF, 5.0, TOLERANCE)
     replayed = replay(robot, ball_cell(), task, found.witness, np.ones(1, dtype=bool))
 
-    assert tilt_at_foot(robot, found.witness.q[0]) > np.radians(9.0)
+    assert tilt_at_closest_point(robot, found.witness.q[0]) > np.radians(9.0)
     assert not replayed.accepted
     assert "tilts" in replayed.refusal
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_a_single_cell_is_covered_inside_the_cone_at_the_tool_points_own_foot(seed: int) -> None:
-    """What the replay asks for, the search keeps to."""
+def test_a_single_cell_is_covered_inside_the_cone_at_the_closest_point(seed: int) -> None:
+    """The search obeys the constraint that the replay checks."""
     robot = load_robot("ur5")
     task = Task(STANDOFF, 0.5, TOLERANCE)
     verdict = check(robot, ball_cell(), task, Search(seed=seed))
@@ -64,15 +64,15 @@ def test_a_single_cell_is_covered_inside_the_cone_at_the_tool_points_own_foot(se
     assert verdict.feasible
     assert verdict.witness is not None
     assert verdict.certificate is not None
-    tilt = tilt_at_foot(robot, verdict.witness.q[0])
+    tilt = tilt_at_closest_point(robot, verdict.witness.q[0])
     assert tilt <= verdict.certificate.max_angle + 1e-12
     assert verdict.certificate.max_angle <= task.cone
 
 
-def test_what_is_not_proved_is_not_said_to_be_the_best_there_is() -> None:
+def test_a_cause_without_proof_says_so() -> None:
     """The last cell is covered, but only by a tool point that lies off its target by 5 mm.
 
-    Newton wants the tool point at the target, and finds 20 degrees there at best.
+    Newton's method puts the tool point at the target, and finds 20 degrees there at best.
     """
     limits = [(-126.34, 35.35), (-153.32, 133.07), (-90.9, 144.12)]
     limits += [(-166.45, 105.49), (-49.38, 59.27), (-53.96, 129.41)]
@@ -100,12 +100,12 @@ def test_what_is_not_proved_is_not_said_to_be_the_best_there_is() -> None:
 
     verdict = check(robot, cells, task, Search(seed=3))
     details = {cause.cell: cause.detail for cause in verdict.causes if not cause.proved}
-    # A search that uses the whole tolerance may well cover it.
+    # A search that uses the full tolerance may well cover it.
     assert verdict.covered[47] or details[47].endswith(UNPROVED)
 
 
 @pytest.mark.parametrize("least", [0, 1, 3])
-def test_a_value_never_reads_like_the_bound_that_it_passes(least: int) -> None:
+def test_a_value_is_never_printed_like_the_bound_that_it_passes(least: int) -> None:
     rng = np.random.default_rng(least)
     for bound in rng.uniform(0.0, 200.0, 200):
         value = bound + 10.0 ** rng.uniform(-5.9, 1.0)
