@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from feasibility.clock import Clock
 from feasibility.found import Found
-from feasibility.problem import Problem, refuse_other_types
+from feasibility.problem import Problem
 from feasibility.search import Progress, Search
 from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence, Replay, Verdict, deferred
@@ -56,8 +56,8 @@ def check(
     from feasibility.roadmap import complete_search
 
     search = Search() if search is None else search
-    refuse_other_types((search, "search", Search, "a Search, such as Search(seed=1)"))
-    problem = Problem.of(robot, cells, task)
+    settings = (search, "search", Search, "a Search, such as Search(seed=1)")
+    problem = Problem.of(robot, cells, task, settings)
     if search.method == "greedy":
         return _decided(problem, search, progress, greedy_search)
     return _decided(problem, search, progress, complete_search)

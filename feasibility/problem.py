@@ -10,6 +10,9 @@ from surfaces import Cells
 
 NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
 
+Given = tuple[object, str, type, str]
+"""The value of an argument, its name, its type, and an example in words."""
+
 
 @dataclass(frozen=True, eq=False)
 class Problem:
@@ -22,17 +25,22 @@ class Problem:
     """The task that the search keeps to: `task`, or a little less than it, see `narrowed`."""
 
     @classmethod
-    def of(cls, robot: Robot, cells: Cells, task: Task) -> Problem:
+    def of(cls, robot: Robot, cells: Cells, task: Task, *others: Given) -> Problem:
         """The problem of covering `cells` with `robot`.
+
+        Args:
+            robot, cells, task: see the fields.
+            others: further arguments of the caller, refused together with these.
 
         Raises:
             TypeError: an argument is something else, such as a surface that is not cut into cells;
                 all of them are named.
         """
-        refuse_other_types(
+        _refuse_other_types(
             (robot, "robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
             (cells, "cells", Cells, "a surface cut into cells, such as surface.cells(9, 10)"),
             (task, "task", Task, "a Task, such as Task(standoff=0.02, cone_deg=20)"),
+            *others,
         )
         return cls(robot, cells, task, task)
 
@@ -50,11 +58,8 @@ class Problem:
         return f"within {1e3 * self.task.effective_tolerance:g} mm and {self.task.cone_deg:g} deg"
 
 
-def refuse_other_types(*given: tuple[object, str, type, str]) -> None:
+def _refuse_other_types(*given: Given) -> None:
     """Refuse arguments of a wrong type, all of them at once.
-
-    Args:
-        given: (value, name of the argument, its type, an example in words) of each.
 
     Raises:
         TypeError: some are of another type.
