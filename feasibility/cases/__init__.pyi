@@ -19,4 +19,3 @@ from .toml import TomlError as TomlError
 from .toml import parse_toml as parse_toml
 from .toml import toml_document as toml_document
 from .toml import toml_key as toml_key
-from .toml import toml_value as toml_value

@@ -1,74 +1,42 @@
-"""TOML as text: writing values, and reading one `key=value` of the command line."""
+"""TOML as text: documents, and one `key=value` of the command line."""
 
 from __future__ import annotations
 
-import math
+import json
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from coverable_errors import CoverableError
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
-_ESCAPES = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\t": "\\t", "\r": "\\r"}
+# tomllib takes time and memory with the square of such a key's length.
+_LONG_PATH = re.compile(
+    r"""(?<![\w-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){99}""", re.ASCII
+)
 
 
 class TomlError(CoverableError):
     """Text that is not the TOML it should be."""
 
 
-def toml_value(value: Any) -> str:
-    """One value on one line; `tomllib` reads it back as the same value.
+def toml_key(key: str) -> str:
+    """A key for a message, quoted where it must be."""
+    return key if _BARE_KEY.fullmatch(key) else json.dumps(key, ensure_ascii=False)
+
+
+def toml_document(tables: Mapping[str, Any]) -> str:
+    """Tables of values as a document that `parse_toml` reads back; empty ones are left out.
 
     Example:
-        >>> toml_value({"joint 1": [-1.5, 2.0], "open": True})
-        '{ "joint 1" = [-1.5, 2.0], open = true }'
+        >>> print(toml_document({"task": {"cone_deg": 45.0}, "search": {}}), end="")
+        [task]
+        cone_deg = 45.0
     """
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        if math.isinf(value):
-            return "inf" if value > 0 else "-inf"
-        return repr(value)
-    if isinstance(value, str):
-        return toml_string(value)
-    if isinstance(value, Mapping):
-        rows = ", ".join(f"{toml_key(key)} = {toml_value(item)}" for key, item in value.items())
-        return f"{{ {rows} }}" if rows else "{}"
-    if isinstance(value, Sequence):
-        return "[" + ", ".join(toml_value(item) for item in value) + "]"
-    raise TypeError(f"TOML has no {type(value).__name__}")
+    import tomli_w
 
-
-def toml_string(text: str) -> str:
-    """A basic string with everything escaped that must be."""
-    return '"' + "".join(_escaped(character) for character in text) + '"'
-
-
-def _escaped(character: str) -> str:
-    """One character inside a basic string."""
-    if character in _ESCAPES:
-        return _ESCAPES[character]
-    code = ord(character)
-    return f"\\u{code:04X}" if code < 32 or code == 127 else character
-
-
-def toml_key(key: str) -> str:
-    """A key, quoted where it must be."""
-    return key if _BARE_KEY.fullmatch(key) else toml_string(key)
-
-
-def toml_document(tables: Mapping[str, Mapping[str, Any]]) -> str:
-    """Tables of values as a document; empty tables are left out."""
-    parts = []
-    for name, table in tables.items():
-        if table:
-            rows = [f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items()]
-            parts.append("\n".join([f"[{toml_key(name)}]", *rows]) + "\n")
-    return "\n".join(parts)
+    return tomli_w.dumps({name: table for name, table in tables.items() if table != {}})
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -77,6 +45,8 @@ def parse_toml(text: str) -> dict[str, Any]:
     Raises:
         TomlError: it is not TOML; the message has the line where the parser knows it.
     """
+    if _LONG_PATH.search(text):
+        raise TomlError("is nested too deeply")
     try:
         return tomllib.loads(text)
     except RecursionError as error:

@@ -20,8 +20,6 @@ from feasibility.cases import (
     parse_toml,
     read_surface,
     toml_document,
-    toml_key,
-    toml_value,
 )
 from feasibility.studies.axes import POSES, Axis, Range, Variation
 from feasibility.studies.outcome import HOME, arm_of
@@ -193,8 +191,7 @@ def case_of(tables: Tables) -> Case:
     Raises:
         CaseError: with everything that is wrong.
     """
-    rows = [f"{toml_key(title)} = {toml_value(table)}" for title, table in tables.items()]
-    return Case.from_toml("\n".join(rows))
+    return Case.from_toml(toml_document(tables))
 
 
 def faults_of(tables: Tables) -> list[Fault]:

@@ -143,6 +143,7 @@ BAD_CASES = {
     "NUL": Bad(GOOD + "\0", "", ("is not valid TOML",)),
     "huge": Bad(GOOD + "#" * 300_000, "", ("is larger than 256 kB",)),
     "nested too deeply": Bad("a = " + "[" * 20_000, "", ("is nested too deeply",)),
+    "a key without end": Bad("a." * 60_000 + "b = 1", "", ("is nested too deeply",)),
     "digits without end": Bad("a = " + "9" * 20_000, "", ("is not valid TOML",)),
     # tables
     "table missing": Bad(GOOD.replace("[task]", "[tusk]"), "task", ("is missing", '"task"')),
