@@ -172,7 +172,7 @@ def _detour(graph: MotionGraph, cells: Cells, states: list[_State], cell: int) -
         if "cost" in edge:
             return edge["cost"]
         apart = np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]])
-        return edge["length"] + REVISIT * float(apart) / graph.problem.scale
+        return edge["length"] + REVISIT * float(apart) / graph.arrays.scale
 
     edges = graph.edges
     edges.add_weighted_edges_from(((START, s.node, s.cost) for s in states), "cost")

@@ -26,7 +26,7 @@ Motion = NDArray[np.float64]
 class MotionGraph:
     """Nodes, and the motions that join them."""
 
-    problem: SearchArrays
+    arrays: SearchArrays
     work: Work
     pairs: dict[tuple[int, int], int]
     """Which pair of `cells.pairs` two cells i < j are."""
@@ -104,8 +104,8 @@ def joint_length(motion: Motion) -> float:
 def motion_graph_of(verdict: Verdict) -> MotionGraph:
     """The motions that a verdict holds: those of its graph, and those of its witness."""
     pairs = {(int(i), int(j)): k for k, (i, j) in enumerate(verdict.cells.pairs.tolist())}
-    problem = arrays_of(verdict.robot, verdict.cells, verdict.task)
-    graph = MotionGraph(problem, work_for(verdict.robot.n), pairs)
+    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
+    graph = MotionGraph(arrays, work_for(verdict.robot.n), pairs)
     for first, last, motion in _motions(verdict):
         graph.join(graph.node(first, motion[0]), graph.node(last, motion[-1]), motion)
     return graph

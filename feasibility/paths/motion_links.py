@@ -87,7 +87,7 @@ def _follow(
     # The curve between two cells runs from the one of lower index to the other.
     begin, end = (0.0, 1.0) if here < cell else (1.0, 0.0)
     count = track(
-        graph.problem, graph.work, graph.pairs[min(here, cell), max(here, cell)], begin, end, q,
+        graph.arrays, graph.work, graph.pairs[min(here, cell), max(here, cell)], begin, end, q,
         q if goal is None else goal, goal is not None, rows, 0,
     )  # fmt: skip
     return None if count < 0 else np.vstack([graph.q[x][None], rows[:count]])
@@ -101,9 +101,9 @@ def _self_motion(
         return start[None].copy()
     q = start.copy()
     rows = np.empty((CONNECT_STEPS + 1, len(q)))
-    problem = graph.problem
+    arrays = graph.arrays
     count, reached = connect(
-        problem, graph.work, problem.points[cell], problem.approaches[cell], q, goal, rows, 0,
+        arrays, graph.work, arrays.points[cell], arrays.approaches[cell], q, goal, rows, 0,
         CONNECT_STEPS,
     )  # fmt: skip
     return np.vstack([start[None], rows[:count]]) if reached else None
@@ -119,9 +119,9 @@ def windings(graph: MotionGraph, nodes: list[int]) -> list[NDArray[np.float64]]:
     motions = [graph.q[nodes[0]][None], *(graph.motion(x, y) for x, y in pairwise(nodes))]
     lowest = np.min([motion.min(axis=0) for motion in motions], axis=0)
     highest = np.max([motion.max(axis=0) for motion in motions], axis=0)
-    lower, upper = graph.problem.lower, graph.problem.upper
+    lower, upper = graph.arrays.lower, graph.arrays.upper
     found = []
-    for joint in np.flatnonzero(~graph.problem.chain.prismatic):
+    for joint in np.flatnonzero(~graph.arrays.chain.prismatic):
         for times in range(1, MOST_TURNS + 1):
             for by in (-times * TURN, times * TURN):
                 winding = np.zeros(len(lowest))

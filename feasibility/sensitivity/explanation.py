@@ -154,16 +154,16 @@ def other_motions(prober: Prober, guesses: int, most: int) -> list[Attempt]:
         most: searches.
     """
     robot, cells, _ = prober.given
-    exploration = Exploration(robot, cells, prober.problem, prober.seed + 1)
+    exploration = Exploration(robot, cells, prober.arrays, prober.seed + 1)
     tried = exploration.guesses(guesses)
-    margins = margin_shares(prober.problem, prober.work, cells.middle, tried)
+    margins = margin_shares(prober.arrays, prober.work, cells.middle, tried)
     order = np.argsort(-margins, kind="stable")
     found = []
     tried = tried[order[margins[order] >= 0.0]]
     for k in apart(np.array([_posture(prober, q) for q in tried]), most):
         seeds = np.full((len(cells), robot.n), np.nan)
         seeds[cells.middle] = tried[k]
-        found.append(prober.attempt(prober.problem, seeds, np.inf, deep=False))
+        found.append(prober.attempt(prober.arrays, seeds, np.inf, deep=False))
     return [attempt for attempt in found if attempt.found]
 
 
@@ -172,8 +172,8 @@ def _posture(prober: Prober, q: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Joint values alone say little: wrists turned by half turns change them much.
     """
-    place(prober.problem, prober.work, HERE, q)
-    origins, axes = prober.work.origins[0] / prober.problem.scale, prober.work.axes[0]
+    place(prober.arrays, prober.work, HERE, q)
+    origins, axes = prober.work.origins[0] / prober.arrays.scale, prober.work.axes[0]
     return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
 
 
@@ -220,7 +220,7 @@ def drop(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> Dropped:
     """What the best motion misses, and whether one motion covers all the rest."""
     covered, areas = verdict.covered, verdict.cells.areas
     most = 2 * cost_of(verdict)
-    rest = prober.attempt(prober.problem, q, most, deep=False, needed=covered)
+    rest = prober.attempt(prober.arrays, q, most, deep=False, needed=covered)
     rest = prober.confirmed(prober.given, rest, covered)
     cells = np.flatnonzero(~covered)
     return Dropped(

@@ -82,19 +82,19 @@ def configurations(exploration: Exploration) -> NDArray[np.float64]:
     return q
 
 
-def certifiable(problem: SearchArrays) -> bool:
+def certifiable(arrays: SearchArrays) -> bool:
     """Could a motion be certified everywhere, if there were one?
 
     Not in a cone of 0 degrees, where the offset surface folds, or where the deviation bounds exceed
     the tolerance or the cone.
     """
-    smooth = bool(np.isfinite(problem.derivative_bounds).all())
-    known = bool((problem.deviations < (problem.tolerance, problem.cone_chord)).all())
-    return smooth and known and problem.cone_chord > 0.0
+    smooth = bool(np.isfinite(arrays.derivative_bounds).all())
+    known = bool((arrays.deviations < (arrays.tolerance, arrays.cone_chord)).all())
+    return smooth and known and arrays.cone_chord > 0.0
 
 
 @kernel
-def project_all(problem, work, order, q):  # type: ignore[no-untyped-def]
+def project_all(arrays, work, order, q):  # type: ignore[no-untyped-def]
     """Project row q[k] (n,) onto the self-motion manifold over cell k, for the cells of `order`.
 
     Returns:
@@ -103,14 +103,14 @@ def project_all(problem, work, order, q):  # type: ignore[no-untyped-def]
     for k in range(order.shape[0]):
         row = q[order[k]]
         for j in range(row.shape[0]):
-            row[j] = min(max(row[j], problem.lower[j]), problem.upper[j])
-        if not project_onto_cell(problem, work, order[k], row, NEARBY_STEPS):
+            row[j] = min(max(row[j], arrays.lower[j]), arrays.upper[j])
+        if not project_onto_cell(arrays, work, order[k], row, NEARBY_STEPS):
             return k
     return order.shape[0]
 
 
 @kernel
-def project_guesses(problem, work, cell, guesses, steps, projected):  # type: ignore[no-untyped-def]
+def project_guesses(arrays, work, cell, guesses, steps, projected):  # type: ignore[no-untyped-def]
     """Project each guess (k, n) onto one cell's manifold, in place; fills `projected` (k,)."""
     for k in range(guesses.shape[0]):
-        projected[k] = project_onto_cell(problem, work, cell, guesses[k], steps)
+        projected[k] = project_onto_cell(arrays, work, cell, guesses[k], steps)

@@ -59,10 +59,10 @@ class Prober:
         self.given = variant
         self.seed = seed
         self.deadline = deadline
-        self.problem = arrays_of(*variant)
-        self._latest = ("", 0), self.problem
+        self.arrays = arrays_of(*variant)
+        self._latest = ("", 0), self.arrays
         beyond = replace(variant.task, standoff=variant.task.standoff + 1.0)
-        self.outwards = beyond.targets(variant.cells).points - self.problem.points
+        self.outwards = beyond.targets(variant.cells).points - self.arrays.points
         """(N, 3) how the target points move with the standoff."""
         self.work = work_for(variant.robot.n)
         self.spent_before = 0
@@ -83,39 +83,39 @@ class Prober:
         """Evaluations of the arm so far; a box of a proof counts as one."""
         return self.spent_before + int(self.work.counts[0])
 
-    def problem_at(self, quantity: Quantity, k: int) -> SearchArrays:
-        """The problem with a quantity k steps from the value given, without making it anew."""
+    def arrays_at(self, quantity: Quantity, k: int) -> SearchArrays:
+        """The arrays with a quantity k steps from the value given, without making it anew."""
         if quantity.kind in (Kind.CONE, Kind.STANDOFF):
             if self._latest[0] != (quantity.name, k):
                 self._latest = (quantity.name, k), arrays_of(*quantity.applied(self.given, k))
             return self._latest[1]
-        problem = self.centres_at(quantity, k)
+        arrays = self.centres_at(quantity, k)
         if quantity.kind is Kind.SHIFT:
-            targets = self.problem.targets.copy()
+            targets = self.arrays.targets.copy()
             targets[:, 0, :3] += quantity.value(k) * np.array(quantity.axis)  # the constant ones
             # Arrays that may be written to are of another type, for which kernels compile anew.
-            targets.flags.writeable = self.problem.targets.flags.writeable
-            return problem._replace(targets=targets)
-        return problem
+            targets.flags.writeable = self.arrays.targets.flags.writeable
+            return arrays._replace(targets=targets)
+        return arrays
 
     def centres_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The same over the cells' centres, cheaper: what lies between them may be unchanged."""
         value = quantity.value(k) if k else quantity.given
         if quantity.kind is Kind.CONE:
-            return self._coned(value) or self.problem_at(quantity, k)
+            return self._coned(value) or self.arrays_at(quantity, k)
         if quantity.kind is Kind.STANDOFF:
             grown = (value - quantity.given) * self.outwards
-            return self.problem._replace(points=self.problem.points + grown)
+            return self.arrays._replace(points=self.arrays.points + grown)
         if quantity.kind is Kind.SHIFT:
             shift = value * np.array(quantity.axis)
-            return self.problem._replace(points=self.problem.points + shift)
-        ends = [self.problem.lower.copy(), self.problem.upper.copy()]
+            return self.arrays._replace(points=self.arrays.points + shift)
+        ends = [self.arrays.lower.copy(), self.arrays.upper.copy()]
         ends[quantity.kind is Kind.UPPER][quantity.joint] = value
-        return self.problem._replace(lower=ends[0], upper=ends[1])
+        return self.arrays._replace(lower=ends[0], upper=ends[1])
 
     def _coned(self, cone: float) -> SearchArrays | None:
-        """The problem with another cone (rad), as it is over the cells' centres, nearly."""
-        cone_chord, former = float(2.0 * np.sin(0.5 * cone)), self.problem
+        """The arrays with another cone (rad), as it is over the cells' centres, nearly."""
+        cone_chord, former = float(2.0 * np.sin(0.5 * cone)), self.arrays
         if not (cone < np.pi and former.cone_chord < np.inf and former.cone_chord > 0.0):
             return None
         lost = (former.cone_chord - former.inner_cone_chord) * min(
@@ -137,12 +137,12 @@ class Prober:
         del self.suspects[MOST_SUSPECTS:]
 
     def follow(
-        self, problem: SearchArrays, q: NDArray[np.float64]
+        self, arrays: SearchArrays, q: NDArray[np.float64]
     ) -> tuple[int, NDArray[np.float64]]:
         """Project configurations of a case nearby onto the manifolds of this one.
 
         Args:
-            problem: see `problem_at`.
+            arrays: see `arrays_at`.
             q: (N, n) a configuration over each cell, in the case nearby.
 
         Returns:
@@ -152,14 +152,14 @@ class Prober:
         self.tick()
         found = q.copy()
         order = self.order()
-        projected = int(project_all(problem, self.work, order, found))
+        projected = int(project_all(arrays, self.work, order, found))
         if projected == len(order):
             return NO_CELL, found
         self.suspect(int(order[projected]))
         return int(order[projected]), found
 
     def rule(
-        self, problem: SearchArrays, cell: int, boxes: int
+        self, arrays: SearchArrays, cell: int, boxes: int
     ) -> tuple[Ruling, NDArray[np.float64] | None]:
         """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
 
@@ -168,11 +168,11 @@ class Prober:
             manifold, None where Newton's steps end elsewhere.
         """
         self.tick()
-        if self.beyond_reach(problem)[cell]:
+        if self.beyond_reach(arrays)[cell]:
             self.suspect(cell)
             return Ruling.PROVED, None
         boxes = max(int(self.allowance * boxes), min(boxes, LEAST_BOXES))
-        ruling, q = rule(problem, self.work, cell, root_box(problem), boxes)
+        ruling, q = rule(arrays, self.work, cell, root_box(arrays), boxes)
         if ruling is Ruling.OPEN:
             self.allowance *= 0.5  # until a proof of this arm succeeds
             return ruling, None
@@ -182,27 +182,27 @@ class Prober:
             return ruling, None
         if not np.isfinite(q).all():
             return ruling, None
-        row = np.full((len(problem.points), len(q)), np.nan)
-        row[cell] = wound(problem, q)
-        projected = int(project_all(problem, self.work, np.array([cell]), row)) == 1
+        row = np.full((len(arrays.points), len(q)), np.nan)
+        row[cell] = wound(arrays, q)
+        projected = int(project_all(arrays, self.work, np.array([cell]), row)) == 1
         return ruling, row[cell] if projected else None
 
-    def beyond_reach(self, problem: SearchArrays) -> NDArray[np.bool_]:
+    def beyond_reach(self, arrays: SearchArrays) -> NDArray[np.bool_]:
         """(N,) cells that are further away than the arm reaches.
 
         Revolute joints reach alike in any limits; a prismatic joint that is longer than in the case
         as given is not ruled out here.
         """
         slides = self.given.robot.prismatic
-        longer = (problem.lower < self.problem.lower) | (problem.upper > self.problem.upper)
+        longer = (arrays.lower < self.arrays.lower) | (arrays.upper > self.arrays.upper)
         if (slides & longer).any():
-            return np.zeros(len(problem.points), dtype=bool)
-        distance = self.given.robot.distance_from_base(problem.points)
-        return distance > self.reach + problem.tolerance
+            return np.zeros(len(arrays.points), dtype=bool)
+        distance = self.given.robot.distance_from_base(arrays.points)
+        return distance > self.reach + arrays.tolerance
 
     def attempt(
         self,
-        problem: SearchArrays,
+        arrays: SearchArrays,
         seeds: NDArray[np.float64],
         most: float,
         deep: bool,
@@ -212,7 +212,7 @@ class Prober:
         """Search for a covering motion, from known configurations first.
 
         Args:
-            problem: see `problem_at`.
+            arrays: see `arrays_at`.
             seeds: (N, n) configurations to start from, one for each cell; NaN where there is none.
             most: evaluations of the arm after which the search is stopped.
             deep: go on with the full search where the seeds do not lead to a covering motion.
@@ -225,10 +225,10 @@ class Prober:
         """
         self.tick()
         robot, cells, _ = self.given
-        robot = robot.with_limits(np.column_stack([problem.lower, problem.upper]))
+        robot = robot.with_limits(np.column_stack([arrays.lower, arrays.upper]))
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
         clock = Clock(self.deadline - time.monotonic(), lambda *_: self.tick()).start()
-        exploration = LimitedExploration(robot, cells, problem, self.seed, clock, most=most)
+        exploration = LimitedExploration(robot, cells, arrays, self.seed, clock, most=most)
         ended = False
         try:
             self._add_seeds(exploration, seeds, deep)
@@ -252,7 +252,7 @@ class Prober:
             detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
             return Attempt(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
         best = f"the best motion covers {int(exploration.covered.sum())} of {len(cells)} cells"
-        if ended and certifiable(problem):
+        if ended and certifiable(arrays):
             detail = f"the search ended without a covering motion; {best}"
             return Attempt(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
         detail = f"not found with {int(exploration.work.counts[0])} evaluations of the arm; {best}"

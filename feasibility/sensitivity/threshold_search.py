@@ -103,7 +103,7 @@ class ThresholdSearch:
         """The last feasible probe on the way to the end, what was found past it, if anything."""
         end = self.quantity.last
         if self.quantity.monotone:
-            cell, q = self.prober.follow(self.prober.problem_at(self.quantity, end), here.attempt.q)
+            cell, q = self.prober.follow(self.prober.arrays_at(self.quantity, end), here.attempt.q)
             if cell == NO_CELL:
                 attempt = self._search(end, q)
                 if attempt.found:
@@ -154,16 +154,16 @@ class ThresholdSearch:
 
     def _look(self, k: int, seeds: NDArray[np.float64]) -> Attempt | Finding:
         """Is it feasible at k steps? An attempt if so, or what speaks against it."""
-        problem = self.prober.problem_at(self.quantity, k)
+        arrays = self.prober.arrays_at(self.quantity, k)
         missed = np.flatnonzero(~np.isfinite(seeds).all(axis=1))
         spread = missed[np.linspace(0, len(missed) - 1, min(PROOFS, len(missed))).astype(int)]
         hard = [cell for cell in self.prober.suspects if cell in missed]
-        far = self.prober.beyond_reach(problem)
+        far = self.prober.beyond_reach(arrays)
         if far.any():
             return self._proof(k, int(far.argmax()))
         seeds = seeds.copy()
         for cell in list(dict.fromkeys([*hard, *spread.tolist()]))[:PROOFS]:
-            ruling, q = self.prober.rule(problem, cell, HINT_BOXES)
+            ruling, q = self.prober.rule(arrays, cell, HINT_BOXES)
             if ruling is Ruling.PROVED:
                 return self._proof(k, cell)
             if q is None:
@@ -296,8 +296,8 @@ class ThresholdSearch:
         proof, q = None, None
         for steps in (s for s in BEYOND if (far - bracket.good.k) * sign > s):
             k = bracket.good.k + sign * steps
-            problem = self.prober.problem_at(self.quantity, k)
-            ruling, q = self.prober.rule(problem, bracket.failed, PROOF_BOXES)
+            arrays = self.prober.arrays_at(self.quantity, k)
+            ruling, q = self.prober.rule(arrays, bracket.failed, PROOF_BOXES)
             if ruling is not Ruling.PROVED:
                 break
             proof = self._proof(k, bracket.failed)
@@ -309,8 +309,8 @@ class ThresholdSearch:
         """Search at k steps: from the seeds alone, or deeper, with half of what is left."""
         left = self.stop - self.prober.spent
         most = max(left, self.verdict_cost) // 2 if deep else SHORT * self.verdict_cost
-        problem = self.prober.problem_at(self.quantity, k)
-        return self.prober.attempt(problem, seeds, most, deep, hard=hard)
+        arrays = self.prober.arrays_at(self.quantity, k)
+        return self.prober.attempt(arrays, seeds, most, deep, hard=hard)
 
     def _reported(self, probe: Probe) -> Finding:
         """A feasible probe as a finding, once its motion is replayed."""

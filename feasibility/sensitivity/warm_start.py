@@ -48,8 +48,8 @@ class WarmStart:
     def projects(self, cells: NDArray[np.int64], k: int) -> int:
         """How many of these cells project at k steps, before the first that does not."""
         found = self.q.copy()
-        problem = self.prober.centres_at(self.quantity, k)
-        count = int(project_all(problem, self.prober.work, cells, found))
+        arrays = self.prober.centres_at(self.quantity, k)
+        count = int(project_all(arrays, self.prober.work, cells, found))
         self.q[cells[:count]] = found[cells[:count]]
         return count
 

@@ -1,4 +1,4 @@
-"""A sample of `make campaign NAME=oracle`: the oracles know cases of the paper, and their answers."""
+"""A sample of `make campaign NAME=oracle`: the oracles know the answers of a few cases."""
 
 import numpy as np
 import puma_oracle

@@ -229,8 +229,8 @@ def test_the_same_question_has_the_same_path():
 def hand_made(rng, cells, nodes, density):
     """A graph over cells in a row: some nodes over each, random motions between neighbours."""
     verdict = small_verdict("plate")
-    problem = arrays_of(verdict.robot, verdict.cells, verdict.task)
-    graph = MotionGraph(problem, work_for(2), {(k, k + 1): k for k in range(cells - 1)})
+    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
+    graph = MotionGraph(arrays, work_for(2), {(k, k + 1): k for k in range(cells - 1)})
     for cell in range(cells):
         for _ in range(nodes):
             graph.node(cell, rng.random(2))
@@ -297,7 +297,7 @@ def test_a_detour_is_the_cheapest(stored_motions_only):
         for x, y in graph.edges.edges:
             apart = np.linalg.norm(cells.centres[graph.cell[x]] - cells.centres[graph.cell[y]])
             cost = joint_length(graph.motion(x, y))
-            cost += joint_routes.REVISIT * apart / graph.problem.scale
+            cost += joint_routes.REVISIT * apart / graph.arrays.scale
             weighted.add_edge(x, y, weight=cost)
         lengths = [
             nx.dijkstra_path_length(weighted, x, y)

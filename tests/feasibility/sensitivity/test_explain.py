@@ -365,7 +365,7 @@ def test_a_search_that_the_time_limit_cut_says_so() -> None:
     variant = variant_of("4a")
     prober = Prober(variant, 0, deadline=0.0)
     nothing = np.full((90, 6), np.nan)
-    attempt = prober.attempt(prober.problem, nothing, np.inf, deep=True)
+    attempt = prober.attempt(prober.arrays, nothing, np.inf, deep=True)
     assert (attempt.answer, attempt.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
     assert attempt.detail == "unknown, because the time limit ran out"
 

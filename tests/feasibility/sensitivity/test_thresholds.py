@@ -189,7 +189,7 @@ def test_a_problem_nearby_is_the_one_made_anew() -> None:
     variant = paper("4c")
     prober = prober_of(variant)
     for q in quantities(variant, widen=False):
-        found, fresh = prober.problem_at(q, 7), arrays_of(*q.applied(variant, 7))
+        found, fresh = prober.arrays_at(q, 7), arrays_of(*q.applied(variant, 7))
         for name, one, other in zip(found._fields, found, fresh, strict=True):
             if name != "chain":
                 np.testing.assert_allclose(one, other, atol=1e-9, err_msg=f"{q.name}: {name}")
@@ -211,7 +211,7 @@ def test_followed_configurations_lie_on_the_fibres(name: str) -> None:
     assert not np.isnan(start.q).any()
     q = quantity(variant, name)
     for k in (1, 10, 40):
-        cell, found = prober.follow(prober.problem_at(q, k), start.q)
+        cell, found = prober.follow(prober.arrays_at(q, k), start.q)
         assert cell == NO_CELL
         robot, cells, task = q.applied(variant, k)
         points, axes = tools(robot, found)
@@ -221,7 +221,7 @@ def test_followed_configurations_lie_on_the_fibres(name: str) -> None:
         assert np.degrees(np.arccos(cosine)).max() <= task.cone_deg + 1e-6
         assert (found >= robot.lower).all()
         assert (found <= robot.upper).all()
-    cell, _ = prober.follow(prober.problem, nowhere)
+    cell, _ = prober.follow(prober.arrays, nowhere)
     assert cell != NO_CELL  # NaN is never taken for a configuration
 
 
@@ -249,9 +249,9 @@ def test_warm_starts_reach_as_far_as_they_go_and_no_further(name: str) -> None:
     for q in quantities(variant, widen=False):
         reached = WarmStart(prober, q, 0, start.q).reach(q.last + 1)
         assert 0 <= reached.k <= q.last
-        problem = prober.problem_at(q, reached.k)
+        arrays = prober.arrays_at(q, reached.k)
         if len(variant.cells) <= 40:  # on more cells the search that follows looks at the rest
-            cell, found = prober.follow(problem, reached.q)
+            cell, found = prober.follow(arrays, reached.q)
             assert cell == NO_CELL
             points, axes = tools(variant.robot, found)
             robot, cells, task = q.applied(variant, reached.k)
@@ -274,17 +274,17 @@ def test_proofs_that_fail_are_asked_for_less_until_one_succeeds() -> None:
     variant = paper("4d")
     prober = prober_of(variant)
     for _ in range(20):
-        assert prober.rule(prober.problem, 89, 2)[0] is Ruling.OPEN
+        assert prober.rule(prober.arrays, 89, 2)[0] is Ruling.OPEN
     assert prober.allowance < 1e-3
     before = prober.spent
-    assert prober.rule(prober.problem, 89, 3000)[0] is Ruling.OPEN
+    assert prober.rule(prober.arrays, 89, 3000)[0] is Ruling.OPEN
     # A box may be looked at up to three times.
     assert LEAST_BOXES <= prober.spent - before <= 3 * LEAST_BOXES
-    assert prober.rule(prober.problem, 60, 3000)[0] is not Ruling.PROVED
+    assert prober.rule(prober.arrays, 60, 3000)[0] is not Ruling.PROVED
     prober.allowance = 0.5
-    assert prober.rule(prober.problem, 60, 3000)[0] is Ruling.PROVED
+    assert prober.rule(prober.arrays, 60, 3000)[0] is Ruling.PROVED
     assert prober.allowance == 1.0
-    assert prober.rule(prober.problem, 89, 3000)[0] is Ruling.PROVED
+    assert prober.rule(prober.arrays, 89, 3000)[0] is Ruling.PROVED
 
 
 def test_a_ruling_brings_a_proof_or_a_configuration() -> None:
@@ -292,7 +292,7 @@ def test_a_ruling_brings_a_proof_or_a_configuration() -> None:
     prober = prober_of(variant)
     points, approaches = variant.task.targets(variant.cells)
     for cell in (0, 45, 89):
-        ruling, q = prober.rule(prober.problem, cell, 20_000)
+        ruling, q = prober.rule(prober.arrays, cell, 20_000)
         if cell >= 60:
             assert ruling is Ruling.PROVED
             assert q is None
@@ -308,17 +308,17 @@ def test_a_search_without_a_ration_finds_nothing_and_says_so() -> None:
     variant = paper("4a")
     prober = prober_of(variant)
     nothing = np.full((90, 6), np.nan)
-    attempt = prober.attempt(prober.problem, nothing, 10, deep=True)
+    attempt = prober.attempt(prober.arrays, nothing, 10, deep=True)
     assert not attempt.found
     assert (attempt.answer, attempt.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)
     assert prober.spent > 0
-    attempt = prober.attempt(prober.problem, nothing, np.inf, deep=True)
+    attempt = prober.attempt(prober.arrays, nothing, np.inf, deep=True)
     assert attempt.found
 
 
 def test_a_motion_that_the_replay_refuses_is_not_feasible() -> None:
     prober = prober_of(SMALL)
-    attempt = prober.attempt(prober.problem, np.full((9, 6), np.nan), np.inf, deep=True)
+    attempt = prober.attempt(prober.arrays, np.full((9, 6), np.nan), np.inf, deep=True)
     assert attempt.walk is not None
     assert prober.confirmed(SMALL, attempt).answer is Answer.FEASIBLE
     q = attempt.walk.q.copy()
