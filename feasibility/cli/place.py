@@ -21,7 +21,7 @@ from feasibility.cli.session import open_case
 from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
-    from feasibility.placement import Judge, PlacementMap, Placements, StationPlan
+    from feasibility.placement import Evaluator, PlacementMap, Placements, StationPlan
 
 AXES = {
     "x": "m", "y": "m", "z": "m", "roll": "degrees", "pitch": "degrees", "yaw": "degrees"
@@ -90,7 +90,7 @@ def run_place(args: argparse.Namespace, began: float) -> int:
             COUNT,
             Pose,
             Region,
-            StudyJudge,
+            StudyEvaluator,
             map_around_best,
             place,
             station_plan,
@@ -103,19 +103,19 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         count = COUNT if args.count is None else args.count
         store = None if args.out is None else stack.enter_context(Store(args.out))
         workers = stack.enter_context(open_workers(args.workers, args.dask))
-        judge: Judge = StudyJudge(case, workers, store, lambda *rest: progress.settle())
+        evaluator: Evaluator = StudyEvaluator(case, workers, store, lambda *rest: progress.settle())
         placements = place(
-            *setup[:3], region, setup.search, judge=judge, progress=progress,
+            *setup[:3], region, setup.search, evaluator=evaluator, progress=progress,
             count=count, time_limit=args.time_limit,
         )  # fmt: skip
         if args.stations and not placements.found:
-            plan = station_plan(placements, judge, setup.search, count, progress)
+            plan = station_plan(placements, evaluator, setup.search, count, progress)
         if args.html is not None:
             from feasibility.viewer import view_placements
 
             drawn = view_placements(placements, setup.search, case.name, plan, progress=progress)
         if args.map is not None:
-            chart = map_around_best(placements, judge, progress)
+            chart = map_around_best(placements, evaluator, progress)
     placements.timing["command_s"] = time.perf_counter() - began
     _report(args, placements, case.name, plan, chart)
     if drawn is not None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.placement.placements import Placements
-from feasibility.placement.refinement import BATCH, Judge
+from feasibility.placement.refinement import BATCH, Evaluator
 from feasibility.placement.region import AXES, Array, PlacementError, Pose, Region
 from feasibility.placement.trial import Stage
 from feasibility.search import Progress
@@ -30,7 +30,7 @@ class PlacementMap:
     share: Array
     """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
     margin: Array
-    """Likewise the margin, see `placement_room`; 0 where not every cell is covered."""
+    """Likewise the margin, see `placement.margins`; 0 where not every cell is covered."""
     known: NDArray[np.bool_]
     """Likewise, where a search was run; elsewhere share and margin are NaN."""
 
@@ -49,7 +49,7 @@ def axes_of(region: Region) -> tuple[str, ...]:
 
 
 def placement_map(
-    judge: Judge,
+    evaluator: Evaluator,
     region: Region,
     held: Pose,
     axes: Sequence[str] | None = None,
@@ -59,9 +59,9 @@ def placement_map(
     """Search every placement of a raster.
 
     Args:
-        judge: who tries placements.
+        evaluator: tries placements.
         region: its ranges are the map's.
-        held: where the axes that are not mapped stand, such as the best placement.
+        held: values of the axes that are not mapped, such as those of the best placement.
         axes: two or three of those that vary; default `axes_of`. One is mapped as a strip.
         shape: places along each.
         progress: called as progress(done, total, text); what it raises ends it.
@@ -97,7 +97,7 @@ def placement_map(
         if progress is not None:
             progress(start, len(values), "searching the map")
         poses = [Pose.of_values(row) for row in values[start : start + BATCH]]
-        trials += judge.tried(poses, early=False)
+        trials += evaluator.try_all(poses, early=False)
     known = np.array([trial.stage is not Stage.FAILED for trial in trials])
     share = np.where(known, [trial.share for trial in trials], np.nan)
     margin = np.where(known, [trial.margin for trial in trials], np.nan)
@@ -112,10 +112,10 @@ def placement_map(
 
 
 def map_around_best(
-    placements: Placements, judge: Judge, progress: Progress | None = None
+    placements: Placements, evaluator: Evaluator, progress: Progress | None = None
 ) -> PlacementMap:
     """The map of a region through the best placement found there, or through its middle."""
     region = placements.region
     middle = Pose.of_values(0.5 * (region.low + region.high))
     held = middle if placements.best is None else placements.best.pose
-    return placement_map(judge, region, held, progress=progress)
+    return placement_map(evaluator, region, held, progress=progress)

@@ -1,12 +1,12 @@
-"""The room that the motion over a placement leaves, as shares from 0 (none) to 1 (all there is).
+"""The margins that the motion over a placement leaves, as shares from 0 (none) to 1 (all).
 
 - limits: over every cell, how far a joint stays from the nearer end of its range, by half the range
-- cone: over every cell, how far the tool axis stays inside the rim, by the cone
+- cone: over every cell, how far the tool axis stays inside the cone, by its angle
 - reach: how far the furthest target stays inside the reach bound, by the reach
 
-The measure of a placement is the least of the three. Over each cell that configuration of the
-covering motion's component counts which leaves most of limits and cone, after moving over the
-cell's centre away from both; each such step is certified, as those of the search are.
+The measure of a placement is the least of the three. Each cell counts with the configuration of the
+covering motion's component that leaves most of limits and cone, after self-motions over the cell's
+centre away from both; each such step is certified, as those of the search are.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from feasibility.roadmap import (
 )
 
 NARROW = 0.1  # [1] of the cone: no axis is led further inside
-ROOM_STEPS = np.int64(80)  # over one cell's centre, away from limits and rim
+MARGIN_STEPS = np.int64(80)  # over one cell's centre, away from limits and boundary of the cone
 STALE = 8  # of them without gain end it
-MOST_SETTLED = 2  # configurations over one cell that room is looked for from
+MOST_SETTLED = 2  # configurations over one cell from which margins are widened
 
 
 @kernel
-def _room_at(problem, work, q, out):  # type: ignore[no-untyped-def]
+def _margins_at(problem, work, q, out):  # type: ignore[no-untyped-def]
     """Shares of half range and of cone that q leaves (slot 0 holds it)."""
     out[0] = 1.0
     for j in range(q.shape[0]):
@@ -51,19 +51,19 @@ def _room_at(problem, work, q, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _make_room(problem, aimed, work, target, approach, q, best):  # type: ignore[no-untyped-def]
-    """Self-motion over one target away from limits and rim (q in place); `best` gets its room.
+def _widen_margins(problem, aimed, work, target, approach, q, best):  # type: ignore[no-untyped-def]
+    """Self-motion over one target away from limits and boundary of the cone; changes q and `best`.
 
-    As `fibre.settle`, but further: each step leads the axis inwards by a part of its angle, down to
-    the cone of `aimed`. Every step is certified.
+    As `self_motion.settle`, but further: each step leads the axis inwards by a part of its angle,
+    down to the cone of `aimed`. Every step is certified. `best` gets the margins.
     """
     n = q.shape[0]
-    room = np.empty(2)
+    here = np.empty(2)
     look_at(problem, work, target, approach)
     place(problem, work, HERE, q)
-    _room_at(problem, work, q, best)
+    _margins_at(problem, work, q, best)
     size, stale = 0.3, 0
-    for _ in range(ROOM_STEPS):
+    for _ in range(MARGIN_STEPS):
         copy_slot(work)
         linearise(problem, work, NEXT, problem.cone_chord)
         margin_objective(problem, work, q, size)
@@ -82,23 +82,23 @@ def _make_room(problem, aimed, work, target, approach, q, best):  # type: ignore
         for j in range(n):
             q[j] = work.trial[j]
         accept(work)
-        _room_at(problem, work, q, room)
+        _margins_at(problem, work, q, here)
         stale += 1
-        if min(room[0], room[1]) > min(best[0], best[1]) + 1e-3:
-            best[0], best[1], stale = room[0], room[1], 0
+        if min(here[0], here[1]) > min(best[0], best[1]) + 1e-3:
+            best[0], best[1], stale = here[0], here[1], 0
         if stale > STALE:
             return
 
 
-def least_room(exploration: Exploration) -> NDArray[np.float64]:
+def least_margins(exploration: Exploration) -> NDArray[np.float64]:
     """(2,) shares of limits and of cone that the best component leaves over every cell."""
     problem, roadmap, work = exploration.arrays, exploration.roadmap, exploration.work
     # Steps over a centre head for a cone that is next to nothing, and keep to the task's.
     aimed = problem._replace(
         cone_chord=NARROW * problem.cone_chord if problem.cone_chord < np.inf else np.inf
     )
-    room = np.empty(2)
-    best = np.full((len(exploration.cells), 2), -1.0)  # limits and cone, of the roomiest so far
+    here = np.empty(2)
+    best = np.full((len(exploration.cells), 2), -1.0)  # limits and cone, the widest so far
     settled = np.zeros(len(exploration.cells), dtype=np.int64)
     for x in range(int(roadmap.counters[NODES])):
         cell = int(roadmap.cell[x])
@@ -108,7 +108,9 @@ def least_room(exploration: Exploration) -> NDArray[np.float64]:
             continue
         settled[cell] += 1
         q = roadmap.q[x].copy()
-        _make_room(problem, aimed, work, problem.points[cell], problem.approaches[cell], q, room)
-        if room.min() > best[cell].min():
-            best[cell] = room
+        _widen_margins(
+            problem, aimed, work, problem.points[cell], problem.approaches[cell], q, here
+        )
+        if here.min() > best[cell].min():
+            best[cell] = here
     return np.clip(best.min(axis=0), 0.0, 1.0)

@@ -1,33 +1,36 @@
 """Where may the surface stand? A search over the poses of a region, coarse to fine.
 
-1. The reach bound is asked about the whole region; where it shows that every placement has a target
+1. The reach bound is evaluated over the region; where it shows that every placement has a target
    out of reach, that is the answer, and no search is run.
-2. Poses are spread evenly over the region (Sobol). The same bound discards most hopeless ones for
-   next to nothing; of the others, Newton's method is tried at a few cells that differ most. A
-   short search is run only where it succeeds at all of them.
+2. Poses are spread evenly over the region (Sobol). The same bound discards most of those that are
+   out of reach; of the others, Newton's method is tried at a few cells that differ most. A short
+   search is run only where it succeeds at all of them.
 3. Around the best few, more poses are tried in ever smaller boxes: larger covered share first, then
-   larger margin (see `feasibility.placement_room`).
-4. The best placements are asked about as any other case: `feasibility.check` searches and replays.
+   larger margin (see `feasibility.placement.margins`).
+4. The best placements are decided as any other case: `feasibility.check` searches and replays.
    Only what it calls feasible is an answer.
 
-The poses tried depend on the region, the counts and the seed alone, not on who tries them.
+The poses tried depend on the region, the counts and the seed alone, not on the evaluator.
 """
 
 from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from feasibility.placement.placer import Placer
+from feasibility.notices import compiling_notice
+from feasibility.placement.evaluator import LocalEvaluator
 from feasibility.placement.reach_bound import Beyond, Reach
-from feasibility.placement.refinement import Hunt, Judge
+from feasibility.placement.refinement import Evaluator, Refinement
 from feasibility.placement.region import PlacementError, Pose, Region
 from feasibility.placement.trial import Stage, Trial
+from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
 from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
@@ -42,6 +45,8 @@ MISSED = {
     CauseKind.COLLISION: "missed for collision",
     CauseKind.DISCONNECTED: "reachable by another motion only",
 }
+
+COUNTS = ("fk", "drawn", "bound", "probe", "search", "check", "boxes")  # see `statistics`
 
 COUNT = 256  # poses spread over the region
 AROUND = 8  # poses tried around each of the best, a round
@@ -91,27 +96,6 @@ class Placements:
         return f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
 
 
-class Local:
-    """A judge in this process."""
-
-    def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
-        """Load the kernels."""
-        from feasibility.notices import compiling_notice
-        from feasibility.roadmap import warm_up
-
-        with compiling_notice():
-            warm_up()
-        self.placer = Placer(robot, cells, task, search)
-
-    def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
-        """See `Judge`."""
-        return [self.placer.try_at(pose, early) for pose in poses]
-
-    def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
-        """See `Judge`."""
-        return [self.placer.check_at(pose, causes) for pose in poses]
-
-
 def place(
     robot: Robot,
     cells: Cells,
@@ -124,7 +108,7 @@ def place(
     keep: int = KEEP,
     early: bool = True,
     time_limit: float | None = None,
-    judge: Judge | None = None,
+    evaluator: Evaluator | None = None,
     progress: Progress | None = None,
 ) -> Placements:
     """Where in a region may the surface stand, so that one continuous motion covers it?
@@ -140,7 +124,7 @@ def place(
         keep: feasible placements to verify, at most.
         early: whether bounds and probes may discard placements before a search is run.
         time_limit: s, looked at between batches; the verdicts asked for at the end come on top.
-        judge: who tries placements; default this process.
+        evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
 
     Returns:
@@ -164,10 +148,17 @@ def place(
     began = time.monotonic()
     reach = Reach.of(robot, cells, task)
     beyond = reach.beyond(region)
+    answered = partial(Placements, robot, cells, task, region)
     if beyond is not None:
-        return _beyond(robot, cells, task, region, reach, beyond, began)
-    hunt = Hunt(
-        judge=Local(robot, cells, task, search) if judge is None else judge,
+        placements = _ruled_out(answered, region, reach, beyond)
+        placements.timing["total_s"] = time.monotonic() - began
+        return placements
+    if evaluator is None:
+        with compiling_notice():
+            warm_up()
+        evaluator = LocalEvaluator(robot, cells, task, search)
+    refinement = Refinement(
+        evaluator=evaluator,
         reach=reach,
         region=region,
         seed=search.seed,
@@ -175,10 +166,15 @@ def place(
         deadline=np.inf if time_limit is None else began + time_limit,
         progress=progress,
     )
-    hunt.sweep(count)
-    hunt.refine(around)
-    found = hunt.verified(keep)
-    return _told(robot, cells, task, region, hunt, found, began)
+    refinement.sweep(count)
+    refinement.refine(around)
+    placements = _searched(answered, refinement, refinement.verified(keep))
+    if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
+        placements = replace(
+            placements, message=f"{placements.message} Wherever it stands: {closed}"
+        )
+    placements.timing["total_s"] = time.monotonic() - began
+    return placements
 
 
 def _check_settings(
@@ -204,10 +200,9 @@ def _check_settings(
         raise PlacementError(faults)
 
 
-def _beyond(
-    robot: Robot, cells: Cells, task: Task, region: Region, reach: Reach, beyond: Beyond,
-    began: float,
-) -> Placements:  # fmt: skip
+def _ruled_out(
+    answered: Callable[..., Placements], region: Region, reach: Reach, beyond: Beyond
+) -> Placements:
     """The answer where the reach bound leaves no placement."""
     values = region.samples(0, 0)  # its middle
     trials = [
@@ -219,34 +214,27 @@ def _beyond(
         f"{beyond.reach:.3f} m (proved for the whole region, {beyond.boxes} "
         f"box{'es' if beyond.boxes > 1 else ''})."
     )
-    return Placements(
-        robot=robot,
-        cells=cells,
-        task=task,
-        region=region,
+    return answered(
         answer=Answer.INFEASIBLE,
         evidence=Evidence.PROOF,
         message=message,
         found=(),
         trials=tuple(trials),
         cause=CauseKind.OUT_OF_REACH,
-        timing={"total_s": time.monotonic() - began},
-        statistics={"fk": 0, "drawn": 0, "bound": 0, "probe": 0, "search": 0, "check": 0,
-                    "boxes": beyond.boxes},
-    )  # fmt: skip
+        statistics={**dict.fromkeys(COUNTS, 0), "boxes": beyond.boxes},
+    )
 
 
-def _told(
-    robot: Robot, cells: Cells, task: Task, region: Region, hunt: Hunt, found: list[Trial],
-    began: float,
-) -> Placements:  # fmt: skip
+def _searched(
+    answered: Callable[..., Placements], refinement: Refinement, found: list[Trial]
+) -> Placements:
     """The answer of a search."""
-    trials = sorted(hunt.trials, key=lambda trial: trial.rank, reverse=True)
+    trials = sorted(refinement.trials, key=lambda trial: trial.rank, reverse=True)
     failed = [trial for trial in trials if trial.stage is Stage.FAILED]
     stages = Counter(trial.stage for trial in trials)
     looked = stages[Stage.SEARCH] + stages[Stage.CHECK]
     tried = (
-        f"{hunt.drawn} placements were drawn: {hunt.bound} have a target out of reach, "
+        f"{refinement.drawn} placements were drawn: {refinement.bound} have a target out of reach, "
         f"{stages[Stage.PROBE]} failed a few Newton starts, {looked} were searched"
     ) + (f", {len(failed)} could not be tried ({failed[0].message})" if failed else "")
     causes: dict[str, int] = {}
@@ -258,7 +246,7 @@ def _told(
             f"motion; the best leaves a margin of {found[0].margin:.3f}. {tried}."
         )
     else:
-        undecided = hunt.late or bool(failed)
+        undecided = refinement.late or bool(failed)
         undecided |= any(trial.answer is Answer.UNDECIDED for trial in trials)
         answer = Answer.UNDECIDED if undecided else Answer.INFEASIBLE
         evidence = Evidence.BUDGET if undecided else Evidence.EXHAUSTED
@@ -268,16 +256,9 @@ def _told(
         message = (
             f"None found in the region: {tried}; the best covers {100.0 * best:.1f} % of the area"
             + (f", and most of the rest is {MISSED[cause]}" if cause else "")
-            + ("; the time limit ran out." if hunt.late else ". This is no proof.")
+            + ("; the time limit ran out." if refinement.late else ". This is no proof.")
         )
-        closed = blocked_curves(cells, task)
-        if closed and answer is Answer.UNDECIDED:
-            message += f" Wherever it stands: {closed}"
-    return Placements(
-        robot=robot,
-        cells=cells,
-        task=task,
-        region=region,
+    return answered(
         answer=answer,
         evidence=evidence,
         message=message,
@@ -285,14 +266,11 @@ def _told(
         trials=tuple(trials),
         cause=cause,
         causes=causes,
-        timing={"total_s": time.monotonic() - began},
         statistics={
             "fk": sum(trial.fk for trial in trials),
-            "drawn": hunt.drawn,
-            "bound": hunt.bound,
-            "probe": stages[Stage.PROBE],
-            "search": stages[Stage.SEARCH],
-            "check": stages[Stage.CHECK],
+            "drawn": refinement.drawn,
+            "bound": refinement.bound,
+            **{str(stage): stages[stage] for stage in (Stage.PROBE, Stage.SEARCH, Stage.CHECK)},
             "boxes": 0,
         },
     )

@@ -7,14 +7,13 @@ from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
 from feasibility.division import undominated
-from feasibility.roadmap import PROJECTION_STEPS, Exploration, margin_shares, project_onto_cell
+from feasibility.roadmap import PROJECTION_STEPS, Exploration, project_onto_cell, seed_middle
 from surfaces import Cells
 
 PROBES = 8  # cells that represent the surface, besides the furthest and the nearest
 STARTS = 16  # Newton starts at each
-PIVOT_SEEDS = 8  # guesses at the middle cell
 MORE_CELLS = 4  # cells that nothing has reached, seeded in a short search
-STIRS = 6  # of the border of the best component, in a short search
+SELF_MOTIONS = 6  # of the border of the best component, in a short search
 MOST_COVERS = 8  # components that are kept of a placement, the largest
 
 
@@ -46,19 +45,13 @@ def probe(exploration: Exploration, cells: NDArray[np.int64]) -> NDArray[np.bool
     return hits.astype(bool)
 
 
-def skim(exploration: Exploration, early: bool) -> None:
-    """A short search: the middle cell, some that it leaves unreached, some stirring at borders.
+def search_quickly(exploration: Exploration, early: bool) -> None:
+    """A short search: the middle cell, some cells that it misses, some self-motions at borders.
 
     With `early` it ends at a cell over which nothing is found: no motion will cover that one.
     """
-    pivot = exploration.cells.middle
-    guesses = exploration.guesses(PIVOT_SEEDS)
-    room = margin_shares(exploration.arrays, exploration.work, pivot, guesses)
-    for k in np.argsort(-room, kind="stable"):
-        if room[k] >= 0.0:
-            exploration.add_seeds(pivot, guesses[k : k + 1])
-        if exploration.complete:
-            return
+    if seed_middle(exploration):
+        return
     for _ in range(MORE_CELLS):
         missed = np.flatnonzero(~exploration.covered)
         lost = missed[~exploration.reached[missed]]
@@ -68,7 +61,7 @@ def skim(exploration: Exploration, early: bool) -> None:
         )
         if exploration.complete or (early and len(lost) and not found):
             return
-    for _ in range(STIRS):
+    for _ in range(SELF_MOTIONS):
         for root in exploration.roots()[:2]:
             border = exploration.border(root)
             if len(border):

@@ -1,7 +1,7 @@
-"""Placements that no search need look at: targets beyond the arm's reach, one pose or a region.
+"""Placements that need no search: targets beyond the arm's reach, one pose or a region.
 
 The tool point is never further from the first joint than the reach bound R (see `robots.reach`).
-So a pose is hopeless where a target lies further off than R and the tolerance. For a whole box of
+So a pose is ruled out where a target lies further off than R and the tolerance. For a box of
 poses, let c be a target in the surface's frame, B the box of positions, and Q the rotation in the
 middle of the ranges of roll, pitch and yaw, whose half widths add up to at most t (angles of
 rotations that follow each other add up at most). Then for every pose in the box

@@ -16,7 +16,7 @@ from feasibility.search import Progress
 
 DRAWS = 16  # as many times more are drawn where the bound leaves few
 FEW = 32  # poses within reach that refinement should start from
-DESPERATE = 4  # placements that are searched although bound or probe speak against them
+FALLBACK = 4  # placements that are searched although bound or probe speak against them
 ELITES = 4  # placements that are refined
 WIDTHS = (0.5, 0.35, 0.25, 0.17, 0.12, 0.08)  # [1] of the region, around the best
 CYCLES = 3  # times through the widths, as long as nothing is feasible
@@ -24,21 +24,21 @@ APART = 0.05  # [1] of the region's widths: placements nearer to each other are 
 BATCH = 64  # poses between two looks at the clock
 
 
-class Judge(Protocol):
+class Evaluator(Protocol):
     """Tries placements, here or elsewhere; results come in the order of the poses."""
 
-    def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
-        """See `placer.Placer.try_at`."""
+    def try_all(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
+        """See `LocalEvaluator.try_at`."""
 
-    def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
-        """See `placer.Placer.check_at`."""
+    def check_all(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+        """See `LocalEvaluator.check_at`."""
 
 
 @dataclass(slots=True)
-class Hunt:
+class Refinement:
     """A search for placements in progress."""
 
-    judge: Judge
+    evaluator: Evaluator
     reach: Reach
     region: Region
     seed: int
@@ -72,15 +72,15 @@ class Hunt:
         self.bound = self.drawn - len(inside)
         self._try(inside, early=True)
         if not any(trial.stage is Stage.SEARCH for trial in self.trials):
-            self._hope(values)
+            self._fall_back(values)
 
-    def _hope(self, values: Array) -> None:
+    def _fall_back(self, values: Array) -> None:
         """Search where the least speaks against it, for the best share that can be had."""
         self.trials.sort(key=lambda trial: trial.rank, reverse=True)
-        rows = [trial.pose.values for trial in self.trials[:DESPERATE]]
-        self.trials = self.trials[DESPERATE:]
+        rows = [trial.pose.values for trial in self.trials[:FALLBACK]]
+        self.trials = self.trials[FALLBACK:]
         if not rows:
-            rows = list(values[np.argsort(-self.reach.share(values), kind="stable")[:DESPERATE]])
+            rows = list(values[np.argsort(-self.reach.share(values), kind="stable")[:FALLBACK]])
         self._try(np.array(rows), early=False)
 
     def refine(self, around: int) -> None:
@@ -143,7 +143,7 @@ class Hunt:
                 self.late = True
                 return
             rows = values[start : start + BATCH]
-            self.trials += self.judge.tried([Pose.of_values(row) for row in rows], early)
+            self.trials += self.evaluator.try_all([Pose.of_values(row) for row in rows], early)
             if self.progress is not None:
                 done = sum(trial.complete for trial in self.trials)
                 self.progress(len(self.trials), None, f"trying placements, {done} covered")
@@ -153,7 +153,7 @@ class Hunt:
         poses = [pose for pose in poses if causes or pose not in self.checks]
         if self.progress is not None:
             self.progress(len(self.trials), None, "checking the best placements")
-        for trial in self.judge.checked(poses, causes):
+        for trial in self.evaluator.check_all(poses, causes):
             self.checks[trial.pose] = trial
             self.trials = [t for t in self.trials if t.pose != trial.pose] + [trial]
 

@@ -1,22 +1,28 @@
-"""Stations: the fewest placements of arms that together cover a surface.
+"""Stations: the fewest placements of an arm that together cover a surface.
 
 A station is one arm with the surface at one placement, doing one continuous motion. What such a
 motion covers is one component of that placement's search. So stations are a set cover of the cells
-by components, solved to the proven optimum (see `feasibility.set_cover`). Among the fewest, the
+by components, solved to the proven optimum (see `feasibility.division`). Among the fewest, the
 stations with larger components are not preferred: how many is what costs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.division import set_cover
+from feasibility.placement.evaluator import LocalEvaluator
+from feasibility.placement.placements import COUNT, Placements
+from feasibility.placement.reach_bound import Reach
+from feasibility.placement.refinement import BATCH, Evaluator
+from feasibility.placement.region import Pose
+from feasibility.placement.trial import Trial
+from feasibility.search import Progress, Search
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
 
@@ -25,10 +31,10 @@ TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far l
 class Station:
     """One arm at one placement, doing one continuous motion."""
 
-    row: int
-    """Row of the table, or of the study."""
+    placement: int
+    """Index of the placement."""
     component: int
-    """Which of that row's components; 0 for a table of covers."""
+    """Index of its component."""
     covers: NDArray[np.bool_]
     """(N,) cells that its motion can cover."""
     cells: NDArray[np.int64]
@@ -55,96 +61,102 @@ class Stations:
         """Is it proved that no fewer will do, given the components found?"""
         return len(self.stations) <= self.bound
 
-    @property
-    def whole(self) -> bool:
-        """Is every needed cell given to a station?"""
-        return len(self.left_out) == 0
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StationPlan:
+    """The fewest stations found in a region, and the outcome of their replays."""
+
+    stations: Stations
+    trials: tuple[Trial, ...]
+    """The placement of each station."""
+    refusals: tuple[str, ...]
+    """For each station why the replay refuses its motion; empty where it accepts it."""
+
+
+def station_plan(
+    placements: Placements,
+    evaluator: Evaluator,
+    search: Search | None = None,
+    count: int = COUNT,
+    progress: Progress | None = None,
+) -> StationPlan:
+    """The fewest placements that together cover the surface, each by one continuous motion.
+
+    A search for one placement discards those that miss a part of the surface; here they are what
+    is wanted. So more of them are searched, and all components go into one table.
+
+    Args:
+        placements: the search for one placement, which found none.
+        evaluator: tries placements.
+        search: its settings; the seed is that of the replays, as of the evaluator.
+        count: poses spread over the region and searched, besides those of `placements`.
+        progress: called as progress(done, total, text); what it raises ends it.
+
+    Returns:
+        The plan. Optimal is meant among the motions found; more placements may need fewer.
+    """
+    search = Search() if search is None else search
+    values = placements.region.samples(count, search.seed)[:count]
+    reach = Reach.of(placements.robot, placements.cells, placements.task)
+    values = values[reach.share(values) > 0.0]
+    trials = [trial for trial in placements.trials if len(trial.covers)]
+    for start in range(0, len(values), BATCH):
+        if progress is not None:
+            progress(start, len(values), "searching for stations")
+        poses = [Pose.of_values(row) for row in values[start : start + BATCH]]
+        trials += evaluator.try_all(poses, early=False)
+    needed = np.ones(len(placements.cells), dtype=bool)
+    stations = fewest_stations([trial.covers for trial in trials], needed)
+    local = LocalEvaluator(placements.robot, placements.cells, placements.task, search)
+    chosen = [(trials[station.placement], station.component) for station in stations.stations]
+    refusals = tuple(local.replayed(*motion) for motion in chosen)
+    return StationPlan(stations, tuple(trial for trial, _ in chosen), refusals)
 
 
 def fewest_stations(
-    covers: ArrayLike, needed: ArrayLike | None = None, time_limit: float = TIME_LIMIT
-) -> Stations:
-    """The fewest rows of a table that together cover what all of them cover.
-
-    Args:
-        covers: (K, N) True where row k, one continuous motion of one arm at one placement, covers
-            cell c.
-        needed: (N,) cells to cover; default all.
-        time_limit: s, for the proof of the optimum.
-
-    Raises:
-        ArgumentError: the tables do not fit together.
-
-    Example:
-        >>> table = [[1, 1, 0, 0], [0, 0, 1, 0], [0, 1, 1, 1]]
-        >>> found = fewest_stations(table)
-        >>> [(s.row, s.cells.tolist()) for s in found.stations], found.optimal
-        ([(2, [1, 2, 3]), (0, [0])], True)
-    """
-    table = np.asarray(covers, dtype=bool)
-    if table.ndim != 2:
-        raise ArgumentError(f"covers must have shape (K, N), got {table.shape}")
-    owners = [(row, 0) for row in range(len(table))]
-    return _chosen(table, owners, needed, time_limit)
-
-
-def stations_of(
-    results: Sequence[Mapping[str, Any]],
+    covers: Sequence[NDArray[np.bool_]],
     needed: ArrayLike | None = None,
     time_limit: float = TIME_LIMIT,
 ) -> Stations:
-    """The fewest stations among the outcomes of a study, or the trials of a search for placements.
+    """The fewest motions that together cover what all motions found cover.
 
     Args:
-        results: one for each arm and placement, with `cells`, how many there are, and
-            `components`, the cells of each as hexadecimal bits: what `study_outcome.outcome_of` and
-            `placement_study.trial_table` give. Those without components count as covering nothing.
+        covers: for each placement (K, N) the cells that its K components cover; placements without
+            components count as covering nothing.
         needed: (N,) cells to cover; default all.
         time_limit: s, for the proof of the optimum.
 
     Raises:
-        ArgumentError: the outcomes are of surfaces with different numbers of cells, or damaged.
-    """
-    from feasibility.studies import cells_of
+        ArgumentError: the placements are of surfaces with different numbers of cells.
 
-    rows, owners, counts = [], [], set()
-    for row, result in enumerate(results):
-        components = result.get("components") or []
-        if components:
-            counts.add(int(result["cells"]))
-        for component, bits in enumerate(components):
-            rows.append(cells_of(bits, int(result["cells"])))
-            owners.append((row, component))
+    Example:
+        >>> covers = np.array([[1, 1, 0, 0], [0, 0, 1, 0]]), np.array([[0, 1, 1, 1]])
+        >>> found = fewest_stations([table.astype(bool) for table in covers])
+        >>> [(s.placement, s.cells.tolist()) for s in found.stations], found.optimal
+        ([(1, [1, 2, 3]), (0, [0])], True)
+    """
+    counts = {table.shape[1] for table in covers if len(table)}
     if len(counts) > 1:
         listed = ", ".join(str(count) for count in sorted(counts))
-        raise ArgumentError(f"the outcomes are of different surfaces: they have {listed} cells")
+        raise ArgumentError(f"the placements are of different surfaces: they have {listed} cells")
     n = counts.pop() if counts else (0 if needed is None else len(np.asarray(needed)))
-    return _chosen(np.array(rows, dtype=bool).reshape(len(rows), n), owners, needed, time_limit)
-
-
-def _chosen(
-    table: NDArray[np.bool_],
-    owners: Sequence[tuple[int, int]],
-    needed: ArrayLike | None,
-    time_limit: float,
-) -> Stations:
-    """Choose rows of a table, and share its cells out among them."""
-    n = table.shape[1]
     wanted = np.ones(n, dtype=bool) if needed is None else np.asarray(needed, dtype=bool)
     if wanted.shape != (n,):
         raise ArgumentError(
             f"needed must have shape ({n},) as covers has cells, got {wanted.shape}"
         )
+    motions = [(k, component) for k, table in enumerate(covers) for component in range(len(table))]
+    table = np.array([covers[k][component] for k, component in motions], dtype=bool).reshape(-1, n)
     can = wanted & table.any(axis=0)
     found = set_cover(table[:, can], time_limit)
     rows = sorted(found.rows, key=lambda row: (-int((table[row] & can).sum()), row))
     # Each cell to the first of them that covers it.
     owner = np.where(can, np.argmax(table[rows], axis=0) if rows else 0, -1)
     stations = [
-        Station(*owners[row], covers=table[row].copy(), cells=np.flatnonzero(owner == k))
+        Station(*motions[row], covers=table[row].copy(), cells=np.flatnonzero(owner == k))
         for k, row in enumerate(rows)
     ]
-    stations.sort(key=lambda station: (-len(station.cells), station.row, station.component))
+    stations.sort(key=lambda station: (-len(station.cells), station.placement, station.component))
     for station in stations:
         station.covers.flags.writeable = station.cells.flags.writeable = False
     return Stations(tuple(stations), np.flatnonzero(wanted & ~can), found.bound)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from feasibility.cases import TABLES, Case, toml_document
-from feasibility.placement.placer import Placer
+from feasibility.placement.evaluator import LocalEvaluator
 from feasibility.placement.region import Pose
 from feasibility.placement.trial import Margins, Stage, Trial
 from feasibility.search import Progress
@@ -21,8 +21,8 @@ KEPT = 4  # surfaces that one worker keeps
 Tables = dict[str, Any]
 
 
-class StudyJudge:
-    """Tries placements of a case's surface as tasks of a study; see `placement_hunt.Judge`."""
+class StudyEvaluator:
+    """Tries placements of a case's surface as tasks of a study; see `Evaluator`."""
 
     def __init__(
         self,
@@ -35,7 +35,7 @@ class StudyJudge:
 
         Args:
             case: the robot, the surface, the task and the search.
-            workers: who does it.
+            workers: where they are tried.
             store: where what was tried is kept and found again.
             progress: called as progress(done, total, text) several times a second, with the
                 tasks of the present batch; what it raises ends the run.
@@ -43,12 +43,12 @@ class StudyJudge:
         self.tables, self.workers, self.store = case.to_tables(), workers, store
         self.progress = progress
 
-    def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
-        """See `placement_hunt.Judge`."""
+    def try_all(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
+        """See `Evaluator`."""
         return self._all(poses, {"early": early})
 
-    def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
-        """See `placement_hunt.Judge`."""
+    def check_all(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+        """See `Evaluator`."""
         return self._all(poses, {"causes": causes})
 
     def _all(self, poses: Sequence[Pose], how: Tables) -> list[Trial]:
@@ -72,23 +72,24 @@ def try_placement(tables: Tables) -> Tables:
 
     Args:
         tables: a case, as `Case.to_tables` gives it, and `placement`: `pose`, six numbers, and
-            either `early`, see `placer.Placer.try_at`, or `causes`, see `placer.Placer.check_at`.
+            either `early`, see `LocalEvaluator.try_at`, or `causes`, see
+            `LocalEvaluator.check_at`.
 
     Returns:
         See `trial_table`.
     """
-    placer = _placer(toml_document({title: tables[title] for title in TABLES if title in tables}))
+    local = _evaluator(toml_document({title: tables[title] for title in TABLES if title in tables}))
     asked = tables["placement"]
     pose = Pose.of_values(asked["pose"])
     if "early" in asked:
-        return trial_table(placer.try_at(pose, asked["early"]))
-    return trial_table(placer.check_at(pose, asked["causes"]))
+        return trial_table(local.try_at(pose, asked["early"]))
+    return trial_table(local.check_at(pose, asked["causes"]))
 
 
 @lru_cache(maxsize=KEPT)
-def _placer(text: str) -> Placer:
-    """What tries placements of a case, made once."""
-    return Placer(*Case.from_toml(text).build())
+def _evaluator(text: str) -> LocalEvaluator:
+    """The evaluator of a case, made once."""
+    return LocalEvaluator(*Case.from_toml(text).build())
 
 
 def trial_table(trial: Trial) -> Tables:

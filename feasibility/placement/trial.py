@@ -25,12 +25,12 @@ class Stage(StrEnum):
     CHECK = "check"
     """The full search was run, and its motion replayed."""
     FAILED = "failed"
-    """Nobody came to an end with it; the message says why."""
+    """No evaluator finished it; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """The room that the motion over a placement leaves, as shares 0..1; see `placement_room`."""
+    """What the motion over a placement leaves, as shares 0..1; see `placement.margins`."""
 
     limits: float
     cone: float

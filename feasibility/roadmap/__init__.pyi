@@ -28,6 +28,7 @@ from .search import close as close
 from .search import evenly as evenly
 from .search import explore as explore
 from .search import improve as improve
+from .search import seed_middle as seed_middle
 from .segment_bound import segment_holds as segment_holds
 from .self_motion import CONE_SLACK as CONE_SLACK
 from .self_motion import NEWTON_STEPS as NEWTON_STEPS

@@ -45,13 +45,13 @@ def explore(exploration: Exploration) -> None:
     Raises:
         OutOfTime: the deadline passed; the exploration holds what was found until then.
     """
-    if len(exploration.cells) == 0 or _pivot(exploration):
+    if len(exploration.cells) == 0 or seed_middle(exploration):
         return
     _unreached(exploration)
     _rounds(exploration)
 
 
-def _pivot(exploration: Exploration) -> bool:
+def seed_middle(exploration: Exploration) -> bool:
     """Step 1; True when one component covers every cell."""
     pivot = exploration.cells.middle
     exploration.tick("looking for configurations")

@@ -6,8 +6,7 @@ import time
 
 from feasibility.cases import load_case
 from feasibility.placement import Pose, Region, Stage, place
-from feasibility.placement.placements import Local
-from feasibility.placement.placer import Placer
+from feasibility.placement.evaluator import LocalEvaluator
 from feasibility.placement.reach_bound import Reach
 
 REGIONS = {
@@ -31,21 +30,21 @@ def rows(count: int = COUNT) -> tuple[str, list[dict[str, object]]]:
     table = []
     for name in CASES:
         setup = load_case(name).build()
-        local = Local(*setup)
+        local = LocalEvaluator(*setup)
         own = Pose.of_surface(setup.cells.surface)
-        local.tried([own], True)
+        local.try_all([own], True)
         for title, ranges in REGIONS.items():
             region = Region.around(own, ranges)
             began = time.perf_counter()
             answer = place(*setup[:3], region, setup.search, count=count)
             whole_s = time.perf_counter() - began
-            table.append({"case": name, "region": title, **_sweep(local.placer, region, count),
+            table.append({"case": name, "region": title, **_sweep(local, region, count),
                           "answer of place": str(answer.answer), "place s": whole_s,
                           "margin": answer.best.margin if answer.best else 0.0})  # fmt: skip
     return f"Placements: {count} poses of a region, with and without early rejection.", table
 
 
-def _sweep(placer: Placer, region: Region, count: int) -> dict[str, object]:
+def _sweep(placer: LocalEvaluator, region: Region, count: int) -> dict[str, object]:
     """The same poses searched all, and with bounds and probes first; s of processor time."""
     poses = [Pose.of_values(row) for row in region.samples(count, 0)[:count]]
     began = time.process_time()

@@ -27,20 +27,19 @@ from feasibility.placement import (
     Pose,
     Region,
     Stage,
-    StudyJudge,
+    StudyEvaluator,
     Trial,
     moved_cells,
     place,
     station_plan,
     trial_table,
 )
+from feasibility.placement.evaluator import LocalEvaluator
 from feasibility.placement.map import axes_of, placement_map
-from feasibility.placement.placements import Local
-from feasibility.placement.placer import Placer
-from feasibility.placement.quick_search import MOST_COVERS, covers_of, skim
+from feasibility.placement.quick_search import MOST_COVERS, covers_of, search_quickly
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import PlacementError
-from feasibility.placement.stations import stations_of
+from feasibility.placement.stations import fewest_stations
 from feasibility.placement.study_tasks import trial_from
 from feasibility.reports.placement import as_csv, as_json, as_text, settings_of
 from feasibility.roadmap import (
@@ -74,12 +73,12 @@ MOVED = [
 
 
 class Nobody:
-    """A judge that must not be asked."""
+    """An evaluator that must not be asked."""
 
-    def tried(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
+    def try_all(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
         raise AssertionError("no search should be run")
 
-    def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+    def check_all(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
         raise AssertionError("no search should be run")
 
 
@@ -126,7 +125,7 @@ def test_a_region_far_away_is_refused_by_the_bound_alone() -> None:
         own = Pose.of_surface(setup.cells.surface).values
         far = own + np.array([3.0, 0, 0, 0, 0, 0])
         region = region_about(Pose.of_values(far))
-        placements = place(*setup[:3], region, setup.search, judge=Nobody())
+        placements = place(*setup[:3], region, setup.search, evaluator=Nobody())
         assert placements.answer is Answer.INFEASIBLE
         assert placements.evidence is Evidence.PROOF
         assert placements.cause is CauseKind.OUT_OF_REACH
@@ -177,8 +176,8 @@ def test_the_seed_decides_everything_and_time_running_out_decides_nothing() -> N
 def test_a_verdict_decides_not_the_search() -> None:
     """Placements that the short search believes in are not an answer until check agrees."""
 
-    class Doubting(Local):
-        def checked(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+    class Doubting(LocalEvaluator):
+        def check_all(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
             return [
                 Trial(pose, Stage.CHECK, 1.0, answer=Answer.UNDECIDED, evidence=Evidence.BUDGET)
                 for pose in poses
@@ -186,7 +185,7 @@ def test_a_verdict_decides_not_the_search() -> None:
 
     setup = placement_case("panda plate").build()
     region = region_about(Pose.of_surface(setup.cells.surface))
-    placements = place(*setup[:3], region, judge=Doubting(*setup), count=8, around=1, keep=2)
+    placements = place(*setup[:3], region, evaluator=Doubting(*setup), count=8, around=1, keep=2)
     assert any(trial.complete for trial in placements.trials)
     assert placements.answer is Answer.UNDECIDED
     assert placements.found == ()
@@ -243,7 +242,7 @@ def test_distances_are_those_of_the_targets() -> None:
 
 def test_what_the_bound_discards_is_proved_infeasible() -> None:
     setup = placement_case("ur5 plate").build()
-    placer = Placer(*setup)
+    placer = LocalEvaluator(*setup)
     region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.5, 1.4), "z": (0, 0.5)})
     discarded = 0
     for row in region.samples(16, 0):
@@ -267,7 +266,7 @@ def test_what_the_bound_discards_is_proved_infeasible() -> None:
 def test_a_moved_problem_is_the_problem_of_the_moved_surface(name: str) -> None:
     setup = placement_case("ur5 plate" if name == "mesh" else name).build()
     cells = bent_mesh() if name == "mesh" else setup.cells
-    placer = Placer(setup.robot, cells, setup.task, setup.search)
+    placer = LocalEvaluator(setup.robot, cells, setup.task, setup.search)
     for seed in range(3):
         pose = moved_away(placement_case("ur5 plate"), seed)
         one = placer.problem_at(pose)
@@ -329,7 +328,7 @@ def test_the_margin_can_be_kept_over_every_cell() -> None:
     margin_shares = 0
     for name in TEXTS:
         setup = placement_case(name).build()
-        placer = Placer(*setup)
+        placer = LocalEvaluator(*setup)
         pose = Pose.of_surface(setup.cells.surface)
         trial = placer.try_at(pose)
         assert trial.complete, name
@@ -362,9 +361,9 @@ def test_what_a_short_search_covers_is_one_motion() -> None:
     for name, seed in MOVED[::2]:
         case = placement_case(name)
         setup = case.build()
-        placer, pose = Placer(*setup), moved_away(case, seed)
+        placer, pose = LocalEvaluator(*setup), moved_away(case, seed)
         exploration = Exploration(setup.robot, setup.cells, placer.problem_at(pose), 0)
-        skim(exploration, False)
+        search_quickly(exploration, False)
         covers = covers_of(exploration)
         assert 0 < len(covers) <= MOST_COVERS
         roots = {
@@ -381,7 +380,7 @@ def test_what_a_short_search_covers_is_one_motion() -> None:
 def test_trials_survive_their_journey() -> None:
     """As JSON, with the result of a search and of a verdict."""
     setup = placement_case("panda dome").build()
-    placer = Placer(*setup)
+    placer = LocalEvaluator(*setup)
     case = placement_case("panda dome")
     poses = [Pose.of_surface(setup.cells.surface), moved_away(case, 9), Pose.of_values([9.0] * 6)]
     trials = [placer.try_at(pose) for pose in poses]
@@ -411,21 +410,21 @@ def test_who_tries_placements_changes_nothing_and_a_store_saves_the_work(tmp_pat
     here = place(*setup[:3], region, setup.search, **ask)
     expected = [trial_table(trial) for trial in here.trials]
     with open_workers(2) as workers:
-        judge = StudyJudge(case, workers)
-        spread = place(*setup[:3], region, setup.search, judge=judge, **ask)
+        evaluator = StudyEvaluator(case, workers)
+        spread = place(*setup[:3], region, setup.search, evaluator=evaluator, **ask)
     assert [trial_table(trial) for trial in spread.trials] == expected
     path = tmp_path / "placements.db"
     counts = []
     for _ in range(2):
         with open_workers(0) as workers, Store(path) as store:
-            judge = StudyJudge(case, workers, store)
-            kept = place(*setup[:3], region, setup.search, judge=judge, **ask)
+            evaluator = StudyEvaluator(case, workers, store)
+            kept = place(*setup[:3], region, setup.search, evaluator=evaluator, **ask)
             counts.append(len(store))
         assert [trial_table(trial) for trial in kept.trials] == expected
     assert counts[0] == counts[1] > 8
     with Store(path) as store, open_workers(0) as workers:
-        judge = StudyJudge(case, Refusing(workers), store)
-        again = place(*setup[:3], region, setup.search, judge=judge, **ask)
+        evaluator = StudyEvaluator(case, Refusing(workers), store)
+        again = place(*setup[:3], region, setup.search, evaluator=evaluator, **ask)
     assert [trial_table(trial) for trial in again.trials] == expected
 
 
@@ -445,10 +444,10 @@ def test_a_placement_that_nobody_can_try_is_no_answer() -> None:
     case = placement_case("ur5 plate")
     setup = case.build()
     with open_workers(0) as workers:
-        judge = StudyJudge(case, workers)
-        judge.tables = {**judge.tables, "robot": {"name": "no such arm"}}
+        evaluator = StudyEvaluator(case, workers)
+        evaluator.tables = {**evaluator.tables, "robot": {"name": "no such arm"}}
         region = region_about(Pose.of_surface(setup.cells.surface))
-        placements = place(*setup[:3], region, judge=judge, count=4, around=1)
+        placements = place(*setup[:3], region, evaluator=evaluator, count=4, around=1)
     assert placements.answer is Answer.UNDECIDED
     assert "could not be tried" in placements.message
     assert all(trial.stage is Stage.FAILED for trial in placements.trials)
@@ -515,26 +514,26 @@ def test_questions_that_make_no_sense() -> None:
 # -- maps, reports, the command -------------------------------------------------------------------
 
 
-def small_map() -> tuple[Placements, PlacementMap, Local]:
+def small_map() -> tuple[Placements, PlacementMap, LocalEvaluator]:
     setup = placement_case("panda plate").build()
     own = Pose.of_surface(setup.cells.surface)
     region = Region.around(own, {"x": (0.3, 1.2), "y": (-0.3, 0.3), "yaw_deg": (-40, 40)})
-    judge = Local(*setup)
-    placements = place(*setup[:3], region, judge=judge, count=16, around=1, keep=2)
+    evaluator = LocalEvaluator(*setup)
+    placements = place(*setup[:3], region, evaluator=evaluator, count=16, around=1, keep=2)
     assert placements.best is not None
-    chart = placement_map(judge, region, placements.best.pose, shape=(4, 3, 2))
-    return placements, chart, judge
+    chart = placement_map(evaluator, region, placements.best.pose, shape=(4, 3, 2))
+    return placements, chart, evaluator
 
 
 def test_a_map_tells_what_single_placements_tell() -> None:
-    placements, chart, judge = small_map()
+    placements, chart, evaluator = small_map()
     assert chart.axes == ("x", "y", "yaw_deg") == axes_of(placements.region)
     assert chart.share.shape == chart.margin.shape == (4, 3, 2)
     for index in np.ndindex(4, 3, 2):
         values = chart.held.values
         for axis, ticks, k in zip(chart.axes, chart.ticks, index, strict=True):
             values[AXES.index(axis)] = ticks[k]
-        trial = judge.placer.try_at(Pose.of_values(values), early=False)
+        trial = evaluator.try_at(Pose.of_values(values), early=False)
         assert chart.share[index] == trial.share
         assert chart.margin[index] == trial.margin
     assert chart.share.max() == 1.0 > chart.share.min()
@@ -552,7 +551,7 @@ def test_a_map_tells_what_single_placements_tell() -> None:
         for k, field in enumerate(drawn):
             assert (getattr(chart, value)[:, :, k] == np.asarray(field).reshape(3, 4).T).all()
     with pytest.raises(PlacementError, match="z: does not vary"):
-        placement_map(judge, placements.region, chart.held, axes=("x", "z"))
+        placement_map(evaluator, placements.region, chart.held, axes=("x", "z"))
     report = json.loads(json.dumps(as_json(placements, chart=chart), allow_nan=False))
     assert report["map"]["share"][0][0][0] == chart.share[0, 0, 0]
 
@@ -581,24 +580,23 @@ def test_stations_where_no_single_placement_will_do() -> None:
     )
     placements = place(setup.robot, shell, setup.task, region, count=24, around=1)
     assert placements.answer is Answer.INFEASIBLE
-    judge = Local(setup.robot, shell, setup.task, Search())
-    plan = station_plan(placements, judge, count=32)
+    evaluator = LocalEvaluator(setup.robot, shell, setup.task, Search())
+    plan = station_plan(placements, evaluator, count=32)
     stations = plan.stations
     assert stations.optimal
     assert len(stations) >= 2
-    assert plan.certified
+    assert plan.refusals == ("",) * len(stations)
     covered = sum(len(station.cells) for station in stations.stations)
     assert covered + len(stations.left_out) == len(shell)
     for trial, station in zip(plan.trials, stations.stations, strict=True):
         assert (trial.covers[station.component] == station.covers).all()
-    placer = judge.placer
     checked = next(trial for trial in placements.trials if trial.stage is Stage.CHECK)
-    assert placer.replayed(checked, 0) == ""
+    assert evaluator.replayed(checked, 0) == ""
     lying = Trial(checked.pose, Stage.SEARCH, 1.0, covers=np.ones((1, len(shell)), dtype=bool))
-    assert "did not find" in placer.replayed(lying, 0)
+    assert "did not find" in evaluator.replayed(lying, 0)
     # From any table of motions, no fewer.
-    tables = [trial_table(trial) for trial in placements.trials]
-    assert len(stations_of(tables).left_out) >= len(stations.left_out)
+    fewer = fewest_stations([trial.covers for trial in placements.trials])
+    assert len(fewer.left_out) >= len(stations.left_out)
     text = as_text(placements, "", plan)
     assert f"{len(stations)} stations" in text
     assert "not certified" not in text

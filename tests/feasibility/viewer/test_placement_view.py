@@ -25,10 +25,10 @@ from feasibility.placement import (
     moved_cells,
     place,
 )
-from feasibility.placement.stations import stations_of
+from feasibility.placement.stations import fewest_stations
 from feasibility.placement.trial import Margins
 from feasibility.reports.placement import as_text
-from feasibility.studies import Row, bits_of, open_workers, run_tasks
+from feasibility.studies import Row, open_workers, run_tasks
 from feasibility.studies.file import read_study
 from feasibility.viewer import pose_layers, view_placements, view_study
 from feasibility.viewer.outline import MOST, outline
@@ -332,8 +332,8 @@ def test_stations_are_drawn_where_they_stand():
         Trial(pose, Stage.SEARCH, 1.0, 1.0, 0.5, covers=mask[None])
         for pose, mask in zip(where, masks, strict=True)
     )
-    stations = stations_of([{"cells": 6, "components": [bits_of(mask)]} for mask in masks])
-    plan = StationPlan(stations, tuple(trials[s.row] for s in stations.stations), ("", ""))
+    stations = fewest_stations([mask[None] for mask in masks])
+    plan = StationPlan(stations, tuple(trials[s.placement] for s in stations.stations), ("", ""))
     asked = fabricated(*trials)
     view = view_placements(asked, plan=plan)
     assert "2 stations cover 6 of 6 cells" in view.legend.text

@@ -1,20 +1,27 @@
 """Placements of one surface tried, one at a time.
 
-Moving the surface moves targets and courses rigidly; how much they bend stays. So a placement is
-the same problem with its arrays turned and shifted, and the cells need not be cut again. Only
-`feasibility.check`, whose word counts in the end, is asked about cells that have really been moved.
+Moving the surface moves targets and curves rigidly, and their derivative bounds stay. So a
+placement is the same problem with its arrays rotated and shifted, and the cells need not be cut
+again. Only `feasibility.check`, which decides in the end, gets cells that have really been moved.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.division import undominated
-from feasibility.placement.margins import least_room
-from feasibility.placement.quick_search import MOST_COVERS, covers_of, probe, skim, spread_cells
+from feasibility.placement.margins import least_margins
+from feasibility.placement.quick_search import (
+    MOST_COVERS,
+    covers_of,
+    probe,
+    search_quickly,
+    spread_cells,
+)
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
 from feasibility.placement.trial import Margins, Stage, Trial
@@ -26,11 +33,11 @@ from robots import Robot
 from surfaces import Cells
 
 
-class Placer:
+class LocalEvaluator:
     """Tries placements of one surface for one arm and task."""
 
     def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
-        """Gather what all placements share."""
+        """Compute what all placements share."""
         self.robot, self.cells, self.task, self.search = robot, cells, task, search
         self.problem = arrays_of(robot, cells, task)
         self.reach = Reach.of(robot, cells, task)
@@ -71,6 +78,14 @@ class Placer:
             return Trial(pose, Stage.PROBE, in_reach, probed, fk=fk)
         return replace(self.trial_of(exploration, pose, in_reach, probed), early=early)
 
+    def try_all(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
+        """See `Evaluator`."""
+        return [self.try_at(pose, early) for pose in poses]
+
+    def check_all(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
+        """See `Evaluator`."""
+        return [self.check_at(pose, causes) for pose in poses]
+
     def _searched(self, exploration: Exploration, distances: Array, early: bool) -> float:
         """Probe and search; returns the share of probed cells that were reached."""
         if early:
@@ -79,7 +94,7 @@ class Placer:
             hits = probe(exploration, some)
             if not hits.all():
                 return float(hits.mean())
-        skim(exploration, early)
+        search_quickly(exploration, early)
         return 1.0
 
     def replayed(self, trial: Trial, component: int) -> str:
@@ -106,8 +121,8 @@ class Placer:
         for root in exploration.roots():
             if (exploration.covers(root) >= cover).all():
                 walk = covering_walk(exploration.roadmap, root)
-                told = replay(self.robot, cells, self.task, walk, exploration.covers(root))
-                return "" if told.accepted else told.refusal
+                replayed = replay(self.robot, cells, self.task, walk, exploration.covers(root))
+                return "" if replayed.accepted else replayed.refusal
         return "the search did not find this motion again"
 
     def check_at(self, pose: Pose, causes: bool = False) -> Trial:
@@ -144,7 +159,7 @@ class Placer:
         )
 
     def _explored(self, cells: Cells, pose: Pose) -> Trial:
-        """The search of `check` again, for the room that its motion leaves."""
+        """The search of `check` again, for the margins that its motion leaves."""
         from feasibility.roadmap import explore
 
         problem = arrays_of(self.robot, cells, self.task)
@@ -175,6 +190,6 @@ class Placer:
         )
 
     def _margins(self, exploration: Exploration, pose: Pose) -> Margins:
-        """The room that the component which covers every cell leaves."""
-        limits, cone = least_room(exploration).tolist()
+        """What the component that covers every cell leaves."""
+        limits, cone = least_margins(exploration).tolist()
         return Margins(limits, cone, max(0.0, min(1.0, self.reach.slack(pose.values))))
