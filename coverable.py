@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from feasibility.paths import CoveragePath, PathError, coverage_path
     from feasibility.paths import coverage_path as path
     from feasibility.placement import (
+        LocalEvaluator,
         Placements,
         Pose,
         Region,
@@ -109,8 +110,8 @@ if TYPE_CHECKING:
 # fmt: off
 __all__ = [
     "Answer", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Comparison", "CoveragePath",
-    "Division", "Evidence", "Explanation", "MeshSurface", "Patch", "PathError", "Piecewise",
-    "Placements", "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store", "Study",
+    "Division", "Evidence", "Explanation", "LocalEvaluator", "MeshSurface", "Patch", "PathError",
+    "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store", "Study",
     "Surface", "SurfaceError", "Task", "Trajectory", "Verdict", "View", "__version__", "bspline",
     "builtin_cases", "check", "compare", "comparison_chart", "comparison_text", "cone",
     "coverage_path", "cut_box", "cut_plane", "cylinder", "divide", "division_text", "ellipsoid",

@@ -146,7 +146,7 @@ def fewest_stations(
             f"needed must have shape ({n},) as covers has cells, got {wanted.shape}"
         )
     motions = [(k, component) for k, table in enumerate(covers) for component in range(len(table))]
-    table = np.array([covers[k][component] for k, component in motions], dtype=bool).reshape(-1, n)
+    table = np.vstack([np.zeros((0, n), dtype=bool), *(table for table in covers if len(table))])
     can = wanted & table.any(axis=0)
     found = set_cover(table[:, can], time_limit)
     rows = sorted(found.rows, key=lambda row: (-int((table[row] & can).sum()), row))
