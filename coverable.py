@@ -111,18 +111,18 @@ if TYPE_CHECKING:
 __all__ = [
     "Answer", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Comparison", "CoveragePath",
     "Division", "Evidence", "Explanation", "LocalEvaluator", "MeshSurface", "Patch", "PathError",
-    "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store", "Study",
-    "Surface", "SurfaceError", "Task", "Trajectory", "Verdict", "View", "__version__", "bspline",
-    "builtin_cases", "check", "compare", "comparison_chart", "comparison_text", "cone",
+    "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store",
+    "Study", "Surface", "SurfaceError", "Task", "Trajectory", "Verdict", "View", "__version__",
+    "bspline", "builtin_cases", "check", "compare", "comparison_chart", "comparison_text", "cone",
     "coverage_path", "cut_box", "cut_plane", "cylinder", "divide", "division_text", "ellipsoid",
     "explain", "explanation_text", "faces_within_cone", "greedy_check", "hyperboloid",
     "list_robots", "load_case", "load_result", "load_robot", "load_study", "load_trajectory",
     "mesh", "motion_limits", "open_workers", "path", "path_text", "piecewise", "place",
     "placement_map", "placement_text", "plane", "plot_causes", "plot_graph", "plot_map",
-    "plot_transition", "read_net", "read_study", "replay", "revolution", "run_tasks",
-    "save_result", "save_trajectory", "settings_of", "show", "sphere", "starts", "station_plan",
-    "study_text", "take_faces", "torus", "trajectory", "unrolled_edges", "view", "view_division",
-    "view_path", "view_placements", "view_study",
+    "plot_transition", "read_net", "read_study", "replay", "revolution", "run_tasks", "save_result",
+    "save_trajectory", "settings_of", "show", "sphere", "starts", "station_plan", "study_text",
+    "take_faces", "torus", "trajectory", "unrolled_edges", "view", "view_division", "view_path",
+    "view_placements", "view_study",
 ]
 # fmt: on
 

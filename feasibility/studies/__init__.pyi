@@ -14,7 +14,7 @@ from .robot_comparison import compare as compare
 from .run import Row as Row
 from .run import StudyTask as StudyTask
 from .run import run_tasks as run_tasks
+from .scheduling import Workers as Workers
+from .scheduling import WorkersError as WorkersError
 from .store import Store as Store
-from .workers import Workers as Workers
-from .workers import WorkersError as WorkersError
 from .workers import open_workers as open_workers

@@ -10,7 +10,7 @@ from typing import Any
 
 from feasibility.notices import slow_notice
 from feasibility.roadmap import warm_up
-from feasibility.studies.workers import BREAKS, WorkersError
+from feasibility.studies.scheduling import BREAKS, WorkersError
 
 CONNECT = 10.0  # [s] for a Dask scheduler to answer
 FIRST_WORKER = 60.0  # [s] for its first worker to be there

@@ -15,8 +15,8 @@ from feasibility.studies.outcome import arm_of, cut_of, finite, merit, outcome_o
 from feasibility.studies.run import StudyTask, run_tasks
 
 if TYPE_CHECKING:
+    from feasibility.studies.scheduling import Workers
     from feasibility.studies.store import Store
-    from feasibility.studies.workers import Workers
     from feasibility.task import Task
     from robots import Robot
     from surfaces import Cells

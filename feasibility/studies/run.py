@@ -13,9 +13,8 @@ from typing import Any
 
 from feasibility.search import Progress
 from feasibility.studies.outcome import evaluate
-from feasibility.studies.scheduling import Answer, Tables, Work, schedule
+from feasibility.studies.scheduling import Answer, Tables, Work, Workers, schedule
 from feasibility.studies.store import Record, Status, Store
-from feasibility.studies.workers import Workers
 from feasibility.version import version
 
 KEEP_S = 0.5  # [s] for which finished tasks may wait to be written together

@@ -6,18 +6,54 @@ import json
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
-from feasibility.studies.workers import Workers, WorkersError
+from coverable_errors import CoverableError
 
 AHEAD = 2  # tasks in flight for each worker: one at work, one waiting
 LOOK = 0.1  # [s] between two looks at what has come back
 MOST_BREAKS = 10  # of the pool, one after the other, with nothing finished in between
 
+BREAKS = (BrokenExecutor, CancelledError, EOFError, OSError, RuntimeError, ValueError)
+"""What a pool that is breaking raises, at submitting or as the outcome of a future, besides
+BrokenExecutor: its pipes may be closed already while it does not yet know that a worker died."""
+
 Tables = dict[str, Any]
 Work = Callable[[Tables], dict[str, Any]]
+
+
+class WorkersError(CoverableError):
+    """Workers that cannot be had, or were lost for good; what would do."""
+
+
+class Workers(Protocol):
+    """Where tasks run."""
+
+    breaks: tuple[type[BaseException], ...]
+    """What `submit` or a future raises when the pool is of no more use, and has to be renewed."""
+    deaths: tuple[type[BaseException], ...]
+    """What a future raises when a worker died with it."""
+    patience: int
+    """How many workers may die with a task alone in flight before it is given up."""
+
+    @property
+    def width(self) -> int:
+        """How many tasks run at the same time."""
+
+    @property
+    def broken(self) -> bool:
+        """Is the pool of no more use? Its futures then may never end."""
+
+    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Run something; arguments and result are pickled on their way."""
+
+    def renew(self) -> None:
+        """Start anew after a break; the old pool's futures end no more."""
+
+    def close(self, at_once: bool) -> None:
+        """End the workers: after what they are doing, or at once."""
 
 
 @dataclass(frozen=True, slots=True)

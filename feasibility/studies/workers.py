@@ -11,58 +11,23 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
-from typing import Any, Protocol
+from typing import Any
 
-from coverable_errors import CoverableError
 from feasibility.notices import compiling_notice, notify
 from feasibility.roadmap import SharedLock, warm_up, warm_up_in_turn
+from feasibility.studies.scheduling import BREAKS, Workers, WorkersError
 
 ATTEMPTS = 3  # to start worker processes anew
-BREAKS = (BrokenExecutor, CancelledError, EOFError, OSError, RuntimeError, ValueError)
-"""What a pool that is breaking raises, at submitting or as the outcome of a future, besides
-BrokenExecutor: its pipes may be closed already while it does not yet know that a worker died."""
-
-
-class WorkersError(CoverableError):
-    """Workers that cannot be had, or were lost for good; what would do."""
-
-
-class Workers(Protocol):
-    """Where tasks run."""
-
-    breaks: tuple[type[BaseException], ...]
-    """What `submit` or a future raises when the pool is of no more use, and has to be renewed."""
-    deaths: tuple[type[BaseException], ...]
-    """What a future raises when a worker died with it."""
-    patience: int
-    """How many workers may die with a task alone in flight before it is given up."""
-
-    @property
-    def width(self) -> int:
-        """How many tasks run at the same time."""
-
-    @property
-    def broken(self) -> bool:
-        """Is the pool of no more use? Its futures then may never end."""
-
-    def submit(self, work: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Run something; arguments and result are pickled on their way."""
-
-    def renew(self) -> None:
-        """Start anew after a break; the old pool's futures end no more."""
-
-    def close(self, at_once: bool) -> None:
-        """End the workers: after what they are doing, or at once."""
 
 
 @contextmanager
 def open_workers(
     count: int | None = None, address: str | None = None, *, warm: bool = True
 ) -> Iterator[Workers]:
-    """Workers for `feasibility.study.run_tasks`, until the block ends.
+    """Workers for `run_tasks`, until the block ends.
 
     Args:
         count: processes on this machine; None for one on each processor, 0 for none: then tasks

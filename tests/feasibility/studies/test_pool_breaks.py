@@ -13,7 +13,7 @@ import pytest
 import study_works
 
 from feasibility.studies import StudyTask, open_workers, run_tasks
-from feasibility.studies.workers import WorkersError
+from feasibility.studies.scheduling import WorkersError
 
 COUNT = 12
 BREAKS = [

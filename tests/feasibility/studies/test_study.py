@@ -36,8 +36,8 @@ from feasibility.studies import (
     run_tasks,
 )
 from feasibility.studies.outcome import evaluate, outcome_of
+from feasibility.studies.scheduling import WorkersError
 from feasibility.studies.store import StoreError
-from feasibility.studies.workers import WorkersError
 
 SHARED = Path(__file__).parent
 

@@ -11,7 +11,7 @@ import study_works
 
 from feasibility.cli.main import main
 from feasibility.studies import Store, StudyTask, open_workers, run_tasks
-from feasibility.studies.workers import WorkersError
+from feasibility.studies.scheduling import WorkersError
 
 distributed = pytest.importorskip("distributed")
 
