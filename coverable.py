@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         placement_map,
         station_plan,
     )
+    from feasibility.placement import LocalEvaluator as Local
     from feasibility.reports.comparison import as_text as comparison_text
     from feasibility.reports.comparison import chart as comparison_chart
     from feasibility.reports.division import as_text as division_text
@@ -110,19 +111,19 @@ if TYPE_CHECKING:
 # fmt: off
 __all__ = [
     "Answer", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Comparison", "CoveragePath",
-    "Division", "Evidence", "Explanation", "LocalEvaluator", "MeshSurface", "Patch", "PathError",
-    "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store",
-    "Study", "Surface", "SurfaceError", "Task", "Trajectory", "Verdict", "View", "__version__",
-    "bspline", "builtin_cases", "check", "compare", "comparison_chart", "comparison_text", "cone",
-    "coverage_path", "cut_box", "cut_plane", "cylinder", "divide", "division_text", "ellipsoid",
-    "explain", "explanation_text", "faces_within_cone", "greedy_check", "hyperboloid",
-    "list_robots", "load_case", "load_result", "load_robot", "load_study", "load_trajectory",
-    "mesh", "motion_limits", "open_workers", "path", "path_text", "piecewise", "place",
-    "placement_map", "placement_text", "plane", "plot_causes", "plot_graph", "plot_map",
-    "plot_transition", "read_net", "read_study", "replay", "revolution", "run_tasks", "save_result",
-    "save_trajectory", "settings_of", "show", "sphere", "starts", "station_plan", "study_text",
-    "take_faces", "torus", "trajectory", "unrolled_edges", "view", "view_division", "view_path",
-    "view_placements", "view_study",
+    "Division", "Evidence", "Explanation", "Local", "LocalEvaluator", "MeshSurface", "Patch",
+    "PathError", "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot", "RobotError",
+    "Search", "Store", "Study", "Surface", "SurfaceError", "Task", "Trajectory", "Verdict", "View",
+    "__version__", "bspline", "builtin_cases", "check", "compare", "comparison_chart",
+    "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane", "cylinder", "divide",
+    "division_text", "ellipsoid", "explain", "explanation_text", "faces_within_cone",
+    "greedy_check", "hyperboloid", "list_robots", "load_case", "load_result", "load_robot",
+    "load_study", "load_trajectory", "mesh", "motion_limits", "open_workers", "path", "path_text",
+    "piecewise", "place", "placement_map", "placement_text", "plane", "plot_causes", "plot_graph",
+    "plot_map", "plot_transition", "read_net", "read_study", "replay", "revolution", "run_tasks",
+    "save_result", "save_trajectory", "settings_of", "show", "sphere", "starts", "station_plan",
+    "study_text", "take_faces", "torus", "trajectory", "unrolled_edges", "view", "view_division",
+    "view_path", "view_placements", "view_study",
 ]
 # fmt: on
 
@@ -143,6 +144,7 @@ _ROOMS = (
     "feasibility.viewer",
 )
 _RENAMED = {  # name -> module, name there
+    "Local": ("feasibility.placement", "LocalEvaluator"),
     "comparison_chart": ("feasibility.reports.comparison", "chart"),
     "comparison_text": ("feasibility.reports.comparison", "as_text"),
     "division_text": ("feasibility.reports.division", "as_text"),
