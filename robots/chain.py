@@ -95,8 +95,7 @@ def _constants(model: pin.Model, tool_frame: int, approach_axis: NDArray[np.floa
     """Every joint's frame in that of the joint before it, turned so that its axis is z."""
     n, frame, data = model.nv, model.frames[tool_frame], model.createData()
     pin.computeJointJacobians(model, data, pin.neutral(model))
-    rotations = np.empty((n, 3, 3))
-    translations = np.empty((n + 1, 3))
+    rotations, translations = np.empty((n, 3, 3)), np.empty((n + 1, 3))
     prismatic = np.empty(n, dtype=bool)
     align = np.eye(3)  # brings z onto the axis of the previous joint
     for i in range(n):
@@ -159,12 +158,8 @@ def frames(chain, q, origins, axes, point, axis):  # type: ignore[no-untyped-def
         zx = ay * bz - az * by
         zy = az * bx - ax * bz
         zz = ax * by - ay * bx
-        origins[i, 0] = px
-        origins[i, 1] = py
-        origins[i, 2] = pz
-        axes[i, 0] = zx
-        axes[i, 1] = zy
-        axes[i, 2] = zz
+        origins[i, 0], origins[i, 1], origins[i, 2] = px, py, pz
+        axes[i, 0], axes[i, 1], axes[i, 2] = zx, zy, zz
         if chain.prismatic[i]:
             xx, xy, xz = ax, ay, az
             yx, yy, yz = bx, by, bz
@@ -172,14 +167,9 @@ def frames(chain, q, origins, axes, point, axis):  # type: ignore[no-untyped-def
             py += zy * q[i]
             pz += zz * q[i]
         else:
-            c = np.cos(q[i])
-            s = np.sin(q[i])
-            xx = c * ax + s * bx
-            xy = c * ay + s * by
-            xz = c * az + s * bz
-            yx = c * bx - s * ax
-            yy = c * by - s * ay
-            yz = c * bz - s * az
+            c, s = np.cos(q[i]), np.sin(q[i])
+            xx, xy, xz = c * ax + s * bx, c * ay + s * by, c * az + s * bz
+            yx, yy, yz = c * bx - s * ax, c * by - s * ay, c * bz - s * az
     t = chain.translations[n]
     point[0] = px + xx * t[0] + yx * t[1] + zx * t[2]
     point[1] = py + xy * t[0] + yy * t[1] + zy * t[2]
@@ -197,23 +187,15 @@ def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # type
     Revolute joint: dp = z x (p - o), da = z x a. Prismatic joint: dp = z, da = 0.
 
     Args:
-        chain: a `Chain`.
-        origins: (n, 3) from `frames`.
-        axes: (n, 3) from `frames`.
-        point: (3,) from `frames`.
-        axis: (3,) from `frames`.
+        chain, origins, axes, point, axis: as in `frames`.
         point_rows: (3, n) out, d point / dq.
         axis_rows: (3, n) out, d axis / dq.
     """
     for i in range(axes.shape[0]):
         zx, zy, zz = axes[i, 0], axes[i, 1], axes[i, 2]
         if chain.prismatic[i]:
-            point_rows[0, i] = zx
-            point_rows[1, i] = zy
-            point_rows[2, i] = zz
-            axis_rows[0, i] = 0.0
-            axis_rows[1, i] = 0.0
-            axis_rows[2, i] = 0.0
+            point_rows[0, i], point_rows[1, i], point_rows[2, i] = zx, zy, zz
+            axis_rows[:, i] = 0.0
         else:
             rx = point[0] - origins[i, 0]
             ry = point[1] - origins[i, 1]

@@ -92,8 +92,7 @@ def begin_search(chain, grid, offsets, target, memory):  # type: ignore[no-untyp
     memory.nodes[0] = offsets
     slot = _mixed(_key(offsets)) & (memory.table.shape[0] - 1)
     memory.table[slot] = counters[CALL] << 32
-    memory.stack_node[0] = 0
-    memory.stack_next[0] = 0
+    memory.stack_node[0], memory.stack_next[0] = 0, 0
     place_tool(chain, grid, offsets, memory.stack_tool[0, :6])
     memory.stack_tool[0, 6] = distance(memory.stack_tool[0], target)
 
@@ -138,10 +137,10 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
     FULL (enlarge the memory, and call again).
 
     Args:
-        chain, chart, grid: a `Chain`, a `PatchKernel` and a `Grid`.
+        chain, patch_kernel, grid: a `Chain`, a `PatchKernel` and a `Grid`.
         target, target_cell: (3,) p_T, m, and the flat index of ec_T.
         budget, cap: neighbours to look at now, and J-cells that the call may check in all.
-        memory: a `Memory`, started by `begin_search`.
+        memory: started by `begin_search`.
     """
     # Arrays are read out of their tuples once, here: numba counts references each time it is done.
     rotations, translations, prismatic = chain.rotations, chain.translations, chain.prismatic
@@ -155,8 +154,7 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
     offsets, delta, held = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
     call, count, depth = counters[CALL], counters[NODES], counters[DEPTH]
     tool, last = partial[0], min(cap + 1, nodes.shape[0])
-    placed = 0  # joints, from the base on, whose frames in `base` are those of the present J-cell
-    state = EXHAUSTED
+    placed, state = 0, EXHAUSTED  # placed: joints whose frames in `base` are of this J-cell
     while depth >= 0:
         shared = _expand(nodes, stack_node[depth], stack_tool[depth], offsets, held, partial)
         placed = min(placed, shared)
@@ -173,7 +171,9 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
             ):
                 continue
             count += 1
-            top = _last_move(delta)
+            top = n - 1  # the last joint that moves
+            while delta[top] == 0:
+                top -= 1
             if top >= placed:
                 place_joints(
                     rotations, translations, prismatic, origin, step, offsets, placed, top, base
@@ -193,22 +193,12 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
         depth += 1 if deeper else -1
         if deeper:
             stack_node[depth], stack_next[depth] = count - 1, 0
-            for k in range(6):
-                stack_tool[depth, k] = tool[k]
+            stack_tool[depth, :6] = tool
             stack_tool[depth, 6] = nearer
             if depth % REFRESH == 0:
                 place_tool(chain, grid, nodes[count - 1], stack_tool[depth, :6])
                 counters[PLACED] += n
     counters[STATE], counters[DEPTH], counters[NODES] = state, depth, count
-
-
-@njit(cache=True, error_model="numpy")
-def _last_move(delta):  # type: ignore[no-untyped-def]
-    """The last joint that moves."""
-    top = delta.shape[0] - 1
-    while delta[top] == 0:
-        top -= 1
-    return top
 
 
 @njit(cache=True, error_model="numpy")
@@ -223,9 +213,7 @@ def _expand(nodes, node, tool, offsets, held, partial):  # type: ignore[no-untyp
     shared = 1
     while shared < n and offsets[shared - 1] == nodes[node, shared - 1]:
         shared += 1
-    for i in range(n):
-        offsets[i] = nodes[node, i]
-        held[i] = 2
-    for k in range(6):
-        partial[n, k] = tool[k]
+    offsets[:] = nodes[node]
+    held[:] = 2
+    partial[n] = tool[:6]
     return shared

@@ -135,9 +135,8 @@ class JSpace:
         offsets = np.asarray(jcell, dtype=np.int32)
         if (offsets < self._grid.lowest).any() or (offsets > self._grid.highest).any():
             return -1
-        tool = np.empty(6)
-        place_tool(self._chain, self._grid, offsets, tool)
-        grid = self._grid
+        tool, grid = np.empty(6), self._grid
+        place_tool(self._chain, grid, offsets, tool)
         return int(cell_of(self._patch_kernel, grid.height, grid.tolerance, grid.cone_cosine, tool))
 
     def continuity(
@@ -165,12 +164,8 @@ class JSpace:
                 break
             if clock is not None and clock.out_of_time:
                 return self._result(Outcome.OUT_OF_TIME)
-        outcomes = {
-            jcells.FOUND: Outcome.FOUND,
-            jcells.EXHAUSTED: Outcome.EXHAUSTED,
-            jcells.CAPPED: Outcome.CAPPED,
-        }
-        return self._result(outcomes[int(state)])
+        ended = {jcells.FOUND: Outcome.FOUND, jcells.EXHAUSTED: Outcome.EXHAUSTED}
+        return self._result(ended.get(int(state), Outcome.CAPPED))
 
     def _result(self, outcome: Outcome) -> Continuity:
         """Read the result of the call out of the working memory."""
@@ -247,13 +242,11 @@ def _enlarged(memory: jcells.Memory) -> jcells.Memory:
     """The same running call with larger arrays for what is full: J-cells, stack, or both."""
     nodes, n = memory.nodes.shape
     stack = len(memory.stack_node)
-    full_nodes = memory.counters[jcells.NODES] >= nodes
-    full_stack = memory.counters[jcells.DEPTH] + 1 >= stack
-    larger = _memory(n, 4 * nodes if full_nodes else nodes, 4 * stack if full_stack else stack)
-    larger.counters[:] = memory.counters
-    larger.nodes[:nodes] = memory.nodes
-    larger.stack_node[:stack] = memory.stack_node
-    larger.stack_next[:stack] = memory.stack_next
-    larger.stack_tool[:stack] = memory.stack_tool
+    more_nodes = 4 if memory.counters[jcells.NODES] >= nodes else 1
+    more_stack = 4 if memory.counters[jcells.DEPTH] + 1 >= stack else 1
+    larger = _memory(n, more_nodes * nodes, more_stack * stack)
+    for name in ("counters", "nodes", "stack_node", "stack_next", "stack_tool"):
+        kept = getattr(memory, name)
+        getattr(larger, name)[: len(kept)] = kept
     jcells.rehash(larger)
     return larger

@@ -37,7 +37,8 @@ FEW_SEEDS = 10  # random configurations to try over each cell once the middle on
 class _Run:
     """All trees of one greedy search: the best, and the sums over them."""
 
-    best: Tree | None = None
+    best: Tree
+    """Empty until the first is added."""
     trees: int = 0
     calls: int = 0
     checked: int = 0
@@ -53,9 +54,7 @@ class _Run:
         self.fk += tree.fk
         self.capped += tree.capped
         self.complete &= tree.complete
-        rank = (len(tree.jcell), len(tree.edges))
-        if self.best is None or rank > (len(self.best.jcell), len(self.best.edges)):
-            self.best = tree
+        self.best = max(self.best, tree, key=lambda one: (len(one.jcell), len(one.edges)))
 
     def counts(self) -> dict[str, float]:
         """The sums, and calls and edges of the best tree."""
@@ -65,8 +64,8 @@ class _Run:
             "checked": self.checked,
             "fk": round(self.fk),
             "capped": self.capped,
-            "best_calls": 0 if self.best is None else self.best.calls,
-            "best_capped": 0 if self.best is None else self.best.capped,
+            "best_calls": self.best.calls,
+            "best_capped": self.best.capped,
         }
 
 
@@ -93,9 +92,10 @@ def greedy_search(
     cells = closed_form_grid(problem.cells)
     steps = Steps.of(robot, cells.closed_form, task, search)
     with compiling_notice():
-        JSpace(robot, cells, task, np.zeros(robot.n), search, steps).load()
+        space = JSpace(robot, cells, task, np.zeros(robot.n), search, steps)
+        space.load()
     clock.start()
-    run = _Run()
+    run = _Run(Tree(space, start=None))
     for q in _starts(robot, cells, task, search, clock, start):
         space = JSpace(robot, cells, task, q, search, steps)
         at = space.cell_of(np.zeros(robot.n, dtype=np.int32))
@@ -105,40 +105,41 @@ def greedy_search(
             raise ArgumentError(
                 "start must satisfy limits, cone and tolerance over one of the cells"
             )
-        if _touches_all(run, cells) or not run.complete:
+        if len(run.best.jcell) == len(cells) or not run.complete:
             break
-    run.complete &= _touches_all(run, cells) or not clock.out_of_time
+    run.complete &= len(run.best.jcell) == len(cells) or not clock.out_of_time
     return _found(problem, cells, search, steps, run)
 
 
 def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run: _Run) -> Found:
     """The best tree, and what is to be said of it."""
     best, count = run.best, len(cells)
-    number = 0 if best is None else len(best.jcell)
-    step = f"{search.step_deg:g}"
     settings = (
-        f"{search.moves} moves of {step} degrees, tolerance {1e3 * steps.tolerance:.3g} mm; "
-        f"{run.calls} calls of Algorithm 1 from {run.trees} start"
+        f"{search.moves} moves of {search.step_deg:g} degrees, tolerance "
+        f"{1e3 * steps.tolerance:.3g} mm; {run.calls} calls of Algorithm 1 from {run.trees} start"
         f"{'' if run.trees == 1 else 's'}"
     )
 
     def replay() -> Replay:
         """Every path of the tree, by Pinocchio."""
-        parents = {} if best is None else best.parent
-        paths = [Path(a, b, best.motion(a, b)) for b, a in parents.items() if best is not None]
+        paths = [Path(a, b, best.motion(a, b)) for b, a in best.parent.items()]
         return replay_tree(problem.robot, cells, problem.task, steps, paths)
 
-    touched = f"the best tree touches {number} of {count} cells"
+    capped = f"; {run.capped} calls stopped at the cap, which is unknown rather than no"
+    capped *= run.capped > 0
     unfinished = ""
     if not run.complete:
-        unfinished = f"The time limit of {search.time_limit:g} s ran out ({settings}); {touched}."
+        unfinished = (
+            f"The time limit of {search.time_limit:g} s ran out ({settings}); "
+            f"{_touched(run, count)}."
+        )
     return Found(
-        covered=np.zeros(count, dtype=bool) if best is None else best.touched(count),
-        components=() if best is None else (np.array(sorted(best.jcell), dtype=np.int64),),
-        start=None if best is None else best.start,
-        n_edges=0 if best is None else len(best.edges),
+        covered=best.touched(count),
+        components=(np.array(sorted(best.jcell), dtype=np.int64),) if best.jcell else (),
+        start=best.start,
+        n_edges=len(best.edges),
         counts=run.counts(),
-        replay=replay if _touches_all(run, cells) else None,
+        replay=replay if len(best.jcell) == count else None,
         accepted="The greedy search touches every cell with one tree of motions, and Pinocchio's "
         f"replay accepts it ({settings}). Touching a cell is entering it: centres need not be "
         "visited.",
@@ -146,7 +147,7 @@ def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run
         f"{{refusal}} ({settings}).",
         unfinished=unfinished,
         exhausted=f"A covering motion was not found by the greedy search: "
-        f"{_why_not(run, steps, count)} ({settings}{_capped(run)}). Another start or method may "
+        f"{_why_not(run, steps, count)} ({settings}{capped}). Another start or method may "
         "find one.",
         make_graph=lambda: graph_of(best, count),
         make_causes=lambda: _causes(problem, steps, run),
@@ -185,9 +186,9 @@ def _starts(
             return
 
 
-def _touches_all(run: _Run, cells: GridCells) -> bool:
-    """True when the best tree touches every cell."""
-    return len(cells) == 0 or (run.best is not None and len(run.best.jcell) == len(cells))
+def _touched(run: _Run, count: int) -> str:
+    """How many cells the best tree touches, for a message."""
+    return f"the best tree touches {len(run.best.jcell)} of {count} cells"
 
 
 def _why_not(run: _Run, steps: Steps, count: int) -> str:
@@ -196,16 +197,9 @@ def _why_not(run: _Run, steps: Steps, count: int) -> str:
         return "the motion between J-cells cannot be bounded here (the offset surface folds)"
     if steps.sag >= steps.tolerance or not steps.in_cone:
         return "the step is too coarse for the tolerance or the cone"
-    if run.best is None:
+    if not run.best.jcell:
         return "no configuration was found over any cell"
-    return f"the best tree touches {len(run.best.jcell)} of {count} cells"
-
-
-def _capped(run: _Run) -> str:
-    """How many calls ended without an answer, for a message."""
-    if not run.capped:
-        return ""
-    return f"; {run.capped} calls stopped at the cap, which is unknown rather than no"
+    return _touched(run, count)
 
 
 def _beyond(robot: Robot, points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -217,9 +211,8 @@ def _causes(problem: Problem, steps: Steps, run: _Run) -> tuple[Cause, ...]:
     """Why each cell outside the best tree is missed, as far as this search can tell."""
     targets = problem.task.targets(problem.cells)
     beyond = _beyond(problem.robot, targets.points) - steps.tolerance
-    touched = set() if run.best is None else set(run.best.jcell)
     causes = []
-    for cell in sorted(set(range(len(problem.cells))) - touched):
+    for cell in sorted(set(range(len(problem.cells))) - set(run.best.jcell)):
         if beyond[cell] > 0.0:
             kind, proved = CauseKind.OUT_OF_REACH, True
             detail = f"its centre's target is {beyond[cell]:.3f} m beyond the arm's reach"

@@ -59,11 +59,8 @@ def place_joints(  # type: ignore[no-untyped-def]
     """Bring the frames of joints `placed` .. `wanted` up to date, each before its own motion.
 
     Args:
-        rotations: (n, 3, 3) of a `Chain`.
-        translations: (n + 1, 3) of a `Chain`.
-        prismatic: (n,) of a `Chain`.
-        origin: (n,) of a `Grid`.
-        step: (n,) of a `Grid`.
+        rotations, translations, prismatic: of a `Chain`.
+        origin, step: (n,) of a `Grid`.
         offsets: (n,) the J-cell.
         placed: number of joints, from the base on, whose frames are right already.
         wanted: the last joint that is needed.
@@ -72,33 +69,22 @@ def place_joints(  # type: ignore[no-untyped-def]
     for i in range(placed, wanted + 1):
         if i == 0:
             for k in range(3):
-                base[0, k] = rotations[0, k, 0]
-                base[0, 3 + k] = rotations[0, k, 1]
-                base[0, 6 + k] = rotations[0, k, 2]
+                for column in range(3):
+                    base[0, 3 * column + k] = rotations[0, k, column]
                 base[0, 9 + k] = translations[0, k]
             continue
         value = origin[i - 1] + offsets[i - 1] * step[i - 1]
         c, s, slide = 1.0, 0.0, value
         if not prismatic[i - 1]:
             c, s, slide = np.cos(value), np.sin(value), 0.0
+        r, t = rotations[i], translations[i]
         for k in range(3):
             x = c * base[i - 1, k] + s * base[i - 1, 3 + k]
             y = c * base[i - 1, 3 + k] - s * base[i - 1, k]
             z = base[i - 1, 6 + k]
-            base[i, k] = x * rotations[i, 0, 0] + y * rotations[i, 1, 0] + z * rotations[i, 2, 0]
-            base[i, 3 + k] = (
-                x * rotations[i, 0, 1] + y * rotations[i, 1, 1] + z * rotations[i, 2, 1]
-            )
-            base[i, 6 + k] = (
-                x * rotations[i, 0, 2] + y * rotations[i, 1, 2] + z * rotations[i, 2, 2]
-            )
-            base[i, 9 + k] = (
-                base[i - 1, 9 + k]
-                + z * slide
-                + x * translations[i, 0]
-                + y * translations[i, 1]
-                + z * translations[i, 2]
-            )
+            for column in range(3):
+                base[i, 3 * column + k] = x * r[0, column] + y * r[1, column] + z * r[2, column]
+            base[i, 9 + k] = base[i - 1, 9 + k] + z * slide + x * t[0] + y * t[1] + z * t[2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -119,7 +105,7 @@ def cell_of(patch_kernel, height, tolerance, cosine, tool):  # type: ignore[no-u
     The paper's eqs. (5) and (7), with a tolerance, and with the angle of its prose: a.b >= cos.
 
     Args:
-        chart: a `PatchKernel`.
+        patch_kernel: a `PatchKernel`.
         height: m, signed height of the tool point over the surface; of a `Grid`, as the next two.
         tolerance: m.
         cosine: least cosine of the angle between axis and approach direction.
@@ -180,9 +166,7 @@ def move_tool(prismatic, step, sine, cosine, base, delta, held, partial):  # typ
 
     Args:
         prismatic: (n,) of a `Chain`.
-        step: (n,) of a `Grid`.
-        sine: (n,) of a `Grid`.
-        cosine: (n,) of a `Grid`.
+        step, sine, cosine: (n,) of a `Grid`.
         base: (n, 12) joint frames of the J-cell, right up to the last joint that moves.
         delta: (n,) moves -1, 0, +1.
         held: (n,) in and out; the moves for which partial[i] is right, 2 where there are none.
@@ -193,18 +177,14 @@ def move_tool(prismatic, step, sine, cosine, base, delta, held, partial):  # typ
         top -= 1
     for i in range(top, -1, -1):
         held[i] = delta[i]
+        for k in range(6):
+            partial[i, k] = partial[i + 1, k]
         if delta[i] == 0:
-            for k in range(6):
-                partial[i, k] = partial[i + 1, k]
             continue
         x, y, z = base[i, 6], base[i, 7], base[i, 8]
         if prismatic[i]:
-            slide = delta[i] * step[i]
-            partial[i, 0] = partial[i + 1, 0] + slide * x
-            partial[i, 1] = partial[i + 1, 1] + slide * y
-            partial[i, 2] = partial[i + 1, 2] + slide * z
-            for k in range(3, 6):
-                partial[i, k] = partial[i + 1, k]
+            for k in range(3):
+                partial[i, k] += delta[i] * step[i] * base[i, 6 + k]
             continue
         s, c = delta[i] * sine[i], cosine[i]
         ox, oy, oz = base[i, 9], base[i, 10], base[i, 11]

@@ -36,19 +36,14 @@ class StartProjection:
     def __init__(
         self, robot: Robot, point: NDArray[np.float64], approach: NDArray[np.float64], cone: float
     ) -> None:
-        """Configurations of `robot` with the tool at `point` (3,) m and its axis at `approach`.
+        """Configurations of `robot` with the tool at `point` (3,) m, its axis at `approach` (3,).
 
-        Args:
-            robot: the arm.
-            point: (3,) target of the tool point, m.
-            approach: (3,) unit approach direction.
-            cone: angle (rad) that the axis may deviate from it where it cannot be aligned.
+        The `cone` is the angle (rad) by which the axis may deviate where it cannot be aligned.
         """
         self._kinematics = Kinematics(robot)
         self._point, self._approach = point, approach
         self._cone_cosine = float(np.cos(0.98 * cone))  # starts keep off the cone's boundary
         self._lower, self._upper = robot.lower, robot.upper
-        self._middle = _window(robot).mean(axis=0)
         reach = robot.reach
         self._length = 0.3 * reach if 0.0 < reach < np.inf else 1.0  # m per rad of misalignment
 
@@ -136,14 +131,6 @@ class StartProjection:
             q = projected
         return q
 
-    def settle(self, q: NDArray[np.float64], align: bool) -> NDArray[np.float64]:
-        """Move along the manifold towards the middle of the limits (zero for endless joints)."""
-        return self.toward(q, self._middle, align)
-
-    def joined(self, a: NDArray[np.float64], b: NDArray[np.float64], align: bool) -> bool:
-        """True when a self-motion from a (n,) straight towards b (n,) arrives there."""
-        return bool(np.abs(self.toward(a, b, align) - b).max(initial=0.0) < CLOSE)
-
 
 def starts(
     robot: Robot,
@@ -163,29 +150,26 @@ def starts(
         seed: of the random configurations.
         patience: random configurations to try before the first is found.
     """
-    projection = StartProjection(robot, point, approach, cone)
+    projection, window = StartProjection(robot, point, approach, cone), _window(robot)
+    middle = window.mean(axis=0)  # of the limits; zero for endless joints
     for align in (True, False):
         rng = np.random.default_rng(seed)
         found: list[NDArray[np.float64]] = []
         left = patience
         while left > 0 and len(found) < MOST_STARTS:
             left -= 1
-            q = projection.project(random_configuration(robot, rng), align)
+            q = projection.project(rng.uniform(window[0], window[1]), align)
             if q is None:
                 continue
-            q = projection.settle(q, align)
-            if not any(projection.joined(q, other, align) for other in found):
+            q = projection.toward(q, middle, align)
+            # Joined: the self-motion from q straight towards the other arrives there.
+            moved = (np.abs(projection.toward(q, other, align) - other) for other in found)
+            if not any(off.max(initial=0.0) < CLOSE for off in moved):
                 found.append(q)
                 left = DRY_SEEDS
                 yield q
         if found:
             return
-
-
-def random_configuration(robot: Robot, rng: np.random.Generator) -> NDArray[np.float64]:
-    """A configuration (n,), even over the middle turn of each joint's limits."""
-    low, high = _window(robot)
-    return rng.uniform(low, high)
 
 
 def _window(robot: Robot) -> NDArray[np.float64]:

@@ -43,12 +43,7 @@ def replay_tree(
     - a path begins in its cell, where and how that cell was first entered, and ends in the
       neighbour.
 
-    Args:
-        robot: the arm.
-        cells: the E-cells.
-        task: standoff and cone.
-        steps: size of the moves, tolerance, and the margin between J-cells.
-        paths: the edges of a tree, each after the edge that enters its cell.
+    The `paths` are the edges of a tree, each after the edge that enters its cell.
     """
     faults: list[str] = []
     q = np.concatenate([path.q for path in paths]) if paths else np.empty((0, robot.n))
@@ -82,9 +77,9 @@ def replay_tree(
     if task.cone_deg < 180.0 and not angle <= task.cone:
         faults.append(f"the tool axis tilts {np.degrees(angle):.4f} degrees out of the cone")
 
-    within = Borders(cells)
-    begins = within(closest_point.u[first], closest_point.v[first], [path.cell for path in paths])
-    ends = within(closest_point.u[last], closest_point.v[last], [path.neighbour for path in paths])
+    at = np.column_stack([closest_point.u, closest_point.v])
+    begins = within_cells(cells, at[first], [path.cell for path in paths])
+    ends = within_cells(cells, at[last], [path.neighbour for path in paths])
     if not begins.all() or not ends.all():
         faults.append("a path does not begin or end in the cell it claims")
     if not _continuous(paths):
@@ -93,24 +88,18 @@ def replay_tree(
     return Replay(certificate, "; ".join(faults))
 
 
-class Borders:
-    """The parameter ranges of cells."""
-
-    def __init__(self, cells: GridCells) -> None:
-        """Read them from the centres and the number of cells."""
-        surface = cells.surface
-        self._centres = np.column_stack([cells.u, cells.v])  # (N, 2) rad or m
-        ranges = np.array([surface.u_range, surface.v_range])
-        self._half = 0.5 * np.diff(ranges, axis=1)[:, 0] / np.maximum(cells.shape, 1)
-        self._closed = np.array([surface.u_closed, surface.v_closed])
-
-    def __call__(
-        self, u: NDArray[np.float64], v: NDArray[np.float64], cell: Sequence[int]
-    ) -> NDArray[np.bool_]:
-        """(k,) whether the points u, v (k,) lie in the cells (k,)."""
-        away = np.column_stack([u, v]) - self._centres[np.asarray(cell, dtype=int)]
-        away = np.where(self._closed, (away + np.pi) % (2.0 * np.pi) - np.pi, away)
-        return np.asarray((np.abs(away) <= self._half + SAME).all(axis=1))
+def within_cells(
+    cells: GridCells, parameters: NDArray[np.float64], cell: Sequence[int]
+) -> NDArray[np.bool_]:
+    """(k,) whether points with surface parameters (k, 2), rad or m, lie in the cells (k,)."""
+    surface = cells.surface
+    centres = np.column_stack([cells.u, cells.v])  # (N, 2) rad or m
+    ranges = np.array([surface.u_range, surface.v_range])
+    half = 0.5 * np.diff(ranges, axis=1)[:, 0] / np.maximum(cells.shape, 1)
+    away = parameters - centres[np.asarray(cell, dtype=int)]
+    turned = (away + np.pi) % (2.0 * np.pi) - np.pi
+    away = np.where([surface.u_closed, surface.v_closed], turned, away)
+    return np.asarray((np.abs(away) <= half + SAME).all(axis=1))
 
 
 def _continuous(paths: Sequence[Path]) -> bool:

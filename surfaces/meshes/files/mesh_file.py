@@ -16,8 +16,7 @@ import numpy as np
 from coverable_files import FileFault, open_regular, reason
 from surfaces.arguments import Checks
 from surfaces.meshes.files.glb import read_glb
-from surfaces.meshes.files.obj import read_obj
-from surfaces.meshes.files.off import read_off
+from surfaces.meshes.files.obj_and_off import read_obj, read_off
 from surfaces.meshes.files.ply import read_ply
 from surfaces.meshes.files.raw_mesh import RawMesh
 from surfaces.meshes.files.stl import read_stl

@@ -7,8 +7,14 @@ from typing import BinaryIO
 
 import numpy as np
 
-from surfaces.meshes.files.raw_mesh import RawMesh, no_triangles, refuse_large
-from surfaces.meshes.files.text import BYTE_ORDER_MARK, Lines, shown
+from surfaces.meshes.files.raw_mesh import (
+    BYTE_ORDER_MARK,
+    Lines,
+    RawMesh,
+    no_triangles,
+    refuse_large,
+    shown,
+)
 from surfaces.meshes.triangle_mesh import Floats, doubled_areas
 from surfaces.surface import SurfaceError
 

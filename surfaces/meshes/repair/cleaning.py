@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from surfaces.meshes.repair.caps import flipped, thin
+from surfaces.meshes.repair.degenerate import flipped, thin, weld_distance, welded
+from surfaces.meshes.repair.mesh_notes import counted
 from surfaces.meshes.repair.orientation import one_fan_each, oriented, place
-from surfaces.meshes.repair.weld import weld_distance, welded
 from surfaces.meshes.triangle_mesh import (
     Floats,
     Ints,
@@ -63,21 +63,21 @@ def clean(
     corners, turned = oriented(points, corners)
     if turned:
         notes.append(
-            f"{_count(turned, 'face')} turned over, to face the same way as the larger part of "
+            f"{counted(turned, 'face')} turned over, to face the same way as the larger part of "
             f"{'its' if turned == 1 else 'their'} piece"
         )
     corners, flips, dropped = flipped(points, corners, distance)
     if flips:
         notes.append(
-            f"{_count(flips, 'face')} without area (thinner than {distance:.2g} m) mended by "
+            f"{counted(flips, 'face')} without area (thinner than {distance:.2g} m) mended by "
             "flipping the long edge"
         )
     if dropped:
-        notes.append(f"{_count(dropped, 'face')} thinner than {distance:.2g} m dropped")
+        notes.append(f"{counted(dropped, 'face')} thinner than {distance:.2g} m dropped")
     _refuse_empty(corners, notes)
     points, corners, split = one_fan_each(points, corners)
     if split:
-        notes.append(f"{_count(split, 'vertex', 'vertices')} added where pieces touch in a point")
+        notes.append(f"{counted(split, 'vertex', 'vertices')} added where pieces touch in a point")
     points, corners = _compact(points, corners, [])
     return TriangleMesh(points, corners, tuple(notes))
 
@@ -101,7 +101,7 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
     if outside.any():
         first = int(outside.argmax())
         raise SurfaceError(
-            f"{_count(int(outside.sum()), 'face')} of {len(numbers)} name vertices that do not "
+            f"{counted(int(outside.sum()), 'face')} of {len(numbers)} name vertices that do not "
             f"exist; face {first} (counted from 0) has {numbers[first].tolist()}, and the vertices "
             f"are 0 .. {len(points) - 1}; the file is damaged or cut short, export it again"
         )
@@ -112,7 +112,7 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
     if bad.any():
         first = int(bad.argmax())
         raise SurfaceError(
-            f"{_count(int(bad.sum()), 'vertex', 'vertices')} of {len(points)} that faces use "
+            f"{counted(int(bad.sum()), 'vertex', 'vertices')} of {len(points)} that faces use "
             f"{'is' if bad.sum() == 1 else 'are'} not finite, the first is vertex {first} (counted "
             f"from 0) at {points[first].tolist()}; remove or mend it where the mesh comes from"
         )
@@ -147,7 +147,7 @@ def _compact(points: Floats, corners: Ints, notes: list[str]) -> tuple[Floats, I
     unused = len(points) - int(used.sum())
     if unused:
         notes.append(
-            f"{_count(unused, 'vertex', 'vertices')} that no face uses "
+            f"{counted(unused, 'vertex', 'vertices')} that no face uses "
             f"{'was' if unused == 1 else 'were'} dropped"
         )
     return points[used], (np.cumsum(used) - 1)[corners]
@@ -161,14 +161,14 @@ def _weld(points: Floats, corners: Ints, distance: float, notes: list[str]) -> I
     if joined:
         near = f", {moved.sum()} of them not equal but within {distance:.2g} m" * bool(moved.any())
         notes.append(
-            f"{_count(joined, 'vertex', 'vertices')} that repeated others "
+            f"{counted(joined, 'vertex', 'vertices')} that repeated others "
             f"{'was' if joined == 1 else 'were'} joined to them{near}"
         )
     corners = representative[corners]
     collapsed = (corners == np.roll(corners, 1, axis=1)).any(axis=1)
     if collapsed.any():
         notes.append(
-            f"{_count(int(collapsed.sum()), 'face')} with two corners in one place dropped"
+            f"{counted(int(collapsed.sum()), 'face')} with two corners in one place dropped"
         )
     _refuse_empty(corners[~collapsed], notes)
     return corners[~collapsed]
@@ -183,7 +183,7 @@ def _drop_repeated(points: Floats, corners: Ints, notes: list[str]) -> Ints:
     if repeated.any():
         area = 0.5 * np.linalg.norm(doubled_areas(points, corners[repeated]), axis=1).sum()
         notes.append(
-            f"{_count(int(repeated.sum()), 'face')} ({area:.4g} m^2) that repeated others dropped"
+            f"{counted(int(repeated.sum()), 'face')} ({area:.4g} m^2) that repeated others dropped"
         )
     return corners[~repeated]
 
@@ -198,7 +198,7 @@ def _drop_thin_at_non_manifold(
     bad &= thin(points, corners, distance)
     if bad.any():
         notes.append(
-            f"{_count(int(bad.sum()), 'face')} thinner than {distance:.2g} m dropped from "
+            f"{counted(int(bad.sum()), 'face')} thinner than {distance:.2g} m dropped from "
             "edges with more than two faces"
         )
     _refuse_empty(corners[~bad], notes)
@@ -213,7 +213,7 @@ def _refuse_non_manifold(points: Floats, corners: Ints) -> None:
         first = int(bad.argmax())
         a, b = points[half_edge_ends(corners, halves.order[halves.starts[first]])]
         raise SurfaceError(
-            f"{_count(int(bad.sum()), 'edge')} with more than two faces; the first runs from "
+            f"{counted(int(bad.sum()), 'edge')} with more than two faces; the first runs from "
             f"{place(a)} to {place(b)} and has {halves.counts[first]}; keep only the surface "
             "to be covered: remove inner walls and doubled parts, and export it again"
         )
@@ -225,8 +225,3 @@ def _refuse_empty(corners: Ints, notes: list[str]) -> None:
         raise SurfaceError(
             "no face with an area is left; " + "; ".join(notes) + "; export the surface again"
         )
-
-
-def _count(count: int, one: str, several: str | None = None) -> str:
-    """A number with its noun."""
-    return f"{count} {one if count == 1 else several or one + 's'}"

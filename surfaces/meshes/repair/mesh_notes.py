@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surfaces.adjacency import components
 
@@ -20,17 +19,6 @@ def notes_of(mesh: TriangleMesh) -> tuple[str, ...]:
     return (*mesh.history, *_about_pieces(mesh), *_about_borders(mesh), *_about_sides(mesh))
 
 
-def border_loops(mesh: TriangleMesh) -> NDArray[np.int64]:
-    """(B,) number of the closed border line to which each border edge belongs.
-
-    Every vertex on the border of a clean mesh has two border edges, so these lines are closed and
-    never touch.
-    """
-    _, ends = np.unique(mesh.edges.border_vertices, return_inverse=True)
-    ends = ends.reshape(-1, 2)
-    return components(ends, int(ends.max(initial=-1)) + 1)[ends[:, 0]]
-
-
 def _about_pieces(mesh: TriangleMesh) -> list[str]:
     """Names the pieces, if there are several."""
     pieces = mesh.pieces
@@ -38,7 +26,10 @@ def _about_pieces(mesh: TriangleMesh) -> list[str]:
     if len(areas) == 1:
         return []
     faces = np.bincount(pieces)
-    named = [f"{_faces(faces[k])}, {areas[k]:.4g} m^2" for k in range(min(LISTED, len(areas)))]
+    named = [
+        f"{counted(int(faces[k]), 'face')}, {areas[k]:.4g} m^2"
+        for k in range(min(LISTED, len(areas)))
+    ]
     more = f"; {len(areas) - LISTED} smaller ones" if len(areas) > LISTED else ""
     return [
         f"the mesh is in {len(areas)} separate pieces ({'; '.join(named)}{more}): no continuous "
@@ -51,7 +42,11 @@ def _about_borders(mesh: TriangleMesh) -> list[str]:
     edges = mesh.edges
     if not len(edges.border_faces):
         return []
-    loops = border_loops(mesh)
+    # Every vertex on the border of a clean mesh has two border edges, so its border lines are
+    # closed and never touch.
+    _, ends = np.unique(edges.border_vertices, return_inverse=True)
+    ends = ends.reshape(-1, 2)
+    loops = components(ends, int(ends.max()) + 1)[ends[:, 0]]
     lengths = np.bincount(loops, edges.border_lengths)
     piece = np.zeros(len(lengths), np.int64)
     piece[loops] = mesh.pieces[edges.border_faces]
@@ -61,10 +56,9 @@ def _about_borders(mesh: TriangleMesh) -> list[str]:
     holes = lengths[ordered[~outer]]
     if not len(holes):
         return []
-    count = "1 hole" if len(holes) == 1 else f"{len(holes)} holes"
     return [
-        f"the mesh has {count} (border lines beside the longest of each piece); "
-        f"the longest is {holes.max():.4g} m around"
+        f"the mesh has {counted(len(holes), 'hole')} (border lines beside the longest of each "
+        f"piece); the longest is {holes.max():.4g} m around"
     ]
 
 
@@ -80,11 +74,11 @@ def _about_sides(mesh: TriangleMesh) -> list[str]:
     if not inverted.any():
         return []
     return [
-        f"{inverted.sum()} closed piece{'s' if inverted.sum() > 1 else ''} of the mesh "
+        f"{counted(int(inverted.sum()), 'closed piece')} of the mesh "
         f"face{'' if inverted.sum() > 1 else 's'} inwards: there, side 'outside' is the inner side"
     ]
 
 
-def _faces(count: int) -> str:
-    """A number of faces."""
-    return f"{count} face{'s' if count != 1 else ''}"
+def counted(count: int, one: str, several: str | None = None) -> str:
+    """A number with its noun."""
+    return f"{count} {one if count == 1 else several or one + 's'}"

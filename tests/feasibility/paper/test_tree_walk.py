@@ -11,7 +11,7 @@ import pytest
 from feasibility import Search, Task, Verdict, greedy_check
 from feasibility.paper import tree_walk
 from feasibility.paper.jcell_steps import Steps
-from feasibility.paper.tree_replay import Borders
+from feasibility.paper.tree_replay import within_cells
 from feasibility.reports.verdict import as_csv
 from robots import Kinematics, load_robot
 from surfaces import sphere
@@ -58,9 +58,9 @@ def test_its_csv_is_one_motion_that_enters_every_cell(moves: str, step: float) -
     assert np.abs(closest_point.height - sign * TASK.standoff).max() + steps.sag <= steps.tolerance
     chord = np.linalg.norm(axes + sign * closest_point.normal, axis=1).max() + steps.turn
     assert 2.0 * np.arcsin(0.5 * chord) <= TASK.cone
-    within = Borders(DOME)
+    at = np.column_stack([closest_point.u, closest_point.v])
     for cell in range(len(DOME)):
-        assert within(closest_point.u, closest_point.v, [cell] * len(q)).any()
+        assert within_cells(DOME, at, [cell] * len(q)).any()
 
 
 def test_a_row_is_at_a_cell_only_where_the_tool_is_at_its_centre() -> None:

@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 from surfaces import SurfaceError
 from surfaces.meshes import TriangleMesh
 from surfaces.meshes.repair import clean, notes_of, one_fan_each, weld_distance
-from surfaces.meshes.repair.caps import flipped
+from surfaces.meshes.repair.degenerate import flipped, welded
 from surfaces.meshes.repair.orientation import oriented
-from surfaces.meshes.repair.weld import welded
 
 RNG = np.random.default_rng(11)
 
