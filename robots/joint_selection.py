@@ -35,15 +35,7 @@ def select_joints(
 ) -> Selection:
     """Choose the free joints, those from the root link to the tool frame, and hold all others.
 
-    Args:
-        checked: the tree of links and joints.
-        name: what the robot is called in messages.
-        tool_frame: a link; None takes the only leaf.
-        lock: joints to hold, name -> rad or m.
-        limits: what will replace the URDF's limits, see `Robot.with_limits`.
-
-    Raises:
-        RobotError: as `robots.pinocchio_model.robot_from_urdf`.
+    Arguments and errors are those of `robots.pinocchio_model.robot_from_urdf`.
     """
     tool = _tool_frame(checked, name, tool_frame)
     _check_lock(checked, name, lock)
@@ -153,29 +145,18 @@ def _check_free(
 def _locked_values(
     checked: CheckedUrdf, free: set[str], lock: Mapping[str, float]
 ) -> dict[str, float]:
-    """Where every one-dof joint that is not free is held, rad or m."""
-    by_name = {joint.name: joint for joint in checked.joints}
-    held: dict[str, float] = {}
-    for joint in checked.joints:
-        if joint.moves and joint.name not in free:
-            low, high = joint.limits
-            held[joint.name] = float(lock.get(joint.name, min(max(0.0, low), high)))
-    return {title: _followed(by_name[title], by_name, held, lock) for title in held}
-
-
-def _followed(
-    joint: JointInfo,
-    joints: Mapping[str, JointInfo],
-    held: Mapping[str, float],
-    lock: Mapping[str, float],
-) -> float:
-    """The value of a held joint that may mimic another one, rad or m.
+    """Where every one-dof joint that is not free is held, rad or m.
 
     A mimic joint whose leader is free keeps its own value; it moves nothing that carries the tool.
-    A joint with a fault follows nothing, so that a ring of mimics ends here.
+    A joint with a fault follows nothing, so that a ring of mimics ends there.
     """
-    independent = joint.fault is not None or joint.name in lock
-    if joint.mimic is None or independent or joint.mimic.joint not in held:
-        return held[joint.name]
-    leader = _followed(joints[joint.mimic.joint], joints, held, lock)
-    return joint.mimic.multiplier * leader + joint.mimic.offset
+    held = {joint.name: joint for joint in checked.joints if joint.moves and joint.name not in free}
+
+    def value(joint: JointInfo) -> float:
+        independent = joint.fault is not None or joint.name in lock
+        if joint.mimic is None or independent or joint.mimic.joint not in held:
+            low, high = joint.limits
+            return float(lock.get(joint.name, min(max(0.0, low), high)))
+        return joint.mimic.multiplier * value(held[joint.mimic.joint]) + joint.mimic.offset
+
+    return {title: value(joint) for title, joint in held.items()}

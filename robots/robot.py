@@ -64,11 +64,7 @@ class Robot:
         """Copy and write-protect the arrays, and check that they fit together."""
         n = len(self.joint_names)
         for name, shape in (("approach_axis", (3,)), ("lower", (n,)), ("upper", (n,))):
-            array = _numbers(getattr(self, name), f"robot {self.name!r}: {name}")
-            if array.shape != shape:
-                raise RobotError(
-                    f"robot {self.name!r}: {name} has shape {array.shape}, not {shape}"
-                )
+            array = _numbers(getattr(self, name), f"robot {self.name!r}: {name}", shape)
             if np.isnan(array).any():
                 raise RobotError(f"robot {self.name!r}: {name} holds NaN")
             object.__setattr__(self, name, array)
@@ -89,12 +85,11 @@ class Robot:
         for array in (self.approach_axis, self.lower, self.upper):
             array.flags.writeable = False
         self._check_joints()
-        sets = {name: np.array(table, dtype=float) for name, table in self.limit_sets.items()}
-        for name, table in sets.items():
-            if table.shape != (n, 2):
-                raise RobotError(
-                    f"robot {self.name!r}: limit set {name!r} has shape {table.shape}, not {(n, 2)}"
-                )
+        sets = {
+            name: _numbers(table, f"robot {self.name!r}: limit set {name!r}", (n, 2))
+            for name, table in self.limit_sets.items()
+        }
+        for table in sets.values():
             table.flags.writeable = False
         object.__setattr__(self, "limit_sets", MappingProxyType(sets))
         object.__setattr__(self, "locked", MappingProxyType(dict(self.locked)))
@@ -236,9 +231,14 @@ class Robot:
         return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r})"
 
 
-def _numbers(values: ArrayLike, what: str) -> NDArray[np.float64]:
-    """A copy of `values` as an array of floats; raises RobotError where they are none."""
+def _numbers(
+    values: ArrayLike, what: str, shape: tuple[int, ...] | None = None
+) -> NDArray[np.float64]:
+    """A copy of `values` as an array of floats of that shape; RobotError where it is none."""
     try:
-        return np.array(values, dtype=float)
+        array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise RobotError(f"{what} must be an array of numbers, got {values!r}") from error
+    if shape is not None and array.shape != shape:
+        raise RobotError(f"{what} has shape {array.shape}, not {shape}")
+    return array

@@ -145,8 +145,8 @@ class JSpace:
         """Algorithm 1: search a path of J-cells from `jcell` into `target_cell`.
 
         Args:
-            jcell: (n,) offsets of a feasible J-cell.
-            target_cell: flat index of ec_T.
+            jcell: (n,) offsets of a feasible J-cell; all zero at `start`.
+            target_cell: flat index of ec_T, a neighbour of the cell of `jcell`.
             clock: when to give up.
         """
         offsets = np.ascontiguousarray(jcell, dtype=np.int32)
@@ -182,38 +182,6 @@ class JSpace:
             checked=int(counters[jcells.NODES]) - 1,
             fk=float(counters[jcells.PLACED]) / memory.nodes.shape[1],
         )
-
-
-def continuity(
-    robot: Robot,
-    cells: GridCells,
-    task: Task,
-    q: ArrayLike,
-    target_cell: int,
-    search: Search | None = None,
-) -> Continuity:
-    """Algorithm 1 once: is there a feasible path of J-cells from q into a neighbouring E-cell?
-
-    Args:
-        robot: the arm.
-        cells: the E-cells.
-        task: standoff, cone, tolerance.
-        q: (n,) feasible configuration, the origin of the J-cells, rad or m.
-        target_cell: flat index of ec_T.
-        search: step, moves, cap and time limit.
-
-    Raises:
-        ArgumentError: q is not a feasible configuration over one of the cells, or the target is no
-            cell.
-    """
-    space = JSpace(robot, cells, task, q, search)
-    here = np.zeros(robot.n, dtype=np.int32)
-    if not 0 <= target_cell < len(cells):
-        raise ArgumentError(f"target_cell must be 0 to {len(cells) - 1}, got {target_cell}")
-    if space.cell_of(here) < 0:
-        raise ArgumentError("q must satisfy limits, cone and tolerance over one of the cells")
-    clock = Clock(None if search is None else search.time_limit).start()
-    return space.continuity(here, target_cell, clock)
 
 
 def _last_offset(

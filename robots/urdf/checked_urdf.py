@@ -94,16 +94,9 @@ def check_urdf_text(
     base_dir: str | os.PathLike[str] | None = None,
     package_dirs: Sequence[str | os.PathLike[str]] = (),
 ) -> CheckedUrdf:
-    """Check a URDF that is a string.
+    """Check a URDF that is a string, as `check_urdf` does, and call it `name` in messages.
 
-    Args:
-        text: the URDF.
-        name: what to call it in messages.
-        base_dir: folder of relative mesh names; without it they are not looked for.
-        package_dirs: as in `check_urdf`.
-
-    Raises:
-        UrdfError: as `check_urdf`.
+    Relative mesh names are looked up in `base_dir`; without it they are not looked for.
 
     Example:
         >>> two_links = '''<robot name="slider"> <link name="rail"/> <link name="cart"/>
@@ -141,6 +134,8 @@ def _check(
     parents = {joint.parent for joint in joints}
     root = next(iter(set(links) - {joint.child for joint in joints}))
     names = (root, *(joint.child for joint in joints))
+    unlisted = len(faults.warnings) - MAX_WARNINGS
+    more = [f"... and {unlisted:,} more"] if unlisted > 0 else []
     title = robot.attributes.get("name") or os.path.splitext(os.path.basename(path))[0] or "robot"
     return CheckedUrdf(
         path=path,
@@ -151,14 +146,9 @@ def _check(
         joints=joints,
         leaves=tuple(name for name in names if name not in parents),
         visuals=visuals,
-        warnings=_capped(faults.warnings),
+        warnings=(*faults.warnings[:MAX_WARNINGS], *more),
         package_dirs=folders,
     )
-
-
-def _capped(warnings: list[str]) -> tuple[str, ...]:
-    more = len(warnings) - MAX_WARNINGS
-    return (*warnings[:MAX_WARNINGS], *([f"... and {more:,} more"] if more > 0 else []))
 
 
 def _written(title: str, links: tuple[str, ...], joints: tuple[JointInfo, ...]) -> str:
@@ -166,9 +156,8 @@ def _written(title: str, links: tuple[str, ...], joints: tuple[JointInfo, ...]) 
     lines = [f"<robot name={quoteattr(title)}>"]
     lines += [f"  <link name={quoteattr(link)}/>" for link in links]
     for joint in joints:
-        xyz, rpy, axis = (
-            " ".join(map(repr, values)) for values in (joint.xyz, joint.rpy, joint.axis)
-        )
+        poses = (joint.xyz, joint.rpy, joint.axis)
+        xyz, rpy, axis = (" ".join(map(repr, values)) for values in poses)
         lines += [
             f'  <joint name={quoteattr(joint.name)} type="{joint.kind}">',
             f"    <parent link={quoteattr(joint.parent)}/>",

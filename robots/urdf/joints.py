@@ -20,12 +20,10 @@ from robots.urdf.xml import (
     triple,
 )
 
-# fmt: off
 CHILDREN = (
     "parent", "child", "origin", "axis", "limit", "mimic", "calibration", "dynamics",
     "safety_controller",
-)
-# fmt: on
+)  # fmt: skip
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 MIN_AXIS = 1e-6  # a shorter axis has no direction worth trusting
 FREE_TURN = MAX_LENGTH  # [rad] a revolute limit this wide (1e16 is the custom) means "none"
@@ -101,12 +99,13 @@ def read_joint(node: Node, faults: Faults) -> JointInfo | None:
     _check_attributes(axis_node, ("xyz",), owner, faults)
     xyz = _triple(origin, "xyz", (0.0, 0.0, 0.0), owner, faults)
     rpy = _triple(origin, "rpy", (0.0, 0.0, 0.0), owner, faults)
-    if origin is not None and max(map(abs, rpy)) > 2 * math.pi + 1e-3:
-        faults.warn(
-            origin, f"{owner}: rpy={shown(_text(rpy))} is read in radians; were degrees meant?"
-        )
-    if origin is not None and max(map(abs, xyz)) > 100.0:
-        faults.warn(origin, f"{owner}: xyz={shown(_text(xyz))} is read in metres; were mm meant?")
+    for key, values, most, units in (
+        ("rpy", rpy, 2 * math.pi + 1e-3, "read in radians; were degrees"),
+        ("xyz", xyz, 100.0, "read in metres; were mm"),
+    ):
+        if origin is not None and max(map(abs, values)) > most:
+            text = " ".join(f"{value:g}" for value in values)
+            faults.warn(origin, f"{owner}: {key}={shown(text)} is {units} meant?")
     axis = _axis(axis_node, owner, faults)
     if len(faults.errors) > before or name is None or ends[0] is None or ends[1] is None:
         return None
@@ -118,10 +117,6 @@ def read_joint(node: Node, faults: Faults) -> JointInfo | None:
         _max_velocity(limit), mimic, f"line {node.line}: {owner} {fault}" if fault else None,
         node.line,
     )  # fmt: skip
-
-
-def _text(values: Triple) -> str:
-    return " ".join(f"{value:g}" for value in values)
 
 
 def _kind(node: Node, owner: str, faults: Faults) -> str:
@@ -228,10 +223,9 @@ def _mimic(node: Node | None) -> tuple[Mimic | None, str | None]:
 
 
 class Limits(NamedTuple):
-    """The interval that a joint may move in, as in `JointInfo`."""
+    """Kind and interval of a `JointInfo`; a revolute joint without real stops is continuous."""
 
     kind: str
-    """The joint's kind; a revolute joint without real stops is continuous."""
     lower: float | None
     upper: float | None
     fault: str | None = None

@@ -80,14 +80,14 @@ def read_links(robot: Node, faults: Faults) -> dict[str, Node]:
             )
         elif name is not None:
             links[name] = node
-        for visual in node.all("visual"):
-            for mesh in (mesh for shape in visual.all("geometry") for mesh in shape.all("mesh")):
-                if leaves_package(mesh.attributes.get("filename", "")):
-                    faults.error(
-                        mesh,
-                        f"link {shown(name or '?')}: mesh {shown(mesh.attributes['filename'])} "
-                        "climbs out of its package; write the path inside the package",
-                    )
+        shapes = [shape for visual in node.all("visual") for shape in visual.all("geometry")]
+        for mesh in (mesh for shape in shapes for mesh in shape.all("mesh")):
+            if leaves_package(mesh.attributes.get("filename", "")):
+                faults.error(
+                    mesh,
+                    f"link {shown(name or '?')}: mesh {shown(mesh.attributes['filename'])} "
+                    "climbs out of its package; write the path inside the package",
+                )
     return links
 
 
@@ -200,14 +200,13 @@ def _tree(
 def _with_mimic_faults(joints: tuple[JointInfo, ...]) -> tuple[JointInfo, ...]:
     """Mark the joints whose mimic has no moving leader."""
     by_name = {joint.name: joint for joint in joints}
-    marked = []
     for joint in joints:
         fault = _mimic_fault(joint, by_name)
         if fault is not None and joint.fault is None:
             owner = f"line {joint.line}: joint {shown(joint.name)}"
-            joint = replace(joint, fault=f"{owner} {fault}; correct it, or lock the joint")
-        marked.append(joint)
-    return tuple(marked)
+            fault = f"{owner} {fault}; correct it, or lock the joint"
+            by_name[joint.name] = replace(joint, fault=fault)
+    return tuple(by_name.values())
 
 
 def _mimic_fault(joint: JointInfo, by_name: dict[str, JointInfo]) -> str | None:

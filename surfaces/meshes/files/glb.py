@@ -13,13 +13,15 @@ from __future__ import annotations
 
 import json
 import struct
-from typing import Any, BinaryIO
+from collections.abc import Iterator
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from surfaces.meshes.files.gltf_scene import Json, Placed, checked, item, placed_primitives
 from surfaces.meshes.files.raw_mesh import RawMesh, joined, no_triangles, refuse_large
+from surfaces.meshes.triangle_mesh import Floats
 from surfaces.surface import SurfaceError
 
 LARGEST_JSON = 8 << 20  # bytes; numbers lie in the other chunk
@@ -29,6 +31,34 @@ _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # modes of a primitive; lower ones are points and lines
 # Extensions that a file may insist on without changing the shape.
 _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "KHR_mesh_quant")
+MOST_ENTRIES = 100_000  # of a list: nodes, accessors
+Json = dict[str, Any]
+_SHAPE = {"attributes": {"POSITION": int}, "indices": int, "mode": int, "targets": object}
+_NUMBERS = dict.fromkeys(("bufferView", "byteOffset", "componentType", "count"), int)
+_VIEW = dict.fromkeys(("buffer", "byteOffset", "byteLength", "byteStride"), int)
+# What is read of a scene. Whole numbers are indices, counts and sizes, so never negative; one type
+# in a list stands for any number of entries.
+_SCENE: Json = {
+    "extensionsRequired": [str],
+    "scene": int,
+    "scenes": [{"nodes": [int]}],
+    "nodes": [
+        {"children": [int], "mesh": int, "skin": object, "matrix": [float] * 16}
+        | {"translation": [float] * 3, "rotation": [float] * 4, "scale": [float] * 3}
+    ],
+    "meshes": [{"primitives": [_SHAPE]}],
+    "accessors": [_NUMBERS | {"type": str, "normalized": bool, "sparse": object}],
+    "bufferViews": [_VIEW],
+    "buffers": [{"uri": object}],
+}
+
+
+class _Placed(NamedTuple):
+    """A primitive of the scene, and the affine map (3, 4) that puts it there."""
+
+    primitive: Json
+    matrix: Floats
+    where: str
 
 
 def read_glb(stream: BinaryIO, size: int) -> RawMesh:
@@ -38,7 +68,7 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
         SurfaceError: not a GLB, damaged, too large, or with what we do not read.
     """
     content, data = _chunks(stream, size)
-    scene = checked(content)
+    scene = _checked(content)
     for name in scene.get("extensionsRequired", []):
         if not name.startswith(_HARMLESS):
             raise SurfaceError(
@@ -47,7 +77,7 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
             )
     parts: list[RawMesh] = []
     others = faces = vertices = 0
-    for placed in placed_primitives(scene):
+    for placed in _placed_primitives(scene):
         # A small file can show one mesh many times, so all is counted before it is made.
         if len(parts) + others >= MOST_PARTS:
             raise SurfaceError(f"has more than {MOST_PARTS} meshes; join them before exporting")
@@ -55,8 +85,12 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
         if mode < _TRIANGLES:
             others += 1
             continue
-        position, indices = _accessors(scene, placed)
-        corners = (indices or position).get("count", 0)
+        attributes, where = placed.primitive.get("attributes", {}), placed.where
+        if "POSITION" not in attributes:
+            raise SurfaceError(f"{where} has no 'POSITION'")
+        position = _item(scene, "accessors", attributes["POSITION"], where)
+        listed = placed.primitive.get("indices", attributes["POSITION"])
+        corners = _item(scene, "accessors", listed, where).get("count", 0)
         faces += corners // 3 if mode == _TRIANGLES else max(corners - 2, 0)
         vertices += position.get("count", 0)
         refuse_large(faces, vertices)
@@ -104,18 +138,99 @@ def _chunks(stream: BinaryIO, size: int) -> tuple[Any, bytes]:
     return content, stream.read(data_length)
 
 
-def _accessors(scene: Json, placed: Placed) -> tuple[Json, Json | None]:
-    """What describes the positions of a primitive, and its indices where it has some."""
-    attributes = placed.primitive.get("attributes", {})
-    if "POSITION" not in attributes:
-        raise SurfaceError(f"{placed.where} has no 'POSITION'")
-    position = item(scene, "accessors", attributes["POSITION"], placed.where)
-    if "indices" not in placed.primitive:
-        return position, None
-    return position, item(scene, "accessors", placed.primitive["indices"], placed.where)
+def _checked(value: Any, schema: Any = _SCENE, where: str = "") -> Any:
+    """The part of decoded JSON that the schema names; refuses other types and ranges."""
+    fault = ""
+    if isinstance(schema, dict):
+        if isinstance(value, dict):
+            start = where and where + "."
+            return {k: _checked(value[k], s, start + k) for k, s in schema.items() if k in value}
+        fault = "a JSON object"
+    elif isinstance(schema, list):
+        if isinstance(value, list) and len(schema) in (1, len(value)):
+            if len(value) <= MOST_ENTRIES:
+                return [_checked(item, schema[0], f"{where}[{k}]") for k, item in enumerate(value)]
+            raise SurfaceError(
+                f"lists {len(value)} {where}, more than {MOST_ENTRIES}; join its parts before "
+                "exporting"
+            )
+        fault = f"a list of {len(schema)} numbers" if len(schema) > 1 else "a list"
+    elif schema is int and not (type(value) is int and 0 <= value < 1 << 40):
+        fault = f"a whole number in 0 .. {1 << 40}"
+    elif schema is float and not (type(value) in (int, float) and abs(value) <= 1e12):
+        fault = "a number within 1e12"
+    elif schema in (str, bool) and not isinstance(value, schema):
+        fault = "a text" if schema is str else "a truth value"
+    if fault:
+        raise SurfaceError(f"{where or 'its scene'} must be {fault}")
+    return value
 
 
-def _primitive(scene: Json, data: bytes, placed: Placed, mode: int) -> RawMesh:
+def _item(scene: Json, key: str, k: int | None, owner: str) -> Json:
+    """Entry k of a list of the scene, which `owner` names; refuses one that is not there."""
+    entries = scene.get(key, [])
+    if k is None or k >= len(entries):
+        raise SurfaceError(f"{owner} names {key}[{k}], of {len(entries)}; the file is damaged")
+    return entries[k]
+
+
+def _placed_primitives(scene: Json) -> Iterator[_Placed]:
+    """Every primitive that the default scene shows, once for each node that names its mesh.
+
+    Without a scene, all nodes are shown; without nodes, all meshes as they are.
+
+    Raises:
+        SurfaceError: nodes that form no tree, are damaged, or bend their mesh with a skeleton.
+    """
+    nodes = scene.get("nodes") or [{"mesh": k} for k in range(len(scene.get("meshes", [])))]
+    if scene.get("nodes") and scene.get("scenes"):
+        roots = _item(scene, "scenes", scene.get("scene", 0), "the file").get("nodes", [])
+    else:
+        children = {child for node in nodes for child in node.get("children", ())}
+        roots = [k for k in range(len(nodes)) if k not in children]
+    waiting = [(k, np.eye(4), "the scene") for k in reversed(roots)]
+    seen: set[int] = set()
+    while waiting:
+        k, above, owner = waiting.pop()
+        where = f"nodes[{k}]"
+        node = _item({"nodes": nodes}, "nodes", k, owner)
+        if k in seen:
+            raise SurfaceError(f"{where} is reached twice; the nodes of a scene must form a tree")
+        seen.add(k)
+        matrix = above @ _matrix(node, where)
+        if not np.isfinite(matrix).all() or np.abs(matrix).max() > 1e12:
+            raise SurfaceError(f"{where} is moved or scaled beyond 1e12")
+        if "mesh" in node:
+            if "skin" in node:
+                raise SurfaceError(
+                    f"{where} bends its mesh with a skeleton (skin); export the shape itself"
+                )
+            mesh = _item(scene, "meshes", node["mesh"], where)
+            for number, primitive in enumerate(mesh.get("primitives", [])):
+                name = f"meshes[{node['mesh']}].primitives[{number}]"
+                yield _Placed(primitive, matrix[:3], name)
+        waiting += [(c, matrix, f"{where}.children") for c in reversed(node.get("children", []))]
+
+
+def _matrix(node: Json, where: str) -> Floats:
+    """(4, 4) from the frame of a node to that of its parent."""
+    if "matrix" in node:
+        matrix = np.array(node["matrix"], float).reshape(4, 4).T  # written column by column
+        if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
+            raise SurfaceError(f"{where} has a 'matrix' whose last row is not 0 0 0 1")
+        return matrix
+    quaternion = node.get("rotation", [0.0, 0.0, 0.0, 1.0])
+    if not 0.98 < sum(part * part for part in quaternion) < 1.02:
+        raise SurfaceError(f"{where} has a 'rotation' that is no unit quaternion")
+    matrix = np.eye(4)
+    if "rotation" in node:
+        matrix[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
+    matrix[:3, :3] *= np.array(node.get("scale", [1.0] * 3), float)
+    matrix[:3, 3] = node.get("translation", [0.0] * 3)
+    return matrix
+
+
+def _primitive(scene: Json, data: bytes, placed: _Placed, mode: int) -> RawMesh:
     """The triangles of one primitive, placed."""
     primitive, matrix = placed.primitive, placed.matrix
     points = _numbers(scene, data, primitive["attributes"]["POSITION"], "VEC3")
@@ -159,9 +274,9 @@ def _numbers(scene: Json, data: bytes, k: int, kind: str) -> NDArray[Any]:
     if accessor.get("componentType") not in _TYPES:
         raise SurfaceError(f"{where} has no component type of glTF")
     number = np.dtype(_TYPES[accessor["componentType"]])
-    view = item(scene, "bufferViews", accessor.get("bufferView"), where)
+    view = _item(scene, "bufferViews", accessor.get("bufferView"), where)
     buffer = view.get("buffer", 0)
-    if "uri" in item(scene, "buffers", buffer, where) or buffer != 0:
+    if "uri" in _item(scene, "buffers", buffer, where) or buffer != 0:
         raise SurfaceError(
             f"buffers[{buffer}] lies outside the file; export it as one .glb that holds everything"
         )

@@ -65,11 +65,6 @@ class Element:
     properties: tuple[Property, ...]
 
     @property
-    def least_row(self) -> int:
-        """Bytes of the shortest binary row."""
-        return sum(int((item.count_type or item.type)[1]) for item in self.properties)
-
-    @property
     def wanted(self) -> tuple[int, ...]:
         """Which properties are read: x, y and z of a vertex, the list of corners of a face.
 
@@ -172,7 +167,8 @@ def _checked(elements: tuple[Element, ...], order: str, left: int) -> tuple[Elem
             raise SurfaceError(f"its header announces {element.count:,} of '{element.name}'")
     for element in elements:
         # Text needs a digit and a space or the line's end for each number.
-        row = element.least_row if order else 2 * len(element.properties)
+        binary = sum(int((item.count_type or item.type)[1]) for item in element.properties)
+        row = binary if order else 2 * len(element.properties)
         if element.count * row > left + 2:
             raise SurfaceError(
                 f"its header announces {element.count:,} of '{element.name}', which the "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from surfaces.meshes.repair.degenerate import flipped, thin, weld_distance, welded
 from surfaces.meshes.repair.mesh_notes import counted
@@ -74,7 +74,7 @@ def clean(
         )
     if dropped:
         notes.append(f"{counted(dropped, 'face')} thinner than {distance:.2g} m dropped")
-    _refuse_empty(corners, notes)
+    corners = _kept(corners, np.ones(len(corners), bool), notes)
     points, corners, split = one_fan_each(points, corners)
     if split:
         notes.append(f"{counted(split, 'vertex', 'vertices')} added where pieces touch in a point")
@@ -170,8 +170,7 @@ def _weld(points: Floats, corners: Ints, distance: float, notes: list[str]) -> I
         notes.append(
             f"{counted(int(collapsed.sum()), 'face')} with two corners in one place dropped"
         )
-    _refuse_empty(corners[~collapsed], notes)
-    return corners[~collapsed]
+    return _kept(corners, ~collapsed, notes)
 
 
 def _drop_repeated(points: Floats, corners: Ints, notes: list[str]) -> Ints:
@@ -201,8 +200,7 @@ def _drop_thin_at_non_manifold(
             f"{counted(int(bad.sum()), 'face')} thinner than {distance:.2g} m dropped from "
             "edges with more than two faces"
         )
-    _refuse_empty(corners[~bad], notes)
-    return corners[~bad]
+    return _kept(corners, ~bad, notes)
 
 
 def _refuse_non_manifold(points: Floats, corners: Ints) -> None:
@@ -219,9 +217,10 @@ def _refuse_non_manifold(points: Floats, corners: Ints) -> None:
         )
 
 
-def _refuse_empty(corners: Ints, notes: list[str]) -> None:
-    """Nothing is left."""
-    if not len(corners):
+def _kept(corners: Ints, kept: NDArray[np.bool_], notes: list[str]) -> Ints:
+    """The faces that are kept; refuses to keep none."""
+    if not kept.any():
         raise SurfaceError(
             "no face with an area is left; " + "; ".join(notes) + "; export the surface again"
         )
+    return corners[kept]

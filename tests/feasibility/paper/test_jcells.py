@@ -12,7 +12,7 @@ import pytest
 
 from feasibility import Answer, CauseKind, Evidence, Search, Task, greedy_check
 from feasibility.paper.algorithm_2 import tree_search
-from feasibility.paper.continuity import JSpace, Outcome, continuity
+from feasibility.paper.continuity import JSpace, Outcome
 from feasibility.paper.jcell_steps import Steps
 from robots import Kinematics, Robot, load_robot
 from surfaces import Cells, cylinder, plane, sphere
@@ -218,7 +218,7 @@ def test_same_jcells_as_the_printed_algorithm(moves: str, seed: int) -> None:
     q, start = verdict.graph.nodes[verdict.start]["q"], verdict.start
     outcomes = set()
     for target in cells.neighbours.of(start).tolist():
-        ours = continuity(robot, cells, task, q, target, search)
+        ours = JSpace(robot, cells, task, q, search).continuity(np.zeros(6), target)
         outcome, path, checked = reference(robot, cells, task, q, target, search, 700)
         outcomes.add(outcome)
         assert (ours.outcome, ours.checked) == (outcome, checked)
@@ -252,9 +252,9 @@ def test_memory_grows_without_changing_the_answer() -> None:
         for a in verdict.tree
         for k in cells.neighbours.of(a).tolist()
         if not verdict.graph.has_edge(a, k)
-        and continuity(
-            robot, cells, task, verdict.graph.nodes[a]["q"], k, greedy(cap=60_000)
-        ).outcome
+        and JSpace(robot, cells, task, verdict.graph.nodes[a]["q"], greedy(cap=60_000))
+        .continuity(np.zeros(6), k)
+        .outcome
         is Outcome.CAPPED
     )
     space = JSpace(robot, cells, task, q, greedy(cap=60_000))
