@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.curve_matching import match_to_curves
+from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
 from robots import Kinematics, Robot
@@ -131,8 +132,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     fault = _malformed(robot, cells, walk)
     if fault:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
-    tolerance = task.effective_tolerance
-    cone_chord = task.cone_chord
+    tolerance, cone_chord = task.effective_tolerance, task.cone_chord
     poses = placements(robot, walk.q)
     matched = match_to_curves(cells, task, walk, poses.points, poses.axes)
     if matched.fault:
@@ -162,7 +162,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     certificate = Certificate(
         waypoints=len(walk.q),
         max_position_error=float(position),
-        max_angle=float(2.0 * np.arcsin(min(0.5 * worst, 1.0))) if worst == worst else np.nan,
+        max_angle=angle_of(float(worst)),
         min_limit_margin=margin,
     )
 

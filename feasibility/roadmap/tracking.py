@@ -109,12 +109,11 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
             accept(work)
             dt *= min(2.0, 0.85 / np.sqrt(max(position, 0.1)))
         else:
-            if position < np.inf and position > 1.0:
+            factor = 0.5
+            if 1.0 < position < np.inf:
                 factor = max(0.2, min(0.7, 0.85 / np.sqrt(position)))
-            else:
-                factor = 0.5
-                if position < np.inf:
-                    work.stop_reason[0] = CONE
+            elif position < np.inf:
+                work.stop_reason[0] = CONE
             dt *= factor
             if dt < SMALLEST_STEP:
                 return STOPPED
