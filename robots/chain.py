@@ -56,8 +56,7 @@ def checked_chain(
         model: the n free joints.
         tool_frame: index of the tool's frame in the model.
         approach_axis: (3,) in the tool frame.
-        lower: (n,) rad or m.
-        upper: (n,) rad or m.
+        lower, upper: (n,) rad or m.
 
     Raises:
         RobotError: a joint has more than one degree of freedom, the joints do not form one chain

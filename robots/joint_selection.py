@@ -99,16 +99,16 @@ def _free_joints(
     A mimic joint is held when the joint that leads it is.
     """
     free = [joint for joint in checked.path_to(tool) if joint.moves and joint.name not in lock]
-    names = {joint.name for joint in free}
     while True:
-        led = {
-            joint.name
+        names = {joint.name for joint in free}
+        kept = [
+            joint
             for joint in free
-            if joint.mimic is not None and joint.fault is None and joint.mimic.joint not in names
-        }
-        if not led & names:
-            return tuple(joint for joint in free if joint.name in names)
-        names -= led
+            if joint.mimic is None or joint.fault is not None or joint.mimic.joint in names
+        ]
+        if len(kept) == len(free):
+            return tuple(free)
+        free = kept
 
 
 def _check_free(

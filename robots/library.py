@@ -25,7 +25,6 @@ from robots.joint_selection import suggestion
 from robots.robot import Robot
 
 HERE = Path(__file__).parent
-BUILT_IN = "coverable"
 DATA = "example-robot-data"
 
 
@@ -136,11 +135,10 @@ def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:
 @cache
 def _library() -> Mapping[str, RobotInfo]:
     """The entries of library.toml with their paths filled in."""
+    share, entries = _data_folder(), {}
     table = tomllib.loads((HERE / "library.toml").read_text(encoding="utf-8"))
-    share = _data_folder()
-    entries = {}
     for name, entry in table.items():
-        built_in = entry["source"] == BUILT_IN
+        built_in = entry["source"] == "coverable"
         root = HERE if built_in else share / DATA / "robots"
         entries[name] = RobotInfo(
             name=name,

@@ -34,16 +34,13 @@ def robot_from_urdf(
 
     Free are the joints on the chain from the root link to the tool frame, unless `lock` names them.
     Every other moving joint is held: at the value `lock` gives, or at zero clipped to its limits
-    (a mimic joint where the joint it follows puts it, if that one is held too).
+    (a mimic joint where the joint it follows puts it, if that one is held too). A joint whose own
+    limits are missing or make no sense needs `limits`.
 
     Args:
         checked: a URDF that has passed the check.
         name: what the robot is called in messages.
-        tool_frame: a link; None takes the only leaf.
-        approach_axis: (3,) in the tool frame.
-        lock: joint name -> value, rad or m.
-        limits: replaces the URDF's limits, see `Robot.with_limits`. A joint whose own limits are
-            missing or make no sense needs them.
+        tool_frame, approach_axis, lock, limits: as in `load_robot`.
         limit_sets: name -> joint name -> (lower, upper), rad or m. A set that lacks a free joint
             is left out.
 

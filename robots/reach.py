@@ -32,8 +32,7 @@ def reach_bound(
         model: the n joints, base to tip.
         tool_frame: index of the frame whose origin is the tool point.
         prismatic: (n,) True where a joint slides.
-        lower: (n,) rad or m.
-        upper: (n,) rad or m.
+        lower, upper: (n,) rad or m.
 
     Returns:
         The bound; inf where a prismatic joint has no limits.

@@ -12,12 +12,7 @@ from feasibility.paper.tree_and_graph import Tree
 from surfaces.patches import GridCells
 
 
-def tree_search(
-    space: JSpace,
-    cells: GridCells,
-    start: int,
-    clock: Clock | None = None,
-) -> Tree:
+def tree_search(space: JSpace, cells: GridCells, start: int, clock: Clock | None = None) -> Tree:
     """Algorithm 2: grow T and G from the start configuration of `space`, which lies over `start`.
 
     The recursion of the paper's TREESEARCH is the list `waiting`: the cells from ec_1 to the one in
@@ -57,7 +52,7 @@ def _try_edge(tree: Tree, cell: int, neighbour: int, clock: Clock) -> bool:
     tree.fk += found.fk
     tree.capped += found.outcome is Outcome.CAPPED
     tree.complete = found.outcome is not Outcome.OUT_OF_TIME
-    if not found.found:
+    if found.outcome is not Outcome.FOUND:
         return False
     tree.edges[cell, neighbour] = found.jcells
     if neighbour in tree.jcell:

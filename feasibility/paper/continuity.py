@@ -53,11 +53,6 @@ class Continuity:
     fk: float
     """Forward kinematics computed, in chains: joint frames placed, divided by n."""
 
-    @property
-    def found(self) -> bool:
-        """True when the neighbouring cell was entered."""
-        return self.outcome is Outcome.FOUND
-
 
 class JSpace:
     """The J-cells around one start configuration of one robot, with Algorithm 1 on them.

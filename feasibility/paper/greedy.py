@@ -25,7 +25,6 @@ from feasibility.paper.tree_and_graph import Tree, graph_of, tree_of
 from feasibility.paper.tree_replay import Path, replay_tree
 from feasibility.problem import Problem
 from feasibility.search import Search
-from feasibility.task import Task
 from feasibility.verdict import Cause, CauseKind, Replay
 from robots import Robot
 from surfaces.patches import GridCells, closed_form_grid
@@ -56,18 +55,6 @@ class _Run:
         self.complete &= tree.complete
         self.best = max(self.best, tree, key=lambda one: (len(one.jcell), len(one.edges)))
 
-    def counts(self) -> dict[str, float]:
-        """The sums, and calls and edges of the best tree."""
-        return {
-            "starts": self.trees,
-            "calls": self.calls,
-            "checked": self.checked,
-            "fk": round(self.fk),
-            "capped": self.capped,
-            "best_calls": self.best.calls,
-            "best_capped": self.best.capped,
-        }
-
 
 def greedy_search(
     problem: Problem, search: Search, clock: Clock, start: ArrayLike | None = None
@@ -96,7 +83,7 @@ def greedy_search(
         space.load()
     clock.start()
     run = _Run(Tree(space, start=None))
-    for q in _starts(robot, cells, task, search, clock, start):
+    for q in _starts(problem, cells, search, clock, start):
         space = JSpace(robot, cells, task, q, search, steps)
         at = space.cell_of(np.zeros(robot.n, dtype=np.int32))
         if at >= 0:
@@ -134,11 +121,19 @@ def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run
             f"{_touched(run, count)}."
         )
     return Found(
-        covered=best.touched(count),
+        covered=np.isin(np.arange(count), list(best.jcell)),
         components=(np.array(sorted(best.jcell), dtype=np.int64),) if best.jcell else (),
         start=best.start,
         n_edges=len(best.edges),
-        counts=run.counts(),
+        counts={
+            "starts": run.trees,
+            "calls": run.calls,
+            "checked": run.checked,
+            "fk": round(run.fk),
+            "capped": run.capped,
+            "best_calls": best.calls,
+            "best_capped": best.capped,
+        },
         replay=replay if len(best.jcell) == count else None,
         accepted="The greedy search touches every cell with one tree of motions, and Pinocchio's "
         f"replay accepts it ({settings}). Touching a cell is entering it: centres need not be "
@@ -156,12 +151,7 @@ def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run
 
 
 def _starts(
-    robot: Robot,
-    cells: GridCells,
-    task: Task,
-    search: Search,
-    clock: Clock,
-    start: ArrayLike | None,
+    problem: Problem, cells: GridCells, search: Search, clock: Clock, start: ArrayLike | None
 ) -> Iterator[NDArray[np.float64]]:
     """Start configurations (n,), as many as the search asks for.
 
@@ -171,6 +161,7 @@ def _starts(
     if start is not None:
         yield np.array(start, dtype=float)
         return
+    robot, task = problem.robot, problem.task
     points, approaches = task.targets(cells)
     middle = len(cells) // 2
     within = np.flatnonzero(_beyond(robot, points) <= 0.0).tolist()
@@ -195,7 +186,7 @@ def _why_not(run: _Run, steps: Steps, count: int) -> str:
     """What kept the best tree from touching all cells."""
     if not math.isfinite(steps.sag):
         return "the motion between J-cells cannot be bounded here (the offset surface folds)"
-    if steps.sag >= steps.tolerance or not steps.in_cone:
+    if steps.sag >= steps.tolerance or steps.cone_cosine >= 1.0:
         return "the step is too coarse for the tolerance or the cone"
     if not run.best.jcell:
         return "no configuration was found over any cell"

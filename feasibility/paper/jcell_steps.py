@@ -50,15 +50,9 @@ class Steps:
     """m, margin for the tool point between J-cells; inf where it cannot be bounded."""
     turn: float
     """Margin for |a - approach direction| between J-cells."""
-
     cone_cosine: float
     """Least cosine of the angle between axis and approach direction at a J-cell: -2 where any angle
     will do, 2 where the cone is too narrow for a step."""
-
-    @property
-    def in_cone(self) -> bool:
-        """True when the cone is wide enough for a step."""
-        return self.cone_cosine < 1.0
 
     @staticmethod
     def of(robot: Robot, surface: ClosedFormPatch, task: Task, search: Search) -> Steps:

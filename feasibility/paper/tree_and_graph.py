@@ -55,12 +55,6 @@ class Tree:
         forward = self.edges.get((a, b))
         return self.space.q(self.edges[b, a][::-1] if forward is None else forward)
 
-    def touched(self, count: int) -> NDArray[np.bool_]:
-        """(count,) cells of T."""
-        touched = np.zeros(count, dtype=bool)
-        touched[list(self.jcell)] = True
-        return touched
-
 
 def graph_of(tree: Tree, count: int) -> nx.Graph:
     """Graph G over `count` cells: `q` on those that the tree touches, `motion` on the edges."""

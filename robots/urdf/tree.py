@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
 from dataclasses import replace
 
 from coverable_errors import close_matches
@@ -34,7 +33,10 @@ def refuse_other_formats(robot: Node, path: str) -> None:
     if robot.tag != "robot":
         what = OTHER_FORMATS.get(robot.tag, "not a URDF, which starts with <robot name=...>")
         raise UrdfError(f"line {robot.line}: its first element is <{robot.tag[:60]}>: {what}", path)
-    for node in _walk(robot):
+    pending = deque([robot])
+    while pending:
+        node = pending.popleft()
+        pending.extend(child for child in node.children if child.tag not in EXTENSIONS)
         values = " ".join(node.attributes.values())
         if node.tag.startswith("xacro:") or "${" in values or "$(" in values:
             what = "still holds xacro; expand it first: xacro robot.urdf.xacro > robot.urdf"
@@ -43,15 +45,6 @@ def refuse_other_formats(robot: Node, path: str) -> None:
         else:
             continue
         raise UrdfError(f"line {node.line}: <{node.tag[:60]}> {what}", path)
-
-
-def _walk(robot: Node) -> Iterator[Node]:
-    """Every element, breadth first, but those inside extensions."""
-    pending = deque([robot])
-    while pending:
-        node = pending.popleft()
-        yield node
-        pending.extend(child for child in node.children if child.tag not in EXTENSIONS)
 
 
 def read_links(robot: Node, faults: Faults) -> dict[str, Node]:

@@ -12,6 +12,7 @@ import os
 import stat
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 
 import numpy as np
@@ -151,22 +152,16 @@ class MeshFolders:
 def _package_around(folder: Path) -> Path | None:
     """The nearest folder at or above `folder` that is a ROS package, so ../meshes works in one."""
     folder = Path(os.path.abspath(folder))
-    for candidate in [folder, *folder.parents][:PACKAGE_LEVELS]:
-        if os.path.isfile(candidate / "package.xml"):
-            return candidate
-    return None
+    around = [folder, *folder.parents][:PACKAGE_LEVELS]
+    return next((here for here in around if os.path.isfile(here / "package.xml")), None)
 
 
 def leaves_package(name: str) -> bool:
     """True for a package:// name that climbs out of its package with '..'."""
     if not name.startswith(("package://", "model://")):
         return False
-    depth = 0
-    for part in name.split("://", 1)[1].replace("\\", "/").split("/"):
-        depth += {"": 0, ".": 0, "..": -1}.get(part, 1)
-        if depth < 0:
-            return True
-    return False
+    parts = name.split("://", 1)[1].replace("\\", "/").split("/")
+    return min(accumulate({"": 0, ".": 0, "..": -1}.get(part, 1) for part in parts)) < 0
 
 
 def read_visuals(robot: Node, folders: MeshFolders, faults: Faults) -> tuple[Visual, ...]:

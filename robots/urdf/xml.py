@@ -168,15 +168,14 @@ class _Builder:
         self.open.pop()
 
 
+@dataclass(eq=False, slots=True)
 class Faults:
     """What is wrong with one file so far, and what is odd about it."""
 
-    def __init__(self) -> None:
-        """Start with none."""
-        self.errors: list[str | Fault] = []
-        self.warnings: list[str] = []
-        self.soft_limits: list[str] = []
-        """Names of joints whose controller would stop earlier than the limits do."""
+    errors: list[str | Fault] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    soft_limits: list[str] = field(default_factory=list)
+    """Names of joints whose controller would stop earlier than the limits do."""
 
     def error(self, node: Node, what: str) -> None:
         """Note something that makes the robot unusable."""

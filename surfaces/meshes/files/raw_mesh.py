@@ -40,10 +40,8 @@ def refuse_large(faces: int, vertices: int = 0) -> None:
     Raises:
         SurfaceError: more than `MOST_FACES` faces, or thrice as many vertices.
     """
-    for count, most, what in (
-        (faces, MOST_FACES, "faces"),
-        (vertices, MOST_VERTICES, "vertices"),
-    ):
+    caps = ((faces, MOST_FACES, "faces"), (vertices, MOST_VERTICES, "vertices"))
+    for count, most, what in caps:
         if count > most:
             raise SurfaceError(
                 f"has {count:,} {what}, more than the {most:,} that are taken; thin it first, "

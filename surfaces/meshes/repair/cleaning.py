@@ -23,11 +23,7 @@ from surfaces.surface import SurfaceError
 FARTHEST = 1e6  # mesh diagonals from the origin; beyond it, coordinates have no digits to spare
 
 
-def clean(
-    vertices: ArrayLike,
-    faces: ArrayLike,
-    history: Sequence[str] = (),
-) -> TriangleMesh:
+def clean(vertices: ArrayLike, faces: ArrayLike, history: Sequence[str] = ()) -> TriangleMesh:
     """Check the triangles of a surface, repair what is safe, and note what was done.
 
     Repaired: vertices closer than a few ten-millionths of the mesh's diagonal become one;

@@ -135,8 +135,7 @@ def _flip_some(vertices: Floats, faces: Ints, is_cap: NDArray[np.bool_]) -> tupl
     long_edge[caps] = 3 * caps + longest
     inner = half_edges(faces).of_count(2)
     partner = np.full(faces.size, -1, np.int64)
-    partner[inner[:, 0]] = inner[:, 1]
-    partner[inner[:, 1]] = inner[:, 0]
+    partner[inner] = inner[:, ::-1]
     halves = long_edge[caps]
     halves = halves[partner[halves] >= 0]
     across = partner[halves]
