@@ -33,7 +33,7 @@ surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection
 surfaces.meshes.cells
-feasibility: clock compiled cone found notices problem safe_files search target_curves task verdict version
+feasibility: clock compiled cone found notices problem read_only safe_files search target_curves task verdict version
 feasibility.certification
 feasibility.paper
 feasibility.cases

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.division.reconfiguration import Reconfiguration
+from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate, Walk
 from robots import Robot
@@ -17,7 +18,7 @@ from surfaces import Cells
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class SubPatch:
+class SubPatch(ReadOnlyArrays):
     """Cells that one continuous motion covers, and that motion."""
 
     cells: NDArray[np.int64]
@@ -33,12 +34,6 @@ class SubPatch:
     """What the independent replay measured along the walk."""
     refusal: str
     """Why the replay refuses the walk; empty when it is accepted."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the cells."""
-        cells = np.array(self.cells, dtype=np.int64)
-        cells.flags.writeable = False
-        object.__setattr__(self, "cells", cells)
 
     @property
     def accepted(self) -> bool:
@@ -75,7 +70,7 @@ class Plan:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Division:
+class Division(ReadOnlyArrays):
     """A surface divided into the fewest patches; see `feasibility.division.divide`."""
 
     robot: Robot
@@ -100,12 +95,6 @@ class Division:
     """Seconds: load_s, search_s, divide_s, total_s."""
     statistics: Mapping[str, Any] = field(default_factory=dict)
     """Counts of work done."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the cells."""
-        cells = np.array(self.unsettled, dtype=np.int64)
-        cells.flags.writeable = False
-        object.__setattr__(self, "unsettled", cells)
 
     @property
     def patches(self) -> tuple[SubPatch, ...]:

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock, OutOfTime
-from feasibility.division.components import collect_components
 from feasibility.division.division import Division, Plan
-from feasibility.division.plans import plans
+from feasibility.division.plans import collect_components, plans
 from feasibility.notices import compiling_notice
 from feasibility.roadmap import (
     Exploration,

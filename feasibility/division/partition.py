@@ -1,23 +1,44 @@
-"""The fewest patches: cells shared out among components, each in exactly one patch."""
+"""The fewest patches: cells shared out among components, each in exactly one patch.
+
+Each cell gets one label, a component that covers it; cells of one label that hang together form one
+connected patch. Unlike the sets of a set cover, patches do not overlap, so that two regions which
+cross may cost a third patch.
+
+A set cover by connected regions bounds the number of connected patches from below; patches grown
+from the cells that have no choice bound it from above. Mostly the two are equal. Where they are
+not, the integer programme of `connected_labels` decides.
+"""
 
 from __future__ import annotations
 
 import time
+from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
-from feasibility.division.connected_cover import connected_cover
-from feasibility.division.connected_labels import Bools, Ints, Labels, pieces_of
-from feasibility.division.set_covering import set_cover
+from feasibility.division.connected_labels import (
+    Bools,
+    Ints,
+    Labels,
+    Lists,
+    count_of,
+    fewest_labels,
+    neighbours_of,
+    pieces_of,
+)
+from feasibility.division.set_covering import set_cover, undominated
+from feasibility.read_only import ReadOnlyArrays
 
 TIME_LIMIT = 10.0  # [s]
+OTHER_COVERS = 40  # other choices of regions that patches are grown of
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Partition:
+class Partition(ReadOnlyArrays):
     """Each cell in exactly one patch, each patch inside one component."""
 
     rows: NDArray[np.int64]
@@ -28,13 +49,6 @@ class Partition:
     """Connected pieces that the patches have together; P when each is connected."""
     bound: int
     """No partition of this kind has fewer patches."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the arrays."""
-        for name in ("rows", "patch"):
-            array = np.array(getattr(self, name), dtype=np.int64)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
 
     def __len__(self) -> int:
         """Number of patches."""
@@ -102,7 +116,9 @@ def fewest_patches(
         few = Labels(np.append(rows, -1)[few.label], few.pieces, few.bound)
     if few.pieces < free.pieces:  # out of time
         free = Labels(few.label, few.pieces, free.bound)
-    connected = _connected(free, pairs, max(free.bound, chosen.bound))
+    connected = _partition(
+        free.label, pieces_of(free.label, pairs), free.pieces, max(free.bound, chosen.bound)
+    )
     used = len(np.unique(connected.rows))
     if used == len(connected) <= len(rows):
         return Cover(connected, connected, left_out)
@@ -110,11 +126,6 @@ def fewest_patches(
         few = free
     fewest = _partition(few.label, few.label, few.pieces, chosen.bound)
     return Cover(fewest, connected, left_out)
-
-
-def _connected(labels: Labels, pairs: Ints, bound: int) -> Partition:
-    """One patch for each connected piece."""
-    return _partition(labels.label, pieces_of(labels.label, pairs), labels.pieces, bound)
 
 
 def _partition(label: Ints, group: Ints, pieces: int, bound: int) -> Partition:
@@ -126,3 +137,136 @@ def _partition(label: Ints, group: Ints, pieces: int, bound: int) -> Partition:
     patch = np.full(len(group), -1, dtype=np.int64)
     patch[group >= 0] = rank[np.searchsorted(names, group[group >= 0])]
     return Partition(label[group >= 0][first[order]], patch, pieces, bound)
+
+
+def connected_cover(covers: Bools, pairs: Ints, deadline: float = np.inf) -> Labels:
+    """Label every cell that some row covers, with the fewest connected patches.
+
+    Args:
+        covers: (K, N) True where component k covers cell c.
+        pairs: (M, 2) cells that touch.
+        deadline: `time.monotonic()` at which to stop with the best so far.
+    """
+    label = np.full(covers.shape[1], -1, dtype=np.int64)
+    inside = np.where(covers.any(axis=0), 0, -1)
+    part = pieces_of(inside, pairs)  # parts that do not touch are independent
+    pieces = bound = 0
+    for k in range(part.max(initial=-1) + 1):
+        cells = np.flatnonzero(part == k)
+        number = np.full(len(part), -1, dtype=np.int64)
+        number[cells] = np.arange(len(cells))
+        local = number[pairs[(part[pairs] == k).all(axis=1)]]
+        found = _one_part(covers[:, cells], local, deadline)
+        label[cells] = found.label
+        pieces, bound = pieces + found.pieces, bound + found.bound
+    return Labels(label, pieces, bound)
+
+
+def _one_part(covers: Bools, pairs: Ints, deadline: float) -> Labels:
+    """Label cells that hang together."""
+    regions, rows = _regions(covers, pairs)
+    chosen = set_cover(regions, deadline - time.monotonic())
+    neighbours = neighbours_of(covers.shape[1], pairs)
+    best = Labels(np.zeros(0, dtype=np.int64), covers.shape[1] + 1, chosen.bound)
+    for use in _choices(regions, chosen.rows):
+        if best.pieces <= best.bound:
+            break
+        if len(use) < best.pieces:
+            grown = use[_grow(regions[use], neighbours)]
+            count = count_of(grown, pairs)
+            if count < best.pieces:
+                best = Labels(grown, count, chosen.bound)
+    if best.pieces > best.bound:
+        best = fewest_labels(regions, pairs, best, deadline)
+    return Labels(rows[best.label], best.pieces, best.bound)
+
+
+def _choices(regions: Bools, least: tuple[int, ...]) -> Iterator[Ints]:
+    """Regions to grow patches of, in the order of their priority.
+
+    First the regions of a least set cover in several orders, then other covers: all regions,
+    thrown out one by one in random order where the rest still covers everything.
+    """
+    use = np.array(least, dtype=np.int64)
+    for turn in range(2 * len(use)):
+        yield np.roll(use, turn // 2)[:: 1 - 2 * (turn % 2)]
+    rng = np.random.default_rng(0)
+    for _ in range(OTHER_COVERS):
+        order = rng.permutation(len(regions))
+        counts = regions.sum(axis=0)
+        kept = []
+        for k in order.tolist():
+            if (counts[regions[k]] > 1).all():
+                counts = counts - regions[k]
+            else:
+                kept.append(k)
+        yield np.array(kept, dtype=np.int64)
+
+
+def _regions(covers: Bools, pairs: Ints) -> tuple[Bools, Ints]:
+    """(L, N) the largest connected regions of the rows, and the row (L,) that each is part of.
+
+    A patch inside a region that is contained in another one can have the other's label, so only
+    undominated regions are kept.
+    """
+    regions, rows = [], []
+    for row in undominated(covers):
+        piece = pieces_of(np.where(covers[row], 0, -1), pairs)
+        for k in range(piece.max(initial=-1) + 1):
+            regions.append(piece == k)
+            rows.append(row)
+    kept = undominated(np.array(regions))
+    return np.array(regions)[kept], np.array(rows, dtype=np.int64)[kept]
+
+
+def _grow(regions: Bools, neighbours: Lists) -> Ints:
+    """(N,) labels (rows of `regions`) grown from the cells that have no choice.
+
+    Label by label, a patch in several pieces is joined by shortest paths through cells that are
+    still free; then all patches grow at the same speed. What no patch can grow into becomes a patch
+    of its own.
+    """
+    alone = regions.sum(axis=0) == 1
+    label = np.where(alone, np.argmax(regions, axis=0), -1)
+    for k in range(len(regions)):
+        _bridge(label, k, regions[k], neighbours)
+    queue = deque(np.flatnonzero(label >= 0).tolist())
+    while True:
+        while queue:
+            i = queue.popleft()
+            for j in neighbours[i]:
+                if label[j] < 0 and regions[label[i], j]:
+                    label[j] = label[i]
+                    queue.append(j)
+        free = label < 0
+        if not free.any():
+            return label
+        k = int(np.argmax((regions & free).sum(axis=1)))
+        first = int(np.flatnonzero(regions[k] & free)[0])
+        label[first] = k
+        queue.append(first)
+
+
+def _bridge(label: Ints, k: int, region: Bools, neighbours: Lists) -> None:
+    """Join the pieces of label k by shortest paths through free cells of its region."""
+    own = np.flatnonzero(label == k).tolist()
+    if not own:
+        return
+    joined = {own[0]}
+    came: dict[int, int] = {own[0]: -1}
+    queue = deque([own[0]])
+    while queue:
+        i = queue.popleft()
+        for j in neighbours[i]:
+            if j in came or not (label[j] == k or (label[j] < 0 and region[j])):
+                continue
+            came[j] = i
+            # Cells that have the label cost nothing: look at them first.
+            if label[j] == k:
+                queue.appendleft(j)
+                while j not in joined:
+                    joined.add(j)
+                    label[j] = k
+                    j = came[j]
+            else:
+                queue.append(j)

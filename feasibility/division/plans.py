@@ -1,5 +1,10 @@
 """From components to plans: cells shared out, walks for every patch, the moves between them.
 
+A verdict's search works on its largest components. A division goes on with the components that the
+best cover of all reached cells uses: cells that only some of them reach are seeded, and each two of
+them may join. A round has gained something when the cover has fewer components, or one of them
+covers more. Some rounds in a row without gain end it.
+
 Several components may cover the cells of a patch; they differ in how the arm holds itself. A patch
 gets walks of some of them, each from several starts, and the itinerary picks those between which
 the arm has to move least.
@@ -14,17 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification import replay
-from feasibility.division.components import connect_pairs, cover_table
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.partition import Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
-from feasibility.roadmap import Exploration, Links, links_of, patch_walk
+from feasibility.division.set_covering import set_cover
+from feasibility.roadmap import Exploration, Links, improve, links_of, patch_walk
 from feasibility.task import Task
 from feasibility.verdict import Walk
 
 MOST_COMPONENTS = 4  # components that walks of one patch are made of
 MOST_NEAR = 3  # starts of one component's walks that are near other patches
+DRY_ROUNDS = 10  # rounds without gain after which components are taken as they are
+MOST_ROUNDS = 60
+SEEDS = 6  # guesses at a cell, each round
+TOP = 6  # components of a cover that one round works on
+COVER_SECONDS = 2.0  # for the cover of one round, which need not be the best
+ELSEWHERE = 2  # state of a pair of cells that is not to be joined
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -142,3 +153,43 @@ def _starts(options: Sequence[_Option]) -> list[list[int]]:
         starts += [x for _, x in sorted(near)[:MOST_NEAR]]
         result.append(list(dict.fromkeys(starts)))
     return result
+
+
+def cover_table(exploration: Exploration) -> tuple[list[int], NDArray[np.bool_]]:
+    """The root components, and (K, N) the cells that each covers."""
+    roots = [r for r in exploration.roots() if exploration.roadmap.size[r] > 0]
+    return roots, exploration.roadmap.cover[roots].astype(bool)
+
+
+def collect_components(exploration: Exploration) -> None:
+    """Improve the components that the best cover uses, until some rounds in a row gain nothing.
+
+    Raises:
+        OutOfTime: the deadline passed; what was found until then is kept.
+    """
+    dry, before, rng = 0, (0, 0, 0), exploration.rng
+    for _ in range(MOST_ROUNDS):
+        roots, covers = cover_table(exploration)
+        left = min(COVER_SECONDS, exploration.clock.left)
+        cover = set_cover(covers[:, exploration.reached], left)
+        chosen = [roots[row] for row in cover.rows]
+        sizes = sum(int(exploration.roadmap.size[root]) for root in chosen)
+        state = (int(exploration.reached.sum()), -len(chosen), sizes)
+        dry = dry + 1 if state == before else 0
+        before = state
+        if len(chosen) < 2 or dry >= DRY_ROUNDS:
+            return
+        exploration.tick("looking for components that cover more")
+        counts = exploration.roadmap.cover[chosen].sum(axis=0)
+        rare = np.flatnonzero(exploration.reached & (counts < len(chosen)))
+        exploration.add_seeds(int(rng.choice(rare)), exploration.guesses(SEEDS))
+        improve(exploration, rng.permutation(chosen)[:TOP].tolist())
+        exploration.rounds += 1
+
+
+def connect_pairs(exploration: Exploration, component: int, wanted: NDArray[np.bool_]) -> None:
+    """Look for a motion of a component between every two neighbouring cells that are wanted."""
+    pairs = exploration.cells.pairs
+    state = np.zeros(len(pairs) + 1, dtype=np.int64)
+    state[:-1][~wanted[pairs].all(axis=1)] = ELSEWHERE
+    exploration.join(state, component)

@@ -80,12 +80,7 @@ class Itinerary:
 
 
 def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
-    """Choose for each patch one of its walks and its direction, and the order of patches.
-
-    Args:
-        robot: the arm.
-        choices: for each patch the walks that paint it, one at least.
-    """
+    """Choose for each patch one of its walks, its direction, and the order of patches."""
     options = [
         (p, Walk(walk.q[::direction], walk.cell[::direction]))
         for p, walks in enumerate(choices)
@@ -93,7 +88,10 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
         for direction in (1, -1)
     ]
     group = np.array([p for p, _ in options], dtype=np.int64)
-    costs = _costs(robot, [walk for _, walk in options], _joint_scale(robot))
+    # A slide counts as the turn that sweeps it.
+    reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
+    scale = np.where(robot.prismatic, 1.0 / reach, 1.0)
+    costs = _costs(robot, [walk for _, walk in options], scale)
     own = [np.flatnonzero(group == p) for p in range(len(choices))]
     orders = [[own[p] for p in order] for order in _orders(costs.largest, own)]
     path = _least_path(costs, orders, AS_GOOD)
@@ -105,17 +103,11 @@ def itinerary(robot: Robot, choices: Sequence[Sequence[Walk]]) -> Itinerary:
     return Itinerary(tuple(int(group[k]) for k in path), tuple(walks), moves)
 
 
-def _joint_scale(robot: Robot) -> Floats:
-    """(n,) what turns joint moves into radians: a slide counts as the turn that sweeps it."""
-    reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
-    return np.where(robot.prismatic, 1.0 / reach, 1.0)
-
-
-def _turns(robot: Robot, walk: Walk) -> tuple[Floats, Floats]:
-    """(n,) fewest and most full turns that each joint of a walk can be moved on by."""
+def _turns(robot: Robot, walks: Sequence[Walk]) -> tuple[Floats, Floats]:
+    """(S, n) fewest and most full turns that each joint of each walk can be moved on by."""
     with np.errstate(invalid="ignore"):
-        low = np.ceil((robot.lower - walk.q.min(axis=0)) / TURN)
-        high = np.floor((robot.upper - walk.q.max(axis=0)) / TURN)
+        low = np.ceil((robot.lower - [walk.q.min(axis=0) for walk in walks]) / TURN)
+        high = np.floor((robot.upper - [walk.q.max(axis=0) for walk in walks]) / TURN)
     fixed = robot.prismatic
     # Rounding must not rule out the walk as it is.
     return np.where(fixed, 0.0, np.minimum(low, 0.0)), np.where(fixed, 0.0, np.maximum(high, 0.0))
@@ -131,10 +123,13 @@ class _Costs(NamedTuple):
 
 
 def _costs(robot: Robot, walks: Sequence[Walk], scale: Floats) -> _Costs:
-    """Moves between walks, each walk moved on by the full turns that suit the two best."""
+    """Moves between walks, each walk moved on by the full turns that suit the two best.
+
+    Joint moves times `scale` (n,) are radians.
+    """
     starts = np.array([walk.q[0] for walk in walks])
     ends = np.array([walk.q[-1] for walk in walks])
-    low, high = (np.array(side) for side in zip(*(_turns(robot, w) for w in walks), strict=True))
+    low, high = _turns(robot, walks)
     gap = starts[None] - ends[:, None]
     turns = np.clip(np.round(-gap / TURN), low[None] - high[:, None], high[None] - low[:, None])
     moves = np.abs(gap + TURN * turns) * scale
@@ -142,12 +137,7 @@ def _costs(robot: Robot, walks: Sequence[Walk], scale: Floats) -> _Costs:
 
 
 def _orders(largest: Floats, own: Sequence[Ints]) -> list[tuple[int, ...]]:
-    """Orders of patches that are worth trying: all of them, or one that 2-opt has improved.
-
-    Args:
-        largest: (S, S) see `_Costs`.
-        own: the options of each patch.
-    """
+    """Orders of patches (each has `own` options) to be tried: all, or one that 2-opt improved."""
     if len(own) <= MOST_EXACT:  # of two opposite orders one will do: walks can be reversed
         return [order for order in permutations(range(len(own))) if order[0] >= order[-1]]
     apart = np.array([[largest[np.ix_(a, b)].min() for b in own] for a in own])
@@ -157,10 +147,7 @@ def _orders(largest: Floats, own: Sequence[Ints]) -> list[tuple[int, ...]]:
 def _least_path(costs: _Costs, orders: Sequence[Sequence[Ints]], as_good: float) -> list[int]:
     """One option of each layer: the least sum, of those whose largest move is about the least.
 
-    Args:
-        costs: of the move from each option to each other.
-        orders: layers of options, in each order to be tried.
-        as_good: how many times the least the largest move may be.
+    The `orders` hold layers of options; `as_good` times the least is about the least.
     """
     most = min(_through(costs.largest, layers, np.maximum)[0] for layers in orders)
     allowed = np.where(costs.largest <= as_good * most + SLACK, costs.total, np.inf)
@@ -190,7 +177,7 @@ def _unwound(robot: Robot, walks: Sequence[Walk]) -> list[Walk]:
     Joints are independent of each other, and so are their turns.
     """
     count = len(walks)
-    low, high = (np.array(side) for side in zip(*(_turns(robot, w) for w in walks), strict=True))
+    low, high = _turns(robot, walks)
     # A joint without limits never has to go further than this.
     low, high = np.maximum(low, -count), np.minimum(high, count)
     starts, ends = np.array([w.q[0] for w in walks]), np.array([w.q[-1] for w in walks])

@@ -3,10 +3,15 @@
 The witness of a verdict shows that there is a covering motion; this one is made to be run. The
 cells are put in order (`order`), a configuration is chosen over each (`ladder`), the motion is
 replayed like any witness, and measured (`metrics`).
+
+Rows may be followed from any corner of a grid, and where the surface closes on itself from any row.
+An arm whose joint has to turn with the surface cannot always go on over its seam: where a path gets
+stuck is where it had better begin.
 """
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,19 +20,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification import replay
-from feasibility.paths.ladder import JointRoute
+from feasibility.paths.ladder import JointRoute, first_few, joint_route
 from feasibility.paths.metrics import PathFigures, figures_of
-from feasibility.paths.motion_graph import motion_graph_of
-from feasibility.paths.order import ORDERS, Order, PathError
-from feasibility.paths.start_selection import least_revisiting
+from feasibility.paths.motion_graph import MotionGraph, motion_graph_of
+from feasibility.paths.order import (
+    GRID_ORDERS,
+    ORDERS,
+    Order,
+    PathError,
+    closed_sides,
+    grid_order,
+    route,
+)
+from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
+MOST_CELLS = 6000  # cells that are passed in all attempts together, so that large grids end too
+MOST_TRIED = 24  # attempts at one order
+FLIPS = ((False, False), (True, True), (True, False), (False, True))  # corners to begin at
+
 
 @dataclass(frozen=True, eq=False, slots=True)
-class CoveragePath:
+class CoveragePath(ReadOnlyArrays):
     """One continuous motion that visits cells in a chosen order."""
 
     robot: Robot
@@ -41,12 +58,6 @@ class CoveragePath:
     certificate: Certificate
     """What the independent replay of the walk measured."""
     figures: PathFigures
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the array."""
-        needed = np.array(self.needed, dtype=bool)
-        needed.flags.writeable = False
-        object.__setattr__(self, "needed", needed)
 
     @property
     def visits(self) -> NDArray[np.int64]:
@@ -97,16 +108,8 @@ def coverage_path(
     if order not in ORDERS:
         raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
     needed = _needed(verdict, only)
-    graph = motion_graph_of(verdict)
-    found = least_revisiting(graph, verdict.cells, order, needed)
-    return _replayed(verdict, order, needed, found)
-
-
-def _replayed(
-    verdict: Verdict, order: Order, needed: NDArray[np.bool_], found: JointRoute
-) -> CoveragePath:
-    """The path along a motion, once the replay has accepted it."""
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
+    found = _least_revisiting(motion_graph_of(verdict), cells, order, needed)
     walk = found.graph.walk(found.nodes)
     replayed = replay(robot, cells, task, walk, needed)
     if not replayed.accepted:
@@ -149,10 +152,11 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
     if len(named) == 0:
         faults.append("no cells are named; name at least one")
     if len(beyond):
-        faults.append(f"there is no cell {_listed(beyond)}; cells are 0 to {total - 1}")
+        faults.append(f"there is no cell {first_few(beyond.tolist())}; cells are 0 to {total - 1}")
     if len(missed):
+        names = first_few(missed.tolist())
         faults.append(
-            f"cell {_listed(missed)} cannot be reached by the motion that covers most; leave it out"
+            f"cell {names} cannot be reached by the motion that covers most; leave it out"
         )
     if faults:
         raise PathError(faults)
@@ -161,7 +165,79 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
     return needed
 
 
-def _listed(which: NDArray[np.int64]) -> str:
-    """The first few of some numbers."""
-    more = f" and {len(which) - 5} more" if len(which) > 5 else ""
-    return ", ".join(str(k) for k in which[:5].tolist()) + more
+def _least_revisiting(
+    graph: MotionGraph, cells: Cells, order: Order, needed: NDArray[np.bool_]
+) -> JointRoute:
+    """The motion over cells in an order that revisits least, of those that are tried.
+
+    Raises:
+        PathError: no such order, or no motion leads from cell to cell.
+    """
+    attempts = _Attempts(graph, cells, needed)
+    if order != "shortest":
+        route(cells, order, needed)  # it refuses orders that these cells do not have
+        attempts.along_grid(order)
+        return attempts.best()
+    attempts.along(route(cells, order, needed, graph.joined_cells()))
+    if attempts.left() and len(cells.shape) == 2:
+        for grid in GRID_ORDERS:
+            attempts.along_grid(grid)
+    return attempts.best()
+
+
+@dataclass
+class _Attempts:
+    """Motions that have been tried, of which the best is kept."""
+
+    graph: MotionGraph
+    cells: Cells
+    needed: NDArray[np.bool_]
+    found: JointRoute | None = None
+    fault: PathError | None = None
+
+    def best(self) -> JointRoute:
+        """The motion that revisits least."""
+        if self.found is None:
+            raise self.fault or PathError("there are no cells to cover")
+        return self.found
+
+    def left(self) -> bool:
+        """Is there anything to gain?"""
+        return self.found is None or self.found.revisited > 0.0
+
+    def along(self, visits: NDArray[np.int64]) -> list[int]:
+        """Try an order; the cells at which it got stuck."""
+        for wind in (True, False):
+            most = math.inf if self.found is None else self.found.revisited
+            try:
+                found = joint_route(
+                    self.graph.copy(), self.cells, visits, wind=wind, most_revisited=most
+                )
+            except PathError as error:
+                self.fault = self.fault or error
+                continue
+            if self.found is None or found.rank < self.found.rank:
+                self.found = found
+            return found.stuck
+        return []
+
+    def along_grid(self, order: Order) -> None:
+        """Try an order of a grid from its corners, and from where the best one got stuck."""
+        rows, columns = int(self.cells.shape[0]), int(self.cells.shape[1])
+        close = closed_sides(self.cells)
+        left = max(1, min(MOST_TRIED, MOST_CELLS // max(1, int(self.needed.sum()))))
+        begins = [(0, 0)]
+        for begin in begins:  # grows
+            for flipped in FLIPS:
+                if left <= 0:
+                    return
+                left -= 1
+                visits = grid_order(order, rows, columns, begin, flipped)
+                stuck = self.along(visits[self.needed[visits]])
+                if not self.left():
+                    return
+                for cell in stuck:
+                    row, column = divmod(cell, columns)
+                    new = (row if close[0] else 0, column if close[1] else 0)
+                    if new not in begins:
+                        begins.append(new)

@@ -17,8 +17,13 @@ import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.paths.motion_graph import MotionGraph
-from feasibility.paths.motion_links import join_self_motions, rewound, step_to, windings
+from feasibility.paths.motion_graph import (
+    MotionGraph,
+    join_self_motions,
+    rewound,
+    step_to,
+    windings,
+)
 from feasibility.paths.order import PathError
 from surfaces import Cells
 
@@ -59,6 +64,11 @@ class JointRoute:
     stuck: list[int]
     """Cells to which no single motion led, so that others were visited again."""
 
+    @property
+    def rank(self) -> tuple[float, float]:
+        """What is less is better."""
+        return round(self.revisited, 9), self.travel
+
 
 def joint_route(
     graph: MotionGraph,
@@ -86,7 +96,8 @@ def joint_route(
     """
     missing = [int(c) for c in route if not graph.over.get(int(c))]
     if missing:
-        raise PathError(f"no motion leads to {_names(cells, missing)}")
+        names = first_few([list(cells.unravel(cell)) for cell in missing])
+        raise PathError(f"no motion leads to cell{'s' if len(missing) > 1 else ''} {names}")
     states = [_State(x, 0.0, (x,), None) for x in graph.over[int(route[0])]]
     seen = {int(route[0])}
     stuck, again = [], 0.0
@@ -103,10 +114,8 @@ def joint_route(
         stuck.append(cell)
         detour = _detour(graph, cells, states, cell)
         if detour is None:
-            here = cells.unravel(graph.cell[states[0].node])
-            raise PathError(
-                f"no known motion leads from cell {list(here)} to {_names(cells, [cell])}"
-            )
+            here, there = (list(cells.unravel(c)) for c in (graph.cell[states[0].node], cell))
+            raise PathError(f"no known motion leads from cell {here} to cell {there}")
         again += _revisited(graph, cells, detour.onward, seen)
         if again > most_revisited:
             return JointRoute(graph, [], math.inf, math.inf, stuck)
@@ -196,8 +205,7 @@ def _unrolled(state: _State | None) -> list[int]:
     return [x for part in reversed(parts) for x in part]
 
 
-def _names(cells: Cells, which: list[int]) -> str:
-    """Some cells by their rows and columns."""
-    shown = ", ".join(str(list(cells.unravel(c))) for c in which[:5])
-    more = f" and {len(which) - 5} more" if len(which) > 5 else ""
-    return f"cell{'s' if len(which) > 1 else ''} {shown}{more}"
+def first_few(names: Sequence[object]) -> str:
+    """The first few of some names or numbers, and how many more there are."""
+    more = f" and {len(names) - 5} more" if len(names) > 5 else ""
+    return ", ".join(str(name) for name in names[:5]) + more

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification import placements
 from feasibility.paths.order import least_length
+from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Walk
 from robots import Kinematics, Robot
@@ -19,7 +20,7 @@ BETWEEN = 4  # places along each straight line of joints at which the tool point
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class PathFigures:
+class PathFigures(ReadOnlyArrays):
     """What a path does, measured along it."""
 
     length: float
@@ -40,12 +41,6 @@ class PathFigures:
     """Smallest singular value along the path of the Jacobian of tool point (over the arm's reach)
     and approach axis: 0 where the tool cannot be moved in some direction. For arms of fewer than
     five joints the smallest of as many as there are joints."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the array."""
-        travel = np.array(self.travel, dtype=float)
-        travel.flags.writeable = False
-        object.__setattr__(self, "travel", travel)
 
     @property
     def covered(self) -> float:
@@ -71,16 +66,7 @@ def figures_of(
     certificate: Certificate,
     needed: NDArray[np.bool_],
 ) -> PathFigures:
-    """Measure a path that a replay has accepted.
-
-    Args:
-        robot: the arm.
-        cells: the cells.
-        task: the task.
-        walk: the path.
-        certificate: what the replay of the walk measured.
-        needed: (N,) cells that the path is for.
-    """
+    """Measure a path over the cells `needed` (N,) that a replay has accepted with a certificate."""
     along, owner = _denser(walk.q)
     points = placements(robot, along).points
     closest_point = cells.surface.closest(points)
@@ -105,15 +91,10 @@ def revisiting(walk: Walk) -> NDArray[np.bool_]:
 
     The segments from one marked waypoint to the next lead to the cell of the latter.
     """
-    result = np.zeros(max(len(walk.q) - 1, 0), dtype=bool)
     marks = np.flatnonzero(walk.cell >= 0)
-    seen: set[int] = set()
-    for k, mark in enumerate(marks.tolist()):
-        cell = int(walk.cell[mark])
-        if cell in seen and k > 0:
-            result[marks[k - 1] : mark] = True
-        seen.add(cell)
-    return result
+    again = np.ones(len(marks), dtype=bool)
+    again[np.unique(walk.cell[marks], return_index=True)[1]] = False
+    return np.append(again, False)[np.searchsorted(marks, np.arange(1, len(walk.q)))]
 
 
 def _denser(q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

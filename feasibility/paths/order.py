@@ -85,15 +85,10 @@ def closed_sides(cells: Cells) -> tuple[bool, bool]:
     """
     rows, columns = int(cells.shape[0]), int(cells.shape[1])
     table = np.arange(len(cells)).reshape(rows, columns)
-    known = set(map(tuple, np.sort(cells.pairs, axis=1).tolist()))
-
-    def close(first: NDArray[np.int64], last: NDArray[np.int64]) -> bool:
-        pairs = np.sort(np.column_stack([first, last]), axis=1)
-        return all(tuple(pair) in known for pair in pairs.tolist())
-
+    steps = step_lengths(cells, cells.pairs)
     return (
-        rows > 2 and close(table[0], table[-1]),
-        columns > 2 and close(table[:, 0], table[:, -1]),
+        rows > 2 and bool(np.all(steps[table[0], table[-1]] > 0.0)),
+        columns > 2 and bool(np.all(steps[table[:, 0], table[:, -1]] > 0.0)),
     )
 
 
@@ -126,26 +121,21 @@ def route(
             f"{len(cells)} cells of a {cells.surface.kind} are not; use order 'shortest'"
         )
     wanted = np.ones(len(cells), dtype=bool) if needed is None else needed
-    steps = step_lengths(cells, cells.pairs if pairs is None else pairs)
+    names = GRID_ORDERS if order == "shortest" else (order,)
+    orders = [grid_order(name, int(cells.shape[0]), int(cells.shape[1])) for name in names if grid]
+    candidates = [found[wanted[found]] for found in orders]
     if order != "shortest":
-        found = grid_order(order, int(cells.shape[0]), int(cells.shape[1]))
-        return found[wanted[found]]
-    candidates = []
-    if grid:
-        shape = int(cells.shape[0]), int(cells.shape[1])
-        candidates = [grid_order(name, *shape) for name in GRID_ORDERS]
-        candidates = [found[wanted[found]] for found in candidates]
-    candidates.append(_greedy(steps, wanted))
-    return _shortest(steps, candidates)
+        return candidates[0]
+    steps = step_lengths(cells, cells.pairs if pairs is None else pairs)
+    return _shortest(steps, [*candidates, _greedy(steps, wanted)])
 
 
 def step_lengths(cells: Cells, pairs: NDArray[np.int64]) -> csr_array:
     """(N, N) symmetric: distance (m) of the centres of each pair, nothing elsewhere."""
     length = np.linalg.norm(cells.centres[pairs[:, 0]] - cells.centres[pairs[:, 1]], axis=1)
     length = np.maximum(length, np.finfo(float).tiny)  # a zero would be no step at all
-    both = np.vstack([pairs, pairs[:, ::-1]])
-    shape = (len(cells), len(cells))
-    return csr_array((np.concatenate([length, length]), (both[:, 0], both[:, 1])), shape=shape)
+    steps = csr_array((length, tuple(pairs.T)), shape=(len(cells), len(cells)))
+    return csr_array(steps + steps.T)
 
 
 def route_length(steps: csr_array, order: NDArray[np.int64]) -> float:

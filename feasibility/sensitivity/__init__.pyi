@@ -1,9 +1,9 @@
 from .explanation import explain as explain
-from .parameters import LEAST_CONE_DEG as LEAST_CONE_DEG
-from .parameters import Kind as Kind
-from .parameters import Quantity as Quantity
+from .thresholds import LEAST_CONE_DEG as LEAST_CONE_DEG
 from .thresholds import Dropped as Dropped
 from .thresholds import Explanation as Explanation
 from .thresholds import Finding as Finding
+from .thresholds import Kind as Kind
+from .thresholds import Quantity as Quantity
 from .thresholds import Threshold as Threshold
-from .thresholds import last_true as last_true
+from .warm_start import last_true as last_true

@@ -13,10 +13,17 @@ from feasibility.checking import check
 from feasibility.roadmap import HERE, Exploration, margin_shares, place
 from feasibility.search import Progress, Search
 from feasibility.sensitivity.limited_search import Attempt
-from feasibility.sensitivity.parameters import Quantity, Variant, quantities
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.threshold_search import BEYOND, ThresholdSearch
-from feasibility.sensitivity.thresholds import Dropped, Explanation, Finding, Threshold
+from feasibility.sensitivity.thresholds import (
+    Dropped,
+    Explanation,
+    Finding,
+    Quantity,
+    Threshold,
+    Variant,
+    quantities,
+)
 from feasibility.task import Task
 from feasibility.verdict import Verdict
 from robots import Robot
@@ -146,12 +153,9 @@ def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[A
 
 
 def other_motions(prober: Prober, guesses: int, most: int) -> list[Attempt]:
-    """Covering motions of the case as given, from postures far from each other.
+    """Covering motions of the case as given, from up to `most` postures far from each other.
 
-    Args:
-        prober: of that case.
-        guesses: random configurations that are projected onto a cell in the middle.
-        most: searches.
+    They are chosen among random `guesses` that are projected onto a cell in the middle.
     """
     robot, cells, _ = prober.given
     exploration = Exploration(robot, cells, prober.arrays, prober.seed + 1)

@@ -107,10 +107,3 @@ def project_all(arrays, work, order, q):  # type: ignore[no-untyped-def]
         if not project_onto_cell(arrays, work, order[k], row, NEARBY_STEPS):
             return k
     return order.shape[0]
-
-
-@kernel
-def project_guesses(arrays, work, cell, guesses, steps, projected):  # type: ignore[no-untyped-def]
-    """Project each guess (k, n) onto one cell's manifold, in place; fills `projected` (k,)."""
-    for k in range(guesses.shape[0]):
-        projected[k] = project_onto_cell(arrays, work, cell, guesses[k], steps)

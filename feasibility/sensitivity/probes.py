@@ -24,6 +24,7 @@ from feasibility.roadmap import (
     covering_walk,
     evenly,
     explore,
+    project_onto_cell,
     root_box,
     rule,
     work_for,
@@ -36,9 +37,8 @@ from feasibility.sensitivity.limited_search import (
     certifiable,
     configurations,
     project_all,
-    project_guesses,
 )
-from feasibility.sensitivity.parameters import Kind, Quantity, Variant
+from feasibility.sensitivity.thresholds import Kind, Quantity, Variant
 from feasibility.verdict import Answer, Evidence
 
 MORE_SEEDS = 2  # missed cells that an attempt starts from, besides the first
@@ -102,7 +102,12 @@ class Prober:
         """The same over the cells' centres, cheaper: what lies between them may be unchanged."""
         value = quantity.value(k) if k else quantity.given
         if quantity.kind is Kind.CONE:
-            return self._coned(value) or self.arrays_at(quantity, k)
+            former, chord = self.arrays, float(2.0 * np.sin(0.5 * value))
+            if not (value < np.pi and 0.0 < former.cone_chord < np.inf):
+                return self.arrays_at(quantity, k)
+            lost = former.cone_chord - former.inner_cone_chord
+            inner = chord - lost * min(1.0, chord / former.cone_chord)
+            return former._replace(cone_chord=chord, inner_cone_chord=inner)
         if quantity.kind is Kind.STANDOFF:
             grown = (value - quantity.given) * self.outwards
             return self.arrays._replace(points=self.arrays.points + grown)
@@ -112,16 +117,6 @@ class Prober:
         ends = [self.arrays.lower.copy(), self.arrays.upper.copy()]
         ends[quantity.kind is Kind.UPPER][quantity.joint] = value
         return self.arrays._replace(lower=ends[0], upper=ends[1])
-
-    def _coned(self, cone: float) -> SearchArrays | None:
-        """The arrays with another cone (rad), as it is over the cells' centres, nearly."""
-        cone_chord, former = float(2.0 * np.sin(0.5 * cone)), self.arrays
-        if not (cone < np.pi and former.cone_chord < np.inf and former.cone_chord > 0.0):
-            return None
-        lost = (former.cone_chord - former.inner_cone_chord) * min(
-            1.0, cone_chord / former.cone_chord
-        )
-        return former._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord - lost)
 
     def order(self) -> NDArray[np.int64]:
         """(N,) all cells, the hard ones first, then those at the boundary of the surface."""
@@ -139,11 +134,7 @@ class Prober:
     def follow(
         self, arrays: SearchArrays, q: NDArray[np.float64]
     ) -> tuple[int, NDArray[np.float64]]:
-        """Project configurations of a case nearby onto the manifolds of this one.
-
-        Args:
-            arrays: see `arrays_at`.
-            q: (N, n) a configuration over each cell, in the case nearby.
+        """Project configurations q (N, n) of a case nearby onto the manifolds of this one.
 
         Returns:
             The first cell where that failed, or `NO_CELL`; and the configurations (N, n), which
@@ -300,9 +291,9 @@ class Prober:
         Where none does, little hope is left: half of the evaluations will do.
         """
         guesses = exploration.guesses(GUESSES)
-        projected = np.zeros(len(guesses), dtype=bool)
-        project_guesses(exploration.arrays, exploration.work, cell, guesses, GUESS_STEPS, projected)
-        if projected.any():
+        case = exploration.arrays, exploration.work, cell
+        projected = [project_onto_cell(*case, guess, GUESS_STEPS) for guess in guesses]
+        if any(projected):
             exploration.add_seeds(cell, guesses[projected])
         elif exploration.roadmap.first_node[cell] < 0:
             exploration.most = 0.5 * (exploration.most + float(exploration.work.counts[0]))

@@ -17,10 +17,9 @@ from numpy.typing import NDArray
 
 from feasibility.roadmap import Ruling
 from feasibility.sensitivity.limited_search import NO_CELL, Attempt
-from feasibility.sensitivity.parameters import Kind, Quantity
 from feasibility.sensitivity.probes import Prober
-from feasibility.sensitivity.thresholds import Finding, Span, Threshold, last_true
-from feasibility.sensitivity.warm_start import Reached, WarmStart
+from feasibility.sensitivity.thresholds import Finding, Kind, Quantity, Span, Threshold
+from feasibility.sensitivity.warm_start import Reached, WarmStart, last_true
 from feasibility.verdict import Answer, Evidence
 
 PROOF_BOXES = 3000  # for one cell
@@ -263,12 +262,10 @@ class ThresholdSearch:
                 return good
             angle, good = attempt.angle, Probe(good.k, attempt)
             k = last_true(lambda k: value(k) > angle, good.k, bad)
-        elif self.quantity.kind is Kind.LOWER:
-            least = float(walk.q[:, joint].min())
-            k = last_true(lambda k: value(k) <= least, good.k, bad)
         else:
-            most = float(walk.q[:, joint].max())
-            k = last_true(lambda k: value(k) >= most, good.k, bad)
+            sign = 1.0 if self.quantity.kind is Kind.LOWER else -1.0
+            least = float((sign * walk.q[:, joint]).min())
+            k = last_true(lambda k: sign * value(k) <= least, good.k, bad)
         return Probe(min(k, self.quantity.last), good.attempt)
 
     def _beyond(self, bracket: Bracket, far: int) -> Probe | Finding:

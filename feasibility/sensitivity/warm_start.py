@@ -8,15 +8,15 @@ those is the logarithm of the number of cells.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.sensitivity.limited_search import NO_CELL, project_all
-from feasibility.sensitivity.parameters import Quantity
 from feasibility.sensitivity.probes import Prober
-from feasibility.sensitivity.thresholds import last_true
+from feasibility.sensitivity.thresholds import Quantity
 
 SAMPLE = 12  # cells that are projected on the way
 MOST = 40  # cells that are projected in the end; the search that follows projects all
@@ -120,3 +120,42 @@ class WarmStart:
             if k != top:
                 k = last_true(lambda k: self.projects(cell, k) == 1, k, top, gallop=True)
         return k
+
+
+def last_true(holds: Callable[[int], bool], good: int, bad: int, gallop: bool = False) -> int:
+    """The last whole number before `bad`, seen from `good`, for which `holds` is true.
+
+    Args:
+        holds: called for numbers strictly between the two ends, at most about log2 of their
+            distance times, twice that when galloping.
+        good: where it is known to be true.
+        bad: where it is known, or taken, to be false; above or below `good`.
+        gallop: go out from `good` in steps that double until `holds` fails, so that the number
+            found belongs to the stretch around `good` even where `holds` comes true again further
+            on, unless a gap fits between two steps.
+
+    Returns:
+        A number k with holds(k) true (or k = good), whose neighbour towards `bad` is false (or is
+        `bad` itself).
+
+    Example:
+        >>> last_true(lambda k: k <= 37, 0, 100)
+        37
+        >>> last_true(lambda k: k >= -5, 10, -90, gallop=True)
+        -5
+    """
+    sign = 1 if bad > good else -1
+    step = 1
+    while gallop and good + sign * step != bad and (bad - good) * sign > step:
+        if not holds(good + sign * step):
+            bad = good + sign * step
+            break
+        good += sign * step
+        step *= 2
+    while abs(bad - good) > 1:
+        middle = (good + bad) // 2
+        if holds(middle):
+            good = middle
+        else:
+            bad = middle
+    return good

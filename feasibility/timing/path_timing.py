@@ -4,11 +4,11 @@ The path's straight lines are blended into a smooth curve (`blend`); toppra find
 along it that velocities, accelerations and the tool's speed allow (`timed_curve`), so that all
 limits hold along the curve.
 
-A controller sees its samples only, and puts quintics or cubics through them (`interpolation`). The
-fastest timing of a curve jumps from one acceleration to another, and these swing past both. So the
-joints that would exceed a limit then are given less, the curve is timed again, and the little that
-is left is mended by running slower. The samples at last are replayed like any
-witness: as a motion of straight lines, of quintics and of cubics.
+A controller sees its samples only, and puts quintics or cubics through them (`sampled_trajectory`).
+The fastest timing of a curve jumps from one acceleration to another, and these swing past both. So
+the joints that would exceed a limit then are given less, the curve is timed again, and the little
+that is left is mended by running slower. The samples at last are replayed like any witness: as a
+motion of straight lines, of quintics and of cubics.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.certification import replay
 from feasibility.paths import CoveragePath, PathError
-from feasibility.timing.controller_interpolation import (
+from feasibility.timing.sampled_trajectory import (
     KINDS,
     PLACES,
+    Trajectory,
     accelerations_used,
     motion_between,
     past_limits,
     used,
 )
-from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smoothing import Curve, blended
 from feasibility.timing.speed_limits import MotionLimits, motion_limits, number
 from feasibility.timing.timed_curve import samples, timed_curve
@@ -90,7 +90,10 @@ def trajectory(
     if not SHORTEST <= number(period) <= LONGEST:
         raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
     if len(np.unique(path.walk.q, axis=0)) == 1:
-        return _at_rest(robot, path.walk)
+        q, still = path.walk.q[:1], np.zeros((1, robot.n))
+        return Trajectory(
+            robot.joint_names, np.zeros(1), q, still, still, np.zeros(1), path.walk.cell[:1]
+        )
     curve, refusal = blended(robot, cells, task, path.walk), ""
     for _ in range(FINER + 1):
         run = within_limits(robot, curve, limits, period)
@@ -137,19 +140,9 @@ def _refusal(path: CoveragePath, run: Trajectory) -> str:
     past = past_limits(robot, run)
     if past > AT_LIMIT:
         return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
-    walks = [run.walk, *(motion_between(run, kind, PLACES) for kind in KINDS)]
-    for walk in walks:
+    for walk in (run.walk, *(motion_between(run, kind, PLACES) for kind in KINDS)):
         held = Walk(q=np.clip(walk.q, robot.lower, robot.upper), cell=walk.cell)
         replayed = replay(robot, cells, task, held, path.needed)
         if not replayed.accepted:
             return replayed.refusal
     return ""
-
-
-def _at_rest(robot: Robot, walk: Walk) -> Trajectory:
-    """The trajectory of an arm at rest: one sample."""
-    q, nothing = walk.q[:1], np.zeros((1, robot.n))
-    return Trajectory(
-        joint_names=robot.joint_names, time=np.zeros(1), q=q, dq=nothing, ddq=nothing,
-        tool_speed=np.zeros(1), cell=walk.cell[:1],
-    )  # fmt: skip

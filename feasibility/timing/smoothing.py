@@ -130,11 +130,7 @@ def inside(robot: Robot, q: Array) -> Array:
 def blended(robot: Robot, cells: Cells, task: Task, walk: Walk) -> Curve:
     """The smoothest curve of its kind along an accepted motion that the replay accepts too.
 
-    Args:
-        robot: the arm.
-        cells: the cells.
-        task: the task.
-        walk: the motion; it begins and ends at a cell's centre.
+    The motion begins and ends at a cell's centre.
 
     Raises:
         PathError: the replay refuses the curve, however sharp its turns.

@@ -17,6 +17,7 @@ from scipy.interpolate import BSpline
 
 from feasibility.certification import placements, second_derivatives
 from feasibility.paths import PathError
+from feasibility.read_only import ReadOnlyArrays
 from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
@@ -28,7 +29,7 @@ MOST = 1e6  # [rad/s], [m/s] or their acceleration; more is no limit, and refuse
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class MotionLimits:
+class MotionLimits(ReadOnlyArrays):
     """What a timed motion keeps to."""
 
     velocity: Array
@@ -37,13 +38,6 @@ class MotionLimits:
     """(n,) rad/s^2 or m/s^2, of each joint."""
     tool_speed: float
     """m/s, of the tool point."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the arrays."""
-        for name in ("velocity", "acceleration"):
-            array = np.array(getattr(self, name), dtype=float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
 
 
 def motion_limits(
@@ -57,9 +51,8 @@ def motion_limits(
     Args:
         robot: the arm.
         tool_speed: m/s, largest speed of the tool point.
-        velocity: rad/s or m/s, one for all joints or (n,); the URDF's by default.
-        acceleration: rad/s^2 or m/s^2, one for all joints or (n,); by default each joint gets to
-            its largest velocity in half a second.
+        velocity: rad/s or m/s, see `trajectory`.
+        acceleration: rad/s^2 or m/s^2, see `trajectory`.
 
     Raises:
         PathError: a number is not positive and finite, or the URDF gives a joint no velocity.

@@ -1,23 +1,31 @@
 """A curve with times: when it passes each place, and samples of it.
 
-The speeds are the fastest that `parameterisation` finds. What accelerations are over, from toppra's
-own rounding, is taken back by running slower there, or a little slower altogether, so that all
-limits hold everywhere along the curve.
+The speeds are the fastest that toppra finds. What accelerations are over, from its own rounding, is
+taken back by running slower there, or a little slower altogether, so that all limits hold
+everywhere along the curve.
+
+Between two places of the grid d^2s/dt^2 = u is constant, so x = (ds/dt)^2 runs straight there, and
+d^2q/dt^2 = q'(s) u + q''(s) x is a parabola in s, whose Bernstein coefficients bound it.
+
+H. Pham and Q.-C. Pham, A new approach to time-optimal path parameterization based on reachability
+analysis, IEEE Transactions on Robotics 34 (2018).
 """
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
+from scipy.spatial import cKDTree
 
 from feasibility.paths import PathError
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smoothing import Curve, inside
 from feasibility.timing.speed_limits import MotionLimits, fine_grid, squared_speeds, tool_slopes
-from feasibility.timing.time_optimal import acceleration_excess, parameterised
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -127,11 +135,7 @@ def samples(robot: Robot, timed: TimedCurve, period: float) -> Trajectory:
     # Whole nanoseconds, which is what a ROS message can hold.
     passages = np.round(timed.time[np.searchsorted(timed.grid, curve.marks.astype(float))], 9)
     regular = np.round(np.arange(0.0, timed.duration, period), 9)
-    nearest = np.searchsorted(passages, regular)
-    apart = np.minimum(
-        np.abs(regular - passages[np.minimum(nearest, len(passages) - 1)]),
-        np.abs(regular - passages[np.maximum(nearest - 1, 0)]),
-    )
+    apart, _ = cKDTree(passages[:, None]).query(regular[:, None], p=1)
     regular = regular[apart > CROWDED * period]
     time = np.concatenate([passages, regular])
     order = np.argsort(time, kind="stable")
@@ -143,3 +147,63 @@ def samples(robot: Robot, timed: TimedCurve, period: float) -> Trajectory:
         joint_names=robot.joint_names, time=time, q=q, dq=dq + 0.0, ddq=ddq + 0.0,
         tool_speed=tool_slopes(robot, q, dq), cell=cell,
     )  # fmt: skip
+
+
+def acceleration_excess(spline: BSpline, grid: Array, x: Array, most: Array) -> Array:
+    """(m - 1,) largest share of its limit that a joint's acceleration has on each piece."""
+    h = np.diff(grid)
+    u = 0.5 * np.diff(x) / h
+    slope, bend = spline.derivative(1), spline.derivative(2)
+    values = [
+        slope(grid[:-1] + part * h) * u[:, None]
+        + bend(grid[:-1] + part * h) * (x[:-1] + part * np.diff(x))[:, None]
+        for part in (0.0, 0.5, 1.0)
+    ]
+    # The last place of a piece is evaluated on the piece: second derivatives are continuous.
+    inner = 2.0 * values[1] - 0.5 * (values[0] + values[2])
+    shares = [(np.abs(value) / most).max(axis=1) for value in (values[0], inner, values[2])]
+    return np.asarray(np.max(shares, axis=0))
+
+
+def parameterised(
+    spline: BSpline, grid: Array, unit: float, most: Array, acceleration: Array
+) -> Array:
+    """(m,) the largest (ds/dt)^2 from rest to rest, s = unit * k, as toppra finds it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its sources hold escapes that Python frowns at
+        from toppra.algorithm import TOPPRA
+        from toppra.constraint import JointAccelerationConstraint, LinearConstraint
+        from toppra.interpolator import AbstractGeometricPath
+
+    class Path(AbstractGeometricPath):
+        """The curve in the form that toppra needs."""
+
+        dof = spline.c.shape[1]
+        path_interval = np.array([grid[0], grid[-1]]) * unit
+
+        def __call__(self, s: Any, order: int = 0) -> Array:
+            """Derivatives by s."""
+            k = np.clip(np.asarray(s) / unit, grid[0], grid[-1])
+            return np.asarray(spline.derivative(order)(k)) / unit**order
+
+    class Speed(LinearConstraint):
+        """Bounds on (ds/dt)^2."""
+
+        def __init__(self) -> None:
+            """No other variables."""
+            super().__init__()
+            self.identical = True
+
+        def compute_constraint_params(self, path: Any, gridpoints: Array) -> tuple[Any, ...]:
+            """Only the bounds on (ds/dt)^2."""
+            bounds = np.column_stack([np.zeros(len(gridpoints)), most * unit**2])
+            return None, None, None, None, None, None, bounds
+
+    solver = TOPPRA(
+        [Speed(), JointAccelerationConstraint(np.column_stack([-acceleration, acceleration]))],
+        Path(), gridpoints=grid * unit, solver_wrapper="seidel",
+    )  # fmt: skip
+    _, rate, _ = solver.compute_parameterization(0.0, 0.0)
+    if rate is None or not np.isfinite(rate).all():
+        raise PathError("no timing was found that keeps to the velocities and accelerations")
+    return np.asarray(rate) ** 2

@@ -22,10 +22,9 @@ from feasibility.cases import CaseError, load_case
 from feasibility.certification import replay
 from feasibility.cli.path_divide_explain import divide as run
 from feasibility.division import Division, Plan, divide
-from feasibility.division.components import connect_pairs, cover_table
 from feasibility.division.connected_labels import count_of
 from feasibility.division.partition import Partition
-from feasibility.division.plans import plan_of
+from feasibility.division.plans import connect_pairs, cover_table, plan_of
 from feasibility.division.reconfiguration import AS_GOOD, itinerary
 from feasibility.reports.division import STATUS, answer_of, as_json, as_text
 from feasibility.roadmap import Exploration, arrays_of, explore, links_of, patch_walk

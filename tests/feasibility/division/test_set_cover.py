@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from feasibility.division import set_cover, undominated
-from feasibility.division.connected_cover import connected_cover
-from feasibility.division.connected_labels import Labels, count_of, pieces_of
-from feasibility.division.partition import Cover, Partition, fewest_patches
-from feasibility.division.separator_cuts import fewest_labels
+from feasibility.division.connected_labels import Labels, count_of, fewest_labels, pieces_of
+from feasibility.division.partition import Cover, Partition, connected_cover, fewest_patches
 from surfaces import plane
 
 

@@ -19,8 +19,13 @@ from feasibility.paths import PathError, coverage_path
 from feasibility.paths import ladder as joint_routes
 from feasibility.paths.ladder import joint_route
 from feasibility.paths.metrics import revisiting
-from feasibility.paths.motion_graph import MotionGraph, joint_length, motion_graph_of
-from feasibility.paths.motion_links import rewound, windings
+from feasibility.paths.motion_graph import (
+    MotionGraph,
+    joint_length,
+    motion_graph_of,
+    rewound,
+    windings,
+)
 from feasibility.paths.order import ORDERS, closed_sides, grid_order
 from feasibility.results import load_result, save_result
 from feasibility.roadmap import arrays_of, work_for

@@ -16,8 +16,8 @@ from feasibility import Answer, Evidence, Search, Task, Verdict, check
 from feasibility.reports.explanation import as_json, as_text, shown
 from feasibility.sensitivity import Explanation, Kind, Quantity, Threshold, explain
 from feasibility.sensitivity import explanation as explanations
-from feasibility.sensitivity.parameters import Variant, quantities
 from feasibility.sensitivity.probes import Prober
+from feasibility.sensitivity.thresholds import Variant, quantities
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
 

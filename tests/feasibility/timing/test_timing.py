@@ -24,7 +24,7 @@ from feasibility import Task, check
 from feasibility.certification import replay
 from feasibility.paths import PathError, coverage_path
 from feasibility.timing import Trajectory, motion_limits, trajectory, used
-from feasibility.timing.controller_interpolation import (
+from feasibility.timing.sampled_trajectory import (
     KINDS,
     closely,
     coefficients,
@@ -34,8 +34,7 @@ from feasibility.timing.controller_interpolation import (
 )
 from feasibility.timing.smoothing import Curve, blended, control_points, graded, without_slivers
 from feasibility.timing.speed_limits import fine_grid, squared_speeds, tool_slopes
-from feasibility.timing.time_optimal import acceleration_excess
-from feasibility.timing.timed_curve import samples, timed_curve
+from feasibility.timing.timed_curve import acceleration_excess, samples, timed_curve
 from feasibility.verdict import Walk
 from robots import Kinematics, load_robot
 from surfaces import mesh
