@@ -114,10 +114,8 @@ class _Programme:
         """A root is in its patch, and the first node of it; a patch of one node has a root."""
         x, r = int(self.at[label, c]), int(self.half + self.at[label, c])
         self.add({r: 1.0, x: -1.0}, -1.0, 0.0)
-        near = [d for d in self.neighbours[c] if self.regions[label, d]]
-        for d in near:
-            if d < c:
-                self.add({r: 1.0, int(self.at[label, d]): 1.0}, 0.0, 1.0)
+        for d in (d for d in self.neighbours[c] if d < c and self.regions[label, d]):
+            self.add({r: 1.0, int(self.at[label, d]): 1.0}, 0.0, 1.0)
         self.separate(label, {c}, [c], np.ones(len(self.neighbours), dtype=bool))
 
     def add(self, row: Row, lower: float, upper: float) -> None:
