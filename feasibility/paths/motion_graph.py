@@ -28,7 +28,8 @@ from feasibility.roadmap import (
 )
 from feasibility.verdict import Verdict, Walk
 
-Motion = NDArray[np.float64]
+Floats = NDArray[np.float64]
+Motion = Floats
 """(k, n) waypoints, both ends included."""
 GOALS = 2  # nodes over the next cell that are headed for, besides those that are joined already
 NEAREST = 6  # nodes over one cell that a self-motion is tried to
@@ -48,7 +49,7 @@ class MotionGraph:
     """Which pair of `cells.pairs` two cells i < j are."""
     cell: list[int] = field(default_factory=list)
     """The cell of each node."""
-    q: list[NDArray[np.float64]] = field(default_factory=list)
+    q: list[Floats] = field(default_factory=list)
     """The configuration of each node, (n,)."""
     over: dict[int, list[int]] = field(default_factory=dict)
     """Nodes over each cell."""
@@ -56,7 +57,7 @@ class MotionGraph:
     """Each with its `motion`, from the node of lower index to the other, and its `length`."""
     _known: dict[tuple[int, bytes], int] = field(default_factory=dict)
 
-    def node(self, cell: int, q: NDArray[np.float64]) -> int:
+    def node(self, cell: int, q: Floats) -> int:
         """The node with this configuration over this cell, made where there is none."""
         key = (cell, q.tobytes())
         if key not in self._known:
@@ -171,7 +172,7 @@ def join_self_motions(graph: MotionGraph, x: int) -> None:
                 break
 
 
-def _nearest(graph: MotionGraph, cell: int, q: NDArray[np.float64]) -> list[int]:
+def _nearest(graph: MotionGraph, cell: int, q: Floats) -> list[int]:
     """Nodes over a cell, the nearest to q first."""
     nodes = graph.over.get(cell, [])
     away = [float(np.abs(graph.q[y] - q).sum()) for y in nodes]
@@ -194,9 +195,7 @@ def _head_for(graph: MotionGraph, x: int, y: int) -> bool:
     return True
 
 
-def _follow(
-    graph: MotionGraph, x: int, cell: int, goal: NDArray[np.float64] | None
-) -> NDArray[np.float64] | None:
+def _follow(graph: MotionGraph, x: int, cell: int, goal: Floats | None) -> Floats | None:
     """(k, n) waypoints along the surface from x to a neighbouring cell's centre; None if stuck."""
     q = graph.q[x].copy()
     rows = np.empty((MOST_STEPS + 1, len(q)))
@@ -210,9 +209,7 @@ def _follow(
     return None if count < 0 else np.vstack([graph.q[x][None], rows[:count]])
 
 
-def _self_motion(
-    graph: MotionGraph, cell: int, start: NDArray[np.float64], goal: NDArray[np.float64]
-) -> NDArray[np.float64] | None:
+def _self_motion(graph: MotionGraph, cell: int, start: Floats, goal: Floats) -> Floats | None:
     """(k, n) waypoints over one cell's centre from start to goal; None where none was found."""
     if np.array_equal(start, goal):
         return start[None].copy()
@@ -226,7 +223,7 @@ def _self_motion(
     return np.vstack([start[None], rows[:count]]) if reached else None
 
 
-def windings(graph: MotionGraph, nodes: list[int]) -> list[NDArray[np.float64]]:
+def windings(graph: MotionGraph, nodes: list[int]) -> list[Floats]:
     """(n,) each, rad: full turns of one joint that keep a motion inside the limits.
 
     A joint that may run over more than a full turn can do the same work from another turn. A path
@@ -244,7 +241,7 @@ def windings(graph: MotionGraph, nodes: list[int]) -> list[NDArray[np.float64]]:
     return found
 
 
-def rewound(graph: MotionGraph, nodes: list[int], winding: NDArray[np.float64]) -> list[int]:
+def rewound(graph: MotionGraph, nodes: list[int], winding: Floats) -> list[int]:
     """The nodes of the same motion in another winding, which is added to the graph."""
     moved = [graph.node(graph.cell[x], graph.q[x] + winding) for x in nodes]
     for (x, y), (a, b) in zip(pairwise(nodes), pairwise(moved), strict=True):

@@ -41,6 +41,8 @@ from feasibility.sensitivity.limited_search import (
 from feasibility.sensitivity.thresholds import Kind, Quantity, Variant
 from feasibility.verdict import Answer, Evidence
 
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 MORE_SEEDS = 2  # missed cells that an attempt starts from, besides the first
 MOST_SUSPECTS = 12  # cells that are taken for hard
 AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
@@ -131,9 +133,7 @@ class Prober:
         self.suspects.insert(0, cell)
         del self.suspects[MOST_SUSPECTS:]
 
-    def follow(
-        self, arrays: SearchArrays, q: NDArray[np.float64]
-    ) -> tuple[int, NDArray[np.float64]]:
+    def follow(self, arrays: SearchArrays, q: Floats) -> tuple[int, Floats]:
         """Project configurations q (N, n) of a case nearby onto the manifolds of this one.
 
         Returns:
@@ -149,9 +149,7 @@ class Prober:
         self.suspect(int(order[projected]))
         return int(order[projected]), found
 
-    def rule(
-        self, arrays: SearchArrays, cell: int, boxes: int
-    ) -> tuple[Ruling, NDArray[np.float64] | None]:
+    def rule(self, arrays: SearchArrays, cell: int, boxes: int) -> tuple[Ruling, Floats | None]:
         """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
 
         Returns:
@@ -178,7 +176,7 @@ class Prober:
         projected = int(project_all(arrays, self.work, np.array([cell]), row)) == 1
         return ruling, row[cell] if projected else None
 
-    def beyond_reach(self, arrays: SearchArrays) -> NDArray[np.bool_]:
+    def beyond_reach(self, arrays: SearchArrays) -> Bools:
         """(N,) cells that are further away than the arm reaches.
 
         Revolute joints reach alike in any limits; a prismatic joint that is longer than in the case
@@ -194,10 +192,10 @@ class Prober:
     def attempt(
         self,
         arrays: SearchArrays,
-        seeds: NDArray[np.float64],
+        seeds: Floats,
         most: float,
         deep: bool,
-        needed: NDArray[np.bool_] | None = None,
+        needed: Bools | None = None,
         hard: int = NO_CELL,
     ) -> Attempt:
         """Search for a covering motion, from known configurations first.
@@ -251,9 +249,7 @@ class Prober:
             detail = "unknown, because the time limit ran out"
         return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
 
-    def confirmed(
-        self, variant: Variant, attempt: Attempt, needed: NDArray[np.bool_] | None = None
-    ) -> Attempt:
+    def confirmed(self, variant: Variant, attempt: Attempt, needed: Bools | None = None) -> Attempt:
         """An attempt once its motion is replayed: still feasible, or undecided if refused."""
         if attempt.walk is None or attempt.angle is not None:
             return attempt
@@ -267,9 +263,7 @@ class Prober:
         detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
         return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
 
-    def _add_seeds(
-        self, exploration: LimitedExploration, seeds: NDArray[np.float64], deep: bool
-    ) -> None:
+    def _add_seeds(self, exploration: LimitedExploration, seeds: Floats, deep: bool) -> None:
         """Add seeds until one component covers every cell, hard cells first."""
         known = np.asarray(np.isfinite(seeds).all(axis=1))
         first = [cell for cell in self.suspects if known[cell]][:1]
