@@ -278,8 +278,8 @@ def test_surfaces_know_neither_pinocchio_nor_networkx() -> None:
 
 
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
-    """paper_figures.py is matplotlib's own file; it is loaded when a plot is asked for."""
+    """figures.py is matplotlib's own file; it is loaded when a plot is asked for."""
     for name in FILES:
         now = {i.module.split(".")[0] for i in IMPORTS[name] if not i.deferred}
-        allowed = {"matplotlib"} if name == "feasibility.viewer.paper_figures" else set()
+        allowed = {"matplotlib"} if name == "feasibility.viewer.figures" else set()
         assert not now & HEAVY - allowed, name

@@ -9,8 +9,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from types import FrameType, TracebackType
+from contextlib import contextmanager, suppress
+from types import FrameType
 from typing import Any, TextIO
 
 PAUSE = 0.05  # [s] between two updates of the progress bar
@@ -30,40 +30,30 @@ def print_out(text: str) -> None:
     Raises:
         OSError: stdout cannot be written for another reason, such as a full disk.
     """
-    stream = sys.stdout
-    if stream is None:
-        return
-    try:
-        stream.write(text + "\n")
-        stream.flush()
-    except BrokenPipeError:
-        _discard(stream)
-    except OSError:
-        _discard(stream)
-        raise
+    with suppress(BrokenPipeError):
+        _write(sys.stdout, text)
 
 
 def print_err(text: str) -> None:
     """Write a message to stderr, if there is one that takes it."""
-    stream = sys.stderr
+    with suppress(OSError):
+        _write(sys.stderr, text)
+
+
+def _write(stream: TextIO | None, text: str) -> None:
+    """Write a line. After a failure the buffered rest goes nowhere, so as not to fail again."""
     if stream is None:
         return
     try:
         stream.write(text + "\n")
         stream.flush()
     except OSError:
-        _discard(stream)
-
-
-def _discard(stream: TextIO) -> None:
-    """Discard the buffered rest, so that it does not fail again at the end."""
-    try:
-        descriptor = stream.fileno()
-    except (OSError, ValueError):  # a stream without a file
-        return
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    os.dup2(nowhere, descriptor)
-    os.close(nowhere)
+        with suppress(OSError, ValueError):  # a stream without a file
+            descriptor = stream.fileno()
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, descriptor)
+            os.close(nowhere)
+        raise
 
 
 @contextmanager
@@ -103,11 +93,9 @@ def interruptible() -> Iterator[Callable[[], None]]:
 
 def _importing(frame: FrameType | None) -> bool:
     """Is a module being imported there?"""
-    while frame is not None:
-        if frame.f_globals.get("__name__") == IMPORTER:
-            return True
+    while frame is not None and frame.f_globals.get("__name__") != IMPORTER:
         frame = frame.f_back
-    return False
+    return frame is not None
 
 
 @contextmanager
@@ -163,12 +151,7 @@ class Bar:
         """Nothing is drawn yet."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         """Remove the bar."""
         if self._bar is not None:
             self._bar.stop()

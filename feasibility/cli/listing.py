@@ -7,9 +7,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from feasibility.cli.arguments import add_command
+from feasibility.cli.command import add_command, json_text
 from feasibility.cli.console import print_out
-from feasibility.cli.outputs import json_text
 
 WIDE = 240  # columns of a file, so that nothing is wrapped
 

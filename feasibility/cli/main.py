@@ -14,9 +14,9 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from coverable_errors import CoverableError
-from feasibility.cli import check_command, listing, path_divide_explain, place, study_compare
+from feasibility.cli import case_commands, listing, place, study_compare
+from feasibility.cli.command import BAD_INPUT
 from feasibility.cli.console import prepare, print_err, print_out
-from feasibility.cli.outputs import BAD_INPUT
 
 INTERRUPTED = 130
 TRACEBACK = "COVERABLE_TRACEBACK"
@@ -54,7 +54,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     subcommands = parser.add_subparsers(metavar="COMMAND", required=True)
-    for commands in (check_command, path_divide_explain, study_compare, place, listing):
+    for commands in (case_commands, study_compare, place, listing):
         commands.add(subcommands)
     return parser
 
@@ -118,10 +118,6 @@ def _with_traceback() -> bool:
     return os.environ.get(TRACEBACK, "") not in ("", "0")
 
 
-def _say_nothing(_: sys.UnraisableHookArgs) -> None:
-    """Nobody can do anything about it."""
-
-
 def run() -> NoReturn:
     """The console script: like `main`, and ends the process at once.
 
@@ -129,7 +125,8 @@ def run() -> NoReturn:
     of a second, also after Ctrl-C.
     """
     if not _with_traceback():
-        sys.unraisablehook = _say_nothing  # such as the half-made objects of a Ctrl-C, taken apart
+        # Nobody can do anything about the half-made objects of a Ctrl-C, taken apart.
+        sys.unraisablehook = lambda _: None
     status = main()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError, AttributeError):

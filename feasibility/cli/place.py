@@ -7,17 +7,19 @@ import contextlib
 import time
 from typing import TYPE_CHECKING, Any
 
-from feasibility.cli.arguments import (
+from feasibility.cli.command import (
+    STATUS,
     add_case,
     add_command,
     add_csv,
     add_html,
     add_workers,
+    json_text,
+    open_case,
     positive,
+    write_text,
 )
 from feasibility.cli.console import print_err, print_out
-from feasibility.cli.outputs import STATUS, json_text, write_text
-from feasibility.cli.session import open_case
 from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
@@ -32,15 +34,12 @@ PICTURES = (".png", ".svg", ".pdf")
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     parser = add_command(
-        subcommands,
-        "place",
-        run_place,
+        subcommands, "place", run_place, add_case, add_csv, add_workers,
         help="where the surface can stand",
         description="Search a region of positions and orientations of the surface (in the frame of "
         "the URDF's root link) for placements at which one continuous motion covers it.",
         epilog="exit status: 0 a placement is feasible, 1 none was found, 3 undecided",
-    )
-    add_case(parser)
+    )  # fmt: skip
     for name, unit in AXES.items():
         parser.add_argument(
             f"--{name}", nargs=2, type=float, metavar=("FROM", "TO"),
@@ -51,7 +50,6 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "--stations", action="store_true",
         help="if no single placement is feasible: the fewest that together cover the surface",
     )  # fmt: skip
-    add_csv(parser)
     parser.add_argument(
         "--map", type=_picture, metavar="FILE", help="draw the covered share over the region"
     )
@@ -60,21 +58,17 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "--out", metavar="FILE", help="store finished placements; run again to continue"
     )
     parser.add_argument(
-        "--time-limit",
-        type=positive,
-        metavar="S",
+        "--time-limit", type=positive, metavar="S",
         help="seconds for the search; stations, map and view take additional time",
-    )
-    add_workers(parser)
+    )  # fmt: skip
 
 
 def run_place(args: argparse.Namespace, began: float) -> int:
     """`coverable place CASE`: search a region for placements, and report the feasible ones.
 
     Args:
-        args: `case`, `settings` (a list of KEY=VALUE); `x`, `y`, `z`, `roll`, `pitch`, `yaw`, each
-            two numbers or None; `count` or None; `workers` or None, `dask` or None; `stations`,
-            `json`; `csv`, `map`, `out`, `html`, files or None; `time_limit` or None.
+        args: case, settings; x, y, z, roll, pitch, yaw, each two numbers or None; count, stations,
+            workers, dask, json; csv, map, out, html, files or None; time_limit.
         began: `time.perf_counter()` when the command began.
 
     Returns:

@@ -6,9 +6,18 @@ import argparse
 import time
 from typing import TYPE_CHECKING
 
-from feasibility.cli.arguments import add_case, add_command, add_csv, add_html, add_workers
+from feasibility.cli.command import (
+    STATUS,
+    add_case,
+    add_command,
+    add_csv,
+    add_html,
+    add_workers,
+    check_outputs,
+    json_text,
+    write_text,
+)
 from feasibility.cli.console import Bar, print_err, print_out, progress_bar
-from feasibility.cli.outputs import STATUS, check_outputs, json_text, write_text
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -20,36 +29,26 @@ if TYPE_CHECKING:
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add both commands."""
     parser = add_command(
-        subcommands,
-        "study",
-        study,
+        subcommands, "study", study, add_csv, add_workers,
         help="many cases in parallel, each stored when it is finished",
         description="Decide every case of a study file. Finished cases are stored in one file; "
         "after an interruption, run the command again to continue.",
         epilog="exit status: 0; 3 where some cases failed; 2 bad input, 130 interrupted",
-    )
+    )  # fmt: skip
     parser.add_argument("file", metavar="FILE", help="a study file (TOML)")
     parser.add_argument("--out", metavar="FILE", required=True, help="stores the finished cases")
-    add_csv(parser)
     add_html(parser, "one page with tables, charts and poses")
-    add_workers(parser)
     parser = add_command(
-        subcommands,
-        "compare",
-        compare,
+        subcommands, "compare", compare, add_case, add_html, add_csv, add_workers,
         help="one case, several arms side by side",
         description="Decide the same case for several arms.",
-    )
-    add_case(parser)
-    add_html(parser)
+    )  # fmt: skip
     parser.add_argument(
         "--robots", metavar="NAMES", required=True, help="names of arms, such as ur5,panda,kinova"
     )
     parser.add_argument(
         "--critical", action="store_true", help="also find the smallest cone of each arm (slow)"
     )
-    add_csv(parser)
-    add_workers(parser)
 
 
 def study(args: argparse.Namespace, began: float) -> int:

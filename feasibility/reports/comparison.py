@@ -7,15 +7,13 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from feasibility.reports.page import COLOURS, page, table
-from feasibility.reports.text import aligned, csv_text, percent
+from feasibility.reports.parts import COLOURS, MARGINS, aligned, csv_text, page, percent, table
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies import Arm, Comparison
 from feasibility.version import version
 
 Column = tuple[str, Callable[[Arm], str]]
 
-MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m")
 ROW, BAR, LABEL = 30, 460, 130  # px: height of a row, length of a full bar, width for names
 NOTE = """Bars: share of the area that one continuous motion covers. "Feasible" is said only with a
 motion that an independent replay accepted."""

@@ -9,14 +9,21 @@ from typing import Any
 import numpy as np
 
 from feasibility.division import Division, Plan, Reconfiguration, SubPatch
-from feasibility.reports.objects import causes_json, certificate_json, rounded, seconds
-from feasibility.reports.text import counted, filled, summary
+from feasibility.reports.parts import (
+    causes_json,
+    certificate_json,
+    counted,
+    filled,
+    seconds,
+    seconds_text,
+    summary,
+)
 from feasibility.reports.verdict import causes_listed
 from feasibility.results import plain
 from feasibility.version import version
 from surfaces import Cells
 
-PHASES = ("search_s", "divide_s")
+PHASES = {"search_s": "search", "divide_s": "division"}
 STATUS = {"complete": 0, "partial": 1, "undecided": 3}
 SENTENCES = {
     "complete": "divided: every cell is in a patch that one continuous motion covers.",
@@ -51,7 +58,7 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         "left_out": causes_json(division.left_out, cells),
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
         "message": division.message,
-        "timing": rounded(seconds(division.timing, PHASES, before_s)),
+        "timing": seconds(division.timing, PHASES, before_s),
         "robot": division.robot.name,
         "seed": int(division.seed),
         "version": version(),
@@ -111,19 +118,12 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     head = SENTENCES[answer_of(division)]
     if division.decided and not division.patches and len(division.cells):
         head = NOTHING
-    times = seconds(division.timing, PHASES, before_s)
+    covered = f"{division.n_covered:,} of {len(division.cells):,} cells"
     rows = [
         ("case", title),
-        (
-            "covered",
-            f"{division.n_covered:,} of {len(division.cells):,} cells, in {_motions(division)}",
-        ),
+        ("covered", f"{covered}, in {_motions(division)}"),
         ("found", division.message),
-        (
-            "time",
-            f"{times['total_s']:.2f} s (loading {times['load_s']:.2f}, search "
-            f"{times['search_s']:.3f}, division {times['divide_s']:.3f})",
-        ),
+        ("time", seconds_text(division.timing, PHASES, before_s)),
     ]
     lines = summary(head, rows)
     if division.patches:

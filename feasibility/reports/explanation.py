@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from feasibility.reports.text import filled
+from feasibility.reports.parts import filled
 from feasibility.sensitivity import Dropped, Explanation, Finding, Kind, Quantity, Threshold
-from feasibility.verdict import Answer, Evidence
+from feasibility.verdict import Answer, Evidence, Verdict
 from feasibility.version import version
 
 HEADS = {
@@ -29,8 +29,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
     if not verdict.feasible:
         helps.sort(key=_effort)
     lines += [""] if helps or others else []
-    for threshold in helps:
-        lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
+    lines += [filled("  - ", sentence(threshold, verdict.feasible)) for threshold in helps]
     if not helps and others:
         lines.append(filled("  ", "No single change that was tried was found to make it feasible."))
     if others:
@@ -41,7 +40,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         for threshold in (t for t in others if not t.ruled_out):
             lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
     if explanation.dropped is not None:
-        lines += ["", filled("  ", _dropped(explanation, explanation.dropped))]
+        lines += ["", filled("  ", _dropped(verdict, explanation.dropped))]
     if explanation.left_out:
         lines += ["", filled("  ", _unknown(explanation))]
     return "\n".join(lines)
@@ -55,13 +54,22 @@ def _unknown(explanation: Explanation) -> str:
     return f"The time limit ran out; {number} thresholds are unknown: {names}."
 
 
-def _dropped(explanation: Explanation, dropped: Dropped) -> str:
-    """What would have to be given up, unless the search for it was cut short."""
-    verdict = explanation.verdict
+def _dropped(verdict: Verdict, dropped: Dropped) -> str:
+    """Which cells would have to be given up, unless the search for them was cut short."""
+    cells, number = len(verdict.cells), len(dropped.cells)
     if verdict.answer is Answer.UNDECIDED and dropped.waypoints is None:
-        found = f"{verdict.n_covered} of {len(verdict.cells)} cells"
+        found = f"{verdict.n_covered} of {cells} cells"
         return f"The best motion so far covers {found}; what would have to be dropped is unknown."
-    return dropping(dropped, len(verdict.cells))
+    if number == cells:
+        return f"No cell is covered; all {cells} would have to be dropped."
+    missed = "cell" if number == 1 else f"{number:,} cells"
+    which = f"the {missed} that the best motion misses ({100.0 * dropped.share:.3g} % of the area)"
+    if dropped.waypoints is None:
+        return f"Dropping {which} may leave one motion, but none was certified."
+    return (
+        f"Dropping {which} leaves one motion over the other {cells - number:,}: "
+        f"{dropped.waypoints:,} waypoints, replayed."
+    )
 
 
 def _effort(threshold: Threshold) -> float:
@@ -96,13 +104,12 @@ def sentence(threshold: Threshold, tightened: bool) -> str:
 
 def _margin(quantity: Quantity, value: str, now: str) -> str:
     """How far a feasible case can be tightened."""
-    if quantity.kind is Kind.CONE:
-        return f"alpha can tighten to {value} ({now} now)"
-    if quantity.kind in (Kind.LOWER, Kind.UPPER):
-        return f"the {quantity.name} can tighten to {value} ({now} now)"
+    if quantity.kind is Kind.SHIFT:
+        return f"the surface can shift by {value} {quantity.name.removeprefix('shift ')}"
     if quantity.kind is Kind.STANDOFF:
         return f"the standoff can {_change(quantity)} to {value} ({now} now)"
-    return f"the surface can shift by {value} {quantity.name.removeprefix('shift ')}"
+    name = "alpha" if quantity.kind is Kind.CONE else f"the {quantity.name}"
+    return f"{name} can tighten to {value} ({now} now)"
 
 
 def _remedy(quantity: Quantity, value: str, now: str) -> str:
@@ -131,14 +138,13 @@ def _helpless(threshold: Threshold) -> str:
 
 def _helpless_label(quantity: Quantity) -> str:
     """A quantity and the range that was searched."""
-    end = shown(quantity, quantity.end)
     return {
-        Kind.CONE: f"a wider cone, up to {end}",
-        Kind.LOWER: f"the {quantity.name}, down to {end}",
-        Kind.UPPER: f"the {quantity.name}, up to {end}",
-        Kind.STANDOFF: f"a {quantity.name}, as far as {end}",
-        Kind.SHIFT: f"a {quantity.name}, up to {end}",
-    }[quantity.kind]
+        Kind.CONE: "a wider cone, up to ",
+        Kind.LOWER: f"the {quantity.name}, down to ",
+        Kind.UPPER: f"the {quantity.name}, up to ",
+        Kind.STANDOFF: f"a {quantity.name}, as far as ",
+        Kind.SHIFT: f"a {quantity.name}, up to ",
+    }[quantity.kind] + shown(quantity, quantity.end)
 
 
 def _change(quantity: Quantity) -> str:
@@ -167,21 +173,6 @@ def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str
     up = feasible != (quantity.kind is Kind.LOWER)
     cents = round(100.0 * value, 4)  # what conversions leave behind is no reason to round
     return f"{(math.ceil(cents) if up else math.floor(cents)) / 100.0:.10g} {unit}"
-
-
-def dropping(dropped: Dropped, cells: int) -> str:
-    """Which part of the surface would have to be given up."""
-    number, percent = len(dropped.cells), f"{100.0 * dropped.share:.3g} % of the area"
-    if number == cells:
-        return f"No cell is covered; all {cells} would have to be dropped."
-    cells_missed = "cell" if number == 1 else f"{number:,} cells"
-    which = f"the {cells_missed} that the best motion misses ({percent})"
-    if dropped.waypoints is None:
-        return f"Dropping {which} may leave one motion, but none was certified."
-    return (
-        f"Dropping {which} leaves one motion over the other {cells - number:,}: "
-        f"{dropped.waypoints:,} waypoints, replayed."
-    )
 
 
 def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:

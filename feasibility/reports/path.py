@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from feasibility.paths import CoveragePath, PathFigures
-from feasibility.reports.objects import certificate_json
-from feasibility.reports.text import counted, summary
+from feasibility.reports.parts import certificate_json, counted, summary
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results import plain
 from feasibility.timing import MotionLimits, Trajectory, used
@@ -138,10 +137,7 @@ def as_text(
 ) -> str:
     """The path for people: its length compared with the least possible, margins, and times.
 
-    Args:
-        path: the path.
-        trajectory: its timing, if it was asked for.
-        limits: of the timing.
+    The arguments are those of `as_json`.
     """
     count, figures = int(path.needed.sum()), path.figures
     rows = [
@@ -157,14 +153,12 @@ def as_text(
         ),
     ]
     if trajectory is not None:
-        rows.append(
-            (
-                "time",
-                f"{trajectory.duration:.4g} s in {len(trajectory):,} samples, tool at up to "
-                f"{at_most(float(trajectory.tool_speed.max()), 4)} m/s",
-            )
-        )
-        rows += _limit_rows(path.robot, trajectory, limits)
+        speed = at_most(float(trajectory.tool_speed.max()), 4)
+        samples = f"{len(trajectory):,} samples"
+        rows += [
+            ("time", f"{trajectory.duration:.4g} s in {samples}, tool at up to {speed} m/s"),
+            ("limits", _limits_text(path.robot, trajectory, limits)),
+        ]
     head = f"path: one continuous motion over {counted(count, 'cell')}."
     return "\n".join(summary(head, rows, 14))
 
@@ -185,13 +179,12 @@ def _length_text(figures: PathFigures) -> str:
 
 def _travel_text(path: CoveragePath) -> str:
     """How far each joint travels."""
-    parts = []
-    for name, travel, slides in zip(
-        path.robot.joint_names, path.figures.travel, path.robot.prismatic, strict=True
-    ):
-        amount = f"{travel:.3g} m" if slides else f"{math.degrees(travel):.0f} deg"
-        parts.append(f"{name} {amount}")
-    return ", ".join(parts)
+    robot = path.robot
+    travels = zip(robot.joint_names, path.figures.travel, robot.prismatic, strict=True)
+    return ", ".join(
+        f"{name} {travel:.3g} m" if slides else f"{name} {math.degrees(travel):.0f} deg"
+        for name, travel, slides in travels
+    )
 
 
 def _margins_text(figures: PathFigures) -> str:
@@ -206,20 +199,15 @@ def _margins_text(figures: PathFigures) -> str:
     return ", ".join(parts)
 
 
-def _limit_rows(
-    robot: Robot, trajectory: Trajectory, limits: MotionLimits | None
-) -> list[tuple[str, str]]:
+def _limits_text(robot: Robot, trajectory: Trajectory, limits: MotionLimits | None) -> str:
     """The share of its limits that a trajectory uses, between samples too."""
     if limits is None:
-        return []
+        return ""
     most = used(robot, trajectory, limits)
     velocity, acceleration = (100 * float(s.max()) for s in (most.velocity, most.acceleration))
-    return [
-        (
-            "limits",
-            f"at most {at_most(velocity, 3)} % of the joints' velocities, "
-            f"{at_most(acceleration, 3)} % of their accelerations, "
-            f"{at_most(100 * most.tool_speed, 3)} % of the tool's {limits.tool_speed:g} m/s, "
-            "between samples too, as quintics or cubics",
-        )
-    ]
+    return (
+        f"at most {at_most(velocity, 3)} % of the joints' velocities, "
+        f"{at_most(acceleration, 3)} % of their accelerations, "
+        f"{at_most(100 * most.tool_speed, 3)} % of the tool's {limits.tool_speed:g} m/s, "
+        "between samples too, as quintics or cubics"
+    )

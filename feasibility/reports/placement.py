@@ -18,8 +18,7 @@ from feasibility.placement import (
     Trial,
     trial_table,
 )
-from feasibility.reports.objects import rounded
-from feasibility.reports.text import aligned, counted, csv_text, percent, summary
+from feasibility.reports.parts import aligned, counted, csv_text, percent, summary
 from feasibility.reports.verdict import CAUSES, EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version
@@ -68,7 +67,7 @@ def as_json(
         "stations": None if plan is None else _stations_json(plan),
         "map": None if chart is None else _map_json(chart),
         "statistics": dict(placements.statistics),
-        "timing": rounded(placements.timing),
+        "timing": {key: round(value, 6) for key, value in placements.timing.items()},
         "robot": placements.robot.name,
         "version": version(),
     }
@@ -76,10 +75,8 @@ def as_json(
 
 def _found_json(trial: Trial) -> dict[str, Any]:
     """One placement, without its components."""
-    table = trial_table(trial)
-    for key in ("components", "early", "fk"):
-        del table[key]
-    return table
+    inner = ("components", "early", "fk")
+    return {key: value for key, value in trial_table(trial).items() if key not in inner}
 
 
 def _stations_json(plan: StationPlan) -> dict[str, Any]:
@@ -140,15 +137,17 @@ def as_text(
             if proved
             else "placements sampled over the region and refined; one between them may be feasible"
         )
+    missed = [(CauseKind(kind), number) for kind, number in placements.causes.items()]
+    checked = placements.trials[0].message if placements.trials else ""
     rows = [
         ("case", case),
         ("region", ", ".join(ranges)),
         ("evidence", f"{placements.evidence}: {evidence}"),
         ("found", _found_text(placements)),
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
-        ("missed", _causes_text(placements)),
+        ("missed", "; ".join(f"{counted(n, 'cell')}: {CAUSES[k]}" for k, n in missed)),
         ("share", "" if _searched(placements.best) else _unsearched_text(placements)),
-        ("check", "" if placements.found else _checked_text(placements)),
+        ("check", "" if placements.found or not checked else f"of the best: {checked}"),
         ("time", _time_text(placements)),
     ]
     lines = summary(PROVED if proved else SENTENCES[placements.answer], rows, 10)
@@ -192,19 +191,6 @@ def _unsearched_text(placements: Placements) -> str:
     if placements.evidence is Evidence.PROOF:
         return "not known: placements that the reach bound rules out are not searched"
     return "not known: no placement was searched"
-
-
-def _checked_text(placements: Placements) -> str:
-    """The message of the full search at the best placement."""
-    return next((f"of the best: {t.message}" for t in placements.trials[:1] if t.message), "")
-
-
-def _causes_text(placements: Placements) -> str:
-    """Missed cells of the best placement by cause."""
-    return "; ".join(
-        f"{counted(count, 'cell')}: {CAUSES[CauseKind(kind)]}"
-        for kind, count in placements.causes.items()
-    )
 
 
 def _table(trials: Sequence[Trial]) -> list[str]:

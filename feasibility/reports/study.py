@@ -4,33 +4,30 @@ from __future__ import annotations
 
 import html
 import json
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from feasibility.reports.page import COLOURS, page, table
-from feasibility.reports.study_plot import charts, worded
-from feasibility.reports.study_tables import (
-    best_rows,
-    best_share,
-    causes,
-    counts,
-    dominant,
-    failures,
-    group_table,
-    groups_of,
-    headline,
-    verdicts_text,
+from feasibility.reports.parts import (
+    COLOURS,
+    MARGINS,
+    aligned,
+    counted,
+    csv_text,
+    page,
+    percent,
+    table,
 )
-from feasibility.reports.text import aligned, csv_text
-from feasibility.studies import Row, Study
+from feasibility.reports.study_plot import are_numbers, charts, short, worded
+from feasibility.studies import Row, Study, merit
 from feasibility.version import version
 
 if TYPE_CHECKING:
     from feasibility.viewer import View
 
 COLUMNS = ("verdict", "evidence", "cells", "covered", "share", "edges", "pairs")
-MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m")
 BAR = 640  # px
+MOST = 10  # best rows that are listed, and values of a key up to which each has a line
 NOTE = """Share: of the area, in one continuous motion. "Feasible" is said only with a motion
 that an independent replay accepted."""
 
@@ -69,13 +66,9 @@ def as_csv(study: Study, rows: Sequence[Row]) -> str:
         values = [row.parameters[label] for label in study.labels]
         values += [row.result.get(name) for name in COLUMNS]
         values += [margins.get(name) for name in MARGINS]
-        lines.append([_field(value) for value in [*values, dominant(row)]])
+        values.append(dominant(row))
+        lines.append([json.dumps(v) if isinstance(v, (dict, list)) else v for v in values])
     return csv_text(lines)
-
-
-def _field(value: Any) -> Any:
-    """A value for CSV: tables as JSON."""
-    return json.dumps(value) if isinstance(value, (dict, list)) else value
 
 
 def as_text(study: Study, rows: Sequence[Row]) -> str:
@@ -173,3 +166,85 @@ def _bar(share: float) -> str:
     return (
         f'<span class="bar"><b style="width: {100.0 * min(max(share, 0.0), 1.0):.1f}%"></b></span>'
     )
+
+
+def headline(study: Study, rows: Sequence[Row]) -> str:
+    """The result in one sentence."""
+    return f"{study.name}: {counted(len(rows), 'case')}: {verdicts_text(rows)}."
+
+
+def counts(rows: Sequence[Row]) -> dict[str, int]:
+    """How many rows have each verdict."""
+    found = Counter(str(row.result["verdict"]) for row in rows)
+    return {verdict: found.get(verdict, 0) for verdict in COLOURS}
+
+
+def verdicts_text(rows: Sequence[Row]) -> str:
+    """'3 feasible, 1 infeasible'."""
+    return ", ".join(f"{n} {verdict}" for verdict, n in counts(rows).items() if n) or "none"
+
+
+def failures(rows: Sequence[Row]) -> str:
+    """How many rows failed, and why the first one did; empty where none did."""
+    failed = [row for row in rows if row.status == "failed"]
+    return f"{len(failed)} failed; the first: {failed[0].result['message']}" if failed else ""
+
+
+def dominant(row: Row) -> str | None:
+    """The cause of most of the missed cells."""
+    return next(iter(row.result.get("causes") or {}), None)
+
+
+def causes(rows: Sequence[Row]) -> list[tuple[str, int]]:
+    """Dominant causes, each with its number of rows, the most frequent first."""
+    found = Counter(cause for row in rows if (cause := dominant(row)))
+    return [(cause.replace("_", " "), number) for cause, number in found.most_common()]
+
+
+def best_share(rows: Sequence[Row]) -> float | None:
+    """The largest share of the area covered in one motion, 0..1; None where all failed."""
+    return max((float(row.result["share"]) for row in rows if "share" in row.result), default=None)
+
+
+def best_rows(study: Study, rows: Sequence[Row]) -> list[list[str]]:
+    """The best rows: verdict, share, margin to the joint limits, and what varies."""
+    lines = []
+    for row in sorted(rows, key=lambda row: merit(row.result))[:MOST]:
+        limit = (row.result.get("margins") or {}).get("limit_deg")
+        cells = [str(row.result["verdict"]), _or_dash(row.result.get("share"))]
+        cells.append("-" if limit is None else f"{limit:.1f} deg")
+        lines.append([*cells, *(short(row.parameters[label]) for label in study.labels)])
+    return lines
+
+
+def groups_of(study: Study, rows: Sequence[Row]) -> dict[str, dict[str, list[Row]]]:
+    """Rows by value, for each key that takes a few values; numbers in their order."""
+    found: dict[str, dict[str, list[Row]]] = {}
+    for label in study.labels:
+        groups: dict[str, list[Row]] = {}
+        values = [row.parameters[label] for row in rows]
+        order: Sequence[int] = range(len(rows))
+        if are_numbers(values):
+            order = sorted(order, key=values.__getitem__)
+        for k in order:
+            groups.setdefault(short(values[k]), []).append(rows[k])
+        if 2 <= len(groups) <= MOST:
+            found[label] = groups
+    return found
+
+
+def group_table(label: str, groups: dict[str, list[Row]]) -> list[list[str]]:
+    """One line for each value of a key, below the names of the columns."""
+    lines = [[f"by {label}:", *COLOURS, "best share"]]
+    for value, group in groups.items():
+        lines.append([value, *map(str, counts(group).values()), _or_dash(best_share(group))])
+    used = [
+        k for k, head in enumerate(lines[0])
+        if head not in COLOURS or any(line[k] != "0" for line in lines[1:])
+    ]  # fmt: skip
+    return [[line[k] for k in used] for line in lines]
+
+
+def _or_dash(share: Any) -> str:
+    """A share, which a failed row does not have."""
+    return "-" if share is None else percent(float(share))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import itertools
+import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,8 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.reports.page import COLOURS
-from feasibility.reports.study_tables import are_numbers, short
+from feasibility.reports.parts import COLOURS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -78,6 +78,18 @@ def _numbers(labels: Sequence[str], rows: Sequence[Row]) -> dict[str, NDArray[np
             if len(np.unique(array)) > 1:
                 found[label] = array
     return found
+
+
+def are_numbers(values: Sequence[Any]) -> bool:
+    """Are all values numbers?"""
+    return all(isinstance(v, int | float) and not isinstance(v, bool) for v in values)
+
+
+def short(value: Any) -> str:
+    """A value in few characters."""
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def worded(label: str) -> str:

@@ -10,15 +10,22 @@ import numpy as np
 
 from feasibility.cases import OWN_KEYS, Case
 from feasibility.paper import tree_walk
-from feasibility.reports.objects import causes_json, certificate_json, rounded, seconds
-from feasibility.reports.text import counted, csv_text, summary
+from feasibility.reports.parts import (
+    causes_json,
+    certificate_json,
+    counted,
+    csv_text,
+    seconds,
+    seconds_text,
+    summary,
+)
 from feasibility.results import plain
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 from feasibility.version import version
 from surfaces import Cells
 
 DETAILS = 3  # cells of one group whose details are listed
-PHASES = ("search_s", "certify_s")
+PHASES = {"search_s": "search", "certify_s": "certificate"}
 
 SENTENCES = {
     Answer.FEASIBLE: "feasible: one continuous motion covers the whole surface.",
@@ -56,7 +63,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "edges": verdict.n_edges,
         "uncovered": causes_json(verdict.causes, verdict.cells),
         "certificate": _certificate(verdict),
-        "timing": rounded(seconds(verdict.timing, PHASES, before_s)),
+        "timing": seconds(verdict.timing, PHASES, before_s),
         "robot": verdict.robot.name,
         "method": verdict.method,
         "seed": int(verdict.seed),
@@ -102,7 +109,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("evidence", f"{verdict.evidence}: {EVIDENCE[verdict.evidence]}"),
         ("found", verdict.message),
         ("certificate", _certificate_text(verdict)),
-        ("time", _time_text(seconds(verdict.timing, PHASES, before_s))),
+        ("time", seconds_text(verdict.timing, PHASES, before_s)),
     ]
     lines = summary(head, rows)
     groups = list(causes_listed(verdict.causes, verdict.cells))
@@ -119,27 +126,16 @@ def _certificate_text(verdict: Verdict) -> str:
     found = _certificate(verdict)
     if found is None or verdict.certificate is None:
         return ""
-    parts = [f"{found['waypoints']:,} waypoints"]
-    error = verdict.certificate.max_position_error
-    allowed = verdict.task.tolerance
-    parts.append(
-        f"tool point within {1e3 * error:.3g} mm of its surface"
-        + (f" (allowed {1e3 * allowed:.3g})" if allowed is not None else "")
-    )
-    parts.append(
-        f"tool axis within {found['max_angle_deg']:.4g} deg (allowed {verdict.task.cone_deg:g})"
-    )
+    error, tolerance = verdict.certificate.max_position_error, verdict.task.tolerance
+    allowed = "" if tolerance is None else f" (allowed {1e3 * tolerance:.3g})"
+    parts = [
+        f"{found['waypoints']:,} waypoints",
+        f"tool point within {1e3 * error:.3g} mm of its surface{allowed}",
+        f"tool axis within {found['max_angle_deg']:.4g} deg (allowed {verdict.task.cone_deg:g})",
+    ]
     if found["min_limit_margin_deg"] is not None:
         parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
     return "; ".join(parts)
-
-
-def _time_text(times: dict[str, float]) -> str:
-    """The timing in one line."""
-    return (
-        f"{times['total_s']:.2f} s (loading {times['load_s']:.2f}, "
-        f"search {times['search_s']:.3f}, certificate {times['certify_s']:.3f})"
-    )
 
 
 def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:

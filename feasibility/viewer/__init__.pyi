@@ -1,11 +1,11 @@
-from .paper_figures import Plot as Plot
-from .paper_figures import plot_causes as plot_causes
-from .paper_figures import plot_graph as plot_graph
-from .paper_figures import plot_transition as plot_transition
-from .paper_figures import unrolled_edges as unrolled_edges
+from .figures import Plot as Plot
+from .figures import plot_causes as plot_causes
+from .figures import plot_graph as plot_graph
+from .figures import plot_map as plot_map
+from .figures import plot_transition as plot_transition
+from .figures import unrolled_edges as unrolled_edges
 from .path_and_division import view_division as view_division
 from .path_and_division import view_path as view_path
-from .placement_figures import plot_map as plot_map
 from .placements import view_placements as view_placements
 from .placements import view_study as view_study
 from .viewer import View as View

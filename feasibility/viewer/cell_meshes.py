@@ -1,18 +1,33 @@
-"""Shapes for drawing E-cells: filled patches, borders, and marks at their centres."""
+"""Shapes for drawing E-cells: filled patches, borders, and marks at their centres.
+
+The triangles of a mesh are joined at their corners, and thinned if too many. Thinning merges
+vertices that lie close together, but only where they touch the same cells: so the
+drawn cells still meet in the same order, and their borders are lines between corners of the mesh.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.viewer.decimated_mesh import display_mesh_of
+from feasibility.viewer.meshes import merge_vertices, split_at_creases
 from surfaces import Cells, Triangles
+from surfaces.meshes import half_edge_ends, half_edges
 from surfaces.meshes.cells import MeshCells
 
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
 FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as plain lines
+BUDGET = 30_000  # triangles
+COARSER = 1.25  # from one spacing to the next
+WIDEST = 0.3  # [1] of a cell's width, beyond which no vertices are merged
 
 
-def patch(cells: Cells, which: NDArray[np.int64], inset: float = 0.0) -> Triangles:
+def patch(cells: Cells, which: Ints, inset: float = 0.0) -> Triangles:
     """Triangles that fill some cells, as fine as their number allows; see `Cells.triangles`."""
     if isinstance(cells, MeshCells):
         return display_mesh_of(cells).fill(which, cells.centres, inset)
@@ -21,16 +36,14 @@ def patch(cells: Cells, which: NDArray[np.int64], inset: float = 0.0) -> Triangl
     return cells.triangles(which, 1 if len(cells) > FULL_DETAIL else pieces, inset)
 
 
-def borders(cells: Cells) -> NDArray[np.float64]:
+def borders(cells: Cells) -> Array:
     """(k, 2, 3) m, ends of short lines along the borders of all cells; see `Cells.borders`."""
     if isinstance(cells, MeshCells):
         return display_mesh_of(cells).borders()
     return cells.borders(8 if len(cells) <= FULL_DETAIL else 1)
 
 
-def marks(
-    centres: NDArray[np.float64], radius: float
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def marks(centres: Array, radius: float) -> tuple[Array, Ints]:
     """A small octahedron at each centre: vertices and faces."""
     corners = radius * np.concatenate([np.eye(3), -np.eye(3)])
     one = np.array(
@@ -44,3 +57,129 @@ def marks(
 def cell_size(cells: Cells) -> float:
     """A typical width of a cell, m."""
     return float(np.sqrt(cells.areas.mean())) if len(cells) else 0.0
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class DisplayMesh:
+    """Triangles to draw, and the cell of each."""
+
+    vertices: Array
+    """(V, 3) m, in the root frame; all are vertices of the mesh."""
+    normals: Array
+    """(V, 3) outward unit normals."""
+    faces: Ints
+    """(F, 3)"""
+    labels: Ints
+    """(F,) cell of each face."""
+    places: Ints
+    """(V,) equal for vertices that share a place, where normals differ."""
+    on_border: NDArray[np.bool_]
+    """(V,) vertices on the border of the mesh."""
+
+    def __post_init__(self) -> None:
+        """Write-protect the arrays."""
+        for field in fields(self):
+            getattr(self, field.name).flags.writeable = False
+
+    def fill(self, which: Ints, centres: Array, inset: float = 0.0) -> Triangles:
+        """The triangles of some cells (k,), drawn towards their centres by a share of the way."""
+        mine = np.isin(self.labels, which)
+        labels = np.repeat(self.labels[mine], 3)
+        corner = self.faces[mine].ravel()
+        # Cells that shrink part at their common vertices.
+        key = corner if inset == 0.0 else labels * len(self.vertices) + corner
+        _, first, faces = np.unique(key, return_index=True, return_inverse=True)
+        vertices = self.vertices[corner[first]]
+        return Triangles(
+            vertices=vertices + inset * (centres[labels[first]] - vertices),
+            faces=faces.reshape(-1, 3).astype(np.int64),
+            normals=self.normals[corner[first]],
+        )
+
+    def borders(self) -> Array:
+        """(k, 2, 3) m: edges between triangles of different cells, and on the mesh's border."""
+        halves = half_edges(self.places[self.faces])
+        owner = np.repeat(self.labels, 3)[halves.order]
+        apart = np.minimum.reduceat(owner, halves.starts) != np.maximum.reduceat(
+            owner, halves.starts
+        )
+        single = halves.counts == 1
+        drawn = half_edge_ends(self.faces, halves.order[halves.starts])
+        return self.vertices[drawn[apart | (single & self.on_border[drawn].all(axis=1))]]
+
+
+_display_meshes: WeakKeyDictionary[MeshCells, DisplayMesh] = WeakKeyDictionary()
+
+
+def display_mesh_of(cells: MeshCells) -> DisplayMesh:
+    """The triangles of the cells of a mesh, thinned to `BUDGET`; kept for as long as the cells."""
+    if cells not in _display_meshes:
+        _display_meshes[cells] = make_display_mesh(cells)
+    return _display_meshes[cells]
+
+
+def make_display_mesh(cells: MeshCells, budget: int = BUDGET) -> DisplayMesh:
+    """The triangles of the cells of a mesh, at most about `budget` of them.
+
+    More are left where cells are so many that each would be drawn by too few.
+    """
+    mesh, surface = cells.surface.mesh, cells.surface
+    on_border = np.zeros(len(mesh.vertices), dtype=bool)
+    on_border[mesh.edges.border_vertices] = True
+    faces, labels = mesh.faces, cells.labels
+    if len(mesh.faces) > budget:
+        faces, labels = _thinned(cells, on_border, budget)
+        normals = np.zeros_like(mesh.vertices)
+        for k in range(3):
+            np.add.at(normals, mesh.faces[:, k], surface.corner_normals[:, k])
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+        corner_normals = normals[faces]
+    else:
+        corner_normals = surface.corner_normals
+    corner, flat = faces.ravel(), corner_normals.reshape(-1, 3)
+    first, faces = split_at_creases(corner, flat)
+    return DisplayMesh(
+        vertices=mesh.vertices[corner[first]] @ surface.rotation.T + surface.position,
+        normals=flat[first] @ surface.rotation.T,
+        faces=faces,
+        labels=np.array(labels),
+        places=corner[first],
+        on_border=on_border[corner[first]],
+    )
+
+
+def _thinned(cells: MeshCells, on_border: NDArray[np.bool_], budget: int) -> tuple[Ints, Ints]:
+    """Merge vertices at a wider and wider spacing, until few enough faces (F, 3) are left.
+
+    Returns:
+        The faces, and the cell (F,) of each.
+    """
+    mesh = cells.surface.mesh
+    kinds = _kinds(mesh.faces, cells.labels, on_border)
+    widest = WIDEST * np.sqrt(cells.areas.mean())
+    spacing = min(cells.surface.mean_edge_length * np.sqrt(len(mesh.faces) / budget), widest)
+    merged = merge_vertices(mesh.vertices, mesh.faces, spacing, kinds)
+    while len(merged.faces) > budget and spacing * COARSER <= widest:
+        spacing *= COARSER
+        merged = merge_vertices(mesh.vertices, mesh.faces, spacing, kinds)
+    # Cells that have shrunk to nothing are drawn as they are.
+    labels = cells.labels[merged.kept]
+    gone = ~np.isin(cells.labels, labels)
+    return (
+        np.concatenate([merged.faces, mesh.faces[gone]]),
+        np.concatenate([labels, cells.labels[gone]]),
+    )
+
+
+def _kinds(faces: Ints, labels: Ints, on_border: NDArray[np.bool_]) -> Ints:
+    """(V,) equal for vertices that may be merged: in one cell, or on one border of two cells."""
+    count = int(labels.max()) + 1
+    touching = np.unique(faces.ravel() * count + np.repeat(labels, 3))
+    vertex, cell = np.divmod(touching, count)
+    first = np.searchsorted(vertex, np.arange(len(on_border)))
+    number = np.diff(np.append(first, len(vertex)))
+    low, high = cell[first], cell[first + number - 1]
+    kind = 2 * (low * count + high) + on_border
+    alone = number > 2  # where borders meet
+    kind[alone] = -1 - np.flatnonzero(alone)
+    return np.unique(kind, return_inverse=True)[1].reshape(-1).astype(np.int64)

@@ -11,7 +11,7 @@ import gzip
 import html
 import importlib.util
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -52,11 +52,7 @@ class Camera:
 
 
 def page(
-    commands: Iterable[Command],
-    legend: Legend,
-    camera: Camera,
-    *,
-    animated: bool = False,
+    commands: Iterable[Command], legend: Legend, camera: Camera, *, animated: bool = False
 ) -> str:
     """The page as HTML text.
 
@@ -70,17 +66,16 @@ def page(
         title=html.escape(legend.title),
         legend=_legend(legend, animated),
         program=_program(),
-        commands=_base64(_framed(pack(commands))),
+        # Each message behind its length in four bytes.
+        commands=_base64(b"".join(len(m).to_bytes(4, "little") + m for m in pack(commands))),
         setup=json.dumps(asdict(camera)),
     )
 
 
 def _legend(legend: Legend, animated: bool) -> str:
     """The overlay as HTML."""
-    lines = [
-        f"<summary>{html.escape(legend.title)}</summary>",
-        f"<p>{html.escape(legend.text)}</p>",
-    ]
+    title, text = html.escape(legend.title), html.escape(legend.text)
+    lines = [f"<summary>{title}</summary>", f"<p>{text}</p>"]
     for entry in legend.entries:
         swatch = f'<i style="background:#{hex_colour(entry.colour):06x}"></i>'
         box = ""
@@ -92,11 +87,6 @@ def _legend(legend: Legend, animated: bool) -> str:
     if animated:
         lines.append('<button type="button" id="pause">pause</button>')
     return "\n".join(lines)
-
-
-def _framed(messages: Sequence[bytes]) -> bytes:
-    """Messages one after the other, each behind its length in four bytes."""
-    return b"".join(len(message).to_bytes(4, "little") + message for message in messages)
 
 
 def _base64(data: bytes) -> str:

@@ -12,7 +12,6 @@ import sys
 import threading
 from http.server import BaseHTTPRequestHandler
 from socketserver import ThreadingTCPServer
-from types import TracebackType
 from typing import Any
 
 ADDRESS = "127.0.0.1"
@@ -68,12 +67,7 @@ class LiveView:
         """Serve inside a `with` block."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exception: object) -> None:
         """Stop serving."""
         self.close()
 

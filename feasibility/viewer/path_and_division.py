@@ -17,9 +17,17 @@ from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
+from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import LONGEST, Motion, paced
-from feasibility.viewer.robot_meshes import tubes
-from feasibility.viewer.scene import TRAIL, Layer, cells_layers, missed_layer, patch_layers
+from feasibility.viewer.scene import (
+    TRAIL,
+    Layer,
+    cells_layers,
+    counted,
+    drawn_lines,
+    missed_layer,
+    patch_layers,
+)
 from feasibility.viewer.threejs import Colour
 from feasibility.viewer.viewer import View, compose, titled
 from robots import Kinematics, Robot
@@ -69,10 +77,7 @@ def view_path(
 def view_division(division: Division, case: str | None = None) -> View:
     """The patches of the plan with the fewest motions, and the moves between them in red."""
     robot, cells, plan = division.robot, division.cells, division.fewest
-    names = [
-        f"patch {k + 1} ({len(patch.cells)} cell{'' if len(patch.cells) == 1 else 's'})"
-        for k, patch in enumerate(plan.patches)
-    ]
+    names = [f"patch {k + 1} ({counted(len(patch.cells))})" for k, patch in enumerate(plan.patches)]
     parts = [*cells_layers(cells), *patch_layers(cells, plan.patch_of(len(cells)), names)]
     parts += _left_out(division)
     walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
@@ -83,12 +88,10 @@ def view_division(division: Division, case: str | None = None) -> View:
             share = np.linspace(0.0, 1.0, DENSE)[1:-1, None]
             legs += [legs[-1][-1] + share * (walk[0] - legs[-1][-1]), walk]
         motion = paced(robot, np.concatenate(legs), False, "all patches")
+        size = cell_size(cells)
         for k, move in enumerate(plan.moves):
-            parts.append(
-                _move(robot, move.start, move.end, f"{k + 1} to {k + 2}", cell_size(cells))
-            )
-    number = len(plan.patches)
-    title = f"{number} patch{'' if number == 1 else 'es'}"
+            parts.append(_move(robot, move.start, move.end, f"{k + 1} to {k + 2}", size))
+    title = f"{len(plan.patches)} patch{'' if len(plan.patches) == 1 else 'es'}"
     text = f"{robot.name}: {division.n_covered} of {len(cells)} cells; " + "; ".join(
         f"move {k + 1} to {k + 2}: {move.described(FEW)}" for k, move in enumerate(plan.moves)
     )
@@ -133,10 +136,8 @@ def _move(
     """The path of the tool in a move between patches."""
     share = np.linspace(0.0, 1.0, 4 * DENSE)[:, None]
     line, _ = Kinematics(robot).tools(start + share * (end - start))
-    path = f"/motion/move from patch {name}"
-    vertices, faces = tubes([line], 0.05 * size)
-    commands = (threejs.mesh(path, vertices, faces, RECONFIGURED, lit=False),)
-    return Layer(commands, Entry(f"move from patch {name}", RECONFIGURED, path), 1)
+    label = f"move from patch {name}"
+    return drawn_lines([line], 0.05 * size, RECONFIGURED, f"/motion/{label}", label)
 
 
 def _left_out(division: Division) -> list[Layer]:

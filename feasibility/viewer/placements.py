@@ -7,7 +7,7 @@ view_placements(placements).save_html("placements.html")
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,9 +18,8 @@ from feasibility.cases import Setup
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.search import Progress, Search
 from feasibility.viewer import robot as robot_visuals
-from feasibility.viewer.outline import outline, placed
 from feasibility.viewer.playback import Motion, motion_of
-from feasibility.viewer.pose_layers import (
+from feasibility.viewer.poses import (
     HIDDEN,
     Class,
     Tried,
@@ -30,13 +29,13 @@ from feasibility.viewer.pose_layers import (
     class_of_trial,
     drawn_size,
     hidden,
+    outline,
+    placed,
     station_layers,
 )
 from feasibility.viewer.scene import Layer, cells_layers, counted
-from feasibility.viewer.stage import framing, joint_points
-from feasibility.viewer.viewer import View, compose, titled
+from feasibility.viewer.viewer import View, compose, framing, joint_points, titled
 from robots import Robot
-from surfaces import Cells
 
 if TYPE_CHECKING:
     from feasibility.placement import Placements, StationPlan
@@ -46,15 +45,6 @@ Array = NDArray[np.float64]
 
 LOOKED = 24  # configurations of a motion that have to be in the picture
 NEARER = 0.9  # [1] of the distance from which a ball around everything would fill the picture
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Playing:
-    """How the motion over the best pose is searched, and played."""
-
-    progress: Progress | None
-    play: bool
-    at: float
 
 
 def view_placements(
@@ -92,7 +82,7 @@ def view_placements(
         left_out = len(plan.stations.left_out)
         text += f"; {len(layers)} station{' covers ' if len(layers) == 1 else 's cover '}"
         text += f"{len(placements.cells) - left_out} of {counted(len(placements.cells))}"
-    return _view(setup, tried, title, text, stations, Playing(progress, play, at))
+    return _view(setup, tried, title, text, stations, progress, play=play, at=at)
 
 
 def view_study(
@@ -113,9 +103,9 @@ def view_study(
         tasks: of the study.
         rows: their outcomes, in the same order.
         name: of the study, for the title.
-        progress: of the search for the best row's motion, see `feasibility.check`.
+        progress: of the search for the best row's motion.
         play: start the motion when the page opens.
-        at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
+        at: as in `view_placements`.
 
     Raises:
         ArgumentError: there are no rows, or not one for each task.
@@ -138,7 +128,7 @@ def view_study(
         text = f"{len(drawn)} of {text}"
         text += "; those that differ from the best one in more than the pose are not drawn"
     title = titled("poses of the surface", name)
-    return _view(setup, tried, title, text, [], Playing(progress, play, at))
+    return _view(setup, tried, title, text, [], progress, play=play, at=at)
 
 
 def pose_of(tables: Any) -> Pose:
@@ -185,14 +175,19 @@ def _view(
     title: str,
     text: str,
     stations: Sequence[tuple[Layer, Pose]],
-    playing: Playing,
+    progress: Progress | None,
+    **playing: Any,
 ) -> View:
-    """One picture of poses tried, the best one first among them."""
+    """One picture of poses tried, the best one first among them; `playing` as in `compose`."""
+    from feasibility.checking import check
+
     cells, motion, parts = setup.cells, None, cells_layers(setup.cells)
     if tried:
         cells = moved_cells(setup.cells, tried[0].pose)
         if tried[0].kind is Class.FEASIBLE:
-            motion = _motion(setup, cells, playing.progress)
+            verdict = check(setup.robot, cells, setup.task, setup.search, progress=progress)
+            if verdict.feasible:  # else this search ran out of time
+                motion = motion_of(verdict)
         parts = best_layers(cells, tried[0], motion)
     if stations:  # the best single placement would lie among them
         parts = [hidden(layer) for layer in parts]
@@ -206,7 +201,7 @@ def _view(
     drawn = compose(
         setup.robot, cells, title, f"{setup.robot.name}: {text}",
         [*parts, *(layer for layer, _ in stations), *class_layers(small, tried)], motion,
-        resting=robot_visuals.home(setup.robot), play=playing.play, at=playing.at,
+        resting=robot_visuals.home(setup.robot), **playing,
     )  # fmt: skip
     points = [placed(small, one.pose) for one in tried if one.kind not in HIDDEN]
     full_size = [pose for _, pose in stations] or [one.pose for one in tried[:1]]
@@ -216,14 +211,6 @@ def _view(
     toward = np.array(drawn.camera.eye) - np.array(drawn.camera.target)
     camera = framing(every, toward / np.linalg.norm(toward), NEARER)
     return replace(drawn, camera=camera)
-
-
-def _motion(setup: Setup, cells: Cells, progress: Progress | None) -> Motion | None:
-    """The covering motion over the best placement; None if this search ran out of time."""
-    from feasibility.checking import check
-
-    verdict = check(setup.robot, cells, setup.task, setup.search, progress=progress)
-    return motion_of(verdict) if verdict.feasible else None
 
 
 def _joints(robot: Robot, motion: Motion | None) -> Array:

@@ -65,10 +65,9 @@ def longest_path(tree: nx.DiGraph | None, centres: NDArray[np.float64]) -> list[
     """
     if tree is None:
         return []
-    lengths = nx.DiGraph()
-    lengths.add_nodes_from(tree)
-    for a, b in tree.edges:
-        lengths.add_edge(a, b, weight=float(np.linalg.norm(centres[b] - centres[a])))
+    lengths = nx.create_empty_copy(tree)
+    steps = ((a, b, float(np.linalg.norm(centres[b] - centres[a]))) for a, b in tree.edges)
+    lengths.add_weighted_edges_from(steps)
     return list(nx.dag_longest_path(lengths))
 
 
@@ -126,11 +125,10 @@ def animate(
     placements = joint_placements(robot, motion.at(times))
     tracks = list(tracks)
     for joint, path in enumerate(joint_paths(robot)[1:]):
-        if robot.prismatic[joint]:
-            tracks.append(threejs.track(path, "position", times, placements[:, joint, :3, 3]))
-        else:
-            turns = quaternions(placements[:, joint, :3, :3])
-            tracks.append(threejs.track(path, "quaternion", times, turns))
+        name, values = "position", placements[:, joint, :3, 3]
+        if not robot.prismatic[joint]:
+            name, values = "quaternion", quaternions(placements[:, joint, :3, :3])
+        tracks.append(threejs.track(path, name, times, values))
     return threejs.animation(tracks, play=play, there_and_back=motion.there_and_back)
 
 

@@ -15,7 +15,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility.viewer import threejs
-from feasibility.viewer.robot_meshes import GREY, Mesh, MeshError, moved, read_mesh, shaded, thinned
+from feasibility.viewer.meshes import GREY, Mesh, MeshError, moved, read_mesh, shaded, thinned
 from robots import Kinematics, Robot, RobotError
 from robots.urdf import Box, Capsule, Cylinder, MeshFile, Sphere, Visual
 
@@ -64,8 +64,7 @@ def joint_placements(robot: Robot, walk: ArrayLike) -> NDArray[np.float64]:
     placements = np.empty((len(rows), robot.n, 4, 4))
     for row, q in enumerate(rows):
         pin.forwardKinematics(robot.model, data, kinematics.configuration(q))
-        for joint in range(robot.n):
-            placements[row, joint] = data.liMi[joint + 1].homogeneous
+        placements[row] = [data.liMi[joint].homogeneous for joint in range(1, robot.n + 1)]
     return placements
 
 
@@ -102,32 +101,19 @@ def draw(robot: Robot) -> Drawing:
 
 def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list[str]) -> Drawing:
     """Thin, shade and name the parts of all links."""
-    owners, meshes = [], []
-    for key, group in parts.items():
-        for mesh in _joined(group):
-            owners.append(key)
-            meshes.append(mesh)
+    owned = [(key, mesh) for key, group in parts.items() for mesh in _joined(group)]
+    fewer = thinned([mesh for _, mesh in owned], TRIANGLES)
     paths = joint_paths(robot)
     commands, lowest = [], 0.0
-    for number, ((joint, link), mesh) in enumerate(
-        zip(owners, thinned(meshes, TRIANGLES), strict=True)
-    ):
+    for number, (((joint, link), _), mesh) in enumerate(zip(owned, fewer, strict=True)):
         if len(mesh.faces) == 0:
             continue
         mesh, normals = shaded(mesh)
         if joint == 0:
             lowest = min(lowest, float(mesh.vertices[:, 2].min()))
         path = f"{paths[joint]}/link {threejs.safe_name(link)}/part {number}"
-        commands.append(
-            threejs.mesh(
-                path,
-                mesh.vertices,
-                mesh.faces,
-                mesh.colour,
-                normals=normals,
-                opacity=mesh.opacity,
-            )
-        )
+        looks: dict[str, Any] = {"normals": normals, "opacity": mesh.opacity}
+        commands.append(threejs.mesh(path, mesh.vertices, mesh.faces, mesh.colour, **looks))
     return Drawing(tuple(commands), lowest, tuple(notes))
 
 
@@ -154,10 +140,8 @@ def _meshes(visual: Visual) -> list[Mesh]:
     """
     import trimesh
 
-    colour, opacity = None, 1.0
-    if visual.rgba is not None:
-        red, green, blue, opacity = visual.rgba
-        colour = (red, green, blue)
+    red, green, blue, opacity = visual.rgba or (*GREY, 1.0)
+    colour = None if visual.rgba is None else (red, green, blue)
     match visual.geometry:
         case MeshFile(path, scale):
             return read_mesh(Path(path), np.asarray(scale), colour)
@@ -182,22 +166,15 @@ def _mesh(body: Any, colour: threejs.Colour, opacity: float = 1.0) -> Mesh:
 
 def _joined(meshes: list[Mesh]) -> list[Mesh]:
     """One mesh for each colour."""
+    from trimesh.util import append_faces
+
     groups: dict[tuple[threejs.Colour, float], list[Mesh]] = {}
     for mesh in meshes:
         groups.setdefault((mesh.colour, mesh.opacity), []).append(mesh)
     joined = []
-    for (colour, opacity), group in groups.items():
-        starts = np.cumsum([0] + [len(mesh.vertices) for mesh in group[:-1]])
-        joined.append(
-            Mesh(
-                np.concatenate([mesh.vertices for mesh in group]),
-                np.concatenate(
-                    [mesh.faces + start for mesh, start in zip(group, starts, strict=True)]
-                ),
-                colour,
-                opacity,
-            )
-        )
+    for looks, group in groups.items():
+        shape = append_faces([mesh.vertices for mesh in group], [mesh.faces for mesh in group])
+        joined.append(Mesh(np.asarray(shape[0], float), np.asarray(shape[1], np.int64), *looks))
     return joined
 
 

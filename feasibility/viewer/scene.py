@@ -16,8 +16,8 @@ from feasibility.verdict import CauseKind, Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, marks, patch
 from feasibility.viewer.html_page import Entry
+from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Motion
-from feasibility.viewer.robot_meshes import tubes
 from feasibility.viewer.threejs import Colour, Command
 from surfaces import Cells
 
@@ -35,12 +35,6 @@ CAUSES: dict[CauseKind, Colour] = {  # distinct for colour-blind readers too (Ok
     CauseKind.COLLISION: (0.20, 0.20, 0.20),
     CauseKind.DISCONNECTED: (0.94, 0.86, 0.20),
 }
-COMPONENTS: tuple[Colour, ...] = (
-    (0.34, 0.71, 0.91),
-    (0.00, 0.62, 0.45),
-    (0.80, 0.47, 0.65),
-    (0.90, 0.60, 0.00),
-)
 PATCHES: tuple[Colour, ...] = (
     (0.00, 0.45, 0.70),
     (0.90, 0.60, 0.00),
@@ -51,6 +45,7 @@ PATCHES: tuple[Colour, ...] = (
     (0.94, 0.86, 0.20),
     (0.45, 0.35, 0.65),
 )
+COMPONENTS = tuple(PATCHES[k] for k in (4, 2, 3, 1))
 TRAIL_POINTS = 2_000
 LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
 
@@ -67,20 +62,33 @@ class Layer:
 
 def layers(verdict: Verdict) -> list[Layer]:
     """Every part of the picture but the arm, in the order of the legend."""
-    if len(verdict.cells) == 0:
+    cells = verdict.cells
+    if len(cells) == 0:
         return []
+    missed = [missed_layer(cells, kind, which) for kind, which in missed_by_cause(verdict).items()]
     return [
-        *cells_layers(verdict.cells),
-        *_graph(verdict),
-        *_start(verdict),
-        *_missed(verdict),
-        *_components(verdict),
-    ]
+        *cells_layers(cells), *_graph(verdict), *_start(verdict), *missed, *_components(verdict)
+    ]  # fmt: skip
 
 
 def cells_layers(cells: Cells) -> list[Layer]:
-    """The surface, the borders of its cells, and their centres."""
-    return [_surface(cells), *_cell_marks(cells)]
+    """The surface, shaded and half transparent, the borders of its cells, and their centres."""
+    count, path = len(cells), "/surface/patch"
+    if count == 0:
+        return [Layer((), Entry("surface", SURFACE, path), 0)]
+    vertices, faces, normals = patch(cells, np.arange(count))
+    shape = threejs.mesh(path, vertices, faces, SURFACE, normals=normals, opacity=0.45)
+    parts = [Layer((shape,), Entry("surface", SURFACE, path), count)]
+    path = "/surface/cell outlines"
+    lines = threejs.segments(path, borders(cells).reshape(-1, 3), OUTLINES)
+    grid = f" ({' x '.join(map(str, cells.shape))})" if len(cells.shape) > 1 else ""
+    parts.append(Layer((lines,), Entry(counted(count) + grid, OUTLINES, path), count))
+    if count <= FULL_DETAIL:
+        path = "/surface/cell centres"
+        vertices, faces = marks(cells.centres, 0.035 * cell_size(cells))
+        dots = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
+        parts.append(Layer((dots,), Entry("cell centres", CENTRES, path), count))
+    return parts
 
 
 def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) -> list[Layer]:
@@ -96,19 +104,32 @@ def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) 
         which = np.flatnonzero(labels == k)
         if len(which) == 0:
             continue
-        colour = PATCHES[k % len(PATCHES)]
         path = f"/patches/{threejs.safe_name(name)}"
-        command = filled(cells, which, colour, path)
-        parts.append(Layer((command,), Entry(name, colour, path), len(which)))
+        parts.append(filled(cells, which, PATCHES[k % len(PATCHES)], path, name))
     return parts
 
 
 def filled(
-    cells: Cells, which: NDArray[np.int64], colour: Colour, path: str, inset: float = 0.06
-) -> Command:
+    cells: Cells,
+    which: NDArray[np.int64],
+    colour: Colour,
+    path: str,
+    label: str,
+    inset: float = 0.06,
+) -> Layer:
     """Some cells filled with a colour, smaller by `inset` of their size."""
     vertices, faces, _ = patch(cells, which, inset=inset)
-    return threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+    command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
+    return Layer((command,), Entry(label, colour, path), len(which))
+
+
+def drawn_lines(
+    lines: Sequence[NDArray[np.float64]], radius: float, colour: Colour, path: str, label: str
+) -> Layer:
+    """Polylines, (k, 3) m each, as tubes."""
+    vertices, faces = tubes(lines, radius)
+    command = threejs.mesh(path, vertices, faces, colour, lit=False)
+    return Layer((command,), Entry(label, colour, path), len(lines))
 
 
 def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
@@ -121,7 +142,9 @@ def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
     pairs = np.array(list(verdict.graph.edges), dtype=np.int64).reshape(-1, 2)
     keys = cells.pairs[:, 0] * len(cells) + cells.pairs[:, 1]
     curve = np.searchsorted(keys, pairs.min(axis=1) * len(cells) + pairs.max(axis=1))
-    t = np.linspace(0.0, 1.0, _edge_points(cells))
+    # The more cells, the shorter and straighter their edges.
+    points = 2 if len(cells) > FULL_DETAIL else 5 if len(cells) > 400 else 9
+    t = np.linspace(0.0, 1.0, points)
     backwards = (pairs[:, 0] > pairs[:, 1])[:, None]
     places = np.where(backwards, 1.0 - t, t)
     closest_point, normal = cells.curves.at(np.repeat(curve, len(t)), places.reshape(-1))
@@ -141,48 +164,19 @@ def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64
     return found
 
 
-def _surface(cells: Cells) -> Layer:
-    """The surface, shaded and half transparent."""
-    path = "/surface/patch"
-    commands: tuple[Command, ...] = ()
-    if len(cells):
-        vertices, faces, normals = patch(cells, np.arange(len(cells)))
-        commands = (threejs.mesh(path, vertices, faces, SURFACE, normals=normals, opacity=0.45),)
-    return Layer(commands, Entry("surface", SURFACE, path), len(cells))
-
-
-def _cell_marks(cells: Cells) -> Iterator[Layer]:
-    """Outlines of the cells, and a mark at each centre."""
-    if len(cells) == 0:
-        return
-    path = "/surface/cell outlines"
-    lines = threejs.segments(path, borders(cells).reshape(-1, 3), OUTLINES)
-    words = counted(len(cells))
-    if len(cells.shape) > 1:
-        words += f" ({' x '.join(str(part) for part in cells.shape)})"
-    yield Layer((lines,), Entry(words, OUTLINES, path), len(cells))
-    if len(cells) <= FULL_DETAIL:
-        path = "/surface/cell centres"
-        vertices, faces = marks(cells.centres, 0.035 * cell_size(cells))
-        dots = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
-        yield Layer((dots,), Entry("cell centres", CENTRES, path), len(cells))
-
-
 def _graph(verdict: Verdict) -> Iterator[Layer]:
     """Graph G: one line for each edge."""
     lines = edge_lines(verdict)
     if len(lines) == 0:
         return
     path = f"/graph/edges of G ({len(lines)})"
+    label = f"{len(lines)} edges of G (of {len(verdict.cells.pairs)} pairs)"
     if len(verdict.cells) <= FULL_DETAIL:
-        vertices, faces = tubes(list(lines), 0.022 * cell_size(verdict.cells))
-        command = threejs.mesh(path, vertices, faces, EDGES, lit=False)
+        yield drawn_lines(list(lines), 0.022 * cell_size(verdict.cells), EDGES, path, label)
     else:
         ends = np.stack([lines[:, :-1], lines[:, 1:]], axis=2)
         command = threejs.segments(path, ends.reshape(-1, 3), EDGES)
-    pairs = len(verdict.cells.pairs)
-    label = f"{len(lines)} edges of G (of {pairs} pairs)"
-    yield Layer((command,), Entry(label, EDGES, path), len(lines))
+        yield Layer((command,), Entry(label, EDGES, path), len(lines))
 
 
 def _start(verdict: Verdict) -> Iterator[Layer]:
@@ -198,19 +192,12 @@ def _start(verdict: Verdict) -> Iterator[Layer]:
     yield Layer((command,), Entry("start cell", START, path), 1)
 
 
-def _missed(verdict: Verdict) -> Iterator[Layer]:
-    """Cells that are not covered, in the colour of their cause."""
-    for kind, cells in missed_by_cause(verdict).items():
-        yield missed_layer(verdict.cells, kind, cells)
-
-
 def missed_layer(cells: Cells, kind: CauseKind | None, which: NDArray[np.int64]) -> Layer:
     """Some cells in the colour of the cause for which they are missed; None where it is unknown."""
     colour = MISSED if kind is None else CAUSES[kind]
     words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
-    path = f"/cells/{words} ({len(which)})"
-    command = filled(cells, which, colour, path)
-    return Layer((command,), Entry(f"{words} ({len(which)})", colour, path), len(which))
+    label = f"{words} ({len(which)})"
+    return filled(cells, which, colour, f"/cells/{label}", label)
 
 
 def _components(verdict: Verdict) -> Iterator[Layer]:
@@ -221,8 +208,7 @@ def _components(verdict: Verdict) -> Iterator[Layer]:
         colour = COMPONENTS[(number - 1) % len(COMPONENTS)]
         words = f"component {number} ({counted(len(cells))})"
         path = f"/components/{words}"
-        command = filled(verdict.cells, np.asarray(cells), colour, path, inset=0.15)
-        yield hidden(Layer((command,), Entry(words, colour, path), len(cells)))
+        yield hidden(filled(verdict.cells, np.asarray(cells), colour, path, words, inset=0.15))
 
 
 def hidden(layer: Layer) -> Layer:
@@ -243,17 +229,9 @@ def trail(cells: Cells, motion: Motion) -> Layer:
     path = f"/motion/tool path, {motion.label}"
     even = np.linspace(0.0, motion.seconds[-1], TRAIL_POINTS)
     line = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
-    vertices, faces = tubes([line], 0.035 * cell_size(cells))
-    command = threejs.mesh(path, vertices, faces, TRAIL, lit=False)
-    layer = Layer((command,), Entry(f"tool path: {motion.label}", TRAIL, path), 1)
+    label = f"tool path: {motion.label}"
+    layer = drawn_lines([line], 0.035 * cell_size(cells), TRAIL, path, label)
     return layer if motion.there_and_back else hidden(layer)
-
-
-def _edge_points(cells: Cells) -> int:
-    """Points of an edge as drawn: the more cells, the shorter and straighter their edges."""
-    if len(cells) > FULL_DETAIL:
-        return 2
-    return 9 if len(cells) <= 400 else 5
 
 
 def counted(number: int) -> str:

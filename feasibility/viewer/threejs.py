@@ -17,17 +17,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError
 
+Array = NDArray[np.float64]
 Command = dict[str, Any]
 Colour = tuple[float, float, float]
 """Red, green, blue, each 0 to 1."""
 
 _EXTENSION = {"int8": 0x11, "uint16": 0x14, "uint32": 0x16, "float32": 0x17}
-_JAVASCRIPT = {
-    "int8": "Int8Array",
-    "uint16": "Uint16Array",
-    "uint32": "Uint32Array",
-    "float32": "Float32Array",
-}
 _GRID = 2.0**16  # [1/m]: positions are rounded to 15 um, which lets them compress
 _DOUBLE_SIDED = 2
 _PING_PONG = 2202  # three.js: there and back
@@ -115,8 +110,7 @@ def segments(path: str, points: ArrayLike, colour: Colour, *, colours: Any = Non
 
 def transform(path: str, matrix: NDArray[np.float64]) -> Command:
     """Place what is at `path` by a homogeneous (4, 4) matrix."""
-    values = [float(value) for value in matrix.T.reshape(-1)]
-    return {"type": "set_transform", "path": path, "matrix": values}
+    return {"type": "set_transform", "path": path, "matrix": matrix.T.reshape(-1).tolist()}
 
 
 def set_property(path: str, name: str, value: Any) -> Command:
@@ -124,9 +118,7 @@ def set_property(path: str, name: str, value: Any) -> Command:
     return {"type": "set_property", "path": path, "property": name, "value": value}
 
 
-def track(
-    path: str, name: str, times: NDArray[np.float64], values: NDArray[np.float64]
-) -> dict[str, Any]:
+def track(path: str, name: str, times: Array, values: Array) -> dict[str, Any]:
     """How one property of one path changes with time.
 
     Args:
@@ -141,18 +133,14 @@ def track(
 
 def appearing(path: str, when: float, end: float) -> dict[str, Any]:
     """What is at `path` hidden until `when` (s), and shown from then to `end`."""
-    return _clip(
-        path, "visible", "bool", np.array([0.0, when, max(end, when)]), [False, True, True]
-    )
+    times = np.array([0.0, when, max(end, when)])
+    return _clip(path, "visible", "bool", times, [False, True, True])
 
 
-def _clip(
-    path: str, name: str, kind: str, times: NDArray[np.float64], values: Any
-) -> dict[str, Any]:
+def _clip(path: str, name: str, kind: str, times: Array, values: Any) -> dict[str, Any]:
     """One track of key frames."""
-    keys = {
-        "name": f".{name}", "type": kind, "times": _packed(times, "float32"), "values": values
-    }  # fmt: skip
+    packed = _packed(times, "float32")
+    keys = {"name": f".{name}", "type": kind, "times": packed, "values": values}
     return {"path": path, "clip": {"fps": 1, "name": "default", "tracks": [keys]}}
 
 
@@ -184,16 +172,13 @@ def _object(path: str, kind: str, data: dict[str, Any], material: dict[str, Any]
         "material": surface["uuid"],
         "matrix": [1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0, 0, 0, 0, 0, 1.0],
     }
-    return {
-        "type": "set_object",
-        "path": path,
-        "object": {
-            "metadata": {"version": 4.5, "type": "Object"},
-            "geometries": [geometry],
-            "materials": [surface],
-            "object": placed,
-        },
+    scene = {
+        "metadata": {"version": 4.5, "type": "Object"},
+        "geometries": [geometry],
+        "materials": [surface],
+        "object": placed,
     }
+    return {"type": "set_object", "path": path, "object": scene}
 
 
 def _positions(points: ArrayLike) -> dict[str, Any]:
@@ -208,7 +193,7 @@ def _array(values: NDArray[Any], size: int, dtype: str) -> dict[str, Any]:
     """An array as a vertex attribute with `size` numbers a vertex."""
     return {
         "itemSize": size,
-        "type": _JAVASCRIPT[dtype],
+        "type": f"{dtype.capitalize()}Array",
         "array": _packed(values, dtype),
         "normalized": False,
     }

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
@@ -26,12 +26,14 @@ from feasibility.viewer.html_page import Camera, Entry, Legend, page
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.playback import Motion, animate, motion_of
 from feasibility.viewer.scene import Layer, layers, trail
-from feasibility.viewer.stage import camera_on, ground
 from feasibility.viewer.threejs import Command
 from robots import Robot
 from surfaces import Cells
 
+Array = NDArray[np.float64]
+
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
+FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -114,7 +116,7 @@ def compose(
     parts: Sequence[Layer],
     motion: Motion | None,
     *,
-    resting: NDArray[np.float64],
+    resting: Array,
     tracks: Sequence[dict[str, Any]] = (),
     play: bool = True,
     at: float = 0.0,
@@ -172,9 +174,7 @@ def show(
     if _in_notebook():
         return drawn
     live = drawn.show()
-    if block is None:
-        block = not hasattr(sys, "ps1")
-    if block:
+    if block or (block is None and not hasattr(sys, "ps1")):
         try:
             live.wait()
         except KeyboardInterrupt:
@@ -185,8 +185,7 @@ def show(
 def _in_notebook() -> bool:
     """True where a Jupyter kernel runs this."""
     ipython = sys.modules.get("IPython")
-    shell = ipython.get_ipython() if ipython is not None else None
-    return getattr(shell, "kernel", None) is not None
+    return ipython is not None and getattr(ipython.get_ipython(), "kernel", None) is not None
 
 
 def titled(title: str, case: str | None) -> str:
@@ -194,10 +193,90 @@ def titled(title: str, case: str | None) -> str:
     return f"{case}: {title}" if case else title
 
 
-def _resting(verdict: Verdict) -> NDArray[np.float64]:
+def _resting(verdict: Verdict) -> Array:
     """A configuration for an arm that does not move: over the start cell if one is known."""
     nodes = verdict.graph.nodes(data="q")
     for _, q in sorted(nodes, key=lambda node: (node[0] != verdict.start, node[0])):
         if q is not None:
             return np.asarray(q, dtype=float)
     return robot_visuals.home(verdict.robot)
+
+
+def ground(robot: Robot, cells: Cells, floor: float) -> list[Command]:
+    """Background, a ground grid at the height of the lowest thing, and the root frame's axes."""
+    box = _extent(cells)
+    size = max(robot.reach if np.isfinite(robot.reach) else 1.0, 0.2)
+    spacing = _round_below(size / 5.0)
+    extent = np.abs(box[:, :2]).max(initial=size)
+    half = spacing * np.ceil(extent / spacing)
+    lines = np.arange(-half, half + spacing / 2.0, spacing)
+    z = min(floor, float(box[:, 2].min(initial=0.0)))
+    ends = [[(x, -half, z), (x, half, z), (-half, x, z), (half, x, z)] for x in lines]
+    axis = 0.25 * size
+    frame = [(0, 0, 0), (axis, 0, 0), (0, 0, 0), (0, axis, 0), (0, 0, 0), (0, 0, axis)]
+    colours = np.repeat([(0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9)], 2, axis=0)
+    return [
+        threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
+        threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
+        threejs.set_property("/Grid", "visible", False),
+        threejs.set_property("/Axes", "visible", False),
+        threejs.segments("/ground", np.reshape(ends, (-1, 3)), (0.78, 0.80, 0.83)),
+        threejs.segments("/root frame", np.array(frame), (0, 0, 0), colours=colours),
+    ]
+
+
+def _round_below(value: float) -> float:
+    """The largest of 1, 2.5 and 5 times a power of ten that is at most `value`."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(max(step * power for step in (1.0, 2.5, 5.0) if step * power <= value))
+
+
+def camera_on(robot: Robot, cells: Cells, q: Array, floor: float) -> Camera:
+    """Look at arm and surface from the tool's side, a little from above.
+
+    Args:
+        robot: the arm.
+        cells: what it works on.
+        q: (n,) its configuration.
+        floor: m, height of the ground.
+    """
+    points = np.concatenate([_extent(cells), joint_points(robot, q), [[0.0, 0.0, floor]]])
+    toward = np.zeros(3)
+    if len(cells):
+        toward = cells.surface.side_sign * cells.normals.mean(axis=0)
+    heading = np.arctan2(toward[1], toward[0]) if np.hypot(*toward[:2]) > 0.1 else -np.pi / 3.0
+    heading, height = heading + np.radians(25.0), np.radians(24.0)
+    level = np.cos(height)
+    direction = np.array([np.cos(heading) * level, np.sin(heading) * level, np.sin(height)])
+    return framing(points, direction)
+
+
+def framing(points: Array, direction: Array, near: float = 1.0) -> Camera:
+    """A camera that has points (k, 3) m in its picture.
+
+    Args:
+        points: what is to be seen.
+        direction: (3,) unit, from the points to the camera.
+        near: 1 where a ball around all points fills `FRAMED`; less comes nearer.
+    """
+    target = (points.min(axis=0) + points.max(axis=0)) / 2.0
+    radius = max(float(np.linalg.norm(points - target, axis=1).max()), 0.1)
+    eye = target + near * radius / np.sin(FRAMED) * direction
+    return Camera(tuple(target.tolist()), tuple(eye.tolist()))
+
+
+def joint_points(robot: Robot, walk: ArrayLike) -> Array:
+    """The joints (m n, 3) m of the arm at configurations (m, n) or (n,)."""
+    placements = robot_visuals.joint_placements(robot, walk)
+    place, points = np.eye(4), []
+    for step in placements.transpose(1, 0, 2, 3):
+        place = place @ step
+        points.append(place[:, :3, 3])
+    return np.concatenate(points)
+
+
+def _extent(cells: Cells) -> Array:
+    """Points (k, 3) m of the surface and the arm's base."""
+    if len(cells) == 0:
+        return np.zeros((1, 3))
+    return np.concatenate([np.zeros((1, 3)), cells.centres, cells.borders(1).reshape(-1, 3)])

@@ -24,7 +24,7 @@ from small_cases import TEXTS, small_case, small_verdict
 import feasibility.checking
 from feasibility import Answer, Evidence, Verdict
 from feasibility.cases import builtin_cases
-from feasibility.cli import console, outputs
+from feasibility.cli import command, console
 from feasibility.cli import main as cli
 from feasibility.notices import NOTICE, compiling_notice
 from feasibility.results import load_result, save_result
@@ -511,7 +511,7 @@ def test_every_answer_has_its_status(ask, monkeypatch, plate, answer, status):
         return Verdict(**{**fields, "answer": answer, "evidence": Evidence.BUDGET})
 
     monkeypatch.setattr(feasibility.checking, "check", said)
-    assert outputs.STATUS[answer] == status
+    assert command.STATUS[answer] == status
     assert ask("check", plate)[0] == status
 
 

@@ -20,7 +20,7 @@ from random_cases import draw, draw_ur5
 from feasibility import Search, Task, check
 from feasibility.cases import CaseError, load_case
 from feasibility.certification import replay
-from feasibility.cli.path_divide_explain import divide as run
+from feasibility.cli.case_commands import divide as run
 from feasibility.division import Division, Plan, divide
 from feasibility.division.connected_labels import count_of
 from feasibility.division.partition import Partition

@@ -11,7 +11,7 @@ from feasibility import Task
 from feasibility.cli.main import main
 from feasibility.division import Reconfiguration
 from feasibility.placement.reach_bound import Reach
-from feasibility.reports.study_tables import groups_of, short
+from feasibility.reports.study import groups_of, short
 from feasibility.studies import Row, Study
 from robots import load_robot
 from surfaces import sphere

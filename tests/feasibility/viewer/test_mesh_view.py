@@ -14,8 +14,8 @@ from matplotlib.colors import to_rgb
 
 from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import scene, view
-from feasibility.viewer.decimated_mesh import make_display_mesh
-from feasibility.viewer.paper_figures import plot_causes, plot_graph, plot_transition
+from feasibility.viewer.cell_meshes import make_display_mesh
+from feasibility.viewer.figures import plot_causes, plot_graph, plot_transition
 from feasibility.viewer.scene import edge_lines, patch_layers
 from robots import load_robot
 from surfaces import mesh

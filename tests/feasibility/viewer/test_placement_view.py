@@ -30,12 +30,13 @@ from feasibility.placement.trial import Margins
 from feasibility.reports.placement import as_text
 from feasibility.studies import Row, open_workers, run_tasks
 from feasibility.studies.file import read_study
-from feasibility.viewer import pose_layers, view_placements, view_study
-from feasibility.viewer.outline import MOST, outline
+from feasibility.viewer import poses as pose_layers
+from feasibility.viewer import view_placements, view_study
 from feasibility.viewer.placements import NEARER, same_frame
-from feasibility.viewer.pose_layers import (
+from feasibility.viewer.poses import (
     COLOURS,
     HIDDEN,
+    MOST,
     MOST_DRAWN,
     Class,
     Tried,
@@ -43,9 +44,10 @@ from feasibility.viewer.pose_layers import (
     class_of_row,
     class_of_share,
     drawn_size,
+    outline,
 )
-from feasibility.viewer.stage import FRAMED
 from feasibility.viewer.threejs import hex_colour, pack
+from feasibility.viewer.viewer import FRAMED
 from robots import load_robot
 from surfaces import cylinder, mesh, plane, sphere, torus
 

@@ -10,7 +10,7 @@ from matplotlib.collections import LineCollection, PathCollection, PolyCollectio
 from matplotlib.colors import to_rgb
 
 from feasibility import CauseKind
-from feasibility.viewer.paper_figures import (
+from feasibility.viewer.figures import (
     cells_below,
     plot_causes,
     plot_graph,

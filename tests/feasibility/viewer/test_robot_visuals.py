@@ -5,8 +5,8 @@ import pinocchio as pin
 import pytest
 import trimesh
 
+from feasibility.viewer.meshes import Mesh, MeshError, read_mesh, shaded, thinned, tubes
 from feasibility.viewer.robot import TRIANGLES, draw, joint_paths, joint_placements
-from feasibility.viewer.robot_meshes import Mesh, MeshError, read_mesh, shaded, thinned, tubes
 from feasibility.viewer.threejs import safe_name
 from robots import Kinematics, load_robot
 from robots.urdf import check_urdf

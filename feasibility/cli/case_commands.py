@@ -1,4 +1,4 @@
-"""`coverable path`, `divide` and `explain`: what follows from the verdict on one case."""
+"""Commands on one case: `coverable check`, `show`, `path`, `divide` and `explain`."""
 
 from __future__ import annotations
 
@@ -6,11 +6,18 @@ import argparse
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from feasibility.cli.arguments import add_case, add_command, add_html, positive
+from feasibility.cli.command import (
+    STATUS,
+    add_case,
+    add_command,
+    add_html,
+    json_text,
+    open_case,
+    positive,
+    write_text,
+)
 from feasibility.cli.console import print_err, print_out
-from feasibility.cli.outputs import STATUS, json_text, write_text
-from feasibility.cli.session import open_case
-from feasibility.safe_files import shown_path
+from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
     from feasibility.paths import Order
@@ -19,8 +26,9 @@ if TYPE_CHECKING:
     from feasibility.viewer import View
 
 ORDERS = ("rows", "columns", "spiral", "shortest")
-STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a patch, 1 cells are
-left out, 3 undecided"""
+STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
+LATER_STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a patch,
+1 cells are left out, 3 undecided"""
 WHY_COMPLETE = {
     "path": "a path needs 'complete': the greedy search does not visit the cells' centres",
     "divide": "a division needs 'complete': the greedy search keeps one motion only",
@@ -29,41 +37,51 @@ WHY_COMPLETE = {
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
-    """Add the three commands."""
+    """Add the commands."""
     parser = add_command(
-        subcommands,
-        "path",
-        path,
+        subcommands, "check", check, add_case, add_html,
+        help="decide one case",
+        description="Decide one case, and report the evidence for the answer.",
+        epilog=STATUSES,
+    )  # fmt: skip
+    parser.add_argument(
+        "--witness", metavar="FILE", help="write the covering motion as CSV (feasible only)"
+    )
+    parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
+    parser = subcommands.add_parser(
+        "show",
+        help="look at a result that `check --save` wrote",
+        description="Open the view of a result in a browser window; Ctrl-C ends it.",
+        allow_abbrev=False,
+    )
+    parser.set_defaults(run=show)
+    parser.add_argument("result", metavar="RESULT", help="a file that `check --save` wrote")
+    add_html(parser, "the view to a file instead")
+    parser.add_argument(
+        "--no-browser", dest="browser", action="store_false",
+        help="only print the address of the view",
+    )  # fmt: skip
+    add_command(
+        subcommands, "path", path, add_case, add_html, _add_timing,
         help="a coverage motion that an arm can run",
         description="Plan a path over every cell in a chosen order, time it within the limits of "
         "joints and tool, and write it as a trajectory.",
-        epilog=STATUSES,
-    )
-    add_case(parser)
-    add_html(parser)
-    _add_timing(parser)
-    parser = add_command(
-        subcommands,
-        "divide",
-        divide,
+        epilog=LATER_STATUSES,
+    )  # fmt: skip
+    add_command(
+        subcommands, "divide", divide, add_case, add_html,
         help="the fewest sub-patches, each covered by one continuous motion",
         description="Divide a surface that one motion cannot cover into the fewest patches, and "
         "report how the joints move from one to the next.",
-        epilog=STATUSES,
-    )
-    add_case(parser)
-    add_html(parser)
-    parser = add_command(
-        subcommands,
-        "explain",
-        explain,
+        epilog=LATER_STATUSES,
+    )  # fmt: skip
+    add_command(
+        subcommands, "explain", explain, add_case, add_html,
         help="what would make a case feasible, and the margins of a feasible one",
         description="Find the thresholds at which the verdict changes: cone, joint limits, "
         "standoff, position of the surface, cells to drop.",
-        epilog=STATUSES,
-    )
-    add_case(parser)
-    add_html(parser)
+        epilog=LATER_STATUSES,
+    )  # fmt: skip
 
 
 def _add_timing(parser: argparse.ArgumentParser) -> None:
@@ -95,6 +113,61 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def check(args: argparse.Namespace, began: float) -> int:
+    """`coverable check CASE`: run the search, print the verdict, write the files asked for."""
+    outputs = {"--save": args.save, "--html": args.html, "--witness": args.witness}
+    with open_case(args, began, outputs) as opened:
+        from feasibility.checking import check as run
+        from feasibility.reports import verdict as report
+
+        case, loaded = opened.case, opened.so_far()
+        verdict = run(*opened.setup, progress=opened.progress)
+    if args.json:
+        print_out(json_text(report.as_json(verdict, loaded)))
+    else:
+        print_out(report.as_text(verdict, case, loaded))
+    if args.save is not None:
+        from feasibility.results import save_result
+
+        save_result(verdict, case, args.save)
+        print_err(f"result: {shown_path(args.save)} (`coverable show` opens it)")
+    if args.html is not None:
+        from feasibility.viewer import view
+
+        write_text(args.html, view(verdict, case.name).html(), "view")
+    if args.witness is not None:
+        motion = report.as_csv(verdict)
+        if motion is None:
+            why = "has no stored motion" if verdict.feasible else f"is {verdict.answer}"
+            print_err(f"--witness: nothing written to {shown_path(args.witness)}: this case {why}")
+        else:
+            write_text(args.witness, motion, "witness")
+    return STATUS[str(verdict.answer)]
+
+
+def show(args: argparse.Namespace, began: float) -> int:
+    """`coverable show RESULT`: the view in a browser window until Ctrl-C, or in a file."""
+    from feasibility.results import load_result
+
+    if args.html is not None:
+        check_writable(args.html)
+    result = load_result(args.result)
+    print_out(f"{result.case.name}: {result.verdict!r}")
+    from feasibility.viewer import view
+
+    drawn = view(result.verdict, result.case.name)
+    if args.html is not None:
+        write_text(args.html, drawn.html(), "view")
+        return 0
+    with drawn.show(open_browser=args.browser) as live:
+        print_err(f"view: {live.url} (served until Ctrl-C)")
+        try:
+            live.wait()
+        except KeyboardInterrupt:
+            print_err("")
+    return 0
+
+
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
@@ -117,12 +190,9 @@ def path(args: argparse.Namespace, began: float) -> int:
         found = coverage_path(verdict, order)
         opened.progress(0, None, "timing the path")
         run = trajectory(
-            found,
-            args.speed,
-            velocity=args.velocity,
-            acceleration=args.acceleration,
+            found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
             period=args.period,
-        )
+        )  # fmt: skip
     if args.json:
         print_out(json_text(report.as_json(found, run, limits)))
     else:

@@ -1,7 +1,11 @@
-"""The parts of a picture of poses: outlines in classes, the best one in full, stations."""
+"""The parts of a picture of poses: outlines in classes, the best one in full, stations.
+
+An outline is light enough to be drawn at hundreds of poses.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -12,10 +16,10 @@ from numpy.typing import NDArray
 
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.viewer import threejs
+from feasibility.viewer.cell_meshes import patch
 from feasibility.viewer.html_page import Entry
-from feasibility.viewer.outline import outline, placed
+from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Motion
-from feasibility.viewer.robot_meshes import tubes
 from feasibility.viewer.scene import (
     MISSED,
     PATCHES,
@@ -27,7 +31,7 @@ from feasibility.viewer.scene import (
     trail,
 )
 from feasibility.viewer.threejs import Colour
-from surfaces import Cells
+from surfaces import Cells, Triangles, components
 
 if TYPE_CHECKING:
     from feasibility.placement import StationPlan
@@ -35,6 +39,11 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+MOST = 96  # segments of one outline
+FINEST = 8  # pieces that a cell's side is cut into, at most
+ALIKE = 1e-6  # [1] of the surface's size: corners nearer than this are one
+SMALL = 0.5  # [1] of the surface's size: a smaller boundary does not show where the surface lies
+STROKE = 0.12  # [1] of the surface's size: the stroke that points to the working side
 MOST_DRAWN = 200  # poses drawn of one class; of more, as many spread evenly over their ranks
 FULL_SIZE = 16  # poses up to which outlines are drawn in full size
 SMALLEST = 0.15  # [1] of their size
@@ -96,11 +105,9 @@ def class_of_trial(trial: Trial) -> Class:
     """The class of a placement."""
     if trial.feasible:
         return Class.FEASIBLE
-    if trial.stage is Stage.FAILED:
-        return Class.FAILED
-    if trial.stage in (Stage.BOUND, Stage.PROBE):
-        return Class.UNSEARCHED
-    return class_of_share(trial.share)
+    never = {Stage.FAILED: Class.FAILED, Stage.BOUND: Class.UNSEARCHED}
+    never[Stage.PROBE] = Class.UNSEARCHED
+    return never.get(trial.stage) or class_of_share(trial.share)
 
 
 def class_of_row(row: Row) -> Class:
@@ -131,10 +138,8 @@ def best_layers(cells: Cells, best: Tried, motion: Motion | None) -> list[Layer]
             ("not covered there", MISSED, np.flatnonzero(~best.cover)),
         ):
             if len(which):
-                path = f"/best/{words}"
-                command = filled(cells, which, colour, path)
-                entry = Entry(f"{words} ({counted(len(which))})", colour, path)
-                parts.append(Layer((command,), entry, len(which)))
+                label = f"{words} ({counted(len(which))})"
+                parts.append(filled(cells, which, colour, f"/best/{words}", label))
     if motion is not None:
         parts.append(trail(cells, motion))
     return parts
@@ -147,12 +152,12 @@ def station_layers(cells: Cells, plan: StationPlan) -> list[Layer]:
         colour = PATCHES[k % len(PATCHES)]
         root = f"/stations/station {k + 1}"
         there = moved_cells(cells, trial.pose)
-        commands = (
-            filled(there, station.cells, colour, f"{root}/cells"),
-            threejs.segments(f"{root}/outline", placed(lines, trial.pose).reshape(-1, 3), colour),
-        )
-        entry = Entry(f"station {k + 1} ({counted(len(station.cells))})", colour, root)
-        parts.append(Layer(commands, entry, len(station.cells)))
+        label = f"station {k + 1} ({counted(len(station.cells))})"
+        part = filled(there, station.cells, colour, f"{root}/cells", label)
+        ends = placed(lines, trial.pose).reshape(-1, 3)
+        border = threejs.segments(f"{root}/outline", ends, colour)
+        entry = replace(part.entry, path=root)
+        parts.append(replace(part, commands=(*part.commands, border), entry=entry))
     return parts
 
 
@@ -168,10 +173,9 @@ def class_layers(lines: Array, tried: Sequence[Tried]) -> list[Layer]:
         poses = [one.pose for one in tried if one.kind is kind]
         if not poses or len(lines) == 0:
             continue
-        some = _spread(poses)
-        number = (
-            str(len(poses)) if len(some) == len(poses) else f"{len(some)} of {len(poses)} drawn"
-        )
+        some, number = _spread(poses), str(len(poses))
+        if len(some) < len(poses):
+            number = f"{len(some)} of {len(poses)} drawn"
         path = f"/poses/{threejs.safe_name(kind)}"
         if kind is Class.FEASIBLE:
             command = _thick(path, lines, some, COLOURS[kind])
@@ -185,11 +189,8 @@ def class_layers(lines: Array, tried: Sequence[Tried]) -> list[Layer]:
 
 def drawn_size(tried: Sequence[Tried]) -> float:
     """How large outlines are drawn, 0..1 of their size: the more there are, the smaller."""
-    shown = sum(
-        min(sum(one.kind is kind for one in tried), MOST_DRAWN)
-        for kind in Class
-        if kind not in HIDDEN
-    )
+    numbers = Counter(one.kind for one in tried if one.kind not in HIDDEN)
+    shown = sum(min(number, MOST_DRAWN) for number in numbers.values())
     return float(np.clip(np.sqrt(FULL_SIZE / max(shown, 1)), SMALLEST, 1.0))
 
 
@@ -206,3 +207,98 @@ def _thick(path: str, lines: Array, poses: Sequence[Pose], colour: Colour) -> th
     every = np.concatenate([placed(vertices, pose) for pose in poses])
     first = len(vertices) * np.arange(len(poses))[:, None, None]
     return threejs.mesh(path, every, (faces + first).reshape(-1, 3), colour, lit=False)
+
+
+def outline(cells: Cells) -> Array:
+    """The boundary of a surface and a stroke from its middle to the working side.
+
+    A surface without a boundary, or with a small one, shows its three middle sections as well.
+
+    Returns:
+        (k, 2, 3) m, ends of segments, in the surface's frame.
+    """
+    if len(cells) == 0:
+        return np.empty((0, 2, 3))
+    triangles = _triangles(cells)
+    size = _size(triangles.vertices)
+    lines = _boundary(triangles, ALIKE * size)
+    if len(lines) == 0 or _size(lines.reshape(-1, 3)) < SMALL * size:
+        lines = np.concatenate([lines, _sections(triangles)])
+    return np.concatenate([_thinned(lines, size / MOST), _stroke(cells, STROKE * size)])
+
+
+def placed(points: Array, pose: Pose) -> Array:
+    """Points (..., 3) m of the surface's frame in the root frame, for a surface at `pose`."""
+    return points @ pose.rotation.T + np.array(pose.position)
+
+
+def _triangles(cells: Cells) -> Triangles:
+    """A few triangles of all cells, in the surface's frame."""
+    every = np.arange(len(cells))
+    pieces = int(np.clip(MOST // (2 * sum(cells.shape)), 1, FINEST))
+    grid = len(cells.shape) > 1
+    found = cells.triangles(every, pieces) if grid else patch(cells, every)
+    return found._replace(vertices=_in_own_frame(cells, found.vertices))
+
+
+def _in_own_frame(cells: Cells, points: Array) -> Array:
+    """Points (..., 3) m of the root frame in the surface's frame."""
+    return np.asarray((points - cells.surface.position) @ cells.surface.rotation)
+
+
+def _size(points: Array) -> float:
+    """Diagonal of the box around points (k, 3), m."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def _boundary(triangles: Triangles, near: float) -> Array:
+    """(k, 2, 3) m: edges of one triangle only; corners nearer than `near` (m) are one."""
+    from scipy.spatial import cKDTree
+
+    vertices = triangles.vertices
+    pairs = cKDTree(vertices).query_pairs(near, output_type="ndarray")
+    place = components(pairs, len(vertices))
+    faces = place[triangles.faces]
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = edges[edges[:, 0] != edges[:, 1]]  # a side may have shrunk to a point, as at a pole
+    found, number = np.unique(edges, axis=0, return_counts=True)
+    _, first = np.unique(place, return_index=True)
+    return np.asarray(vertices[first[found[number == 1]]])
+
+
+def _sections(triangles: Triangles) -> Array:
+    """(k, 2, 3) m: where the three planes through the middle cut the surface."""
+    import trimesh
+
+    body = trimesh.Trimesh(triangles.vertices, triangles.faces, process=False)
+    # Slightly off the middle: a plane through corners cuts along edges, or nothing.
+    share = np.array([0.5003, 0.4998, 0.5001])
+    middle = body.bounds[0] + share * np.ptp(body.bounds, axis=0)
+    cuts = [trimesh.intersections.mesh_plane(body, axis, middle) for axis in np.eye(3)]
+    return np.concatenate([np.reshape(cut, (-1, 2, 3)) for cut in cuts])
+
+
+def _thinned(lines: Array, spacing: float) -> Array:
+    """At most `MOST` of some segments: ends in one box of a grid become one, at their mean."""
+    result = lines
+    while len(result) > MOST:
+        boxes = np.floor(lines.reshape(-1, 3) / spacing).astype(np.int64)
+        _, box, number = np.unique(boxes, axis=0, return_inverse=True, return_counts=True)
+        box = box.reshape(-1)
+        means = np.column_stack([np.bincount(box, x) / number for x in lines.reshape(-1, 3).T])
+        ends = np.unique(np.sort(box.reshape(-1, 2), axis=1), axis=0)
+        result = means[ends[ends[:, 0] != ends[:, 1]]]
+        spacing *= 1.25
+    return result
+
+
+def _stroke(cells: Cells, length: float) -> Array:
+    """(1, 2, 3) m: from the middle to the working side; (0, 2, 3) where normals cancel out."""
+    mean = (cells.areas[:, None] * cells.normals).sum(axis=0) / cells.areas.sum()
+    if np.linalg.norm(mean) < SMALL:
+        return np.empty((0, 2, 3))
+    away = np.linalg.norm(cells.centres - cells.centres.mean(axis=0), axis=1)
+    cell = int(np.argmax(away <= away.min() + ALIKE * away.max()))  # the first of several as near
+    # The tool is on the side of the targets.
+    tip = cells.centres[cell] + length * cells.surface.side_sign * cells.normals[cell]
+    return _in_own_frame(cells, np.stack([cells.centres[cell], tip]))[None]

@@ -1,4 +1,4 @@
-"""Triangles of a robot's visuals: read with trimesh, thinned, and shaded."""
+"""Triangles as they are drawn: read with trimesh, merged where close, split at creases, shaded."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from coverable_errors import CoverableError
 from coverable_files import FileFault, read_regular
 from feasibility.viewer.threejs import Colour
-from feasibility.viewer.vertex_clusters import merge_vertices, split_at_creases
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 LARGEST_FILE = 200_000_000  # [byte]
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
+DEGREE = 57.0  # [1/rad] normals that agree to about a degree are one
 GREY: Colour = (0.72, 0.74, 0.77)
 
 
@@ -29,15 +32,24 @@ class MeshError(CoverableError):
 class Mesh:
     """Triangles of one colour."""
 
-    vertices: NDArray[np.float64]
+    vertices: Array
     """(V, 3) m."""
-    faces: NDArray[np.int64]
+    faces: Ints
     """(F, 3) indices of vertices."""
     colour: Colour
     opacity: float = 1.0
 
 
-def read_mesh(file: Path, scale: NDArray[np.float64], colour: Colour | None) -> list[Mesh]:
+class Merged(NamedTuple):
+    """Faces after merging vertices."""
+
+    faces: Ints
+    """(F', 3) indices of the vertices that were given."""
+    kept: Ints
+    """(F',) which of the given faces they were, in their order."""
+
+
+def read_mesh(file: Path, scale: Array, colour: Colour | None) -> list[Mesh]:
     """Read every part of a mesh file.
 
     Only the file itself is opened: textures and material files that it names are not.
@@ -77,6 +89,59 @@ def read_mesh(file: Path, scale: NDArray[np.float64], colour: Colour | None) -> 
     return meshes
 
 
+def merge_vertices(
+    vertices: Array, faces: Ints, spacing: float, kinds: Ints | None = None
+) -> Merged:
+    """Merge vertices in one box of a grid into that which is nearest to their mean.
+
+    Faces that collapse, and all but one of those with the same corners, go.
+
+    Args:
+        vertices: (V, 3) m.
+        faces: (F, 3) indices of vertices.
+        spacing: width of the boxes, m.
+        kinds: (V,) only vertices of one kind are merged; all where None.
+    """
+    if not len(faces):
+        return Merged(faces, np.arange(0))
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    width = max(spacing, float((high - low).max()) / 2**20)
+    boxes = np.rint((vertices - low) / width).astype(np.int64)
+    group = _numbered((boxes[:, 0] << 42) + (boxes[:, 1] << 21) + boxes[:, 2])
+    if kinds is not None:
+        group = _numbered(group * (int(kinds.max()) + 1) + kinds)
+    size = np.bincount(group)
+    mean = np.column_stack([np.bincount(group, axis) / size for axis in vertices.T])
+    off = np.linalg.norm(vertices - mean[group], axis=1)
+    order = np.argsort(off, kind="stable")[::-1]
+    chosen = np.empty(len(size), dtype=np.int64)
+    chosen[group[order]] = order  # the last one written, the nearest, stays
+    corners = chosen[group][faces]
+    proper = np.flatnonzero((corners != np.roll(corners, 1, axis=1)).all(axis=1))
+    ordered = np.sort(corners[proper], axis=1)
+    # As whole numbers, which sort ten times faster than rows.
+    key = ordered[:, 0] * len(vertices) + ordered[:, 1]
+    key = (key if len(vertices) < 2**21 else _numbered(key)) * len(vertices) + ordered[:, 2]
+    kept = proper[np.sort(np.unique(key, return_index=True)[1])]
+    return Merged(corners[kept], kept)
+
+
+def split_at_creases(corners: Ints, normals: Array) -> tuple[Ints, Ints]:
+    """Split each vertex by the normals of its corners; those that agree become one again.
+
+    Args:
+        corners: (3 F,) vertex of each corner of each face.
+        normals: (3 F, 3) unit normal of each.
+
+    Returns:
+        (V',) a corner for each vertex of the result, and (F, 3) faces of these vertices.
+    """
+    rounded = np.rint(DEGREE * normals).astype(np.int64) + 64
+    key = (((corners << 7) + rounded[:, 0] << 7) + rounded[:, 1] << 7) + rounded[:, 2]
+    _, first, faces = np.unique(key, return_index=True, return_inverse=True)
+    return first, faces.reshape(-1, 3).astype(np.int64)
+
+
 def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
     """Merge vertices that lie close together until all meshes have at most `budget` triangles.
 
@@ -97,7 +162,7 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
     return result
 
 
-def shaded(mesh: Mesh) -> tuple[Mesh, NDArray[np.float64]]:
+def shaded(mesh: Mesh) -> tuple[Mesh, Array]:
     """Split the vertices at creases, and give each its normal.
 
     A corner's normal is the mean, weighted by area, of those faces around its vertex that lean
@@ -107,7 +172,7 @@ def shaded(mesh: Mesh) -> tuple[Mesh, NDArray[np.float64]]:
         The mesh with its vertices split, and (V, 3) unit normals.
     """
     areas = _doubled_areas(mesh.vertices, mesh.faces)
-    units = areas / np.maximum(np.linalg.norm(areas, axis=1, keepdims=True), 1e-300)
+    units = _unit(areas)
     flat = mesh.faces.reshape(-1)  # vertex of each corner
     face = np.repeat(np.arange(len(mesh.faces)), 3)
     order = np.argsort(flat, kind="stable")
@@ -119,25 +184,19 @@ def shaded(mesh: Mesh) -> tuple[Mesh, NDArray[np.float64]]:
     left = order[first[group] + within // count[group]]
     right = order[first[group] + within % count[group]]
     alike = np.einsum("ij,ij->i", units[face[left]], units[face[right]]) > np.cos(CREASE)
-    normals = np.empty((len(flat), 3))
-    for axis in range(3):
-        normals[:, axis] = np.bincount(
-            left[alike], areas[face[right[alike]], axis], minlength=len(flat)
-        )
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    around = areas[face[right[alike]]].T
+    normals = _unit(np.column_stack([np.bincount(left[alike], x, len(flat)) for x in around]))
     kept, faces = split_at_creases(flat, normals)
     split = replace(mesh, vertices=mesh.vertices[flat[kept]], faces=faces)
     return split, normals[kept]
 
 
-def moved(mesh: Mesh, matrix: NDArray[np.float64]) -> Mesh:
+def moved(mesh: Mesh, matrix: Array) -> Mesh:
     """The same mesh, placed by a homogeneous (4, 4) matrix."""
     return replace(mesh, vertices=mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])
 
 
-def tubes(
-    lines: Sequence[NDArray[np.float64]], radius: float, sides: int = 5
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def tubes(lines: Sequence[Array], radius: float, sides: int = 5) -> tuple[Array, Ints]:
     """Thin tubes around polylines, (k, 3) m each: vertices (V, 3) and faces (F, 3).
 
     Lines are one pixel wide on most machines, whatever width is asked for.
@@ -151,14 +210,9 @@ def tubes(
             continue
         along = np.gradient(line, axis=0)
         helper = np.eye(3)[np.argmin(np.abs(line[-1] - line[0]))]
-        side = np.cross(along, helper)
-        side /= np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
-        up = np.cross(along, side)
-        up /= np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-12)
-        ring = (
-            np.cos(angle)[None, :, None] * side[:, None]
-            + np.sin(angle)[None, :, None] * up[:, None]
-        )
+        side = _unit(np.cross(along, helper), 1e-12)
+        up = _unit(np.cross(along, side), 1e-12)
+        ring = np.cos(angle)[:, None] * side[:, None] + np.sin(angle)[:, None] * up[:, None]
         vertices.append((line[:, None] + radius * ring).reshape(-1, 3))
         i, j = np.meshgrid(np.arange(len(line) - 1), np.arange(sides), indexing="ij")
         a, b = i * sides + j, i * sides + (j + 1) % sides
@@ -177,7 +231,12 @@ def _merged(mesh: Mesh, spacing: float) -> Mesh:
     return replace(mesh, vertices=mesh.vertices[used], faces=(np.cumsum(used) - 1)[faces])
 
 
-def _doubled_areas(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _unit(vectors: Array, least: float = 1e-300) -> Array:
+    """Vectors (k, 3) at length 1; those shorter than `least` stay short."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), least))
+
+
+def _doubled_areas(vertices: Array, faces: Ints) -> Array:
     """(F, 3) normals as long as twice the areas."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
@@ -195,3 +254,8 @@ def _colour(part: Any) -> tuple[Colour | None, float]:
     red, green, blue, alpha = (float(value) / 255.0 for value in rgba)
     # An alpha of zero is a file's way of saying that it left transparency unset.
     return (red, green, blue), alpha if alpha > 0.05 else 1.0
+
+
+def _numbered(keys: Ints) -> Ints:
+    """Equal keys as equal numbers from 0."""
+    return np.unique(keys, return_inverse=True)[1].reshape(-1).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Flat pictures of a verdict, for notebooks and papers: Figures 2 and 3 of the paper, and causes.
+"""Flat pictures for notebooks and papers: Figures 2 and 3 of the paper, causes, placement maps.
 
 Every function returns a figure of its own and leaves matplotlib's global state alone, so it works
 without a display and beside whatever else a notebook draws. `figure.savefig("g.pdf")` writes it.
@@ -7,13 +7,14 @@ without a display and beside whatever else a notebook draws. `figure.savefig("g.
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.placement import AXES, PlacementMap, Placements
 from feasibility.verdict import Verdict
 from feasibility.viewer.scene import CAUSES, CENTRES, EDGES, MISSED, START, missed_by_cause
 from robots import Kinematics
@@ -22,8 +23,13 @@ from surfaces import Cells
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+Array = NDArray[np.float64]
+
 DOTS_PER_INCH = 110
 BORDERS = (0.72, 0.75, 0.78)
+COVERED = (0.86, 0.91, 0.96)
+BEST, OTHERS = "#d62728", "white"
+UNKNOWN = "0.85"
 
 
 class Plot(Figure):
@@ -53,18 +59,10 @@ def plot_graph(verdict: Verdict, title: str | None = None) -> Plot:
     lines = unrolled_edges(verdict)
     axes.add_collection(LineCollection(lines, colors=[EDGES], linewidths=1.0, zorder=2))
     centres, covered = verdict.cells.unrolled().centres, verdict.covered
-    axes.scatter(
-        centres[covered, 0], centres[covered, 1], s=14, color=[CENTRES], zorder=3, label="covered"
-    )
+    x, y = centres.T
+    axes.scatter(x[covered], y[covered], s=14, color=[CENTRES], zorder=3, label="covered")
     if not covered.all():
-        axes.scatter(
-            centres[~covered, 0],
-            centres[~covered, 1],
-            s=30,
-            color=[MISSED],
-            zorder=3,
-            label="not covered",
-        )
+        axes.scatter(x[~covered], y[~covered], s=30, color=[MISSED], zorder=3, label="not covered")
     _mark_start(axes, verdict)
     figure.legend(loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -82,19 +80,14 @@ def plot_causes(verdict: Verdict, title: str | None = None) -> Plot:
 
     figure, axes = _over_parameters(verdict, title)
     outlines = verdict.cells.unrolled().outlines
-    handles = [Patch(color=(0.86, 0.91, 0.96), label=f"covered ({verdict.n_covered})")]
-    axes.add_collection(
-        PolyCollection(
-            [outlines[k] for k in np.flatnonzero(verdict.covered)],
-            facecolors=[(0.86, 0.91, 0.96)],
-            edgecolors="w",
-        )
-    )
+    groups = [("covered", COVERED, np.flatnonzero(verdict.covered))]
     for kind, cells in missed_by_cause(verdict).items():
-        colour = MISSED if kind is None else CAUSES[kind]
         words = "cause not known" if kind is None else kind.replace("_", " ")
-        missed = [outlines[k] for k in cells]
-        axes.add_collection(PolyCollection(missed, facecolors=[colour], edgecolors="w"))
+        groups.append((words, MISSED if kind is None else CAUSES[kind], cells))
+    handles = []
+    for words, colour, cells in groups:
+        shapes = [outlines[k] for k in cells]
+        axes.add_collection(PolyCollection(shapes, facecolors=[colour], edgecolors="w"))
         handles.append(Patch(color=colour, label=f"{words} ({len(cells)})"))
     _mark_start(axes, verdict)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
@@ -135,24 +128,21 @@ def plot_transition(verdict: Verdict, edge: tuple[int, int] | None = None) -> Pl
         for end in (0, -1):  # a single dot in its cell is easily lost
             if mask[end]:
                 axes.plot(x[end], y[end], "s", color=colour, markeredgecolor="k", zorder=3)
-    axes.set_xlabel(_joint_label(verdict, first))
-    axes.set_ylabel(_joint_label(verdict, second))
-    axes.set_title(
-        f"From E-cell {_name(verdict.cells, a)} to {_name(verdict.cells, b)}: "
-        f"{len(motion)} configurations"
-    )
+    axes.set(xlabel=_joint_label(verdict, first), ylabel=_joint_label(verdict, second))
+    ends = f"{_name(verdict.cells, a)} to {_name(verdict.cells, b)}"
+    axes.set_title(f"From E-cell {ends}: {len(motion)} configurations")
     axes.legend(frameon=False)
     axes.grid(alpha=0.3)
     return figure
 
 
-def cells_below(verdict: Verdict, walk: NDArray[np.float64]) -> NDArray[np.int64]:
+def cells_below(verdict: Verdict, walk: Array) -> NDArray[np.int64]:
     """The cell (k,) below the tool point at each row of a walk (k, n); -1 off the patch."""
     points, _ = Kinematics(verdict.robot).tools(walk)
     return verdict.cells.locate(points)
 
 
-def unrolled_edges(verdict: Verdict) -> list[NDArray[np.float64]]:
+def unrolled_edges(verdict: Verdict) -> list[Array]:
     """The edges of G over the parameters, as drawn: lines (2, 2) of (v, u) in degrees or metres.
 
     An edge across the seam of a closed patch becomes two lines, one at either border.
@@ -178,7 +168,6 @@ def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
 
     A mesh has none; it is drawn flat, with equal scales.
     """
-    surface = verdict.cells.surface
     figure = Plot(figsize=(6.4, 5.2), layout="constrained")
     axes = figure.add_subplot()
     flat = verdict.cells.unrolled()
@@ -190,14 +179,9 @@ def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
             figure.set_figheight(float(np.clip(5.6 * height / width + 1.3, 2.8, 7.0)))
         axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
         axes.set_ylim(corners[:, 1].max(), corners[:, 1].min())
-    axes.set_xlabel(flat.labels[0])
-    axes.set_ylabel(flat.labels[1])
-    edges = verdict.n_edges
-    axes.set_title(
-        title
-        or f"{verdict.robot.name} on a {surface.kind}: {verdict.n_covered} of "
-        f"{len(verdict.cells)} cells, {edges} edges"
-    )
+    covered = f"{verdict.n_covered} of {len(verdict.cells)} cells, {verdict.n_edges} edges"
+    axes.set(xlabel=flat.labels[0], ylabel=flat.labels[1])
+    axes.set_title(title or f"{verdict.robot.name} on a {verdict.cells.surface.kind}: {covered}")
     return figure, axes
 
 
@@ -219,9 +203,9 @@ def _edge(verdict: Verdict, edge: tuple[int, int] | None) -> tuple[int, int]:
         for a, b, motion in verdict.graph.edges(data="motion")
         if motion is not None and len(motion)
     }
+    if edge is None and not edges:
+        raise ArgumentError("the verdict's graph has no edge with a motion to draw")
     if edge is None:
-        if not edges:
-            raise ArgumentError("the verdict's graph has no edge with a motion to draw")
         return max(edges, key=lambda key: float(np.sort(np.ptp(edges[key], axis=0))[-2:].min()))
     key = (min(edge), max(edge))
     if key not in edges:
@@ -241,3 +225,73 @@ def _joint_label(verdict: Verdict, joint: int) -> str:
     """A joint's name with its unit; a dollar sign in it is no mathematics."""
     name = verdict.robot.joint_names[joint].replace("$", r"\$")
     return f"{name} ({'mm' if verdict.robot.prismatic[joint] else 'degrees'})"
+
+
+def plot_map(
+    charted: PlacementMap,
+    placements: Placements | None = None,
+    value: Literal["share", "margin"] = "share",
+    title: str | None = None,
+) -> Plot:
+    """Covered share, or margin, over two axes; one panel for each value along a third.
+
+    Args:
+        charted: the map.
+        placements: its feasible placements are marked, each in the panel nearest to it.
+        value: what the colours show.
+        title: above the figure.
+    """
+    values = getattr(charted, value).reshape(*charted.share.shape[:2], -1)
+    panels = charted.ticks[2] if len(charted.ticks) > 2 else np.zeros(1)
+    figure = Plot(figsize=(1.2 + 3.4 * len(panels), 3.6), layout="constrained")
+    grid = figure.subplots(1, len(panels), squeeze=False, sharex=True, sharey=True)[0]
+    most = 1.0 if value == "share" else max(float(np.nanmax(values, initial=0.0)), 1e-9)
+    for k, axes in enumerate(grid):
+        axes.set_facecolor(UNKNOWN)
+        drawn = axes.pcolormesh(
+            _edges(charted.ticks[0]), _edges(charted.ticks[1]), values[:, :, k].T,
+            vmin=0.0, vmax=most, cmap="viridis", rasterized=True,
+        )  # fmt: skip
+        axes.set_xlabel(_label(charted.axes[0]))
+        if len(charted.ticks) > 2:
+            name, unit = _name_and_unit(charted.axes[2])
+            axes.set_title(f"{name} {panels[k]:.3g} {unit}")
+    grid[0].set_ylabel(_label(charted.axes[1]))
+    if placements is not None:
+        _mark(grid, charted, placements)
+    what = "share of the area in one motion" if value == "share" else "margin"
+    figure.colorbar(drawn, ax=list(grid), label=what)
+    if title:
+        figure.suptitle(title)
+    return figure
+
+
+def _mark(grid: Array, charted: PlacementMap, placements: Placements) -> None:
+    """The best as a star, other feasible placements as dots."""
+    where = [AXES.index(name) for name in charted.axes]
+    for rank, trial in enumerate(placements.found):
+        place = trial.pose.values[where]
+        panel = int(np.abs(charted.ticks[2] - place[2]).argmin()) if len(place) > 2 else 0
+        axes: Axes = grid[panel]
+        if rank == 0:
+            axes.plot(*place[:2], "*", color=BEST, markersize=15, markeredgecolor="white", zorder=3)
+        else:
+            axes.plot(*place[:2], "o", color=OTHERS, markersize=5, markeredgecolor="black")
+
+
+def _edges(ticks: Array) -> Array:
+    """Borders of the fields around some places."""
+    if len(ticks) == 1:
+        return ticks[0] + np.array([-0.5, 0.5])
+    middles = 0.5 * (ticks[:-1] + ticks[1:])
+    return np.concatenate([[ticks[0]], middles, [ticks[-1]]])
+
+
+def _label(axis: str) -> str:
+    """An axis with its unit."""
+    return "{} ({})".format(*_name_and_unit(axis))
+
+
+def _name_and_unit(axis: str) -> tuple[str, str]:
+    """An axis of a region, and 'm' or 'deg'."""
+    return axis.removesuffix("_deg"), "deg" if axis.endswith("_deg") else "m"

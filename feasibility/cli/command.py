@@ -1,0 +1,193 @@
+"""What commands have in common: arguments, the case they work on, the files they write.
+
+Each module of commands has a function `add(subcommands)` that declares the arguments of its
+commands beside the functions that run them, as `run(arguments, began)` with the time at which the
+program began.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from feasibility.cli.console import Bar, print_err, progress_bar
+from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
+
+if TYPE_CHECKING:
+    from feasibility.cases import Case, Setup
+
+Command = Callable[[argparse.Namespace, float], int]
+
+STATUS = {"feasible": 0, "infeasible": 1, "undecided": 3}
+BAD_INPUT = 2
+
+
+def add_command(
+    subcommands: argparse._SubParsersAction,
+    name: str,
+    run: Command,
+    *arguments: Callable[[argparse.ArgumentParser], None],
+    **texts: Any,
+) -> argparse.ArgumentParser:
+    """Add a command that prints people's text, or JSON with `--json`.
+
+    Args:
+        subcommands: of the command line.
+        name: of the command.
+        run: what it does with its arguments; returns the exit status.
+        arguments: functions that add some, such as `add_case`.
+        texts: `help`, `description`, `epilog`, see `argparse`.
+    """
+    parser: argparse.ArgumentParser = subcommands.add_parser(name, allow_abbrev=False, **texts)
+    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.set_defaults(run=run)
+    for add in arguments:
+        add(parser)
+    return parser
+
+
+def add_case(parser: argparse.ArgumentParser) -> None:
+    """The arguments that every command about one case has."""
+    parser.add_argument("case", metavar="CASE", help="a case file, or a built-in case")
+    parser.add_argument(
+        "--set", dest="settings", metavar="KEY=VALUE", action="append", default=[],
+        help="replace a key of the case, such as task.cone_deg=10; an empty value removes it; "
+        "can be repeated",
+    )  # fmt: skip
+
+
+def add_html(parser: argparse.ArgumentParser, what: str = "one self-contained page") -> None:
+    """The file for a page."""
+    parser.add_argument("--html", metavar="FILE", help=f"write {what}")
+
+
+def add_csv(parser: argparse.ArgumentParser) -> None:
+    """The file for a table."""
+    parser.add_argument("--csv", metavar="FILE", help="write the table")
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Which processes do the work."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("--workers", type=int, metavar="N", help="processes (default: one per core)")
+    group.add_argument("--dask", metavar="ADDRESS", help="a Dask scheduler: tcp://host:8786")
+
+
+def positive(text: str) -> float:
+    """A finite number > 0.
+
+    Raises:
+        ArgumentTypeError: the text is something else.
+    """
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not (math.isfinite(number) and number > 0.0):
+        raise argparse.ArgumentTypeError(f"must be a finite number > 0, got {text!r}")
+    return number
+
+
+@dataclass(frozen=True, slots=True)
+class OpenCase:
+    """A case that a command works on."""
+
+    case: Case
+    setup: Setup
+    progress: Bar
+    """To be called as progress(done, total, text)."""
+    began: float
+    """`time.perf_counter()` when the command began."""
+
+    def so_far(self) -> float:
+        """Seconds since then: called before the search, the time that loading took."""
+        return time.perf_counter() - self.began
+
+
+@contextmanager
+def open_case(
+    args: argparse.Namespace,
+    began: float,
+    outputs: Mapping[str, str | None],
+    only_complete: str = "",
+) -> Iterator[OpenCase]:
+    """Load `args.case` with `args.settings`, print its notes, and show progress meanwhile.
+
+    Args:
+        args: arguments of the command.
+        began: `time.perf_counter()` when the command began.
+        outputs: files by their flag, see `check_outputs`; checked before anything is built.
+        only_complete: why the command refuses the greedy search; empty where it does not.
+
+    Raises:
+        CaseError: the case cannot be used.
+        FileError: an output cannot be written.
+    """
+    with progress_bar() as progress:
+        from coverable_errors import Fault
+        from feasibility.cases import CaseError, load_case
+        from feasibility.notices import compiling_notice
+
+        progress.settle()
+        case = load_case(args.case, args.settings)
+        check_outputs(outputs, args.case)
+        if only_complete and case.search.method != "complete":
+            raise CaseError(Fault("search.method", only_complete), case.name)
+        with compiling_notice():  # cutting a mesh into cells has kernels of its own
+            setup = case.build()
+        progress.settle()
+        for note in setup.robot.notes:
+            print_err(f"note: {setup.robot.name}: {note}")
+        for note in setup.cells.notes:
+            print_err(f"note: {case.surface.label}: {note}")
+        yield OpenCase(case, setup, progress, began)
+
+
+def check_outputs(outputs: Mapping[str, str | None], given: str = "") -> None:
+    """Refuse outputs that cannot be written or would replace the input, before the work.
+
+    Args:
+        outputs: files by their flag, None where there is none.
+        given: what is read: a file, or the name of a built-in case.
+
+    Raises:
+        FileError: with everything that is wrong.
+    """
+    faults, taken = [], dict[str, str]()
+    for flag, path in outputs.items():
+        if path is None:
+            continue
+        try:
+            check_writable(path)
+        except FileError as error:
+            faults.append(f"{flag} {error}")
+        place = os.path.realpath(path)
+        if place in taken and os.path.realpath(os.devnull) != place:
+            faults.append(f"{flag} {shown_path(path)}: is also the file of {taken[place]}")
+        taken[place] = flag
+        if os.path.isfile(given) and os.path.exists(path) and os.path.samefile(given, path):
+            faults.append(f"{flag} {shown_path(path)}: is the input file; give another name")
+    if faults:
+        raise FileError(faults)
+
+
+def write_text(path: str, text: str, what: str) -> None:
+    """Write a file, and report it on stderr as `what`.
+
+    Raises:
+        FileError: the file cannot be written.
+    """
+    write_whole(path, lambda stream: stream.write(text.encode()))
+    print_err(f"{what}: {shown_path(path)}")
+
+
+def json_text(value: dict[str, Any]) -> str:
+    """One JSON object without NaN."""
+    return json.dumps(value, allow_nan=False, indent=2)

@@ -1,0 +1,185 @@
+"""Parts that several answers share: wrapped texts, tables, JSON objects, pages."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+import math
+import re
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from feasibility.results import plain
+from feasibility.verdict import Cause, Certificate
+from feasibility.version import version
+from surfaces import Cells
+
+WIDTH = 100  # columns
+MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m")
+_UNIT = re.compile(r"(?<=\d) (?=(?:deg|mm|m2|m/s|m|s)\b|%)")
+_UNBROKEN = "\u00a0"  # textwrap breaks at plain blanks only
+# Colours that most colour-blind people can tell apart.
+COLOURS = {"feasible": "#1b7f5c", "infeasible": "#c05621", "undecided": "#6b7280"}
+
+
+def filled(head: str, text: str) -> str:
+    """Text behind a head, wrapped and indented, with no number parted from its unit.
+
+    Example:
+        >>> print(filled("path  ", "along " * 13 + "0.1234567890123456 deg"))
+        path  along along along along along along along along along along along along along
+              0.1234567890123456 deg
+    """
+    wrapped = textwrap.fill(
+        _UNIT.sub(_UNBROKEN, text),
+        WIDTH,
+        initial_indent=head,
+        subsequent_indent=" " * len(head),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return wrapped.replace(_UNBROKEN, " ")
+
+
+def summary(head: str, rows: Iterable[tuple[str, str]], width: int = 12) -> list[str]:
+    """The answer in one line, an empty line, and named rows; rows without text are left out."""
+    return [head, "", *(filled(f"  {name:<{width}}", text) for name, text in rows if text)]
+
+
+def aligned(table: Sequence[Sequence[str]], justify: str = "<") -> list[str]:
+    """Rows with columns of equal width, to the left ("<") or to the right (">")."""
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return [
+        "  ".join(f"{cell:{justify}{width}}" for cell, width in zip(row, widths, strict=True))
+        for row in table
+    ]
+
+
+def counted(number: int, noun: str) -> str:
+    """A number of things.
+
+    Example:
+        >>> counted(1, "cell"), counted(1200, "cell")
+        ('1 cell', '1,200 cells')
+    """
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
+def percent(share: float) -> str:
+    """A share, 0 to 1, in percent."""
+    return f"{100.0 * share:.1f} %"
+
+
+def csv_text(rows: Iterable[Iterable[Any]]) -> str:
+    """Rows as CSV; None is an empty field."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    return text.getvalue()
+
+
+def causes_json(causes: Iterable[Cause], cells: Cells) -> list[dict[str, Any]]:
+    """Why each missed cell is missed."""
+    return [
+        {
+            "cell": list(cells.unravel(cause.cell)),
+            "cause": str(cause.kind),
+            "proved": bool(cause.proved),
+            "detail": cause.detail,
+        }
+        for cause in causes
+    ]
+
+
+def certificate_json(certificate: Certificate) -> dict[str, Any]:
+    """What the replay of a motion measured; null where it measured nothing."""
+    return {
+        "waypoints": int(certificate.waypoints),
+        "max_position_error_m": plain(float(certificate.max_position_error)),
+        "max_angle_deg": plain(math.degrees(certificate.max_angle)),
+    }
+
+
+def seconds(
+    timing: Mapping[str, float], middle: Iterable[str], before_s: float
+) -> dict[str, float]:
+    """The times of an answer to microseconds; what passed before it was asked for is loading.
+
+    Args:
+        timing: in seconds, by key.
+        middle: keys between `load_s` and `total_s`; zero where `timing` has none.
+        before_s: seconds of imports and files before.
+    """
+    found = {key: float(timing.get(key, 0.0)) for key in ("load_s", *middle, "total_s")}
+    found |= {key: found[key] + before_s for key in ("load_s", "total_s")}
+    return {key: round(value, 6) for key, value in found.items()}
+
+
+def seconds_text(timing: Mapping[str, float], phases: Mapping[str, str], before_s: float) -> str:
+    """The same times in one line, with the names of the phases by their keys."""
+    times = seconds(timing, phases, before_s)
+    parts = ", ".join(f"{name} {times[key]:.3f}" for key, name in phases.items())
+    return f"{times['total_s']:.2f} s (loading {times['load_s']:.2f}, {parts})"
+
+
+def page(title: str, body: str, note: str) -> str:
+    """One page that fetches nothing.
+
+    Args:
+        title: plain text.
+        body: HTML.
+        note: plain text at the end; the program's version follows.
+    """
+    return _PAGE.format(
+        title=html.escape(title), body=body, note=html.escape(f"{note} coverable {version()}")
+    )
+
+
+def table(heads: Iterable[str], lines: Iterable[Iterable[str]]) -> str:
+    """A table of escaped cells, as HTML."""
+    head = "".join(f"<th>{cell}</th>" for cell in heads)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{cell}</td>" for cell in line) + "</tr>\n" for line in lines
+    )
+    return f"<table>\n<thead><tr>{head}</tr></thead>\n<tbody>\n{body}</tbody>\n</table>\n"
+
+
+_PAGE = """<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>
+body {{ font: 15px/1.45 system-ui, sans-serif; margin: 2.5rem auto; max-width: 66rem;
+  padding: 0 1rem; color: #1f2937; background: #fff; }}
+h1 {{ font-size: 1.35rem; margin-bottom: .3rem; overflow-wrap: anywhere; }}
+h2 {{ font-size: 1.05rem; margin: 1.8rem 0 .4rem; overflow-wrap: anywhere; }}
+p {{ overflow-wrap: anywhere; }}
+table {{ border-collapse: collapse; margin-top: .4rem; width: 100%; }}
+th, td {{ text-align: left; padding: .3rem .8rem .3rem 0; border-bottom: 1px solid #e5e7eb;
+  overflow-wrap: anywhere; }}
+td {{ font-variant-numeric: tabular-nums; }}
+svg {{ max-width: 100%; height: auto; }}
+svg.bars text {{ font: 13px system-ui, sans-serif; fill: #1f2937; }}
+svg.bars text.tick {{ font-size: 11px; fill: #6b7280; }}
+.charts {{ display: flex; flex-wrap: wrap; gap: 1rem; }}
+figure {{ margin: 0; flex: 1 1 26rem; }}
+figcaption {{ color: #4b5563; font-size: .85rem; overflow-wrap: anywhere; }}
+.keys span {{ margin-right: 1.2rem; }}
+.keys i {{ display: inline-block; width: .8rem; height: .8rem; border-radius: 2px;
+  margin-right: .35rem; }}
+.bar {{ display: block; width: 9rem; height: .7rem; background: #eef0f3; }}
+.bar b {{ display: block; height: 100%; background: #4b7fb3; }}
+iframe {{ width: 100%; height: 620px; border: 1px solid #e5e7eb; }}
+footer {{ margin-top: 1.8rem; color: #6b7280; font-size: .85rem; }}
+@media print {{ h2, table, figure {{ break-inside: avoid; }} }}
+</style>
+</head>
+<body>
+<h1>{title}</h1>
+{body}<footer>{note}</footer>
+</body>
+</html>
+"""
