@@ -21,9 +21,7 @@ from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
     from feasibility.paths import Order
-    from feasibility.sensitivity import Explanation
     from feasibility.verdict import Verdict
-    from feasibility.viewer import View
 
 ORDERS = ("rows", "columns", "spiral", "shortest")
 STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
@@ -253,23 +251,16 @@ def explain(args: argparse.Namespace, began: float) -> int:
         from feasibility.sensitivity import explain as run
 
         explanation = run(*opened.setup, progress=opened.progress)
-    name = opened.case.name
+    name, verdict = opened.case.name, explanation.verdict
     if args.json:
         print_out(json_text(report.as_json(explanation, name)))
     else:
         print_out(report.as_text(explanation, name))
     if args.html is not None:
-        write_text(args.html, _explained(explanation, name).html(), "view")
-    return STATUS[str(explanation.verdict.answer)]
+        from feasibility.viewer import view
 
-
-def _explained(explanation: Explanation, name: str) -> View:
-    """The verdict's view, with the thresholds in its legend."""
-    from feasibility.reports import explanation as report
-    from feasibility.viewer import view
-
-    drawn = view(explanation.verdict, name)
-    feasible = explanation.verdict.feasible
-    helps = [report.sentence(t, feasible) for t in explanation.thresholds if t.feasible is not None]
-    text = " · ".join([drawn.legend.text, *helps])
-    return replace(drawn, legend=replace(drawn.legend, text=text))
+        drawn = view(verdict, name)
+        text = " · ".join([drawn.legend.text, *report.helpful(explanation)])
+        drawn = replace(drawn, legend=replace(drawn.legend, text=text))
+        write_text(args.html, drawn.html(), "view")
+    return STATUS[str(verdict.answer)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
@@ -60,14 +61,11 @@ def robot_rows() -> list[dict[str, Any]]:
     rows = []
     for info in list_robots():
         robot = load_robot(info.name)
+        ends = (robot.lower.tolist(), robot.upper.tolist())
         joints = [
             {"name": name, "kind": kind, **_limits(kind, low, high)}
             for name, kind, low, high in zip(
-                robot.joint_names,
-                robot.joint_kinds,
-                robot.lower.tolist(),
-                robot.upper.tolist(),
-                strict=True,
+                robot.joint_names, robot.joint_kinds, *ends, strict=True
             )
         ]
         rows.append(
@@ -88,13 +86,8 @@ def _limits(kind: str, low: float, high: float) -> dict[str, Any]:
     """Limits of one joint in degrees or metres; null where it turns freely."""
     unit = "m" if kind == "prismatic" else "deg"
     ends = (low, high) if kind == "prismatic" else (math.degrees(low), math.degrees(high))
-    free = not any(map(math.isfinite, ends))
-    return {f"limits_{unit}": None if free else [_finite(end) for end in ends]}
-
-
-def _finite(end: float) -> float | None:
-    """A limit, null where there is none on this side."""
-    return round(end, 9) if math.isfinite(end) else None
+    found = [round(end, 9) if math.isfinite(end) else None for end in ends]
+    return {f"limits_{unit}": None if found == [None, None] else found}
 
 
 def cases_table(rows: Sequence[dict[str, Any]]) -> str:
@@ -103,10 +96,7 @@ def cases_table(rows: Sequence[dict[str, Any]]) -> str:
         ["case", "robot", "limits", "surface", "cells", "cone", "description"],
         [
             [
-                row["name"],
-                row["robot"],
-                row["limits"],
-                row["surface"],
+                *(row[key] for key in ("name", "robot", "limits", "surface")),
                 " x ".join(map(str, row["cells"])),
                 f"{row['cone_deg']:g} deg",
                 row["description"],
@@ -135,11 +125,9 @@ def robots_table(rows: Sequence[dict[str, Any]]) -> str:
 
 def _kinds(joints: Sequence[dict[str, Any]]) -> str:
     """'6' or '6 (3 continuous)'."""
-    kinds = [joint["kind"] for joint in joints]
-    special = [
-        f"{kinds.count(kind)} {kind}" for kind in ("continuous", "prismatic") if kind in kinds
-    ]
-    return f"{len(kinds)}" + (f" ({', '.join(special)})" if special else "")
+    kinds = Counter(joint["kind"] for joint in joints)
+    special = [f"{kinds[kind]} {kind}" for kind in ("continuous", "prismatic") if kinds[kind]]
+    return f"{len(joints)}" + (f" ({', '.join(special)})" if special else "")
 
 
 def _limits_text(joint: dict[str, Any]) -> str:

@@ -119,9 +119,11 @@ def run_place(args: argparse.Namespace, began: float) -> int:
 
 def _ranges(args: argparse.Namespace) -> dict[str, Any]:
     """The ranges given, by the names of the region's axes."""
-    names = {name: name if unit == "m" else f"{name}_deg" for name, unit in AXES.items()}
-    given = {axis: getattr(args, name) for name, axis in names.items()}
-    return {axis: value for axis, value in given.items() if value is not None}
+    return {
+        name if unit == "m" else f"{name}_deg": getattr(args, name)
+        for name, unit in AXES.items()
+        if getattr(args, name) is not None
+    }
 
 
 def _picture(path: str) -> str:
@@ -131,10 +133,8 @@ def _picture(path: str) -> str:
         ArgumentTypeError: the name has another ending.
     """
     if not path.lower().endswith(PICTURES):
-        raise argparse.ArgumentTypeError(
-            f"{shown_path(path)} is no kind of picture; expected a name that ends in "
-            f"{', '.join(PICTURES)}"
-        )
+        wanted = f"expected a name that ends in {', '.join(PICTURES)}"
+        raise argparse.ArgumentTypeError(f"{shown_path(path)} is no kind of picture; {wanted}")
     return path
 
 

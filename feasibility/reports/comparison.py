@@ -99,10 +99,8 @@ def headline(comparison: Comparison) -> str:
     name = comparison.case
     if not able:
         best = comparison.ranked[0]
-        return (
-            f"{name}: none of {number} robots covers the whole surface in one motion; {best.robot} "
-            f"covers most, {percent(best.share)} of the area"
-        )
+        most = f"{best.robot} covers most, {percent(best.share)} of the area"
+        return f"{name}: none of {number} robots covers the whole surface in one motion; {most}"
     cover = f"cover{'s' if len(able) == 1 else ''} the whole surface in one motion"
     return f"{name}: {len(able)} of {number} robots {cover}: {', '.join(able)}"
 

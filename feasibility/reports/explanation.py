@@ -46,6 +46,12 @@ def as_text(explanation: Explanation, case_name: str) -> str:
     return "\n".join(lines)
 
 
+def helpful(explanation: Explanation) -> list[str]:
+    """The thresholds at which a feasible value was found, a sentence each."""
+    feasible = explanation.verdict.feasible
+    return [sentence(t, feasible) for t in explanation.thresholds if t.feasible is not None]
+
+
 def _unknown(explanation: Explanation) -> str:
     """Which thresholds the time limit left no time for."""
     names, number = ", ".join(explanation.left_out), len(explanation.left_out)
@@ -187,9 +193,8 @@ def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
         "covered": verdict.n_covered,
         "thresholds": [_threshold(t, verdict.feasible) for t in explanation.thresholds],
         "not_looked_at": list(explanation.left_out),
-        "dropped": None
-        if dropped is None
-        else {
+        "dropped": dropped
+        and {
             "cells": [list(verdict.cells.unravel(int(k))) for k in dropped.cells],
             "area_m2": dropped.area,
             "share": dropped.share,
@@ -216,9 +221,8 @@ def _threshold(threshold: Threshold, tightened: bool) -> dict[str, Any]:
         **found,
         "feasible": _finding(quantity, threshold.feasible),
         "other": _finding(quantity, threshold.other),
-        "until": None
-        if span is None
-        else {
+        "until": span
+        and {
             "feasible": _finding(quantity, span.feasible),
             "other": _finding(quantity, span.other),
         },

@@ -40,9 +40,7 @@ def settings_of(pose: Pose) -> list[str]:
 
 
 def as_json(
-    placements: Placements,
-    plan: StationPlan | None = None,
-    chart: PlacementMap | None = None,
+    placements: Placements, plan: StationPlan | None = None, chart: PlacementMap | None = None
 ) -> dict[str, Any]:
     """Placements as the object that `coverable place --json` prints.
 
@@ -118,11 +116,7 @@ def _nulled(values: Array, unknown: NDArray[Any]) -> Any:
     return plain.tolist()
 
 
-def as_text(
-    placements: Placements,
-    case: str = "",
-    plan: StationPlan | None = None,
-) -> str:
+def as_text(placements: Placements, case: str = "", plan: StationPlan | None = None) -> str:
     """Placements for people: the answer, where the surface can stand, or why it cannot."""
     proved = placements.answer is Answer.INFEASIBLE and placements.evidence == "proof"
     ranges = [
@@ -137,6 +131,9 @@ def as_text(
             if proved
             else "placements sampled over the region and refined; one between them may be feasible"
         )
+    why = "no placement was searched"
+    if placements.evidence is Evidence.PROOF:
+        why = "placements that the reach bound rules out are not searched"
     missed = [(CauseKind(kind), number) for kind, number in placements.causes.items()]
     checked = placements.trials[0].message if placements.trials else ""
     rows = [
@@ -146,7 +143,7 @@ def as_text(
         ("found", _found_text(placements)),
         ("cause", "" if placements.cause is None else CAUSES[placements.cause]),
         ("missed", "; ".join(f"{counted(n, 'cell')}: {CAUSES[k]}" for k, n in missed)),
-        ("share", "" if _searched(placements.best) else _unsearched_text(placements)),
+        ("share", "" if _searched(placements.best) else f"not known: {why}"),
         ("check", "" if placements.found or not checked else f"of the best: {checked}"),
         ("time", _time_text(placements)),
     ]
@@ -186,13 +183,6 @@ def _found_text(placements: Placements) -> str:
     )
 
 
-def _unsearched_text(placements: Placements) -> str:
-    """Why it is not known what share could be covered."""
-    if placements.evidence is Evidence.PROOF:
-        return "not known: placements that the reach bound rules out are not searched"
-    return "not known: no placement was searched"
-
-
 def _table(trials: Sequence[Trial]) -> list[str]:
     """Placements as aligned lines; the margins only where there are some."""
     heads = ["x (m)", "y (m)", "z (m)", "roll", "pitch", "yaw (deg)", "share"]
@@ -201,10 +191,8 @@ def _table(trials: Sequence[Trial]) -> list[str]:
     for trial in trials:
         row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
         row.append(percent(trial.share))
-        margins = trial.margins
-        if margins is not None:
-            shares = (margins.least, margins.limits, margins.cone, margins.reach)
-            row += [f"{v:.3f}" for v in shares]
+        if (m := trial.margins) is not None:
+            row += [f"{v:.3f}" for v in (m.least, m.limits, m.cone, m.reach)]
         rows.append(row + ["-"] * (len(rows[0]) - len(row)))
     return [f"  {line}" for line in aligned(rows, ">")]
 
@@ -221,17 +209,14 @@ def _stations_text(plan: StationPlan) -> list[str]:
     where = f", at {counted(poses, 'placement')}" if poses < number else ""
     lines = [f"{counted(number, 'station')}{where} ({proof}):"]
     for station, trial, refusal in zip(stations.stations, plan.trials, plan.refusals, strict=True):
-        lines.append(
-            f"  {len(station.cells):5d} cell{'' if len(station.cells) == 1 else 's'} at "
-            f"{', '.join(f'{v:.3f}' for v in trial.pose.position)} m, "
-            f"{', '.join(f'{v:.2f}' for v in trial.pose.rpy_deg)} deg"
-            + (f" (not certified: {refusal})" if refusal else "")
-        )
-    if len(stations.left_out):
-        lines.append(
-            f"  {len(stations.left_out):5d} cells are covered at no placement that was tried"
-        )
-    return lines
+        cells = f"{len(station.cells):5d} cell{'' if len(station.cells) == 1 else 's'}"
+        position = ", ".join(f"{v:.3f}" for v in trial.pose.position)
+        angles = ", ".join(f"{v:.2f}" for v in trial.pose.rpy_deg)
+        refused = f" (not certified: {refusal})" if refusal else ""
+        lines.append(f"  {cells} at {position} m, {angles} deg{refused}")
+    missed = len(stations.left_out)
+    nowhere = f"  {missed:5d} cells are covered at no placement that was tried"
+    return [*lines, nowhere] if missed else lines
 
 
 def as_csv(placements: Placements) -> str:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from feasibility.reports.parts import COLOURS
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from feasibility.studies import Row
@@ -31,12 +32,10 @@ ROUNDING = 1e-6  # [%]: shares are written rounded down, so that 100 means all
 
 
 class Chart(NamedTuple):
-    """One picture."""
+    """One picture: plain text, and an SVG element for a page."""
 
     caption: str
-    """Plain text."""
     svg: str
-    """An element for a page."""
 
 
 class Charts(NamedTuple):
@@ -129,8 +128,8 @@ def _share_chart(label: str, values: NDArray[np.float64], rows: Sequence[Row]) -
     """The share of every row over one number, and the best and the mean share at each value."""
     share = _shares(rows)
     verdicts = np.array([str(row.result["verdict"]) for row in rows])
-    figure, ends = _figure(), np.unique(values)
-    axes = figure.add_subplot(xlabel=worded(label), ylabel="covered in one motion (%)")
+    ends = np.unique(values)
+    figure, axes = _axes(worded(label), "covered in one motion (%)")
     axes.set_ylim(-4.0, 104.0)
     axes.grid(color="0.92")
     for verdict, colour in COLOURS.items():
@@ -156,8 +155,7 @@ def _map_chart(
 ) -> Chart:
     """The share over two numbers: fields with the best of each pair of values, or dots."""
     across, up = (np.unique(part) for part in values)
-    figure = _figure()
-    axes = figure.add_subplot(xlabel=worded(labels[0]), ylabel=worded(labels[1]))
+    figure, axes = _axes(worded(labels[0]), worded(labels[1]))
     scale: dict[str, Any] = {"vmin": 0.0, "vmax": 100.0, "cmap": "viridis"}
     caption = f"over {worded(labels[0])} and {worded(labels[1])}"
     caption += f", {words}" if words else ""
@@ -172,11 +170,12 @@ def _map_chart(
         _ticks(axes.set_yticks, up)
         for (j, i), value in np.ndenumerate(fields if fields.size <= WRITTEN else np.empty((0, 0))):
             if np.isfinite(value):
-                colour = "black" if value > 60 else "white"
-                axes.text(
-                    i, j, f"{int(value + ROUNDING)}", ha="center", va="center", color=colour,
-                    fontsize=8,
-                )  # fmt: skip
+                style = {
+                    "ha": "center",
+                    "va": "center",
+                    "color": "black" if value > 60 else "white",
+                }
+                axes.text(i, j, f"{int(value + ROUNDING)}", fontsize=8, **style)
         caption = f"Best covered share {caption}"
     else:
         order = np.argsort(share, kind="stable")  # the best on top
@@ -196,11 +195,12 @@ def _ticks(put: Any, values: NDArray[np.float64]) -> None:
     put(places, [f"{value:.4g}" for value in values[places]])
 
 
-def _figure() -> Figure:
-    """An empty figure."""
+def _axes(xlabel: str, ylabel: str) -> tuple[Figure, Axes]:
+    """An empty figure with named axes."""
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
+    figure = Figure(figsize=(WIDTH, HEIGHT), layout="constrained")
+    return figure, figure.add_subplot(xlabel=xlabel, ylabel=ylabel)
 
 
 def _svg(figure: Figure, salt: str) -> str:
