@@ -170,12 +170,9 @@ def _map_chart(
         _ticks(axes.set_yticks, up)
         for (j, i), value in np.ndenumerate(fields if fields.size <= WRITTEN else np.empty((0, 0))):
             if np.isfinite(value):
-                style = {
-                    "ha": "center",
-                    "va": "center",
-                    "color": "black" if value > 60 else "white",
-                }
-                axes.text(i, j, f"{int(value + ROUNDING)}", fontsize=8, **style)
+                style: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8}
+                style["color"] = "black" if value > 60 else "white"
+                axes.text(i, j, f"{int(value + ROUNDING)}", **style)
         caption = f"Best covered share {caption}"
     else:
         order = np.argsort(share, kind="stable")  # the best on top
