@@ -54,10 +54,6 @@ def add(subcommands: argparse._SubParsersAction) -> None:
 def study(args: argparse.Namespace, began: float) -> int:
     """`coverable study FILE --out OUT`: every case of a study, stored as they finish.
 
-    Args:
-        args: file, out, workers, dask, json, csv, html.
-        began: `time.perf_counter()` when the command began.
-
     Returns:
         0; 3 where some cases failed.
     """
@@ -92,12 +88,7 @@ def study(args: argparse.Namespace, began: float) -> int:
 
 
 def compare(args: argparse.Namespace, began: float) -> int:
-    """`coverable compare CASE --robots a,b,c`: one case, one arm after the other.
-
-    Args:
-        args: case, settings, robots, critical, workers, dask, json, csv, html.
-        began: `time.perf_counter()` when the command began.
-    """
+    """`coverable compare CASE --robots a,b,c`: one case, one arm after the other."""
     from feasibility.cases import load_case
     from feasibility.reports import comparison as report
     from feasibility.studies import compare as run

@@ -108,13 +108,7 @@ def _move_json(move: Reconfiguration, k: int) -> dict[str, Any]:
 
 
 def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
-    """The division for people: the answer, the patches and moves in order, what is left out.
-
-    Args:
-        division: the division.
-        title: the case's name and description.
-        before_s: as in `as_json`.
-    """
+    """The division for people: the answer, the patches and moves in order, what is left out."""
     head = SENTENCES[answer_of(division)]
     if division.decided and not division.patches and len(division.cells):
         head = NOTHING

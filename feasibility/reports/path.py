@@ -63,13 +63,7 @@ def as_json(
 
 
 def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[str, Any]:
-    """What `coverable path --json` prints where there is no path: the verdict's object, and why.
-
-    Args:
-        verdict: infeasible or undecided.
-        reason: one sentence.
-        before_s: as in the verdict's `as_json`.
-    """
+    """What `coverable path --json` prints where there is no path: the verdict's object, and why."""
     return verdict_json(verdict, before_s) | {"message": reason, "trajectory": None}
 
 

@@ -42,13 +42,7 @@ def settings_of(pose: Pose) -> list[str]:
 def as_json(
     placements: Placements, plan: StationPlan | None = None, chart: PlacementMap | None = None
 ) -> dict[str, Any]:
-    """Placements as the object that `coverable place --json` prints.
-
-    Args:
-        placements: the answer.
-        plan: the fewest stations, where they were asked for.
-        chart: the map, where it was asked for.
-    """
+    """Placements as the object that `coverable place --json` prints, with stations and map."""
     best = placements.best
     return {
         "answer": str(placements.answer),

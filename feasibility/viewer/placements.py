@@ -103,9 +103,7 @@ def view_study(
         tasks: of the study.
         rows: their outcomes, in the same order.
         name: of the study, for the title.
-        progress: of the search for the best row's motion.
-        play: start the motion when the page opens.
-        at: as in `view_placements`.
+        progress, play, at: as in `view_placements`.
 
     Raises:
         ArgumentError: there are no rows, or not one for each task.

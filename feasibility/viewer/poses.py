@@ -120,13 +120,7 @@ def class_of_row(row: Row) -> Class:
 
 
 def best_layers(cells: Cells, best: Tried, motion: Motion | None) -> list[Layer]:
-    """The best placement as a surface with its cells, what is covered there, and the tool's path.
-
-    Args:
-        cells: at the best placement.
-        best: its outcome.
-        motion: that covers it, or None.
-    """
+    """The cells at the best placement, what is covered there, and the path of a covering motion."""
     if len(cells) == 0:
         return []
     surface, *marks = cells_layers(cells)
