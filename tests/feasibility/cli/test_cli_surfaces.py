@@ -92,7 +92,7 @@ def test_a_mesh_may_stay_undecided_or_be_misread(ask, tmp_path):
     assert (status, out) == (2, "")
     assert "search.method" in err
     status, out, err = ask("check", case, "--set", "surface.cells=[3, 4]")
-    assert (status, out, "one whole number" in err) == (2, "", True)
+    assert (status, out, "a whole number in 1 .. 20,000" in err) == (2, "", True)
 
 
 def test_settings_cut_a_mesh_anew(ask, tmp_path):
