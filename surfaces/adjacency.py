@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Clockwise from the upper left; row = u grows downwards, column = v grows to the right.
-_TOP = ((-1, -1), (-1, 0), (-1, 1))
-_RIGHT = ((0, 1),)
-_BOTTOM = ((1, 1), (1, 0), (1, -1))
-_LEFT = ((0, -1),)
+_CLOCKWISE = (
+    ((-1, -1), (-1, 0), (-1, 1)),
+    ((0, 1),),
+    ((1, 1), (1, 0), (1, -1)),
+    ((0, -1),),
+)  # above, right, below, left
 
 
 class Neighbours(NamedTuple):
@@ -77,64 +79,49 @@ def grid_neighbours(
             number is odd, and one more on each side.
     """
     i, j = np.divmod(np.arange(rows * columns, dtype=np.int64), max(columns, 1))
-    slots = [
-        *_vertical(i, j, rows, columns, closed, _TOP, i == 0, poles[0]),
-        *(_step(i, j, rows, columns, closed, offset) for offset in _RIGHT),
-        *_vertical(i, j, rows, columns, closed, _BOTTOM, i == rows - 1, poles[1]),
-        *(_step(i, j, rows, columns, closed, offset) for offset in _LEFT),
-    ]
-    table = np.stack(slots, axis=1)
+
+    def step(offset: tuple[int, int]) -> NDArray[np.int64]:
+        """Flat index one offset further, across closed seams; -1 where the grid ends."""
+        row, column = i + offset[0], j + offset[1]
+        if closed[0]:
+            row = row % max(rows, 1)
+        if closed[1]:
+            column = column % max(columns, 1)
+        there = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+        return np.where(there, row * columns + column, -1)
+
+    top, right, bottom, left = ([step(offset) for offset in slots] for slots in _CLOCKWISE)
+    if poles[0]:
+        top = _over_pole(i, j, columns, top, i == 0, upper=True)
+    if poles[1]:
+        bottom = _over_pole(i, j, columns, bottom, i == rows - 1, upper=False)
+    table = np.stack([*top, *right, *bottom, *left], axis=1)
     valid = (table >= 0) & (table != np.arange(rows * columns)[:, None])
     if any(closed) or any(poles):  # only then can one cell be met twice
         for later in range(1, table.shape[1]):
-            for earlier in range(later):
-                valid[:, later] &= table[:, later] != table[:, earlier]
-    indptr = np.zeros(rows * columns + 1, dtype=np.int64)
-    np.cumsum(valid.sum(axis=1), out=indptr[1:])
+            valid[:, later] &= (table[:, [later]] != table[:, :later]).all(axis=1)
+    indptr = np.concatenate([[0], np.cumsum(valid.sum(axis=1))])
     return Neighbours(indptr, table[valid])
 
 
-def _step(
+def _over_pole(
     i: NDArray[np.int64],
     j: NDArray[np.int64],
-    rows: int,
     columns: int,
-    closed: tuple[bool, bool],
-    offset: tuple[int, int],
-) -> NDArray[np.int64]:
-    """Flat index one offset further, across closed seams; -1 where the grid ends."""
-    row, column = i + offset[0], j + offset[1]
-    if closed[0]:
-        row = row % max(rows, 1)
-    if closed[1]:
-        column = column % max(columns, 1)
-    there = (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
-    return np.where(there, row * columns + column, -1)
-
-
-def _vertical(
-    i: NDArray[np.int64],
-    j: NDArray[np.int64],
-    rows: int,
-    columns: int,
-    closed: tuple[bool, bool],
-    offsets: tuple[tuple[int, int], ...],
+    plain: list[NDArray[np.int64]],
     last: NDArray[np.bool_],
-    pole: bool,
+    upper: bool,
 ) -> list[NDArray[np.int64]]:
-    """Slots of the neighbours above or below, clockwise, and across the pole if there is one.
+    """Slots of the neighbours above or below, clockwise; in the last row those across the pole.
 
     Walking clockwise around a cell at the upper pole, one meets the columns across it in falling
     order; at the lower pole in rising order.
     """
-    plain = [_step(i, j, rows, columns, closed, offset) for offset in offsets]
-    if not pole:
-        return plain
     half = columns // 2
     across = [half - 1, half, half + 1] + ([half + 2] if columns % 2 else [])
-    if offsets is _TOP:
+    if upper:
         across.reverse()
-    plain += [np.full_like(i, -1)] * (len(across) - len(plain))
+    plain = plain + [np.full_like(i, -1)] * (len(across) - len(plain))
     return [
         np.where(last, i * columns + (j + shift) % max(columns, 1), slot)
         for shift, slot in zip(across, plain, strict=True)

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from surfaces.surface import Protected
+
 Array = NDArray[np.float64]
 
 STOPPED = 1e-3  # [1] a parallel curve this much slower than the curve counts as stopped
@@ -22,7 +24,7 @@ PLACES = 3  # along a piece, where its slopes are computed
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class CellCurves:
+class CellCurves(Protected):
     """One curve for each of M neighbouring pairs (i, j) of cells, from centre i to centre j."""
 
     first: NDArray[np.int64]
@@ -35,11 +37,6 @@ class CellCurves:
     """(M, 2) how far point (m) and normal (1) deviate from the surface's own, at most."""
     rests: NDArray[np.bool_]
     """(P,) pieces at an end of which the point is at rest, next to a crease of a mesh."""
-
-    def __post_init__(self) -> None:
-        """Write-protect the arrays."""
-        for name in ("first", "cubics", "derivative_bounds", "deviations", "rests"):
-            getattr(self, name).flags.writeable = False
 
     def __len__(self) -> int:
         """Number of curves."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from collections.abc import Iterable
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
-from surfaces.surface import Surface
+from surfaces.surface import Protected, Surface
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -45,7 +46,7 @@ class Unrolled(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cells(ABC):
+class Cells(Protected, ABC):
     """N cells of one surface, numbered from 0. Cells are values; they pickle."""
 
     surface: Surface
@@ -57,19 +58,6 @@ class Cells(ABC):
     """(N,) m^2."""
     shape: tuple[int, ...]
     """How cells are counted: (nu, nv) for a grid, (N,) for the cells of a mesh."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the arrays."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                array = np.array(value)
-                array.flags.writeable = False
-                object.__setattr__(self, field.name, array)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor; what is derived is derived again."""
-        return (type(self), tuple(getattr(self, field.name) for field in fields(self)))
 
     def __len__(self) -> int:
         """Number of cells."""
@@ -212,8 +200,8 @@ class Cells(ABC):
     def unrolled(self) -> Unrolled:
         """The cells laid flat, for pictures on paper."""
 
-    def seen_from_outside(self) -> tuple[Array, Array]:
-        """Axes (3, 2) of a picture along the mean normal, x right and y down, and its middle (3,).
+    def seen_from_outside(self, outlines: Iterable[Array]) -> Unrolled:
+        """The picture along the mean normal, x right and y down, from N outlines (k, 3) m.
 
         Of a closed surface, whose mean normal is near zero, along its least extent.
         """
@@ -225,7 +213,13 @@ class Cells(ABC):
         flatter = (axis - (axis @ up) * up for axis in axes[:2])
         right = next(axis for axis in flatter if np.linalg.norm(axis) > 1e-6)
         right = right / np.linalg.norm(right)
-        return np.column_stack([right, -np.cross(up, right)]), middle
+        flat = np.column_stack([right, -np.cross(up, right)])
+        return Unrolled(
+            centres=(self.centres - middle) @ flat,
+            outlines=tuple((line - middle) @ flat for line in outlines),
+            labels=("along (m)", "across (m)"),
+            turns=(np.inf, np.inf),
+        )
 
     @abstractmethod
     def unravel(self, k: int) -> tuple[int, ...]:

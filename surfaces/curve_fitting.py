@@ -64,7 +64,8 @@ class CurveFit:
                 fine = 2 * np.ceil(length[missing] / edge).astype(np.int64)
                 samples = np.maximum(samples, fine)
             for some, parts in _blocks(missing, samples):
-                cubics, deviations = _fit_traces(cells, pairs[some], count, parts)
+                traced = cells.trace(pairs[some], np.linspace(0.0, 1.0, 2 * parts + 1))
+                cubics, deviations = fit_between_centres(cells, pairs[some], *traced, count)
                 final = (deviations <= close[some]).all(axis=1) | (count == PIECES[-1])
                 if edge:
                     final |= 4 * count > parts
@@ -110,11 +111,6 @@ class CurveFit:
         return CellCurves(first, joined, ROUNDING * square * bounds, self.deviations, rests)
 
 
-def fitted_curves(cells: Cells) -> CellCurves:
-    """The curves of cells of smooth patches."""
-    return CurveFit.of(cells).joined()
-
-
 def _blocks(curves: Ints, samples: Ints) -> Iterator[tuple[Ints, int]]:
     """Curves that are sampled alike, some at a time: the curves, and into how many parts."""
     # Few different numbers of samples: powers of two of a mesh's, all alike of a patch's.
@@ -123,13 +119,6 @@ def _blocks(curves: Ints, samples: Ints) -> Iterator[tuple[Ints, int]]:
         alike = curves[rounded == parts]
         for start in range(0, len(alike), BLOCK):
             yield alike[start : start + BLOCK], int(parts)
-
-
-def _fit_traces(cells: Cells, pairs: Ints, count: int, parts: int) -> tuple[Array, Array]:
-    """Cubics (m, count, 4, 6) through samples of m traces, and their deviations (m, 2)."""
-    return fit_between_centres(
-        cells, pairs, *cells.trace(pairs, np.linspace(0.0, 1.0, 2 * parts + 1)), count
-    )
 
 
 def fit_between_centres(

@@ -40,9 +40,37 @@ class ClosestPoint:
     inside: NDArray[np.bool_]
     """True where it lies on the patch, and the normal there leads to the given point."""
 
+    @staticmethod
+    def of_rows(
+        shape: tuple[int, ...], values: NDArray[np.float64], inside: NDArray[np.bool_]
+    ) -> ClosestPoint:
+        """From rows (k, 6) of u, v, height and normal, and `inside` (k,), to a leading shape."""
+        u, v, height = values.T[:3].reshape(3, *shape)
+        return ClosestPoint(u, v, height, values[:, 3:].reshape(*shape, 3), inside.reshape(shape))
+
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Surface(ABC):
+class Protected:
+    """A value whose arrays nobody changes, and which pickles as a call of its constructor."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the arrays; those in tuples are protected in place."""
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if isinstance(value, np.ndarray):
+                value = np.array(value)
+                object.__setattr__(self, field.name, value)
+            for array in value if isinstance(value, tuple) else (value,):
+                if isinstance(array, np.ndarray):
+                    array.flags.writeable = False
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """What is derived is derived again, and arrays are protected again."""
+        return (type(self), tuple(getattr(self, item.name) for item in fields(self) if item.init))
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Surface(Protected, ABC):
     """A surface placed in the frame of the URDF's root link.
 
     All methods are vectorised and use the root frame. Surfaces are values: they pickle and are
@@ -57,17 +85,6 @@ class Surface(ABC):
     """(3,) m, origin of the surface's own frame in the root frame."""
     side: Side
     """'inside': the tool works at -d along the outward normal; 'outside': at +d."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the pose."""
-        for name in ("rotation", "position"):
-            array = np.array(getattr(self, name), dtype=float)
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor, which protects the arrays again."""
-        return (type(self), tuple(getattr(self, field.name) for field in fields(self)))
 
     @property
     def side_sign(self) -> float:

@@ -39,14 +39,6 @@ class MeshSurface(Surface):
     """(F, 3, 3) the same on creases, where both sides have one: the normal turns to it over a strip
     along the crease, `WIDTH` of a face wide."""
 
-    def __post_init__(self) -> None:
-        """Copy and write-protect the arrays."""
-        super().__post_init__()
-        for name in ("corner_normals", "crease_normals"):
-            normals = np.array(getattr(self, name), dtype=float)
-            normals.flags.writeable = False
-            object.__setattr__(self, name, normals)
-
     @property
     def notes(self) -> tuple[str, ...]:
         """What was repaired in the mesh, and what to know about it."""
@@ -75,15 +67,9 @@ class MeshSurface(Surface):
         normals = self.normals_at(face, weights)
         outer = np.einsum("ki,ki->k", off, normals @ self.rotation) >= 0.0
         distance = np.linalg.norm(off, axis=1)
-        shape = points.shape[:-1]
-        nowhere = np.full(shape, np.nan)
-        return ClosestPoint(
-            u=nowhere,
-            v=nowhere,
-            height=np.where(outer, distance, -distance).reshape(shape),
-            normal=normals.reshape(*shape, 3),
-            inside=np.ones(shape, dtype=bool),
-        )
+        nowhere = np.full((len(flat), 2), np.nan)
+        values = np.column_stack([nowhere, np.where(outer, distance, -distance), normals])
+        return ClosestPoint.of_rows(points.shape[:-1], values, np.ones(len(flat), dtype=bool))
 
     def nearest(self, points: Array) -> tuple[Ints, Array]:
         """Faces (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m."""

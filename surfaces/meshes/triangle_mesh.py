@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from surfaces.adjacency import components
-from surfaces.surface import SurfaceError
+from surfaces.surface import Protected, SurfaceError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Edges:
+class Edges(Protected):
     """The edges of E pairs of faces, and the B edges on the border."""
 
     faces: Ints
@@ -33,7 +33,7 @@ class Edges:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class TriangleMesh:
+class TriangleMesh(Protected):
     """A surface of triangles that `surfaces.meshes.repair.clean` has checked.
 
     No edge has more than two faces, faces that share an edge agree about the outer side, every
@@ -73,21 +73,17 @@ class TriangleMesh:
         if not lengths.all():
             raise SurfaceError(f"face {int(lengths.argmin())} has no area; clean the mesh first")
         normals = doubled / lengths[:, None]
-        self._set("vertices", vertices)
-        self._set("faces", faces)
-        self._set("face_normals", normals)
-        self._set("face_areas", 0.5 * lengths)
-        self._set("vertex_normals", _vertex_normals(vertices, faces, normals))
-        object.__setattr__(self, "edges", _edges(vertices, faces))
-
-    def _set(self, name: str, array: NDArray[np.generic]) -> None:
-        """Store an array for reading only."""
-        array.flags.writeable = False
-        object.__setattr__(self, name, array)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor, which protects the arrays again."""
-        return (type(self), (self.vertices, self.faces, self.history))
+        derived = {
+            "vertices": vertices,
+            "faces": faces,
+            "face_normals": normals,
+            "face_areas": 0.5 * lengths,
+            "vertex_normals": _vertex_normals(vertices, faces, normals),
+            "edges": _edges(vertices, faces),
+        }
+        for name, value in derived.items():
+            object.__setattr__(self, name, value)
+        Protected.__post_init__(self)
 
     def __repr__(self) -> str:
         """One line: how many faces, their area and extent."""
@@ -189,18 +185,11 @@ def _edges(vertices: Floats, faces: Ints) -> Edges:
     halves = half_edges(faces)
     inner, border = _joined(faces, halves), halves.of_count(1)[:, 0]
     ends, border_ends = half_edge_ends(faces, inner[:, 0]), half_edge_ends(faces, border)
-    arrays: list[ArrayLike] = [
-        inner // 3,
-        ends,
-        np.linalg.norm(np.diff(vertices[ends], axis=1)[:, 0], axis=1),
-        border // 3,
-        border_ends,
-        np.linalg.norm(np.diff(vertices[border_ends], axis=1)[:, 0], axis=1),
-    ]
-    edges = Edges(*map(np.asarray, arrays))
-    for item in fields(edges):
-        getattr(edges, item.name).flags.writeable = False
-    return edges
+    lengths, border_lengths = (
+        np.linalg.norm(np.diff(vertices[some], axis=1)[:, 0], axis=1)
+        for some in (ends, border_ends)
+    )
+    return Edges(inner // 3, ends, lengths, border // 3, border_ends, border_lengths)
 
 
 def edge_partners(faces: Ints) -> Ints:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
+from surfaces.patches.elementary import closed_rows, unit_sphere
+from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.patches.smooth_patch import LocalClosestPoints, SmoothPatch, azimuth
-from surfaces.patches.sphere import closed_rows, unit_sphere
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -152,9 +152,7 @@ def ellipsoid(
         semi_axes: (3,) m.
         polar_deg: (low, high) angle from +z, within 0..180, on the unit sphere that is stretched.
         azimuth_deg: (low, high) angle about z on that sphere, at most a full turn apart.
-        side: 'inside' or 'outside', where the tool works.
-        position: (3,) m, the centre in the root frame.
-        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+        side: see `plane`, as for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the numbers do not describe a patch; all are named.

@@ -14,9 +14,8 @@ from surfaces.adjacency import Neighbours, grid_neighbours
 from surfaces.arguments import Checks
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
-from surfaces.curve_fitting import fitted_curves
-from surfaces.patches.closed_form import ClosedFormPatch
-from surfaces.patches.patch import Patch
+from surfaces.curve_fitting import CurveFit
+from surfaces.patches.patch import ClosedFormPatch, Patch
 from surfaces.surface import SurfaceError, max_principal_curvature
 
 if TYPE_CHECKING:
@@ -78,7 +77,7 @@ class GridCells(Cells):
     @cached_property
     def curves(self) -> CellCurves:
         """See `Cells.curves`."""
-        return fitted_curves(self)
+        return CurveFit.of(self).joined()
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Cells.trace`: straight in u and v; over a pole, closest to the straight line.

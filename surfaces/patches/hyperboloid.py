@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.closed_form import ClosedFormPatch
 from surfaces.patches.normal_bounds import CurvatureSlices
+from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -38,11 +38,6 @@ class Hyperboloid(ClosedFormPatch):
     """m, radius at z = 0."""
     flare: float
     """m, height at which the radius is sqrt(2) waist."""
-
-    @property
-    def lengths(self) -> tuple[float, ...]:
-        """Waist and flare."""
-        return (self.waist, self.flare)
 
     def _radius(self, z: Array) -> Array:
         return np.hypot(self.waist, z * (self.waist / self.flare))
@@ -121,9 +116,7 @@ def hyperboloid(
         flare: m, height at which the radius is sqrt(2) waist.
         angle_deg: (low, high) angle about z, at most a full turn apart.
         height: (low, high) along z, m.
-        side: 'inside' or 'outside', where the tool works.
-        position: (3,) m, origin of the surface's frame in the root frame.
-        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+        side: see `plane`, as for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the numbers do not describe a patch; all are named.

@@ -1,19 +1,27 @@
-"""Patch: a surface with parameters u and v, in ranges, cut into a grid of cells."""
+"""Patch: a surface with parameters u and v, in ranges; and the two families of its kinds.
+
+A `ClosedFormPatch` has formulas in compiled loops, which the paper's greedy search needs; any other
+is a `SmoothPatch`, with formulas in NumPy or a search for closest points.
+"""
 
 from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from surfaces.surface import TURN_TOLERANCE, Surface
+from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
+from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, points_of
 
 if TYPE_CHECKING:
+    from surfaces.patches.closed_form_kernels import PatchKernel
     from surfaces.patches.grid_cells import GridCells
+
+EDGE = 1e-9  # [rad], [m]: a point that misses the patch by no more than this lies on it
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -53,8 +61,9 @@ class Patch(Surface):
 
     @property
     def lengths(self) -> tuple[float, ...]:
-        """The lengths (m) that fix the surface in its own frame, for its `repr`."""
-        return ()
+        """The numbers that fix the surface in its own frame (m, slopes), as the kind lists them."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return tuple(value for value in values if isinstance(value, (int, float)))
 
     @abstractmethod
     def local_point(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -111,3 +120,126 @@ class Patch(Surface):
                 ranges.append(f"{name}=({low:g}, {high:g})")
         parts = [lengths, *ranges, f"side={self.side!r}", f"position={self.position.tolist()}"]
         return f"{self.kind}({', '.join(part for part in parts if part)})"
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class ClosedFormPatch(Patch):
+    """A patch that `closed_form_kernels` knows."""
+
+    code: ClassVar[int]
+    """The number that `closed_form_kernels` dispatches on."""
+
+    @abstractmethod
+    def curvature_slices(self, margin: float) -> CurvatureSlices:
+        """Bounds on the curvatures of the patch, widened by `margin` where it has open ends."""
+
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """The points of the surface closest to `points` (..., 3) m; see `ClosestPoint`.
+
+        Where several points are equally close (centre of a sphere, axis of a cylinder), one of
+        them is taken, on the patch if there is one.
+
+        Raises:
+            ValueError: `points` does not end in an axis of length 3.
+        """
+        from surfaces.patches.closed_form_kernels import closest_points
+
+        points = points_of(points)
+        values, inside = closest_points(self.patch_kernel(), np.array(points.reshape(-1, 3)))
+        return ClosestPoint.of_rows(points.shape[:-1], values, inside)
+
+    def patch_kernel(self, nu: int = 1, nv: int = 1) -> PatchKernel:
+        """What compiled loops need of the surface, cut into nu x nv cells."""
+        from surfaces.patches.closed_form_kernels import PatchKernel
+
+        return PatchKernel(
+            code=self.code,
+            shape=(*map(float, self.lengths), 0.0, 0.0)[:2],
+            rotation=tuple(self.rotation.ravel().tolist()),
+            position=tuple(self.position.tolist()),
+            side_sign=self.side_sign,
+            low=(float(self.u_range[0]), float(self.v_range[0])),
+            high=(float(self.u_range[1]), float(self.v_range[1])),
+            closed=(bool(self.u_closed), bool(self.v_closed)),
+            cells=(int(nu), int(nv)),
+        )
+
+    def bounds(self, height: float, slack: float = 0.0) -> NormalBounds:
+        """Bounds on how fast the normal turns near the parallel surface at a signed height.
+
+        They hold at every point whose closest point lies on the patch and whose height differs from
+        `height` by at most `slack` (m); see `normal_bounds`.
+        """
+        return normal_bounds(self.curvature_slices(abs(slack)), height, abs(slack))
+
+
+Array = NDArray[np.float64]
+
+
+class LocalClosestPoints(NamedTuple):
+    """Closest points to n points in the own frame of a patch, before the ranges are checked."""
+
+    u: Array
+    """(n,) rad, m or as the knots count."""
+    v: Array
+    """(n,) likewise."""
+    height: Array
+    """(n,) m, along the outward normal."""
+    normal: Array
+    """(n, 3) outward unit normals."""
+    upright: NDArray[np.bool_]
+    """(n,) True where the point lies on the normal there, to 1e-9 m."""
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class SmoothPatch(Patch):
+    """A patch that gives points, normals and closest points in its own frame."""
+
+    @abstractmethod
+    def local_closest_points(self, points: Array) -> LocalClosestPoints:
+        """Closest points to finite points (n, 3) m, given in the own frame."""
+
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """The points of the surface closest to `points` (..., 3) m; see `ClosestPoint`.
+
+        Where the normal at the closest point does not lead through the point, because it is on a
+        border, `height` is the part of the distance along the normal there and `inside` is
+        False. For a point that is not finite it is NaN and not inside.
+
+        Raises:
+            ValueError: `points` does not end in an axis of length 3.
+        """
+        points = points_of(points)
+        flat = points.reshape(-1, 3)
+        finite = np.isfinite(flat).all(axis=1)
+        values = np.full((len(flat), 6), np.nan)
+        inside = np.zeros(len(flat), dtype=bool)
+        if finite.any():
+            found = self.local_closest_points((flat[finite] - self.position) @ self.rotation)
+            normal = found.normal @ self.rotation.T
+            values[finite] = np.column_stack([found.u, found.v, found.height, normal])
+            inside[finite] = found.upright & self._on_patch(found.u, found.v)
+        return ClosestPoint.of_rows(points.shape[:-1], values, inside)
+
+    def _on_patch(self, u: Array, v: Array) -> NDArray[np.bool_]:
+        """True where the parameters lie in the patch's ranges."""
+        (u0, u1), (v0, v1) = self.u_range, self.v_range
+        within = (u >= u0 - EDGE) & (u <= u1 + EDGE) & (v >= v0 - EDGE) & (v <= v1 + EDGE)
+        return np.asarray(within)
+
+
+def wrapped(angle: Array, low: float, high: float) -> Array:
+    """The values angle + 2 pi k (rad) that lie in low..high, or failing that, nearest to it."""
+    turned = low + np.mod(angle - low, math.tau)
+    back = (turned > high) & (turned - high > low - (turned - math.tau))
+    return np.where(back, turned - math.tau, turned)
+
+
+def azimuth(x: Array, y: Array, lowest: float, highest: float, size: float) -> Array:
+    """Angle about z (rad) within a range; on the axis, where every angle is one, one inside it.
+
+    `size` (m) is the length beside which a distance from the axis of 1e-9 is none.
+    """
+    angle = wrapped(np.arctan2(y, x), lowest, highest)
+    on_axis = np.hypot(x, y) <= EDGE * size
+    return np.where(on_axis, np.clip(angle, lowest, highest), angle)

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
+from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.patches.revolution_profile import Profile
-from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -106,9 +106,7 @@ def revolution(
             is to the right as the list is walked, with r to the right and z up: away from the axis
             if the points are listed upwards. The parameter u runs from the last point to the first.
         angle_deg: (low, high) angle about z, at most a full turn apart.
-        side: 'inside' or 'outside', where the tool works.
-        position: (3,) m, origin of the surface's frame in the root frame.
-        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+        side: see `plane`, as for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the arguments do not describe a patch; all are named.

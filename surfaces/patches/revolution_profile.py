@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from coverable_errors import Fault
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
+from surfaces.surface import Protected
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -22,7 +23,7 @@ _LEAST = 1e-6  # of the profile's extent: lengths below this are none
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(Protected):
     """A cubic spline over the chord length s, twice continuously differentiable.
 
     An end on the axis is a pole: there the curve leaves the axis at a right angle and r has no
@@ -32,16 +33,6 @@ class Profile:
 
     points: Array
     """(n, 2) m, r and z."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the points."""
-        points = np.array(self.points, dtype=float)
-        points.flags.writeable = False
-        object.__setattr__(self, "points", points)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor; what is derived is derived again."""
-        return (Profile, (self.points,))
 
     @cached_property
     def knots(self) -> Array:

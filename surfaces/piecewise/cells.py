@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
-from surfaces.curve_fitting import fitted_curves
+from surfaces.curve_fitting import CurveFit
 from surfaces.patches import GridCells
-from surfaces.piecewise.curves import SMOOTH, curves_across
+from surfaces.piecewise.across_seams import SMOOTH, curves_across
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import SurfaceError
 
 if TYPE_CHECKING:
-    from surfaces.piecewise.adjacency import SeamPairs
+    from surfaces.piecewise.across_seams import SeamPairs
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -73,7 +73,7 @@ class PieceCells(Cells):
     @cached_property
     def seam_pairs(self) -> SeamPairs:
         """The pairs of cells that touch across seams."""
-        from surfaces.piecewise.adjacency import seam_pairs_of
+        from surfaces.piecewise.across_seams import seam_pairs_of
 
         return seam_pairs_of(self.surface, self.counts)
 
@@ -98,7 +98,7 @@ class PieceCells(Cells):
     @cached_property
     def curves(self) -> CellCurves:
         """See `Cells.curves`."""
-        return fitted_curves(self)
+        return CurveFit.of(self).joined()
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Cells.trace`: within a piece as on its grid, across a seam see `curves_across`."""
@@ -202,15 +202,7 @@ class PieceCells(Cells):
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""
-        flat, middle = self.seen_from_outside()
-        return Unrolled(
-            centres=(self.centres - middle) @ flat,
-            outlines=tuple(
-                (line - middle) @ flat for grid in self.grids for line in grid.outlines()
-            ),
-            labels=("along (m)", "across (m)"),
-            turns=(np.inf, np.inf),
-        )
+        return self.seen_from_outside(line for grid in self.grids for line in grid.outlines())
 
     def __repr__(self) -> str:
         """One line."""

@@ -63,40 +63,28 @@ def nearest_places(
     )
 
 
-class _ClosestPoints(NamedTuple):
-    """Nearest places on one patch."""
-
-    values: Array
-    """(k, 9) u, v, place, normal, height."""
-    distance: Array
-    """(k,) m."""
-    inside: NDArray[np.bool_]
-
-
-def _closest_points(patch: Patch, sign: float, points: Array) -> _ClosestPoints:
-    """Nearest places on one patch."""
+def _closest_points(
+    patch: Patch, sign: float, points: Array
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """On one patch: (k, 9) u, v, place, normal, height; distances (k,) m; and `inside` (k,)."""
     found = patch.closest(points)
     u, v = np.clip(found.u, *patch.u_range), np.clip(found.v, *patch.v_range)
     places, normals = patch.point(u, v), sign * patch.normal(u, v)
     away = points - places
     height = np.where(found.inside, sign * found.height, (away * normals).sum(axis=1))
     distance = np.where(found.inside, np.abs(found.height), np.linalg.norm(away, axis=1))
-    values = np.column_stack([u, v, places, normals, height])
-    return _ClosestPoints(values, distance, found.inside)
+    return np.column_stack([u, v, places, normals, height]), distance, found.inside
 
 
 def _nearest(
     patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
 ) -> tuple[Ints, Array, NDArray[np.bool_]]:
-    """Piece (k,), values (k, 9) as in `_ClosestPoints`, and `inside` (k,) of finite points."""
+    """Piece (k,), values (k, 9) as in `_closest_points`, and `inside` (k,) of finite points."""
     found = [
         _closest_points(patch, sign, points) for patch, sign in zip(patches, signs, strict=True)
     ]
-    distance = np.stack([one.distance + np.where(one.inside, 0.0, TIE) for one in found])
-    values, within = (
-        np.stack([one.values for one in found]),
-        np.stack([one.inside for one in found]),
-    )
+    values, distance, within = (np.stack(part) for part in zip(*found, strict=True))
+    distance = distance + np.where(within, 0.0, TIE)
     row = np.arange(len(points))
     piece = np.argmin(distance, axis=0)
     best, inside = values[piece, row], within[piece, row].copy()

@@ -15,8 +15,7 @@ from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches import Patch
 from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
-from surfaces.piecewise.consistency import groups_of, on_each_other, turned_pieces
-from surfaces.piecewise.seams import Seam, sides_of, survey
+from surfaces.piecewise.seams import Seam, groups_of, on_each_other, sides_of, survey, turned_pieces
 from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
@@ -108,15 +107,9 @@ class Piecewise(Surface):
         """
         points = points_of(points)
         found = self.nearest(points)
-        shape = points.shape[:-1]
-        nowhere = np.full(shape, np.nan)
-        return ClosestPoint(
-            u=nowhere,
-            v=nowhere,
-            height=found.height.reshape(shape),
-            normal=found.normals.reshape(*shape, 3),
-            inside=found.inside.reshape(shape),
-        )
+        nowhere = np.full((len(found.height), 2), np.nan)
+        values = np.column_stack([nowhere, found.height, found.normals])
+        return ClosestPoint.of_rows(points.shape[:-1], values, found.inside)
 
     def cells(self, counts: Any) -> PieceCells:
         """Cut every piece into a grid of cells.
@@ -155,8 +148,7 @@ def piecewise(
         pieces: patches of any kinds, placed in the frame of the joined surface. Their own `side`
             is not used.
         side: 'outside' for a tool on the outward side, 'inside' for one on the other.
-        position: (3,) m, origin of the surface's frame in the root frame.
-        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+        position: see `plane`, as for rpy_deg.
         gap: m, how far apart the borders of a seam may be; None for 0.1 mm, and at most a
             thousandth of the shortest border.
 

@@ -95,8 +95,11 @@ class MeshCells(Cells):
     @cached_property
     def curves(self) -> CellCurves:
         """See `Cells.curves`; those over creases and tight bends are shaped for them."""
-        from surfaces.meshes.cells.curves_over_bends import fit_over_bends
-        from surfaces.meshes.cells.curves_over_creases import creases_of, fit_over_creases
+        from surfaces.meshes.cells.reshaped_curves import (
+            creases_of,
+            fit_over_bends,
+            fit_over_creases,
+        )
 
         fit = CurveFit.of(self)
         rough = fit.rough
@@ -229,18 +232,12 @@ class MeshCells(Cells):
 
     def unrolled(self) -> Unrolled:
         """See `Cells.unrolled`: seen along the mean normal, from the outside."""
-        flat, middle = self.seen_from_outside()
         rotation, position = self.surface.rotation, self.surface.position
         none = np.empty((0, 3))  # of a cell that is a closed surface
-        loops = [
+        loops = (
             max(self.figures.outlines.of(k), key=_length, default=none) for k in range(len(self))
-        ]
-        return Unrolled(
-            centres=(self.centres - middle) @ flat,
-            outlines=tuple((loop @ rotation.T + position - middle) @ flat for loop in loops),
-            labels=("along (m)", "across (m)"),
-            turns=(np.inf, np.inf),
         )
+        return self.seen_from_outside(loop @ rotation.T + position for loop in loops)
 
     def unravel(self, k: int) -> tuple[int]:
         """The cell's number.

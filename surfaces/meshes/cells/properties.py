@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,19 +12,19 @@ from surfaces.adjacency import Neighbours
 from surfaces.meshes.cells.borders import (
     Outlines,
     SharedBorders,
+    centre_places,
     clockwise_neighbours,
     outlines,
     shared_borders,
 )
-from surfaces.meshes.cells.centres import centre_places
 from surfaces.meshes.triangle_mesh import doubled_areas, edge_partners, sum_by
-from surfaces.surface import SurfaceError
+from surfaces.surface import Protected, SurfaceError
 
 MOST_TURN_DEG = 30.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Figures:
+class Figures(Protected):
     """The figures of N cells of a mesh."""
 
     centres: NDArray[np.float64]
@@ -52,18 +52,6 @@ class Figures:
     """Each cell's neighbours, clockwise seen from the normal's tip, the lowest index first."""
     outlines: Outlines
     """The cells' border lines."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the arrays."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                copy = value.copy()
-                copy.flags.writeable = False
-                object.__setattr__(self, field.name, copy)
-            elif isinstance(value, (SharedBorders, Neighbours)):
-                for array in value:
-                    array.flags.writeable = False
 
 
 def figures(

@@ -20,8 +20,8 @@ from surfaces.patches.nurbs.nurbs_checks import (
     checked_weights,
     regularity_faults,
 )
+from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.surface import Side, SurfaceError
 
 Array = NDArray[np.float64]
@@ -105,8 +105,7 @@ def bspline(
         u: (low, high) part of the knots' range to keep; all of it if None.
         v: likewise.
         side: 'outside' for a tool on the side of S_u x S_v, 'inside' for one on the other.
-        position: (3,) m, origin of the surface's frame in the root frame.
-        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+        position: see `plane`, as for rpy_deg.
 
     Raises:
         SurfaceError: one or more of the arguments do not describe a patch; all are named.

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
+from surfaces.surface import Protected
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline
@@ -25,7 +26,7 @@ _SMOOTH = 1e-6  # [rad]: normals that differ by less are one
 
 
 @dataclass(frozen=True, eq=False)
-class SplineMap:
+class SplineMap(Protected):
     """S(u, v) = sum w_ij P_ij B_i(u) B_j(v) / sum w_ij B_i(u) B_j(v) over low..high."""
 
     points: Array
@@ -39,23 +40,6 @@ class SplineMap:
     """Where u and v begin."""
     high: Pair
     """Where they end."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the arrays."""
-        points, weights = np.array(self.points, float), self.weights
-        knots = tuple(np.array(line, float) for line in self.knots)
-        if weights is not None:
-            weights = np.array(weights, float)
-            weights.flags.writeable = False
-        for array in (points, *knots):
-            array.flags.writeable = False
-        for name, value in (("points", points), ("weights", weights), ("knots", knots)):
-            object.__setattr__(self, name, value)
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """Pickle as a call of the constructor; what is derived is derived again."""
-        values = (self.points, self.weights, self.knots, self.degree, self.low, self.high)
-        return (SplineMap, values)
 
     @cached_property
     def _spline(self) -> NdBSpline:

@@ -10,7 +10,7 @@ from smooth_probes import least_distance
 
 from surfaces import cylinder, sphere
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
-from surfaces.patches.smooth_patch import EDGE, LocalClosestPoints, SmoothPatch
+from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch
 
 
 def sphere_jet(radius, x):

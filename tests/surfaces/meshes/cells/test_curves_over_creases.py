@@ -9,7 +9,7 @@ import pytest
 
 from surfaces.curve_fitting import CurveFit
 from surfaces.meshes import TriangleMesh, mesh
-from surfaces.meshes.cells.curves_over_creases import _shortest
+from surfaces.meshes.cells.reshaped_curves import _shortest
 from surfaces.meshes.normals import sectors
 
 

@@ -1,0 +1,219 @@
+"""Patches of planes, cylinders and spheres."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.arguments import ORIGIN, Checks
+from surfaces.patches.normal_bounds import CurvatureSlices
+from surfaces.patches.patch import ClosedFormPatch, Patch
+from surfaces.surface import Side
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Plane(ClosedFormPatch):
+    """u and v are x and y of its own frame, the normal is +z."""
+
+    kind: ClassVar[str] = "plane"
+    units: ClassVar[tuple[str, str]] = ("m", "m")
+    code: ClassVar[int] = 0
+    u_angle: ClassVar[bool] = False
+    v_angle: ClassVar[bool] = False
+
+    def local_point(self, u: Array, v: Array) -> Array:
+        """(u, v, 0)."""
+        return np.stack([u, v, np.zeros_like(u)], axis=-1)
+
+    def local_normal(self, u: Array, v: Array) -> Array:
+        """+z."""
+        zero = np.zeros_like(u)
+        return np.stack([zero, zero, np.ones_like(u)], axis=-1)
+
+    def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
+        """(u1 - u0) (v1 - v0)."""
+        u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
+        return np.asarray((u1 - u0) * (v1 - v0))
+
+    def curvature_slices(self, margin: float) -> CurvatureSlices:
+        """Flat both ways."""
+        return CurvatureSlices.constant(0.0, 0.0)
+
+
+def plane(
+    width: Sequence[float],
+    length: Sequence[float],
+    side: Side = "inside",
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
+) -> Plane:
+    """A rectangle in the xy plane of its own frame, its normal +z.
+
+    Args:
+        width: (low, high) along x, m.
+        length: (low, high) along y, m.
+        side: 'outside' for a tool on the +z side, 'inside' for one on the -z side.
+        position: (3,) m, origin of the surface's frame in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the surface's frame.
+
+    Raises:
+        SurfaceError: one or more of the numbers do not describe a patch; all are named.
+    """
+    check = Checks("plane")
+    made = Plane(
+        u_range=check.length("width", width),
+        v_range=check.length("length", length),
+        **check.pose(side, position, rpy_deg),
+    )
+    check.done()
+    return made
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Cylinder(ClosedFormPatch):
+    """u is the angle about z, v the height along z."""
+
+    kind: ClassVar[str] = "cylinder"
+    units: ClassVar[tuple[str, str]] = ("rad", "m")
+    code: ClassVar[int] = 2
+    u_angle: ClassVar[bool] = True
+    v_angle: ClassVar[bool] = False
+    radius: float
+    """m."""
+
+    def local_point(self, u: Array, v: Array) -> Array:
+        """(R cos u, R sin u, v)."""
+        return np.stack([self.radius * np.cos(u), self.radius * np.sin(u), v], axis=-1)
+
+    def local_normal(self, u: Array, v: Array) -> Array:
+        """Away from the axis."""
+        return np.stack([np.cos(u), np.sin(u), np.zeros_like(u)], axis=-1)
+
+    def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
+        """R (u1 - u0) (v1 - v0)."""
+        u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
+        return np.asarray(self.radius * (u1 - u0) * (v1 - v0))
+
+    def curvature_slices(self, margin: float) -> CurvatureSlices:
+        """Straight along z, 1/R around it."""
+        return CurvatureSlices.constant(0.0, 1.0 / self.radius)
+
+
+def cylinder(
+    radius: float,
+    angle_deg: Sequence[float],
+    height: Sequence[float],
+    side: Side = "inside",
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
+) -> Cylinder:
+    """A patch of a cylinder about the z axis of its own frame.
+
+    Args:
+        radius: m.
+        angle_deg: (low, high) angle about z, at most a full turn apart.
+        height: (low, high) along z, m.
+        side: see `plane`, as for position and rpy_deg.
+
+    Raises:
+        SurfaceError: one or more of the numbers do not describe a patch; all are named.
+    """
+    check = Checks("cylinder")
+    made = Cylinder(
+        u_range=check.angles("angle_deg", angle_deg),
+        v_range=check.length("height", height),
+        radius=check.positive("radius", radius),
+        **check.pose(side, position, rpy_deg),
+    )
+    check.done()
+    return made
+
+
+@dataclass(frozen=True, eq=False, slots=True, repr=False)
+class Sphere(ClosedFormPatch):
+    """u is the polar angle from +z, v the azimuth about z."""
+
+    kind: ClassVar[str] = "sphere"
+    units: ClassVar[tuple[str, str]] = ("rad", "rad")
+    code: ClassVar[int] = 1
+    u_angle: ClassVar[bool] = False
+    v_angle: ClassVar[bool] = True
+    radius: float
+    """m."""
+
+    @property
+    def poles(self) -> tuple[bool, bool]:
+        """See `closed_rows`."""
+        return closed_rows(self)
+
+    def local_point(self, u: Array, v: Array) -> Array:
+        """Radius times normal."""
+        return self.radius * self.local_normal(u, v)
+
+    def local_normal(self, u: Array, v: Array) -> Array:
+        """Away from the centre."""
+        return unit_sphere(u, v)
+
+    def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
+        """R^2 (cos u0 - cos u1) (v1 - v0), the difference written without cancellation."""
+        u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))
+        drop = 2.0 * np.sin((u0 + u1) / 2.0) * np.sin((u1 - u0) / 2.0)
+        return np.asarray(self.radius**2 * drop * (v1 - v0))
+
+    def curvature_slices(self, margin: float) -> CurvatureSlices:
+        """1/R both ways."""
+        return CurvatureSlices.constant(1.0 / self.radius, 1.0 / self.radius)
+
+
+def unit_sphere(u: Array, v: Array) -> Array:
+    """Points (..., 3) at polar angles u from +z and azimuths v about z, rad."""
+    s = np.sin(u)
+    return np.stack([s * np.cos(v), s * np.sin(v), np.cos(u)], axis=-1)
+
+
+def closed_rows(patch: Patch) -> tuple[bool, bool]:
+    """`Patch.poles` where u is a polar angle: the range reaches 0 or pi, and v goes once around."""
+    low, high = patch.u_range
+    return (patch.v_closed and low <= 1e-9, patch.v_closed and high >= math.pi - 1e-9)
+
+
+def sphere(
+    radius: float,
+    polar_deg: Sequence[float],
+    azimuth_deg: Sequence[float],
+    side: Side = "inside",
+    position: Sequence[float] = ORIGIN,
+    rpy_deg: Sequence[float] = ORIGIN,
+) -> Sphere:
+    """A patch of a sphere.
+
+    Args:
+        radius: m.
+        polar_deg: (low, high) angle from +z, within 0..180.
+        azimuth_deg: (low, high) angle about z, at most a full turn apart.
+        side: see `plane`, as for position and rpy_deg.
+
+    Raises:
+        SurfaceError: one or more of the numbers do not describe a patch; all are named.
+
+    Example:
+        >>> dome = sphere(1.0, polar_deg=(10, 90), azimuth_deg=(10, 180))
+        >>> dome.closest([0.0, 0.5, 0.0]).height.item()
+        -0.5
+    """
+    check = Checks("sphere")
+    made = Sphere(
+        u_range=check.polar("polar_deg", polar_deg),
+        v_range=check.angles("azimuth_deg", azimuth_deg),
+        radius=check.positive("radius", radius),
+        **check.pose(side, position, rpy_deg),
+    )
+    check.done()
+    return made
