@@ -41,10 +41,6 @@ class Checks(coverable_errors.Checks):
             expected = f"must be within a factor of {LARGEST_RATIO:g} of {other}"
             self.keep(Fault(name, f"got the ratio {value:g}; {remedy}", expected=expected))
 
-    def length(self, name: str, value: Any) -> tuple[float, float]:
-        """A pair (low, high) of finite metres, low < high."""
-        return self.interval(name, value, "metres")
-
     def angles(self, name: str, value: Any) -> tuple[float, float]:
         """A pair of degrees, low < high, at most a full turn apart; returned in radians."""
         low, high = self.interval(name, value, "degrees", (0.0, 90.0))
@@ -61,10 +57,6 @@ class Checks(coverable_errors.Checks):
             self.wrong(name, value, "must lie in 0 .. 180 (degrees from the +z axis)")
         return math.radians(low), math.radians(high)
 
-    def side(self, value: Any) -> Side:
-        """'inside' or 'outside'."""
-        return self.choice("side", value, SIDES)
-
     def vector(self, name: str, value: Any, unit: str) -> NDArray[np.float64]:
         """Three finite numbers."""
         found = self.numbers(name, value, 3, f"must be three finite numbers ({unit})")
@@ -77,7 +69,7 @@ class Checks(coverable_errors.Checks):
     def pose(self, side: Any, position: Any, rpy_deg: Any) -> Pose:
         """Side, position (metres) and fixed-axis roll, pitch, yaw (degrees), under these names."""
         return {
-            "side": self.side(side),
+            "side": self.choice("side", side, SIDES),
             "position": self.vector("position", position, "metres"),
             "rotation": self.rotation("rpy_deg", rpy_deg),
         }
@@ -129,7 +121,8 @@ def table(
         place = tuple(int(index) for index in bad[0])
         more = f"; {len(bad)} such entries in all" if len(bad) > 1 else ""
         got = f"got {shown(_at(value, place))}{more}"
-        faults.append(Fault(f"{name}{_indices(place)}", got, expected="must be a finite number"))
+        where = name + "".join(f"[{index}]" for index in place)
+        faults.append(Fault(where, got, expected="must be a finite number"))
         return None
     return array
 
@@ -191,10 +184,6 @@ def _at(value: Any, place: tuple[int, ...]) -> Any:
     for index in place:
         value = value[index]
     return value.item() if isinstance(value, np.generic) else value
-
-
-def _indices(place: tuple[int, ...]) -> str:
-    return "".join(f"[{index}]" for index in place)
 
 
 def _times(lengths: tuple[int, ...]) -> str:

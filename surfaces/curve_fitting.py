@@ -101,13 +101,8 @@ class CurveFit:
             rests[legs[1:, 0]] = rests[legs[:-1, -1]] = True
         square = np.repeat(counts, counts)[:, None] ** 2  # from s to t
         ends = [2.0 * joined[:, 2], 2.0 * joined[:, 2] + 6.0 * joined[:, 3]]
-        bounds = np.stack(
-            [
-                np.max([np.linalg.norm(end[:, half], axis=1) for end in ends], axis=0)
-                for half in HALVES
-            ],
-            axis=1,
-        )
+        sizes = [[np.linalg.norm(end[:, half], axis=1) for half in HALVES] for end in ends]
+        bounds = np.max(sizes, axis=0).T
         return CellCurves(first, joined, ROUNDING * square * bounds, self.deviations, rests)
 
 

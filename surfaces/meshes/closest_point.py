@@ -85,9 +85,7 @@ def nearest_of_each(corners, middles, radii, candidates, indptr, points, faces, 
     """`nearest_of` for points (m, 3), each with its own candidates; fills faces (m,), weights.
 
     Args:
-        corners: (F, 3, 3) m.
-        middles: (F, 3) m.
-        radii: (F,) m.
+        corners: see `nearest_of`, as for middles and radii.
         candidates: faces of all points, one list behind the other.
         indptr: (m + 1,) where each list begins.
         points: (m, 3) m.
@@ -129,9 +127,7 @@ def put_on_cells(  # type: ignore[no-untyped-def]
     """Closest points on the faces of two cells each, and of those that touch both.
 
     Args:
-        corners: (F, 3, 3) m.
-        middles: (F, 3) m.
-        radii: (F,) m.
+        corners: see `nearest_of`, as for middles and radii.
         members: (F,) faces, cell by cell.
         indptr: (N + 1,) where each cell's faces begin.
         near: neighbours, cell by cell.

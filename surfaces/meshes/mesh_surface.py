@@ -107,10 +107,6 @@ class MeshSurface(Surface):
         away[some] = np.where(on.all(axis=1), 2.0 * self.face_balls[2][face[some]], off)
         return away
 
-    def faces_below(self, points: ArrayLike) -> Ints:
-        """(k,) the face nearest to each of `points` (k, 3) m."""
-        return self.nearest(points_of(points))[0]
-
     def points_at(self, face: Ints, weights: Array) -> Array:
         """(..., 3) m, places of faces by their weights, in the root frame."""
         local = np.einsum("...c,...ci->...i", weights, self.face_balls[0][face])

@@ -25,7 +25,6 @@ class Cone(SmoothPatch):
     kind: ClassVar[str] = "cone"
     units: ClassVar[tuple[str, str]] = ("rad", "m")
     u_angle: ClassVar[bool] = True
-    v_angle: ClassVar[bool] = False
     radius: float
     """m, at z = 0."""
     slope: float
@@ -94,7 +93,7 @@ def cone(
     """
     check = Checks("cone")
     radius = check.positive("radius", radius)
-    low, high = check.length("height", height)
+    low, high = check.interval("height", height, "metres")
     steep = check.number(
         "slope",
         slope,

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.normal_bounds import CurvatureSlices
-from surfaces.patches.patch import ClosedFormPatch, Patch
+from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -25,8 +24,6 @@ class Plane(ClosedFormPatch):
     kind: ClassVar[str] = "plane"
     units: ClassVar[tuple[str, str]] = ("m", "m")
     code: ClassVar[int] = 0
-    u_angle: ClassVar[bool] = False
-    v_angle: ClassVar[bool] = False
 
     def local_point(self, u: Array, v: Array) -> Array:
         """(u, v, 0)."""
@@ -68,8 +65,8 @@ def plane(
     """
     check = Checks("plane")
     made = Plane(
-        u_range=check.length("width", width),
-        v_range=check.length("length", length),
+        u_range=check.interval("width", width, "metres"),
+        v_range=check.interval("length", length, "metres"),
         **check.pose(side, position, rpy_deg),
     )
     check.done()
@@ -84,7 +81,6 @@ class Cylinder(ClosedFormPatch):
     units: ClassVar[tuple[str, str]] = ("rad", "m")
     code: ClassVar[int] = 2
     u_angle: ClassVar[bool] = True
-    v_angle: ClassVar[bool] = False
     radius: float
     """m."""
 
@@ -128,7 +124,7 @@ def cylinder(
     check = Checks("cylinder")
     made = Cylinder(
         u_range=check.angles("angle_deg", angle_deg),
-        v_range=check.length("height", height),
+        v_range=check.interval("height", height, "metres"),
         radius=check.positive("radius", radius),
         **check.pose(side, position, rpy_deg),
     )
@@ -143,15 +139,10 @@ class Sphere(ClosedFormPatch):
     kind: ClassVar[str] = "sphere"
     units: ClassVar[tuple[str, str]] = ("rad", "rad")
     code: ClassVar[int] = 1
-    u_angle: ClassVar[bool] = False
+    u_polar: ClassVar[bool] = True
     v_angle: ClassVar[bool] = True
     radius: float
     """m."""
-
-    @property
-    def poles(self) -> tuple[bool, bool]:
-        """See `closed_rows`."""
-        return closed_rows(self)
 
     def local_point(self, u: Array, v: Array) -> Array:
         """Radius times normal."""
@@ -176,12 +167,6 @@ def unit_sphere(u: Array, v: Array) -> Array:
     """Points (..., 3) at polar angles u from +z and azimuths v about z, rad."""
     s = np.sin(u)
     return np.stack([s * np.cos(v), s * np.sin(v), np.cos(u)], axis=-1)
-
-
-def closed_rows(patch: Patch) -> tuple[bool, bool]:
-    """`Patch.poles` where u is a polar angle: the range reaches 0 or pi, and v goes once around."""
-    low, high = patch.u_range
-    return (patch.v_closed and low <= 1e-9, patch.v_closed and high >= math.pi - 1e-9)
 
 
 def sphere(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.elementary import closed_rows, unit_sphere
+from surfaces.patches.elementary import unit_sphere
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.surface import Side
@@ -31,7 +31,7 @@ class Ellipsoid(SmoothPatch):
 
     kind: ClassVar[str] = "ellipsoid"
     units: ClassVar[tuple[str, str]] = ("rad", "rad")
-    u_angle: ClassVar[bool] = False
+    u_polar: ClassVar[bool] = True
     v_angle: ClassVar[bool] = True
     semi_axes: tuple[float, float, float]
     """m, along x, y and z."""
@@ -40,11 +40,6 @@ class Ellipsoid(SmoothPatch):
     def lengths(self) -> tuple[float, ...]:
         """The semi-axes."""
         return self.semi_axes
-
-    @property
-    def poles(self) -> tuple[bool, bool]:
-        """See `closed_rows`."""
-        return closed_rows(self)
 
     def local_point(self, u: Array, v: Array) -> Array:
         """The unit sphere's point, stretched."""
@@ -81,9 +76,8 @@ class Ellipsoid(SmoothPatch):
             u_across, v_across = self._parameters(across)
             better = self._on_patch(u_across, v_across)
             gap = np.linalg.norm(across - points[off], axis=1)
-            better &= gap <= np.linalg.norm(closest_point[off] - points[off], axis=1) * (
-                1.0 + 1e-12
-            )
+            before = np.linalg.norm(closest_point[off] - points[off], axis=1)
+            better &= gap <= before * (1.0 + 1e-12)
             u[off[better]], v[off[better]] = u_across[better], v_across[better]
         normal = self.local_normal(u, v)
         height = np.einsum("ni,ni->n", points - self.local_point(u, v), normal)

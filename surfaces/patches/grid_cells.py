@@ -44,11 +44,7 @@ class GridCells(Cells):
 
     @staticmethod
     def cut(surface: Patch, nu: int, nv: int) -> GridCells:
-        """Cut `surface` into nu x nv cells of equal parameter steps; see `Patch.cells`.
-
-        Raises:
-            SurfaceError: nu or nv is not a whole number >= 0.
-        """
+        """Cut `surface` into nu x nv cells of equal parameter steps; see `Patch.cells`."""
         nu, nv = grid_counts(nu, nv)
         u_edges = np.linspace(*surface.u_range, nu + 1)
         v_edges = np.linspace(*surface.v_range, nv + 1)
@@ -149,11 +145,7 @@ class GridCells(Cells):
         return int(i * self.shape[1] + j)
 
     def unravel(self, k: int) -> tuple[int, int]:
-        """Row (u) and column (v) of the cell with flat index k.
-
-        Raises:
-            IndexError: there is no such cell.
-        """
+        """See `Cells.unravel`: row (u) and column (v)."""
         if not 0 <= k < len(self):
             raise IndexError(f"no cell {k} in a grid of {self.shape[0]} x {self.shape[1]}")
         i, j = divmod(int(k), self.shape[1])
@@ -178,10 +170,8 @@ class GridCells(Cells):
         du = np.concatenate([zero, t, one, 1.0 - t, [0.0]]) - 0.5
         dv = np.concatenate([t, one, 1.0 - t, zero, [0.0]]) - 0.5
         width_u, width_v = self._widths
-        return self.surface.point(
-            self.u[:, None] + du * width_u,
-            self.v[:, None] + dv * width_v,
-        )
+        u, v = self.u[:, None] + du * width_u, self.v[:, None] + dv * width_v
+        return self.surface.point(u, v)
 
     def borders(self, samples: int = 8) -> Array:
         """See `Cells.borders`."""

@@ -33,7 +33,6 @@ class Hyperboloid(ClosedFormPatch):
     units: ClassVar[tuple[str, str]] = ("rad", "m")
     code: ClassVar[int] = 3
     u_angle: ClassVar[bool] = True
-    v_angle: ClassVar[bool] = False
     waist: float
     """m, radius at z = 0."""
     flare: float
@@ -128,7 +127,7 @@ def hyperboloid(
     )
     made = Hyperboloid(
         u_range=check.angles("angle_deg", angle_deg),
-        v_range=check.length("height", height),
+        v_range=check.interval("height", height, "metres"),
         waist=waist,
         flare=flare,
         **check.pose(side, position, rpy_deg),

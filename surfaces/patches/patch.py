@@ -30,9 +30,11 @@ class Patch(Surface):
 
     units: ClassVar[tuple[str, str]]
     """'rad' or 'm' or '', of u and of v."""
-    u_angle: ClassVar[bool]
+    u_angle: ClassVar[bool] = False
     """True where u is an angle about an axis, so that u and u + 2 pi are one place."""
-    v_angle: ClassVar[bool]
+    v_angle: ClassVar[bool] = False
+    u_polar: ClassVar[bool] = False
+    """True where u is a polar angle: at 0 and pi all v, once around, are one place."""
 
     u_range: tuple[float, float]
     """rad or m."""
@@ -57,7 +59,9 @@ class Patch(Surface):
     @property
     def poles(self) -> tuple[bool, bool]:
         """Whether the rows of lowest and of highest u close around a pole of the patch."""
-        return (False, False)
+        low, high = self.u_range
+        around = self.u_polar and self.v_closed
+        return (around and low <= 1e-9, around and high >= math.pi - 1e-9)
 
     @property
     def lengths(self) -> tuple[float, ...]:
@@ -138,9 +142,6 @@ class ClosedFormPatch(Patch):
 
         Where several points are equally close (centre of a sphere, axis of a cylinder), one of
         them is taken, on the patch if there is one.
-
-        Raises:
-            ValueError: `points` does not end in an axis of length 3.
         """
         from surfaces.patches.closed_form_kernels import closest_points
 
@@ -205,9 +206,6 @@ class SmoothPatch(Patch):
         Where the normal at the closest point does not lead through the point, because it is on a
         border, `height` is the part of the distance along the normal there and `inside` is
         False. For a point that is not finite it is NaN and not inside.
-
-        Raises:
-            ValueError: `points` does not end in an axis of length 3.
         """
         points = points_of(points)
         flat = points.reshape(-1, 3)

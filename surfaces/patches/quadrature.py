@@ -80,10 +80,8 @@ def _open_ended(breaks: Array) -> Array:
 
 def _clipped(low: Array, high: Array, breaks: Array) -> Array:
     """(2, n, spans) ends of low..high within each span of the breaks."""
-    return np.stack([
-        np.maximum(low[:, None], breaks[:-1]),
-        np.minimum(high[:, None], breaks[1:]),
-    ])  # fmt: skip
+    begin, end = np.maximum(low[:, None], breaks[:-1]), np.minimum(high[:, None], breaks[1:])
+    return np.stack([begin, end])
 
 
 def _integrated(

@@ -132,21 +132,17 @@ def _at_corners(
     pairs, once = np.unique(pairs, axis=0, return_index=True)
     spot = spot[near[once, 0]]
     size = int(first[-1])
-    links = np.concatenate([*_own_pairs(surface, counts, first), touching])
+    own = [
+        grid_neighbours(*of, (patch.u_closed, patch.v_closed), patch.poles).pairs + start
+        for patch, of, start in zip(surface.pieces, counts, first, strict=False)
+    ]
+    links = np.concatenate([*own, touching])
     ones = np.ones(len(links))
     graph: Any = coo_array((ones, (links[:, 0], links[:, 1])), shape=(size, size)).tocsr()
     graph = graph + graph.T
     common = np.asarray(graph[pairs[:, 0]].multiply(graph[pairs[:, 1]]).sum(axis=1)).reshape(-1)
     keep = (common > 0) & ~np.isin(_keys(pairs), _keys(touching))
     return pairs[keep], spot[keep]
-
-
-def _own_pairs(surface: Piecewise, counts: Counts, first: Ints) -> list[Ints]:
-    """Pairs of neighbours within each piece."""
-    return [
-        grid_neighbours(*of, (patch.u_closed, patch.v_closed), patch.poles).pairs + start
-        for patch, of, start in zip(surface.pieces, counts, first, strict=False)
-    ]
 
 
 def _cells_at(side: Side, counts: Counts, along: Ints) -> Ints:

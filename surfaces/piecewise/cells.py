@@ -162,11 +162,7 @@ class PieceCells(Cells):
         return int(self.first[piece]) + self.grids[piece].index(i, j)
 
     def unravel(self, k: int) -> tuple[int, int, int]:
-        """Piece, row (u) and column (v) of the cell with flat index k.
-
-        Raises:
-            IndexError: there is no such cell.
-        """
+        """See `Cells.unravel`: piece, row (u) and column (v)."""
         if not 0 <= k < len(self):
             raise IndexError(f"no cell {k} among {len(self)}")
         piece = int(self.piece[k])

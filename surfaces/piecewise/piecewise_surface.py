@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import Fault
+from surfaces.adjacency import components
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches import Patch
 from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
-from surfaces.piecewise.seams import Seam, groups_of, on_each_other, sides_of, survey, turned_pieces
+from surfaces.piecewise.seams import Seam, on_each_other, sides_of, survey, turned_pieces
 from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
@@ -77,7 +78,9 @@ class Piecewise(Surface):
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:
         """The connected pieces, each group in order."""
-        return groups_of(len(self.pieces), self.seams)
+        pairs = np.array([seam.pieces for seam in self.seams], dtype=np.int64).reshape(-1, 2)
+        group = components(pairs, len(self.pieces))
+        return tuple(tuple(np.flatnonzero(group == g).tolist()) for g in range(group.max() + 1))
 
     @cached_property
     def placed(self) -> tuple[Patch, ...]:
@@ -176,9 +179,9 @@ def piecewise(
             "leave one of them out, or cut it back to the seam",
             "piecewise",
         )
-    found = survey(patches, width)
-    if found.overfull:
-        names = ", ".join(f"pieces[{k}]" for k in found.overfull)
+    seams, overfull = survey(patches, width)
+    if overfull:
+        names = ", ".join(f"pieces[{k}]" for k in overfull)
         raise SurfaceError(
             f"{names} share one seam; a surface has two sides of a seam at most; leave one of them "
             "out",
@@ -186,9 +189,9 @@ def piecewise(
         )
     return Piecewise(
         pieces=patches,
-        turned=turned_pieces(len(patches), found.seams),
+        turned=turned_pieces(len(patches), seams),
         gap=width,
-        seams=found.seams,
+        seams=seams,
         **pose,
     )
 

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.adjacency import components
 from surfaces.patches import Patch
 from surfaces.surface import SurfaceError
 
@@ -173,16 +172,12 @@ def contacts(sides: Sequence[Side], marks: Sequence[Array], gap: float) -> Itera
                 yield Contact(a, b, some, there)
 
 
-class Survey(NamedTuple):
-    """How the borders of several pieces lie to each other."""
+def survey(patches: Sequence[Patch], gap: float) -> tuple[tuple[Seam, ...], tuple[int, ...]]:
+    """The seams between patches, by marks in the middle of equal parts of their borders.
 
-    seams: tuple[Seam, ...]
-    overfull: tuple[int, ...]
-    """Three pieces or more that share one stretch of border; empty where none do."""
-
-
-def survey(patches: Sequence[Patch], gap: float) -> Survey:
-    """The seams between patches, by marks in the middle of equal parts of their borders."""
+    Returns:
+        The seams; and three pieces or more that share one stretch of border, empty where none do.
+    """
     sides = sides_of(patches, gap)
     s = (np.arange(PARTS) + 0.5) / PARTS
     best: dict[tuple[int, int], tuple[int, Seam]] = {}
@@ -196,7 +191,7 @@ def survey(patches: Sequence[Patch], gap: float) -> Survey:
         if len(contact.marks) > max(1, best[key][0] if key in best else 0):
             best[key] = (len(contact.marks), _seam(one, s[contact.marks], other, contact.there))
     crowds = [tuple(sorted(pieces)) for pieces in touched.values() if len(pieces) > 2]
-    return Survey(tuple(seam for _, seam in best.values()), min(crowds, default=()))
+    return tuple(seam for _, seam in best.values()), min(crowds, default=())
 
 
 def _seam(one: Side, here: Array, other: Side, there: Array) -> Seam:
@@ -212,13 +207,6 @@ def _seam(one: Side, here: Array, other: Side, there: Array) -> Seam:
 def _unit(vectors: Array) -> Array:
     """(k, 3) of length 1; zero stays zero."""
     return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300)
-
-
-def groups_of(count: int, seams: Sequence[Seam]) -> tuple[tuple[int, ...], ...]:
-    """The connected groups of `count` pieces."""
-    pairs = np.array([seam.pieces for seam in seams], dtype=np.int64).reshape(-1, 2)
-    group = components(pairs, count)
-    return tuple(tuple(np.flatnonzero(group == g).tolist()) for g in range(group.max() + 1))
 
 
 def turned_pieces(count: int, seams: Sequence[Seam]) -> tuple[bool, ...]:

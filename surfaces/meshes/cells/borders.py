@@ -222,14 +222,7 @@ def shared_borders(
     partner: NDArray[np.int64],
     labels: NDArray[np.int64],
 ) -> SharedBorders:
-    """Which cells share a border, how long it is, and where its middle lies.
-
-    Args:
-        vertices: (V, 3) m.
-        faces: (F, 3) vertex indices.
-        partner: (F, 3) see `triangle_mesh.edge_partners`.
-        labels: (F,) cell of each face.
-    """
+    """Which cells share a border, how long it is, and its middle; arguments as of `outlines`."""
     count = int(labels.max()) + 1
     other = np.where(partner >= 0, labels[partner // 3], -1)
     face, k = np.nonzero(other > labels[:, None])

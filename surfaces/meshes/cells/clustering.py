@@ -36,7 +36,6 @@ _JAGGED = 1.4  # borders run along edges, about this much longer than straight
 _PIN = 1e-3  # keeps the head starts of a separate piece from drifting
 _MOST_OFFSET = 3.0  # head starts, in lengths of a cell
 _MOST_STEP = 0.2  # between neighbours in one round
-NONE = -1  # where an edge has no face on its other side
 
 
 class FaceGraph(NamedTuple):
@@ -70,7 +69,7 @@ def face_graph(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceG
         SurfaceError: an edge has more than two faces, or both run along it in one direction.
     """
     partner = edge_partners(faces)
-    across = np.where(partner >= 0, partner // 3, NONE)
+    across = np.where(partner >= 0, partner // 3, -1)
     corners = vertices[faces]
     centre = corners.mean(axis=1)
     double = doubled_areas(vertices, faces)
@@ -158,32 +157,30 @@ def cluster_faces(
     quota = _shares(graph, count)
     # From here on, lengths are in cells: the side of a square of a cell's mean area is 1.
     unit = math.sqrt(graph.area.sum() / count)
-    step, edge = graph.step / unit, graph.edge / unit
-    centre, area = graph.centre / unit, graph.area / unit**2
-    piece_area = np.bincount(graph.piece, weights=area)
-    target = np.repeat(piece_area / quota, quota)
-    seeds = far_seeds(graph.across, whole_steps(step), graph.piece, quota, units(_BORDER))
-    labels = _lloyd(graph, step, edge, centre, area, target, seeds)
-    smooth(graph.across, whole_steps(edge), area, target, labels)
+    graph = graph._replace(
+        step=graph.step / unit,
+        edge=graph.edge / unit,
+        centre=graph.centre / unit,
+        area=graph.area / unit**2,
+    )
+    target = np.repeat(np.bincount(graph.piece, weights=graph.area) / quota, quota)
+    seeds = far_seeds(graph.across, whole_steps(graph.step), graph.piece, quota, units(_BORDER))
+    labels = _lloyd(graph, target, seeds)
+    smooth(graph.across, whole_steps(graph.edge), graph.area, target, labels)
     return labels
 
 
 def _lloyd(
-    graph: FaceGraph,
-    step: NDArray[np.float64],
-    edge: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    area: NDArray[np.float64],
-    target: NDArray[np.float64],
-    seeds: NDArray[np.int64],
+    graph: FaceGraph, target: NDArray[np.float64], seeds: NDArray[np.int64]
 ) -> NDArray[np.int64]:
     """The most even labels of some rounds, all lengths in cells; `seeds` (N,) is changed."""
+    across, centre, area = graph.across, graph.centre, graph.area
     labels = np.empty(len(area), dtype=np.int64)
     best, least = labels, math.inf
     anchors, offsets = centre[seeds], np.zeros(len(seeds))
     moving, evened = True, 0
     for done in range(1, _MOST_MOVING + _EVENING + 1):
-        flood(graph.across, step, centre, seeds, anchors, offsets, labels)
+        flood(across, graph.step, centre, seeds, anchors, offsets, labels)
         areas = sum_by(labels, area, len(seeds))
         uneven = float((areas / target).std())
         moving = moving and (done < _MOVING or (uneven > _UNEVEN and done < _MOST_MOVING))
@@ -197,7 +194,7 @@ def _lloyd(
                 best, least = labels.copy(), uneven
             if uneven <= _EVEN or evened > _EVENING:
                 break
-            offsets += _head_starts(graph.across, edge, labels, target - areas)
+            offsets += _head_starts(across, graph.edge, labels, target - areas)
         offsets = np.clip(offsets - offsets.mean(), -_MOST_OFFSET, _MOST_OFFSET)
     return best
 

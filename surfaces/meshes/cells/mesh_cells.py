@@ -14,7 +14,7 @@ from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.meshes.mesh_surface import MeshSurface
-from surfaces.surface import SurfaceError, max_principal_curvature
+from surfaces.surface import SurfaceError, max_principal_curvature, points_of
 
 if TYPE_CHECKING:
     from surfaces.meshes.cells.properties import Figures
@@ -204,7 +204,7 @@ class MeshCells(Cells):
 
     def locate(self, points: ArrayLike) -> Ints:
         """See `Cells.locate`."""
-        return self.labels[self.surface.faces_below(points)]
+        return self.labels[self.surface.nearest(points_of(points))[0]]
 
     def borders(self, samples: int = 8) -> Array:
         """See `Cells.borders`: the edges between faces of different cells, and the mesh's own."""
@@ -240,11 +240,7 @@ class MeshCells(Cells):
         return self.seen_from_outside(loop @ rotation.T + position for loop in loops)
 
     def unravel(self, k: int) -> tuple[int]:
-        """The cell's number.
-
-        Raises:
-            IndexError: there is no such cell.
-        """
+        """See `Cells.unravel`: the cell's number."""
         if not 0 <= k < len(self):
             raise IndexError(f"no cell {k} among {len(self)}")
         return (int(k),)

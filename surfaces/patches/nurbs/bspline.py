@@ -37,8 +37,6 @@ class SplinePatch(SmoothPatch):
 
     kind: ClassVar[str] = "bspline"
     units: ClassVar[tuple[str, str]] = ("", "")
-    u_angle: ClassVar[bool] = False
-    v_angle: ClassVar[bool] = False
     net: SplineMap
 
     @property
@@ -157,15 +155,13 @@ def _spline_map(
         checked_knots("knots[0]", knots[0], shape[0], p, faults),
         checked_knots("knots[1]", knots[1], shape[1], q, faults),
     )
-    low, high = [], []
-    for name, wanted, line, order in zip("uv", ranges, lines, (p, q), strict=True):
-        full = (float(line[order]), float(line[-order - 1]))
-        ends = _range(name, wanted, full, faults)
-        low.append(ends[0])
-        high.append(ends[1])
+    (u0, u1), (v0, v1) = (
+        _range(name, wanted, (float(line[order]), float(line[-order - 1])), faults)
+        for name, wanted, line, order in zip("uv", ranges, lines, (p, q), strict=True)
+    )
     if faults:
         return None
-    made = SplineMap(net, checked, lines, (p, q), (low[0], low[1]), (high[0], high[1]))
+    made = SplineMap(net, checked, lines, (p, q), (u0, v0), (u1, v1))
     faults += [Fault("", text) for text in regularity_faults(made)]
     return made
 

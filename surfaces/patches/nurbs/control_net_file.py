@@ -23,9 +23,9 @@ class NetFile(NamedTuple):
     """The arguments of `bspline` as a file gives them; not yet checked."""
 
     points: Any
-    degree: Any
-    knots: Any
-    weights: Any
+    degree: Any = (3, 3)
+    knots: Any = None
+    weights: Any = None
 
 
 def read_net(path: str | os.PathLike[str]) -> NetFile:
@@ -73,12 +73,7 @@ def _from_json(text: str) -> NetFile:
         raise ValueError(f"has keys that are not known: {shown}; known are {', '.join(_KEYS)}")
     if "points" not in value:
         raise ValueError('has no key "points", the rows of control points')
-    return NetFile(
-        points=value["points"],
-        degree=value.get("degree", (3, 3)),
-        knots=value.get("knots"),
-        weights=value.get("weights"),
-    )
+    return NetFile(**value)
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
@@ -122,8 +117,6 @@ def _from_csv(text: str) -> NetFile:
     grid = [[points[i, j] for j in range(columns)] for i in range(rows)]
     return NetFile(
         points=[[point[:3] for point in row] for row in grid],
-        degree=(3, 3),
-        knots=None,
         weights=[[point[3] for point in row] for row in grid] if rational else None,
     )
 
