@@ -1,4 +1,4 @@
-"""Smooth parametric patches g(u, v), one kind a file, cut into grids of E-cells."""
+"""Smooth parametric patches g(u, v) of several kinds, cut into grids of E-cells."""
 
 from lazy_loader import attach_stub
 

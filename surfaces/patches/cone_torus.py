@@ -81,7 +81,7 @@ def cone(
         slope: how fast the radius grows with z: the tangent of half the angle at the apex.
         angle_deg: (low, high) angle about z, at most a full turn apart.
         height: (low, high) along z, m; the radius stays above 0 there.
-        side: see `plane`, as for position and rpy_deg.
+        side: 'inside' or 'outside', where the tool works; see `plane` for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the numbers do not describe a patch; all are named.

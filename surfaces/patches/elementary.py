@@ -116,7 +116,7 @@ def cylinder(
         radius: m.
         angle_deg: (low, high) angle about z, at most a full turn apart.
         height: (low, high) along z, m.
-        side: see `plane`, as for position and rpy_deg.
+        side: 'inside' or 'outside', where the tool works; see `plane` for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the numbers do not describe a patch; all are named.
@@ -183,7 +183,7 @@ def sphere(
         radius: m.
         polar_deg: (low, high) angle from +z, within 0..180.
         azimuth_deg: (low, high) angle about z, at most a full turn apart.
-        side: see `plane`, as for position and rpy_deg.
+        side: 'inside' or 'outside', where the tool works; see `plane` for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the numbers do not describe a patch; all are named.

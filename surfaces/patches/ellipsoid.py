@@ -146,7 +146,7 @@ def ellipsoid(
         semi_axes: (3,) m.
         polar_deg: (low, high) angle from +z, within 0..180, on the unit sphere that is stretched.
         azimuth_deg: (low, high) angle about z on that sphere, at most a full turn apart.
-        side: see `plane`, as for position and rpy_deg.
+        side: 'inside' or 'outside', where the tool works; see `plane` for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the numbers do not describe a patch; all are named.

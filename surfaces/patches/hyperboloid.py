@@ -115,7 +115,7 @@ def hyperboloid(
         flare: m, height at which the radius is sqrt(2) waist.
         angle_deg: (low, high) angle about z, at most a full turn apart.
         height: (low, high) along z, m.
-        side: see `plane`, as for position and rpy_deg.
+        side: 'inside' or 'outside', where the tool works; see `plane` for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the numbers do not describe a patch; all are named.

@@ -272,7 +272,7 @@ def revolution(
             is to the right as the list is walked, with r to the right and z up: away from the axis
             if the points are listed upwards. The parameter u runs from the last point to the first.
         angle_deg: (low, high) angle about z, at most a full turn apart.
-        side: see `plane`, as for position and rpy_deg.
+        side: 'inside' or 'outside', where the tool works; see `plane` for position and rpy_deg.
 
     Raises:
         SurfaceError: one or more of the arguments do not describe a patch; all are named.
