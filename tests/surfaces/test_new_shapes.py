@@ -276,7 +276,7 @@ BAD = {
     "angle_deg must span at most": lambda: cone(1, 1, (0, 361), (0, 1)),
     "tube must be less than ring": lambda: torus(0.2, 0.2, (0, 90), (0, 90)),
     "ring must be a finite": lambda: torus(math.inf, 0.2, (0, 90), (0, 90)),
-    "ring / tube must lie in": lambda: torus(1, 1e-8, (0, 90), (0, 90)),
+    "tube must be within a factor of": lambda: torus(1, 1e-8, (0, 90), (0, 90)),
     "v_deg must be a pair": lambda: torus(1, 0.2, (0, 90), (90, 0)),
     "semi_axes must be three": lambda: ellipsoid((1, 2), (0, 90), (0, 90)),
     r"semi_axes\[1\] must be a finite number > 0": lambda: ellipsoid((1, 0, 1), (0, 90), (0, 90)),
