@@ -280,7 +280,7 @@ BAD = {
     "v_deg must be a pair": lambda: torus(1, 0.2, (0, 90), (90, 0)),
     "semi_axes must be three": lambda: ellipsoid((1, 2), (0, 90), (0, 90)),
     r"semi_axes\[1\] must be a finite number > 0": lambda: ellipsoid((1, 0, 1), (0, 90), (0, 90)),
-    "longest / shortest": lambda: ellipsoid((1, 1, 1e-7), (0, 90), (0, 90)),
+    "semi_axes must be within a factor of": lambda: ellipsoid((1, 1, 1e-7), (0, 90), (0, 90)),
     "polar_deg must lie in 0 .. 180": lambda: ellipsoid((1, 1, 1), (-1, 90), (0, 90)),
 }
 
