@@ -9,19 +9,24 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coverable_errors import Fault, alternatives, close, printable
-from feasibility.cases.edits import as_read, make_absolute, override
+from coverable_errors import MISSING, Fault, alternatives, close, printable
 from feasibility.cases.robot_table import RobotPart, in_robot_table, read_robot
-from feasibility.cases.surface_kinds import CLOSED_FORM_KINDS
+from feasibility.cases.surface_keys import CLOSED_FORM_KINDS
 from feasibility.cases.surface_table import (
     SurfacePart,
     faults_of_building,
     named_file,
     read_surface,
 )
-from feasibility.cases.table_reader import CaseError
-from feasibility.cases.task_tables import read_search, read_task
-from feasibility.cases.toml import TomlError, parse_toml, toml_document
+from feasibility.cases.table_reader import CaseError, Section
+from feasibility.cases.toml import (
+    TomlError,
+    as_read,
+    make_absolute,
+    override,
+    parse_toml,
+    toml_document,
+)
 from feasibility.safe_files import FileError, read_regular, shown_path
 from feasibility.search import Search
 from feasibility.task import Task
@@ -168,15 +173,19 @@ def load_case(name_or_path: str | os.PathLike[str], overrides: Iterable[str] = (
             "ones",
             shown_path(name),
         )
+    text = read_document(name, "a case file (TOML)")
+    return Case.from_toml(text, os.path.dirname(os.path.abspath(name)), shown_path(name), overrides)
+
+
+def read_document(path: str | os.PathLike[str], what: str) -> str:
+    """The text of a TOML file, or a `CaseError` that says what is wrong with it."""
     try:
-        data = read_regular(name, LARGEST_FILE, "a case file (TOML)")
-        text = data.decode("utf-8-sig")
+        return read_regular(path, LARGEST_FILE, what).decode("utf-8-sig")
     except FileError as error:
         raise CaseError(error.faults, error.source) from error
     except UnicodeDecodeError as error:
-        message = f"is not UTF-8 text (byte {error.start}); expected a case file (TOML)"
-        raise CaseError(message, shown_path(name)) from error
-    return Case.from_toml(text, os.path.dirname(os.path.abspath(name)), shown_path(name), overrides)
+        message = f"is not UTF-8 text (byte {error.start}); expected {what}"
+        raise CaseError(message, shown_path(path)) from error
 
 
 @cache
@@ -212,12 +221,14 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
             faults.append(Fault(title, f"is missing; expected a table [{title}]"))
     robot = read_robot(tables["robot"], faults) if "robot" in tables else None
     surface = read_surface(tables["surface"], faults) if "surface" in tables else None
-    task = read_task(tables["task"], faults) if "task" in tables else None
-    search = read_search(tables.get("search", {}), faults)
+    task = _read_task(tables["task"], faults) if "task" in tables else None
+    search = _read_search(tables.get("search", {}), faults)
     if surface and search and search.method == "greedy" and surface.kind not in CLOSED_FORM_KINDS:
-        faults.append(_no_greedy(surface.kind))
+        kinds = alternatives(CLOSED_FORM_KINDS)
+        known = f'"greedy" works on {kinds} only, not on a surface of kind {surface.kind}'
+        faults.append(Fault("search.method", f'{known}; use "complete"'))
     if faults and "robot" in tables:
-        faults += _robot_faults(robot or _named_robot(tables["robot"]))
+        faults += _robot_faults(robot, tables["robot"])
     if faults and "surface" in tables:
         part = surface or named_file(tables["surface"])
         faults += faults_of_building(part) if part is not None else []
@@ -226,30 +237,41 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     return Case(robot, surface, task, search, name)
 
 
-def _no_greedy(kind: str) -> Fault:
-    """The greedy search is asked for a surface that it does not know."""
-    kinds = alternatives(CLOSED_FORM_KINDS)
-    return Fault(
-        "search.method",
-        f'"greedy" works on {kinds} only, not on a surface of kind {kind}; use "complete"',
-    )
-
-
-def _named_robot(table: Any) -> RobotPart | None:
-    """The robot as far as a faulty table names it."""
-    if not isinstance(table, dict) or "urdf" in table or "name" not in table:
-        return None
-    return read_robot({"name": table["name"]}, [])
-
-
-def _robot_faults(part: RobotPart | None) -> list[Fault]:
-    """What loading the arm would say, so that it comes together with the other faults."""
+def _robot_faults(part: RobotPart | None, table: Any) -> list[Fault]:
+    """The faults of loading the arm, or of the one that a faulty table names."""
     from robots import RobotError
 
-    if part is None:
-        return []
+    if part is None and isinstance(table, dict) and "name" in table and "urdf" not in table:
+        part = read_robot({"name": table["name"]}, [])
     try:
-        part.build()
+        if part is not None:
+            part.build()
     except RobotError as error:
         return in_robot_table(error)
     return []
+
+
+def _read_task(table: Any, faults: list[Fault]) -> Task | None:
+    """Read the [task] table; None where it has faults."""
+    section = Section("task", table, faults)
+    required = {"standoff": MISSING, "cone_deg": MISSING}
+    values = required | section.take("standoff", "cone_deg", "tolerance")
+    if section.take("approach").get("approach", "normal") != "normal":
+        section.fault(
+            "approach",
+            'a direction other than "normal" is not supported yet; leave it out: the surface '
+            "normal is used",
+        )
+    if section.has("roll_deg"):
+        free = "leave it out: the roll about the approach direction is free"
+        section.fault("roll_deg", f"is not supported yet; {free}")
+    section.refuse_others()
+    return section.make(Task, values)
+
+
+def _read_search(table: Any, faults: list[Fault]) -> Search | None:
+    """Read the [search] table; None where it has faults."""
+    section = Section("search", table, faults)
+    values = section.take(*Search.__dataclass_fields__)
+    section.refuse_others()
+    return section.make(Search, values)

@@ -8,8 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import MISSING
-from feasibility.cases.patch_keys import in_file
-from feasibility.cases.table_reader import CaseError, Section
+from feasibility.cases.table_reader import CaseError, Section, in_file
 
 if TYPE_CHECKING:
     from surfaces.meshes import MeshSurface, TriangleMesh

@@ -15,6 +15,7 @@ from coverable_errors import (
     printable,
     shown,
 )
+from feasibility.safe_files import shown_path
 
 MOST_GUESSES = 20  # unknown keys for which a known one is looked up
 DEG = "degrees"
@@ -97,10 +98,10 @@ class Section(Checks):
         if not self.has(key) and not (required and self.is_table):
             return None
         value = self.table.get(key, MISSING)
-        if not is_text(value):
-            self.wrong(key, value, f"must be {expected}")
-            return None
-        return str(value)
+        if is_text(value):
+            return str(value)
+        self.wrong(key, value, f"must be {expected}")
+        return None
 
     def word(self, key: str, options: Sequence[str], *, required: bool = False) -> str | None:
         """One of some words."""
@@ -109,11 +110,6 @@ class Section(Checks):
         before = len(self.faults)
         found = self.choice(key, self.table.get(key, MISSING), options)
         return found if len(self.faults) == before else None
-
-    def later(self, key: str, remedy: str) -> None:
-        """A key that has a meaning, but not yet."""
-        if self.has(key):
-            self.fault(key, f"is not supported yet; {remedy}")
 
     def refuse_others(self, hints: Mapping[str, str] = {}) -> None:
         """Keep a fault for every key that nothing has asked for.
@@ -147,3 +143,11 @@ def frozen(value: Any, whole: bool = False) -> Any:
     if isinstance(value, (list, tuple)):
         return tuple(frozen(item, whole) for item in value)
     return float(value) if is_number(value) and not whole else value
+
+
+def in_file(error: CoverableError, file: str, table: str) -> list[Fault]:
+    """The faults of a file that a table of the case names."""
+    return [
+        Fault(f"{table}.file", f"{fault.key} {fault.message}".strip(), shown_path(file))
+        for fault in error.faults
+    ]

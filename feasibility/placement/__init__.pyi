@@ -1,4 +1,6 @@
 from .evaluator import LocalEvaluator as LocalEvaluator
+from .evaluator import Stage as Stage
+from .evaluator import Trial as Trial
 from .map import PlacementMap as PlacementMap
 from .map import map_around_best as map_around_best
 from .map import placement_map as placement_map
@@ -16,5 +18,3 @@ from .stations import StationPlan as StationPlan
 from .stations import station_plan as station_plan
 from .study_tasks import StudyEvaluator as StudyEvaluator
 from .study_tasks import trial_table as trial_table
-from .trial import Stage as Stage
-from .trial import Trial as Trial

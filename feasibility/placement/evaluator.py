@@ -7,30 +7,109 @@ again. Only `feasibility.check`, which decides in the end, gets cells that have 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.division import undominated
-from feasibility.placement.margins import least_margins
 from feasibility.placement.quick_search import (
     MOST_COVERS,
     covers_of,
+    least_margins,
     probe,
     search_quickly,
     spread_cells,
 )
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
-from feasibility.placement.trial import Margins, Stage, Trial
 from feasibility.roadmap import Exploration, SearchArrays, arrays_of
 from feasibility.search import Search
 from feasibility.studies import cause_counts
 from feasibility.task import Task
+from feasibility.verdict import Answer, Evidence
 from robots import Robot
 from surfaces import Cells
+
+
+class Stage(StrEnum):
+    """How far the evaluation of a placement went."""
+
+    BOUND = "bound"
+    """A target is proved out of reach: no search was run."""
+    PROBE = "probe"
+    """Newton's method failed at some of a few cells: no search was run."""
+    SEARCH = "search"
+    """A short search was run."""
+    CHECK = "check"
+    """The full search was run, and its motion replayed."""
+    FAILED = "failed"
+    """No evaluator finished it; the message says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """What the motion over a placement leaves, as shares 0..1; see `placement.quick_search`."""
+
+    limits: float
+    cone: float
+    reach: float
+
+    @property
+    def least(self) -> float:
+        """The measure of a placement."""
+        return min(self.limits, self.cone, self.reach)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Trial:
+    """What is known of one placement."""
+
+    pose: Pose
+    stage: Stage
+    in_reach: float
+    """Share of the area that the reach bound leaves open."""
+    probed: float = 0.0
+    """Share of the probed cells over which Newton's method found a configuration."""
+    share: float = 0.0
+    """Share of the area that the best single motion found covers; 0 where none was looked for."""
+    margins: Margins | None = None
+    """None unless that motion covers every cell."""
+    covers: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    """(K, N) cells of the largest components found, none inside another, the best first."""
+    answer: Answer | None = None
+    """The answer of `feasibility.check`; None where it was not run."""
+    evidence: Evidence | None = None
+    message: str = ""
+    """The message of `feasibility.check`."""
+    causes: Mapping[str, int] = field(default_factory=dict)
+    """Missed cells by cause, the most frequent first; only where requested."""
+    early: bool = False
+    """Whether probes came before its search, and could end it."""
+    fk: int = 0
+    """Evaluations of the arm."""
+
+    @property
+    def feasible(self) -> bool:
+        """Has `feasibility.check` found and replayed a covering motion?"""
+        return self.answer is Answer.FEASIBLE
+
+    @property
+    def margin(self) -> float:
+        """The measure; 0 where not every cell is covered."""
+        return 0.0 if self.margins is None else self.margins.least
+
+    @property
+    def complete(self) -> bool:
+        """Does one motion found cover every cell?"""
+        return bool(len(self.covers) and self.covers[0].all())
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """Larger is better: covered share, then margin, then what was seen before a search."""
+        return (round(self.share, 9), self.margin, self.probed, self.in_reach)
 
 
 class LocalEvaluator:
@@ -61,7 +140,7 @@ class LocalEvaluator:
         )
 
     def try_at(self, pose: Pose, early: bool = True) -> Trial:
-        """Look into one placement.
+        """Evaluate one placement.
 
         Args:
             pose: where the surface's frame stands.
@@ -105,13 +184,11 @@ class LocalEvaluator:
             otherwise why it does not.
         """
         from feasibility.certification import replay
-        from feasibility.roadmap import covering_walk, explore
+        from feasibility.roadmap import covering_walk
 
         cells = moved_cells(self.cells, trial.pose)
         if trial.stage is Stage.CHECK:
-            problem = arrays_of(self.robot, cells, self.task)
-            exploration = Exploration(self.robot, cells, problem, self.search.seed)
-            explore(exploration)
+            exploration = self._explored(cells)
         else:
             problem = self.problem_at(trial.pose)
             exploration = Exploration(self.robot, self.cells, problem, self.search.seed)
@@ -126,7 +203,7 @@ class LocalEvaluator:
         return "the search did not find this motion again"
 
     def check_at(self, pose: Pose, causes: bool = False) -> Trial:
-        """Ask `feasibility.check` about one placement.
+        """Run `feasibility.check` on one placement.
 
         Args:
             pose: where the surface's frame stands.
@@ -138,7 +215,8 @@ class LocalEvaluator:
         verdict = check(self.robot, cells, self.task, self.search)
         tried = self.try_at(pose, early=False) if verdict.feasible else None
         if tried is not None and not tried.complete:
-            tried = self._explored(cells, pose)
+            # The search of `check` again, for the margins that its motion leaves.
+            tried = self.trial_of(self._explored(cells), pose, 1.0, 1.0)
         covers = np.zeros((len(verdict.components), len(cells)), dtype=bool)
         for row, component in zip(covers, verdict.components, strict=True):
             row[component] = True
@@ -158,14 +236,14 @@ class LocalEvaluator:
             fk=int(verdict.statistics["fk"]) + (0 if tried is None else tried.fk),
         )
 
-    def _explored(self, cells: Cells, pose: Pose) -> Trial:
-        """The search of `check` again, for the margins that its motion leaves."""
+    def _explored(self, cells: Cells) -> Exploration:
+        """The search of `check` for cells at their place."""
         from feasibility.roadmap import explore
 
         problem = arrays_of(self.robot, cells, self.task)
         exploration = Exploration(self.robot, cells, problem, self.search.seed)
         explore(exploration)
-        return self.trial_of(exploration, pose, 1.0, 1.0)
+        return exploration
 
     def share_of(self, cover: NDArray[np.bool_]) -> float:
         """Share of the area that some cells (N,) have."""
@@ -177,7 +255,10 @@ class LocalEvaluator:
     ) -> Trial:
         """What a search found."""
         covers = covers_of(exploration)
-        margins = self._margins(exploration, pose) if exploration.complete else None
+        margins = None
+        if exploration.complete:
+            limits, cone = least_margins(exploration).tolist()
+            margins = Margins(limits, cone, max(0.0, min(1.0, self.reach.slack(pose.values))))
         return Trial(
             pose=pose,
             stage=Stage.SEARCH,
@@ -188,8 +269,3 @@ class LocalEvaluator:
             covers=covers,
             fk=int(exploration.work.counts[0]),
         )
-
-    def _margins(self, exploration: Exploration, pose: Pose) -> Margins:
-        """What the component that covers every cell leaves."""
-        limits, cone = least_margins(exploration).tolist()
-        return Margins(limits, cone, max(0.0, min(1.0, self.reach.slack(pose.values))))

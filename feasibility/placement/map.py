@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.placement.evaluator import Stage
 from feasibility.placement.placements import Placements
-from feasibility.placement.refinement import BATCH, Evaluator
+from feasibility.placement.refinement import Evaluator, search_all
 from feasibility.placement.region import AXES, Array, PlacementError, Pose, Region
-from feasibility.placement.trial import Stage
 from feasibility.search import Progress
 
 SIDE = 15  # places along each of the first two axes
@@ -30,7 +30,7 @@ class PlacementMap:
     share: Array
     """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
     margin: Array
-    """Likewise the margin, see `placement.margins`; 0 where not every cell is covered."""
+    """Likewise the margin, see `placement.quick_search`; 0 where not every cell is covered."""
     known: NDArray[np.bool_]
     """Likewise, where a search was run; elsewhere share and margin are NaN."""
 
@@ -92,23 +92,12 @@ def placement_map(
     grid = np.meshgrid(*ticks, indexing="ij")
     for k, places in zip(where, grid, strict=True):
         values[:, k] = places.ravel()
-    trials = []
-    for start in range(0, len(values), BATCH):
-        if progress is not None:
-            progress(start, len(values), "searching the map")
-        poses = [Pose.of_values(row) for row in values[start : start + BATCH]]
-        trials += evaluator.try_all(poses, early=False)
+    trials = search_all(evaluator, values, progress, "searching the map")
     known = np.array([trial.stage is not Stage.FAILED for trial in trials])
     share = np.where(known, [trial.share for trial in trials], np.nan)
     margin = np.where(known, [trial.margin for trial in trials], np.nan)
-    return PlacementMap(
-        axes=names,
-        held=held,
-        ticks=ticks,
-        share=share.reshape(counts),
-        margin=margin.reshape(counts),
-        known=known.reshape(counts),
-    )
+    raster = (array.reshape(counts) for array in (share, margin, known))
+    return PlacementMap(names, held, ticks, *raster)
 
 
 def map_around_best(

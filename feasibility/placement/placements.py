@@ -6,7 +6,7 @@
    out of reach; of the others, Newton's method is tried at a few cells that differ most. A short
    search is run only where it succeeds at all of them.
 3. Around the best few, more poses are tried in ever smaller boxes: larger covered share first, then
-   larger margin (see `feasibility.placement.margins`).
+   larger margin (see `feasibility.placement.quick_search`).
 4. The best placements are decided as any other case: `feasibility.check` searches and replays.
    Only what it calls feasible is an answer.
 
@@ -25,11 +25,10 @@ from typing import Any
 import numpy as np
 
 from feasibility.notices import compiling_notice
-from feasibility.placement.evaluator import LocalEvaluator
+from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
 from feasibility.placement.reach_bound import Beyond, Reach
 from feasibility.placement.refinement import Evaluator, Refinement
 from feasibility.placement.region import PlacementError, Pose, Region
-from feasibility.placement.trial import Stage, Trial
 from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
 from feasibility.target_curves import blocked_curves
@@ -123,7 +122,7 @@ def place(
         around: poses tried around each of the best, a round; 0 for no refinement.
         keep: feasible placements to verify, at most.
         early: whether bounds and probes may discard placements before a search is run.
-        time_limit: s, looked at between batches; the verdicts asked for at the end come on top.
+        time_limit: s, checked between batches; the final verdicts come on top.
         evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
 
@@ -181,21 +180,18 @@ def _check_settings(
     cells: Cells, search: Search, count: int, around: int, keep: int, time_limit: float | None
 ) -> None:
     """Refuse what makes no question."""
-    faults = []
-    if len(cells) == 0:
-        faults.append("there are no cells to cover; cut the surface into some")
-    if search.method != "complete":
-        faults.append(
-            f'the search for placements works with method "complete", not {search.method!r}'
-        )
-    if count < 1:
-        faults.append(f"count: expected a whole number >= 1 of poses to try, got {count}")
-    if around < 0:
-        faults.append(f"around: expected a whole number >= 0 of poses, got {around}")
-    if keep < 1:
-        faults.append(f"keep: expected a whole number >= 1 of placements, got {keep}")
-    if time_limit is not None and not 0.0 < time_limit < np.inf:
-        faults.append(f"time_limit: expected a finite number > 0 (s), got {time_limit}")
+    number = "expected a whole number >="
+    method = f'the search for placements works with method "complete", not {search.method!r}'
+    too_long = time_limit is not None and not 0.0 < time_limit < np.inf
+    checks = {
+        "there are no cells to cover; cut the surface into some": len(cells) == 0,
+        method: search.method != "complete",
+        f"count: {number} 1 of poses to try, got {count}": count < 1,
+        f"around: {number} 0 of poses, got {around}": around < 0,
+        f"keep: {number} 1 of placements, got {keep}": keep < 1,
+        f"time_limit: expected a finite number > 0 (s), got {time_limit}": too_long,
+    }
+    faults = [text for text, wrong in checks.items() if wrong]
     if faults:
         raise PlacementError(faults)
 
@@ -204,10 +200,8 @@ def _ruled_out(
     answered: Callable[..., Placements], region: Region, reach: Reach, beyond: Beyond
 ) -> Placements:
     """The answer where the reach bound leaves no placement."""
-    values = region.samples(0, 0)  # its middle
-    trials = [
-        Trial(Pose.of_values(row), Stage.BOUND, float(reach.share(row[None])[0])) for row in values
-    ]
+    middle = region.samples(0, 0)
+    trial = Trial(Pose.of_values(middle[0]), Stage.BOUND, float(reach.share(middle)[0]))
     message = (
         f"No placement in the region: wherever the surface stands in it, some target is at least "
         f"{beyond.distance:.3f} m from the first joint, and the arm reaches at most "
@@ -219,7 +213,7 @@ def _ruled_out(
         evidence=Evidence.PROOF,
         message=message,
         found=(),
-        trials=tuple(trials),
+        trials=(trial,),
         cause=CauseKind.OUT_OF_REACH,
         statistics={**dict.fromkeys(COUNTS, 0), "boxes": beyond.boxes},
     )
@@ -232,10 +226,10 @@ def _searched(
     trials = sorted(refinement.trials, key=lambda trial: trial.rank, reverse=True)
     failed = [trial for trial in trials if trial.stage is Stage.FAILED]
     stages = Counter(trial.stage for trial in trials)
-    looked = stages[Stage.SEARCH] + stages[Stage.CHECK]
+    searched = stages[Stage.SEARCH] + stages[Stage.CHECK]
     tried = (
         f"{refinement.drawn} placements were drawn: {refinement.bound} have a target out of reach, "
-        f"{stages[Stage.PROBE]} failed a few Newton starts, {looked} were searched"
+        f"{stages[Stage.PROBE]} failed a few Newton starts, {searched} were searched"
     ) + (f", {len(failed)} could not be tried ({failed[0].message})" if failed else "")
     causes: dict[str, int] = {}
     cause = None

@@ -9,9 +9,9 @@ from typing import Protocol
 
 import numpy as np
 
+from feasibility.placement.evaluator import Stage, Trial
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, Region
-from feasibility.placement.trial import Stage, Trial
 from feasibility.search import Progress
 
 DRAWS = 16  # as many times more are drawn where the bound leaves few
@@ -21,7 +21,7 @@ ELITES = 4  # placements that are refined
 WIDTHS = (0.5, 0.35, 0.25, 0.17, 0.12, 0.08)  # [1] of the region, around the best
 CYCLES = 3  # times through the widths, as long as nothing is feasible
 APART = 0.05  # [1] of the region's widths: placements nearer to each other are alike
-BATCH = 64  # poses between two looks at the clock
+BATCH = 64  # poses between two checks of the deadline and of progress
 
 
 class Evaluator(Protocol):
@@ -32,6 +32,19 @@ class Evaluator(Protocol):
 
     def check_all(self, poses: Sequence[Pose], causes: bool) -> list[Trial]:
         """See `LocalEvaluator.check_at`."""
+
+
+def search_all(
+    evaluator: Evaluator, values: Array, progress: Progress | None, text: str
+) -> list[Trial]:
+    """Search the placements (k, 6), a batch at a time; none is discarded early."""
+    trials: list[Trial] = []
+    for start in range(0, len(values), BATCH):
+        if progress is not None:
+            progress(start, len(values), text)
+        poses = [Pose.of_values(row) for row in values[start : start + BATCH]]
+        trials += evaluator.try_all(poses, early=False)
+    return trials
 
 
 @dataclass(slots=True)
@@ -149,7 +162,7 @@ class Refinement:
                 self.progress(len(self.trials), None, f"trying placements, {done} covered")
 
     def _check(self, poses: list[Pose], causes: bool = False) -> None:
-        """Ask `check` about poses; what it says replaces what was known."""
+        """Run `check` on poses; its trials replace the earlier ones."""
         poses = [pose for pose in poses if causes or pose not in self.checks]
         if self.progress is not None:
             self.progress(len(self.trials), None, "checking the best placements")

@@ -16,12 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.division import set_cover
-from feasibility.placement.evaluator import LocalEvaluator
+from feasibility.placement.evaluator import LocalEvaluator, Trial
 from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
-from feasibility.placement.refinement import BATCH, Evaluator
-from feasibility.placement.region import Pose
-from feasibility.placement.trial import Trial
+from feasibility.placement.refinement import Evaluator, search_all
 from feasibility.search import Progress, Search
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
@@ -100,11 +98,7 @@ def station_plan(
     reach = Reach.of(placements.robot, placements.cells, placements.task)
     values = values[reach.share(values) > 0.0]
     trials = [trial for trial in placements.trials if len(trial.covers)]
-    for start in range(0, len(values), BATCH):
-        if progress is not None:
-            progress(start, len(values), "searching for stations")
-        poses = [Pose.of_values(row) for row in values[start : start + BATCH]]
-        trials += evaluator.try_all(poses, early=False)
+    trials += search_all(evaluator, values, progress, "searching for stations")
     needed = np.ones(len(placements.cells), dtype=bool)
     stations = fewest_stations([trial.covers for trial in trials], needed)
     local = LocalEvaluator(placements.robot, placements.cells, placements.task, search)

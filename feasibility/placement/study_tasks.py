@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from feasibility.cases import TABLES, Case, toml_document
-from feasibility.placement.evaluator import LocalEvaluator
+from feasibility.placement.evaluator import LocalEvaluator, Margins, Stage, Trial
 from feasibility.placement.region import Pose
-from feasibility.placement.trial import Margins, Stage, Trial
 from feasibility.search import Progress
 from feasibility.studies import Store, StudyTask, Workers, bits_of, cells_of, run_tasks
 from feasibility.verdict import Answer, Evidence
@@ -79,11 +79,11 @@ def try_placement(tables: Tables) -> Tables:
         See `trial_table`.
     """
     local = _evaluator(toml_document({title: tables[title] for title in TABLES if title in tables}))
-    asked = tables["placement"]
-    pose = Pose.of_values(asked["pose"])
-    if "early" in asked:
-        return trial_table(local.try_at(pose, asked["early"]))
-    return trial_table(local.check_at(pose, asked["causes"]))
+    request = tables["placement"]
+    pose = Pose.of_values(request["pose"])
+    if "early" in request:
+        return trial_table(local.try_at(pose, request["early"]))
+    return trial_table(local.check_at(pose, request["causes"]))
 
 
 @lru_cache(maxsize=KEPT)
@@ -103,9 +103,7 @@ def trial_table(trial: Trial) -> Tables:
         "probed": trial.probed,
         "share": trial.share,
         "margin": trial.margin,
-        "margins": None
-        if margins is None
-        else {"limits": margins.limits, "cone": margins.cone, "reach": margins.reach},
+        "margins": None if margins is None else asdict(margins),
         "cells": trial.covers.shape[1],
         "components": [bits_of(cover) for cover in trial.covers],
         "verdict": None if trial.answer is None else str(trial.answer),

@@ -14,14 +14,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, CoverableError, shown, worded
 from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError
-from feasibility.results.archive import Archive, ArchiveError, write_archive
-from feasibility.results.result_fields import Fields
-from feasibility.results.result_graph import pack_graph, ragged, unpack_graph, unpack_ragged
-from feasibility.results.result_identity import check_cells, check_robot, places, probes
+from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
+from feasibility.results.result_arrays import (
+    check_cells,
+    check_robot,
+    pack_graph,
+    places,
+    probes,
+    ragged,
+    read_cells,
+    unpack_graph,
+    unpack_ragged,
+)
 from feasibility.safe_files import FileError
 from feasibility.task import Task
 from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
@@ -182,15 +189,13 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
     count, n = len(cells), robot.n
     graph = unpack_graph(archive, "graph", count, n)
     covered = np.zeros(count, dtype=bool)
-    covered[unpack_indices(archive, "covered", count)] = True
+    covered[read_cells(archive, "covered", count)] = True
     witness = None
     if fields.flag("has_witness"):
         q = archive.array("witness_q", np.float64, (None, n))
-        at = archive.array("witness_cell", np.int64, (len(q),))
-        if ((at < -1) | (at >= count)).any():
-            raise archive.error("'witness_cell' holds numbers that are no cells")
-        witness = Walk(q=q, cell=at)
+        witness = Walk(q=q, cell=read_cells(archive, "witness_cell", count, (len(q),), low=-1))
     start = None if fields.entries.get("start") is None else fields.cell("start", count)
+    timing = fields.table("timing")
     return Verdict(
         answer=fields.member("answer", Answer),
         evidence=fields.member("evidence", Evidence),
@@ -211,17 +216,9 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
         start=start,
         witness=witness,
         certificate=_certificate(fields),
-        timing=_seconds(fields.table("timing")),
+        timing={key: timing.number(key) for key in timing.entries},
         statistics=dict(fields.table("statistics").entries),
     )
-
-
-def unpack_indices(archive: Archive, name: str, count: int) -> NDArray[np.int64]:
-    """An array of cells."""
-    indices = archive.array(name, np.int64, (None,))
-    if ((indices < 0) | (indices >= count)).any():
-        raise archive.error(f"{name!r} holds numbers that are no cells")
-    return indices
 
 
 def _task(fields: Fields) -> Task:
@@ -258,8 +255,3 @@ def _certificate(fields: Fields) -> Certificate | None:
         max_angle=row.number("max_angle"),
         min_limit_margin=np.inf if margin is None else row.number("min_limit_margin"),
     )
-
-
-def _seconds(fields: Fields) -> dict[str, float]:
-    """The timing."""
-    return {key: fields.number(key) for key in fields.entries}

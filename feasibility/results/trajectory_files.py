@@ -25,6 +25,11 @@ MOST_SAMPLES = 1_000_000
 MOST_JOINTS = 64
 CAP = 64 << 20  # [bytes] largest file that is read
 FORMAT = "coverable trajectory 1"
+ARRAYS = {
+    "time": "time", "positions": "q", "velocities": "dq", "accelerations": "ddq",
+    "tool_speed": "tool_speed",
+}  # fmt: skip
+"""The arrays of the JSON, and what they are called in `Trajectory`."""
 _SHAPES = {"velocities": "_velocity", "accelerations": "_acceleration"}
 
 
@@ -147,17 +152,9 @@ def from_csv(text: str) -> Trajectory:
 def as_json_text(trajectory: Trajectory) -> str:
     """One object; times in seconds, radians or metres; cell is null between centres."""
     cells = [None if cell < 0 else cell for cell in trajectory.cell.tolist()]
-    record = {
-        "format": FORMAT,
-        "joint_names": list(trajectory.joint_names),
-        "time": trajectory.time.tolist(),
-        "positions": trajectory.q.tolist(),
-        "velocities": trajectory.dq.tolist(),
-        "accelerations": trajectory.ddq.tolist(),
-        "tool_speed": trajectory.tool_speed.tolist(),
-        "cell": cells,
-    }
-    return json.dumps(record, allow_nan=False) + "\n"
+    record: dict[str, Any] = {"format": FORMAT, "joint_names": list(trajectory.joint_names)}
+    record |= {key: getattr(trajectory, name).tolist() for key, name in ARRAYS.items()}
+    return json.dumps({**record, "cell": cells}, allow_nan=False) + "\n"
 
 
 def from_json_text(text: str) -> Trajectory:
@@ -172,10 +169,7 @@ def from_json_text(text: str) -> Trajectory:
         raise ArgumentError("is nested too deeply for a trajectory") from error
     except ValueError as error:
         raise ArgumentError(f"is not JSON: {error}") from error
-    keys = {
-        "format", "joint_names", "time", "positions", "velocities", "accelerations", "tool_speed",
-        "cell",
-    }  # fmt: skip
+    keys = {"format", "joint_names", *ARRAYS, "cell"}
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise ArgumentError(f'expected an object with "format": "{FORMAT}"')
     faults = [Fault(key, "is missing") for key in sorted(keys - set(record))]
@@ -192,21 +186,15 @@ def from_json_text(text: str) -> Trajectory:
     checks.done()
     k, n = len(time), len(joints)
     arrays = {
-        key: _array(checks, key, record[key], shape)
-        for key, shape in (
-            ("time", (k,)), ("positions", (k, n)), ("velocities", (k, n)),
-            ("accelerations", (k, n)), ("tool_speed", (k,)),
-        )
-    }  # fmt: skip
+        name: _array(checks, key, record[key], (k, n) if name in ("q", "dq", "ddq") else (k,))
+        for key, name in ARRAYS.items()
+    }
     if not isinstance(cells, list) or len(cells) != k or not all(map(_is_cell, cells)):
         expected = f"must be a list of {k} whole numbers >= 0, or null between centres"
         checks.wrong("cell", cells, expected)
     checks.done()
-    return Trajectory(
-        tuple(joints), arrays["time"], arrays["positions"], arrays["velocities"],
-        arrays["accelerations"], arrays["tool_speed"],
-        np.array([-1 if cell is None else cell for cell in cells], dtype=np.int64),
-    )  # fmt: skip
+    at = np.array([-1 if cell is None else cell for cell in cells], dtype=np.int64)
+    return Trajectory(joint_names=tuple(joints), **arrays, cell=at)
 
 
 def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -240,9 +228,7 @@ def as_yaml(trajectory: Trajectory) -> str:
         f"joint_names: {json.dumps(list(trajectory.joint_names), ensure_ascii=False)}",
         "points:",
     ]
-    rows = {
-        "positions": trajectory.q, "velocities": trajectory.dq, "accelerations": trajectory.ddq,
-    }  # fmt: skip
+    rows = {key: getattr(trajectory, ARRAYS[key]) for key in ("positions", *_SHAPES)}
     for k, cell in enumerate(trajectory.cell.tolist()):
         nanoseconds = round(float(trajectory.time[k]) * 1e9)
         seconds, rest = divmod(nanoseconds, 10**9)

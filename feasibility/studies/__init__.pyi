@@ -1,10 +1,10 @@
-from .combinations import case_of as case_of
 from .file import Study as Study
 from .file import load_study as load_study
 from .file import read_study as read_study
-from .missed_cells import cause_counts as cause_counts
 from .outcome import arm_of as arm_of
 from .outcome import bits_of as bits_of
+from .outcome import case_of as case_of
+from .outcome import cause_counts as cause_counts
 from .outcome import cells_of as cells_of
 from .outcome import cut_of as cut_of
 from .outcome import merit as merit

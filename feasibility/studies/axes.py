@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from coverable_errors import LARGEST_WHOLE, Fault, alternatives, close, is_number, printable, shown
-from feasibility.cases import (
-    Section,
-    is_text,
-)
+from feasibility.cases import Section, is_text
 
 POSES = {"position": ("x", "y", "z"), "rpy_deg": ("roll", "pitch", "yaw")}
 TITLES = ("robot", "surface", "task", "search")
@@ -20,8 +18,8 @@ FORMS = "an array of values, { from = a, to = b, steps = n }, or { range = [a, b
 
 
 @dataclass(frozen=True, slots=True)
-class Axis:
-    """One key of a case and the values that it takes."""
+class Key:
+    """One key of a case."""
 
     label: str
     """In the study's table, such as 'task.cone_deg', 'surface.position.x' or 'robot'."""
@@ -29,7 +27,6 @@ class Axis:
     """In the study file, for messages."""
     path: tuple[str | int, ...]
     """Of what is replaced in the tables of a case; the last one may index an array."""
-    values: tuple[Any, ...]
 
     @property
     def is_pose(self) -> bool:
@@ -38,19 +35,18 @@ class Axis:
 
 
 @dataclass(frozen=True, slots=True)
-class Range:
-    """One number of a case that is sampled."""
+class Axis(Key):
+    """A key and the values that it takes."""
 
-    label: str
-    place: str
-    path: tuple[str | int, ...]
+    values: tuple[Any, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Range(Key):
+    """A key whose value, a number, is sampled."""
+
     low: float
     high: float
-
-    @property
-    def is_pose(self) -> bool:
-        """Does it move the surface alone?"""
-        return self.path[0] == "surface" and self.path[1] in POSES
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,28 +62,33 @@ class Variation:
     @property
     def size(self) -> int:
         """Number of tasks."""
-        size = self.count if self.ranges else 1
-        for axis in self.axes:
-            size *= len(axis.values)
-        return size
+        return math.prod((len(axis.values) for axis in self.axes), start=self.count or 1)
+
+    @property
+    def frames(self) -> int:
+        """Number of tasks that differ in more than the pose of the surface."""
+        sampled = not all(span.is_pose for span in self.ranges)
+        sizes = (len(axis.values) for axis in self.axes if not axis.is_pose)
+        return math.prod(sizes, start=self.count if sampled else 1)
 
 
 def read_variation(table: Any, faults: list[Fault]) -> Variation:
     """Read the [vary] table; what is wrong is added to `faults` and left out."""
     section = Section("vary", table, faults)
-    axes: list[Axis] = []
-    ranges: list[Range] = []
+    keys: list[Axis | Range] = []
     if section.has("robots"):
-        _read_robots(section, axes)
+        _read_robots(section, keys)
     sampler = section.word("sampler", SAMPLERS)
     count = _whole(section, "count", 1, MOST_VALUES)
     seed = _whole(section, "seed", 0)
     for name, key, value in _flattened(section):
         place = f"vary.{name}.{printable(key)}"
         if name == "surface" and key in POSES and isinstance(value, Mapping):
-            _read_pose(place, key, value, axes, ranges, faults)
+            _read_pose(place, key, value, keys, faults)
         else:
-            _read_values(f"{name}.{key}", place, (name, key), value, axes, ranges, faults)
+            _read_values(Key(f"{name}.{key}", place, (name, key)), value, keys, faults)
+    axes = tuple(key for key in keys if isinstance(key, Axis))
+    ranges = tuple(key for key in keys if isinstance(key, Range))
     if ranges and count is None and "count" not in section.table:
         section.fault("count", "is missing; expected how many samples of the ranges to take")
     for key, given in (("sampler", sampler), ("count", count), ("seed", seed)):
@@ -95,7 +96,7 @@ def read_variation(table: Any, faults: list[Fault]) -> Variation:
             section.fault(key, "is of no use without a { range = [low, high] }; leave it out")
     if section.is_table and not section.table:
         section.fault("", "is empty; expected at least one key that varies")
-    return Variation(tuple(axes), tuple(ranges), (count or 1) if ranges else 0, seed or 0)
+    return Variation(axes, ranges, (count or 1) if ranges else 0, seed or 0)
 
 
 def _whole(section: Section, key: str, low: int, high: int = LARGEST_WHOLE) -> int | None:
@@ -125,9 +126,7 @@ def _flattened(section: Section) -> list[tuple[str, str, Any]]:
             section.fault(
                 printable(key), f"is not known here; {hint} and keys such as task.cone_deg"
             )
-    if len({entry[:2] for entry in found}) < len(found):
-        found = _merged(section, found)
-    return found
+    return _merged(section, found)
 
 
 def _merged(section: Section, found: list[tuple[str, str, Any]]) -> list[tuple[str, str, Any]]:
@@ -146,7 +145,7 @@ def _merged(section: Section, found: list[tuple[str, str, Any]]) -> list[tuple[s
     return [(*key, value) for key, value in result.items()]
 
 
-def _read_robots(section: Section, axes: list[Axis]) -> None:
+def _read_robots(section: Section, keys: list[Axis | Range]) -> None:
     """The arms: names, or tables as under [robot]."""
     expected = 'an array of robots, such as ["ur5", { name = "puma560", limits = "set-1" }]'
     value = section.table["robots"]
@@ -162,84 +161,71 @@ def _read_robots(section: Section, axes: list[Axis]) -> None:
         else:
             section.fault(f"robots[{k}]", f"must be a name or a table, got {shown(robot)}")
     if len(tables) == len(value):
-        axes.append(Axis("robot", "vary.robots", ("robot",), tuple(tables)))
+        keys.append(Axis("robot", "vary.robots", ("robot",), tuple(tables)))
 
 
 def _read_pose(
-    place: str,
-    key: str,
-    value: Mapping[str, Any],
-    axes: list[Axis],
-    ranges: list[Range],
-    faults: list[Fault],
+    place: str, key: str, value: Mapping[str, Any], keys: list[Axis | Range], faults: list[Fault]
 ) -> None:
     """A position or an orientation, part by part."""
     names = POSES[key]
-    for name in value:
-        if name not in names:
-            faults.append(
-                Fault(f"{place}.{printable(name)}", f"is not known here; use {alternatives(names)}")
-            )
+    faults += [
+        Fault(f"{place}.{printable(name)}", f"is not known here; use {alternatives(names)}")
+        for name in value
+        if name not in names
+    ]
     for index, name in enumerate(names):
         if name not in value:
             continue
-        label, path = f"surface.{key}.{name}", ("surface", key, index)
-        inner = value[name]
-        if is_number(inner):
-            axes.append(Axis(label, f"{place}.{name}", path, (float(inner),)))
-            continue
-        before = len(axes)
-        _read_values(label, f"{place}.{name}", path, inner, axes, ranges, faults)
-        for axis in axes[before:]:
-            bad = [value for value in axis.values if not is_number(value)]
+        part = Key(f"surface.{key}.{name}", f"{place}.{name}", ("surface", key, index))
+        inner = [float(value[name])] if is_number(value[name]) else value[name]
+        found: list[Axis | Range] = []
+        _read_values(part, inner, found, faults)
+        for entry in found:
+            values = entry.values if isinstance(entry, Axis) else ()
+            bad = [value for value in values if not is_number(value)]
             if bad:
-                faults.append(Fault(axis.place, f"must hold finite numbers, got {shown(bad[0])}"))
-                axes.remove(axis)
+                faults.append(Fault(part.place, f"must hold finite numbers, got {shown(bad[0])}"))
+            else:
+                keys.append(entry)
 
 
-def _read_values(
-    label: str,
-    place: str,
-    path: tuple[str | int, ...],
-    value: Any,
-    axes: list[Axis],
-    ranges: list[Range],
-    faults: list[Fault],
-) -> None:
+def _read_values(key: Key, value: Any, keys: list[Axis | Range], faults: list[Fault]) -> None:
     """The values of one key, in one of the forms that there are."""
+    own = (key.label, key.place, key.path)
     if isinstance(value, list):
         if not value:
-            faults.append(Fault(place, f"is empty; expected {FORMS}"))
+            faults.append(Fault(key.place, f"is empty; expected {FORMS}"))
         elif len(value) > MOST_VALUES:
-            faults.append(Fault(place, f"has {len(value)} values; at most {MOST_VALUES} will do"))
+            faults.append(
+                Fault(key.place, f"has {len(value)} values; at most {MOST_VALUES} will do")
+            )
         else:
-            axes.append(Axis(label, place, path, tuple(value)))
+            keys.append(Axis(*own, tuple(value)))
         return
-    if isinstance(value, Mapping) and value.keys() == {"range"}:
-        before = len(faults)
-        pair = Section(place, value, faults).interval("range", value["range"], "the key's own unit")
+    section = Section(key.place, value if isinstance(value, Mapping) else {}, faults)
+    before = len(faults)
+    if section.table.keys() == {"range"}:
+        pair = section.interval("range", value["range"], "the key's own unit")
         if len(faults) == before:
-            ranges.append(Range(label, place, path, *pair))
-        return
-    if isinstance(value, Mapping) and value.keys() == {"from", "to", "steps"}:
-        _read_steps(label, place, path, Section(place, value, faults), axes)
-        return
-    faults.append(Fault(place, f"must be {FORMS}; got {shown(value)}"))
+            keys.append(Range(*own, *pair))
+    elif section.table.keys() == {"from", "to", "steps"}:
+        values = _steps(section)
+        if len(faults) == before:
+            keys.append(Axis(*own, values))
+    else:
+        faults.append(Fault(key.place, f"must be {FORMS}; got {shown(value)}"))
 
 
-def _read_steps(
-    label: str, place: str, path: tuple[str | int, ...], section: Section, axes: list[Axis]
-) -> None:
+def _steps(section: Section) -> tuple[float, ...]:
     """Evenly spaced values, both ends among them, from the first to the last: up or down."""
     before = len(section.faults)
     start, end = (
         section.number(key, section.table[key], "must be a finite number") for key in ("from", "to")
     )
     steps = section.whole("steps", section.table["steps"], 2, MOST_VALUES)
-    if len(section.faults) > before:
-        return
-    if start == end:
+    if len(section.faults) == before and start == end:
         section.fault("to", f"must differ from from = {start:g}; an empty range has no steps")
-        return
-    values = [start + (end - start) * k / (steps - 1) for k in range(steps - 1)]
-    axes.append(Axis(label, place, path, (*values, end)))
+    if len(section.faults) > before:
+        return ()
+    return (*(start + (end - start) * k / (steps - 1) for k in range(steps - 1)), end)

@@ -6,13 +6,12 @@ import copy
 import itertools
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
 from coverable_errors import Fault, shown
 from feasibility.cases import (
-    Case,
     CaseError,
     as_read,
     faults_of_building,
@@ -21,8 +20,8 @@ from feasibility.cases import (
     read_surface,
     toml_document,
 )
-from feasibility.studies.axes import POSES, Axis, Range, Variation
-from feasibility.studies.outcome import HOME, arm_of
+from feasibility.studies.axes import POSES, Variation
+from feasibility.studies.outcome import HOME, arm_of, case_of
 from feasibility.studies.run import StudyTask
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -53,95 +52,55 @@ def get(tables: Tables, path: Sequence[str | int]) -> Any:
     return value
 
 
-class Frames:
-    """All tasks of a study: cases that differ in more than the pose, and the poses of each."""
+def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[StudyTask, ...]:
+    """Every combination of what varies; those that make no case are kept as faults, one a cause.
 
-    def __init__(self, base: Tables, varied: Variation) -> None:
-        """Every combination of what varies."""
-        self.base, self.varied = base, varied
-
-    @property
-    def count(self) -> int:
-        """How many cases have to be checked by themselves."""
-        count = 1
-        for axis in self.varied.axes:
-            count *= 1 if axis.is_pose else len(axis.values)
-        return count * (self.varied.count if self._sampled else 1)
-
-    @property
-    def _sampled(self) -> bool:
-        """Is anything sampled but the pose?"""
-        return not all(span.is_pose for span in self.varied.ranges)
-
-    def tasks(self, faults: list[Fault]) -> Iterator[StudyTask]:
-        """The tasks in order; combinations that make no case are kept as faults, one a cause."""
-        axes, ranges = self.varied.axes, self.varied.ranges
-        samples = draw(self.varied)
-        checked: dict[str, Tables | None] = {}
-        refused: dict[tuple[str, str], Refused] = {}
-        for values in itertools.product(*(axis.values for axis in axes)):
-            for sample in samples:
-                entries: list[tuple[Axis | Range, Any]] = list(zip(axes, values, strict=True))
-                entries += zip(ranges, sample, strict=True)
-                parameters = {entry.label: _said(entry.label, value) for entry, value in entries}
-                tables = self._tables(entries, parameters, checked, refused)
-                if tables is not None:
-                    yield StudyTask(tables, parameters)
-        faults += [one.fault() for one in refused.values()]
-
-    def _tables(
-        self,
-        entries: list[tuple[Axis | Range, Any]],
-        parameters: Mapping[str, Any],
-        checked: dict[str, Tables | None],
-        refused: dict[tuple[str, str], Refused],
-    ) -> Tables | None:
-        """The checked tables of one combination; None where it makes no case."""
-        others = [(entry, value) for entry, value in entries if not entry.is_pose]
+    Cases that differ in the pose of the surface alone are checked once.
+    """
+    entries = (*varied.axes, *varied.ranges)
+    checked: dict[str, Tables | None] = {}
+    refused: dict[tuple[str, str], tuple[Fault, list[dict[str, str]]]] = {}
+    tasks = []
+    for combination in itertools.product(*(axis.values for axis in varied.axes), draw(varied)):
+        *values, sample = combination
+        row = list(zip(entries, (*values, *sample), strict=True))
+        parameters = {entry.label: _parameter(entry.label, value) for entry, value in row}
+        others = [(entry, value) for entry, value in row if not entry.is_pose]
         name = json.dumps([value for _, value in others], sort_keys=True)
         if name not in checked:
-            tables = copy.deepcopy(self.base)
+            tables = copy.deepcopy(base)
             for entry, value in others:
                 put(tables, entry.path, copy.deepcopy(value))
             found = faults_of(tables)
-            # Filled in is what the case leaves open.
+            # Defaults of the case are filled in.
             checked[name] = None if found else as_read(case_of(tables).to_tables())
-            said = {k: shown(v) for k, v in parameters.items() if k.split(".")[1:2] not in POSED}
+            texts = {k: shown(v) for k, v in parameters.items() if k.split(".")[1:2] not in POSED}
             for fault in found:
                 cause = fault.key, cause_of(fault.message)
-                refused.setdefault(cause, Refused(fault, said)).add(said)
+                refused.setdefault(cause, (fault, []))[1].append(texts)
         frame = checked[name]
         if frame is None:
-            return None
+            continue
         tables = {**frame, "surface": copy.deepcopy(frame["surface"])}
-        for entry, value in entries:
+        for entry, value in row:
             if entry.is_pose:
                 numbers = list(map(float, value)) if isinstance(value, list) else float(value)
                 put(tables, entry.path, numbers)
-        return tables
+        tasks.append(StudyTask(tables, parameters))
+    faults += [_as_one(*alike) for alike in refused.values()]
+    return tuple(tasks)
 
 
-class Refused:
-    """Combinations that make no case, all for the same cause."""
-
-    def __init__(self, fault: Fault, said: Mapping[str, str]) -> None:
-        """The first of them: what is wrong with it, and what its keys are."""
-        self.first, self.count = fault, 0
-        self.seen: dict[str, set[str]] = {label: set() for label in said}
-        self.said = dict(said)
-
-    def add(self, said: Mapping[str, str]) -> None:
-        """One more of them, or the first."""
-        self.count += 1
-        for label, value in said.items():
-            self.seen[label].add(value)
-
-    def fault(self) -> Fault:
-        """All of them as one fault, with the values that they have in common."""
-        alike = [f"{label} = {v}" for label, v in self.said.items() if len(self.seen[label]) == 1]
-        more = f" ({self.count} combinations with that)" if self.count > 1 else ""
-        place = f"vary: with {', '.join(alike)}: " if alike else "vary: "
-        return Fault(f"{place}{self.first.key}", f"{self.first.message}{more}", self.first.place)
+def _as_one(first: Fault, texts: list[dict[str, str]]) -> Fault:
+    """Combinations refused for one cause as one fault, with the values that they have in common."""
+    alike = [
+        f"{label} = {value}"
+        for label, value in texts[0].items()
+        if all(other[label] == value for other in texts)
+    ]
+    more = f" ({len(texts)} combinations with that)" if len(texts) > 1 else ""
+    place = f"vary: with {', '.join(alike)}: " if alike else "vary: "
+    return Fault(f"{place}{first.key}", f"{first.message}{more}", first.place)
 
 
 def cause_of(message: str) -> str:
@@ -154,7 +113,7 @@ def cause_of(message: str) -> str:
     return re.sub(r"(?<![\w'.-])[-+]?\d+(\.\d+)?(e[-+]?\d+)?(?!\w)", "#", message)
 
 
-def _said(label: str, value: Any) -> Any:
+def _parameter(label: str, value: Any) -> Any:
     """A value for the study's table: whole numbers of real quantities as such, arms by name."""
     if label == "robot" and value.keys() == {"name"}:
         return value["name"]
@@ -183,15 +142,6 @@ def draw(varied: Variation) -> list[tuple[float, ...]]:
         )
         for row in unit
     ]
-
-
-def case_of(tables: Tables) -> Case:
-    """The case of some tables, checked.
-
-    Raises:
-        CaseError: with everything that is wrong.
-    """
-    return Case.from_toml(toml_document(tables))
 
 
 def faults_of(tables: Tables) -> list[Fault]:

@@ -22,12 +22,11 @@ from __future__ import annotations
 import copy
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from coverable_errors import Fault, close, printable, shown
 from feasibility.cases import (
-    LARGEST_FILE,
     CaseError,
     Section,
     TomlError,
@@ -35,15 +34,16 @@ from feasibility.cases import (
     load_case,
     make_absolute,
     parse_toml,
+    read_document,
     toml_key,
 )
-from feasibility.safe_files import FileError, read_regular, shown_path
+from feasibility.safe_files import shown_path
 from feasibility.studies.axes import TITLES, Axis, Range, Variation, read_variation
-from feasibility.studies.combinations import Frames, cause_of, faults_of, get, put
+from feasibility.studies.combinations import cause_of, faults_of, get, put, tasks_of
 from feasibility.studies.run import StudyTask
 
 MOST_TASKS = 1_000_000
-MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are told each by itself
+MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are reported one by one
 MOST_INDICES = 8  # of the others
 MOST_FRAMES = 10_000  # combinations of everything but the surface's pose: each is checked by itself
 
@@ -69,13 +69,7 @@ def load_study(path: str | os.PathLike[str]) -> Study:
         CaseError: with everything that is wrong.
     """
     name = shown_path(path)
-    try:
-        text = read_regular(path, LARGEST_FILE, "a study file (TOML)").decode("utf-8-sig")
-    except FileError as error:
-        raise CaseError(error.faults, error.source) from error
-    except UnicodeDecodeError as error:
-        message = f"is not UTF-8 text (byte {error.start}); expected a study file (TOML)"
-        raise CaseError(message, name) from error
+    text = read_document(path, "a study file (TOML)")
     return read_study(text, os.path.dirname(os.path.abspath(path)), name)
 
 
@@ -128,14 +122,14 @@ def read_study(
     varied = _absolute(varied, base_dir)
     if varied.size > MOST_TASKS:
         faults.append(Fault("vary", f"makes {varied.size} tasks; at most {MOST_TASKS} will do"))
-    elif Frames(base, varied).count > MOST_FRAMES:
-        what = f"makes {Frames(base, varied).count} cases besides those that differ in the pose"
+    elif varied.frames > MOST_FRAMES:
+        what = f"makes {varied.frames} cases besides those that differ in the pose"
         faults.append(Fault("vary", f"{what}; at most {MOST_FRAMES} will do"))
     else:
         _check(base, varied, faults)
     if faults:
         raise CaseError(faults, name)
-    tasks = tuple(Frames(base, varied).tasks(faults))
+    tasks = tasks_of(base, varied, faults)
     if faults:
         raise CaseError(faults, name)
     labels = (*(axis.label for axis in varied.axes), *(span.label for span in varied.ranges))
@@ -205,12 +199,12 @@ def _absolute(varied: Variation, base_dir: str | os.PathLike[str] | None) -> Var
 
     files = ("urdf", "package_dirs", "file", "pieces")
     axes = tuple(
-        Axis(axis.label, axis.place, axis.path, values(axis))
+        replace(axis, values=values(axis))
         if axis.path == ("robot",) or axis.path[-1] in files
         else axis
         for axis in varied.axes
     )
-    return Variation(axes, varied.ranges, varied.count, varied.seed)
+    return replace(varied, axes=axes)
 
 
 def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
@@ -249,7 +243,7 @@ def _check(base: Tables, varied: Variation, faults: list[Fault]) -> None:
 
 
 def _more(key: str, indices: Sequence[int]) -> str:
-    """Values that are wrong as others are that have been told."""
+    """Values that are wrong for the same cause as others that were reported."""
     shown_ones = ", ".join(f"[{k}]" for k in indices[:MOST_INDICES])
     rest = ", ..." if len(indices) > MOST_INDICES else ""
     what = "value is" if len(indices) == 1 else "values are"

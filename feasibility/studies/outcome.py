@@ -1,25 +1,75 @@
-"""What a study keeps of one verdict: plain numbers and words, worked out where the task runs."""
+"""What a study keeps of one verdict: plain numbers and words, computed where the task runs."""
 
 from __future__ import annotations
 
 import math
 import os
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.cases import Case, parse_toml, read_robot, read_surface, toml_document
-from feasibility.studies.missed_cells import cause_counts
+from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
+from feasibility.verdict import CauseKind, Verdict
 
 if TYPE_CHECKING:
     from feasibility.verdict import Verdict
     from robots import Robot
     from surfaces import Cells
     from surfaces.meshes.cells import MeshCells
+
+EXAMINED = 6  # missed cells whose causes are determined; the others take that of the nearest one
+
+
+class CauseCounts(NamedTuple):
+    """Why the cells of one verdict are missed."""
+
+    cells: dict[str, int]
+    """Number of missed cells by cause, the most frequent first."""
+    examined: int
+    """How many cells were examined for it."""
+
+
+def cause_counts(verdict: Verdict) -> CauseCounts:
+    """Count the missed cells of a verdict by cause.
+
+    Cells that another component covers are disconnected. Of the cells that no component covers,
+    `EXAMINED` are examined, and the others count as the nearest of these.
+    """
+    missed = np.flatnonzero(~verdict.covered)
+    if len(missed) == 0:
+        return CauseCounts({}, 0)
+    if verdict.method == "greedy":
+        kinds = [str(cause.kind) for cause in verdict.causes]
+        return CauseCounts(_counted(kinds), len(kinds))
+    from feasibility.roadmap import Exploration, arrays_of, diagnose
+
+    reached = np.zeros(len(verdict.cells), dtype=bool)
+    for cells in verdict.components:
+        reached[cells] = True
+    kinds = [str(CauseKind.DISCONNECTED)] * int(reached[missed].sum())
+    lost = missed[~reached[missed]]
+    if len(lost) == 0:
+        return CauseCounts(_counted(kinds), 0)
+    # A new exploration: only its Newton's method and its random starts are used.
+    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
+    exploration = Exploration(verdict.robot, verdict.cells, arrays, verdict.seed)
+    few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
+    examined = [diagnose(exploration, int(cell)) for cell in few]
+    centres = verdict.cells.centres
+    away = np.linalg.norm(centres[lost][:, None] - centres[few][None], axis=2)  # (L, E)
+    kinds += [str(examined[int(k)].kind) for k in away.argmin(axis=1)]
+    return CauseCounts(_counted(kinds), len(examined))
+
+
+def _counted(kinds: list[str]) -> dict[str, int]:
+    """Causes with their number of cells, the most frequent first."""
+    return dict(sorted(Counter(kinds).items(), key=lambda entry: (-entry[1], entry[0])))
+
 
 ROBOTS_KEPT = 32  # arms that one worker keeps
 MESHES_KEPT = 4
@@ -45,9 +95,20 @@ def evaluate(tables: Tables) -> Outcome:
     """
     from feasibility.checking import check
 
-    case = Case.from_toml(toml_document(tables))
+    case = case_of(tables)
     verdict = check(arm_of(case), cut_of(case), case.task, case.search)
     return outcome_of(verdict)
+
+
+def case_of(tables: Tables) -> Case:
+    """The case of some tables, checked; tables that belong to no case are left out.
+
+    Raises:
+        CaseError: with everything that is wrong.
+    """
+    return Case.from_toml(
+        toml_document({title: tables[title] for title in TABLES if title in tables})
+    )
 
 
 def arm_of(case: Case) -> Robot:

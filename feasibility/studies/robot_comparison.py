@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import Fault
-from feasibility.cases import Case, CaseError, as_read, toml_document
+from feasibility.cases import Case, CaseError, as_read
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
-from feasibility.studies.outcome import arm_of, cut_of, finite, merit, outcome_of
+from feasibility.studies.outcome import arm_of, case_of, cut_of, finite, merit, outcome_of
 from feasibility.studies.run import StudyTask, run_tasks
 
 if TYPE_CHECKING:
@@ -26,21 +26,10 @@ CONE_STEP_DEG = 0.5  # resolution of the critical cone
 
 Tables = dict[str, Any]
 
-UNKNOWN: Tables = {
-    "share": 0.0,
-    "covered": 0,
-    "cells": 0,
-    "cause": None,
-    "patches": None,
-    "patches_share": None,
-    "critical_cone_deg": None,
-    "margins": None,
-}  # of an arm whose task failed
-
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """What one arm can do about the surface."""
+    """What one arm can do about the surface; the defaults are those of an arm whose task failed."""
 
     robot: str
     joints: int
@@ -50,23 +39,23 @@ class Arm:
     """'feasible', 'infeasible' or 'undecided'."""
     evidence: str
     message: str
-    share: float
+    share: float = 0.0
     """Of the area, 0..1, that the best single motion covers."""
-    covered: int
+    covered: int = 0
     """Cells of it."""
-    cells: int
-    cause: str | None
+    cells: int = 0
+    cause: str | None = None
     """The most frequent cause of missed cells; None without any."""
-    patches: int | None
+    patches: int | None = None
     """Continuous motions that together cover all that can be covered; None where not asked for."""
-    patches_share: float | None
+    patches_share: float | None = None
     """Of the area, 0..1, that these cover together."""
-    critical_cone_deg: float | None
+    critical_cone_deg: float | None = None
     """The smallest cone with a covering motion, to `CONE_STEP_DEG`; narrower ones than
     `LEAST_CONE_DEG` are not looked at. None where there is none, or it was not asked for."""
-    margins: dict[str, float | None] | None
+    margins: dict[str, float | None] | None = None
     """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m."""
-    seconds: float
+    seconds: float = 0.0
     """Time that the work took."""
 
 
@@ -129,9 +118,9 @@ def compare(
     rows = run_tasks(tasks, workers, store, progress)
     arms = []
     for task, row in zip(tasks, rows, strict=True):
-        robot = arm_of(_case_of(task.tables))
+        robot = arm_of(case_of(task.tables))
         known = {"robot": robot.name, "joints": robot.n, "reach_m": finite(robot.reach)}
-        arms.append(Arm(**{**UNKNOWN, **known, **row.result}, seconds=row.seconds))
+        arms.append(Arm(**{**known, **row.result}, seconds=row.seconds))
     return Comparison(case.name, tuple(arms), divide, critical)
 
 
@@ -155,8 +144,7 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
         own = base["robot"].get("name") == name
         tables = base if own else {**base, "robot": {"name": name}}
         try:
-            case_here = Case.from_toml(toml_document(tables))
-            arm_of(case_here)
+            arm_of(case_of(tables))
         except CaseError as error:
             faults += [fault._replace(key=f"{place}: {fault.key}") for fault in error.faults]
         except ValueError as error:  # RobotError
@@ -168,11 +156,6 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
     return made
 
 
-def _case_of(tables: Tables) -> Case:
-    """The case of a task."""
-    return Case.from_toml(toml_document({k: v for k, v in tables.items() if k != "compare"}))
-
-
 def assess(tables: Tables) -> dict[str, Any]:
     """In a worker: all that is said about one arm, but for the time that it took.
 
@@ -182,7 +165,7 @@ def assess(tables: Tables) -> dict[str, Any]:
     from feasibility.checking import check
 
     asked = tables["compare"]
-    case = _case_of(tables)
+    case = case_of(tables)
     robot, cells = arm_of(case), cut_of(case)
     verdict = check(robot, cells, case.task, case.search)
     outcome = outcome_of(verdict)

@@ -7,8 +7,7 @@ import os
 from hypothesis import strategies as st
 
 from feasibility.cases.mesh_keys import MESH_KEYS
-from feasibility.cases.piecewise_keys import PiecePart
-from feasibility.cases.surface_table import SurfacePart
+from feasibility.cases.surface_table import PiecePart, SurfacePart
 
 lengths = st.floats(0.01, 100)
 triples = st.tuples(*[st.floats(-1e6, 1e6)] * 3)

@@ -16,8 +16,8 @@ from surface_parts import pairs, surfaces, triples
 from feasibility import Search, Task
 from feasibility.cases import CLOSED_FORM_KINDS, Case, builtin_cases, load_case
 from feasibility.cases.case import CaseError
-from feasibility.cases.patch_keys import MOST_CELLS
 from feasibility.cases.robot_table import RobotPart
+from feasibility.cases.surface_keys import MOST_CELLS
 from feasibility.cases.surface_table import SurfacePart
 
 # Table II: position and cone; Table I by name; Table III by kind.

@@ -25,8 +25,8 @@ from feasibility.placement import (
     moved_cells,
     place,
 )
+from feasibility.placement.evaluator import Margins
 from feasibility.placement.stations import fewest_stations
-from feasibility.placement.trial import Margins
 from feasibility.reports.placement import as_text
 from feasibility.studies import Row, open_workers, run_tasks
 from feasibility.studies.file import read_study

@@ -1,4 +1,4 @@
-"""Graphs and lists of arrays as flat arrays of a result file, and back with every index checked."""
+"""The arrays of a result file: graphs, and what identifies the robot and the cells."""
 
 from __future__ import annotations
 
@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.results.archive import Archive
+from feasibility.results.archive import Archive, Fields
+from robots import Robot
+from surfaces import Cells
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -29,8 +31,7 @@ def unpack_ragged(archive: Archive, name: str, count: int) -> tuple[NDArray[np.i
         ArchiveError: they are damaged.
     """
     lengths = archive.array(f"{name}_lengths", np.int64, (None,))
-    values = archive.array(f"{name}_values", np.int64, (None,))
-    _check_cells(archive, f"{name}_values", values, count)
+    values = read_cells(archive, f"{name}_values", count)
     return tuple(_cut(archive, f"{name}_lengths", lengths, values))
 
 
@@ -71,14 +72,12 @@ def unpack_graph(archive: Archive, name: str, count: int, n: int, tree: bool = F
     """
     import networkx as nx
 
-    nodes = archive.array(f"{name}_nodes", np.int64, (None,))
-    at = archive.array(f"{name}_q_cell", np.int64, (None,))
+    nodes = read_cells(archive, f"{name}_nodes", count)
+    at = read_cells(archive, f"{name}_q_cell", count)
     q = archive.array(f"{name}_q", np.float64, (len(at), n))
-    edges = archive.array(f"{name}_edges", np.int64, (None, 2))
+    edges = read_cells(archive, f"{name}_edges", count, (None, 2))
     lengths = archive.array(f"{name}_motion_lengths", np.int64, (len(edges),))
     rows = archive.array(f"{name}_motions", np.float64, (None, n))
-    for part, cells in (("nodes", nodes), ("q_cell", at), ("edges", edges)):
-        _check_cells(archive, f"{name}_{part}", cells, count)
     if not tree and not np.array_equal(np.sort(nodes), np.arange(count)):
         raise archive.error(f"'{name}_nodes' does not hold every cell once")
     if not np.isin(edges, nodes).all() or not np.isin(at, nodes).all():
@@ -91,17 +90,22 @@ def unpack_graph(archive: Archive, name: str, count: int, n: int, tree: bool = F
         graph.nodes[cell]["q"] = row
     motions = _cut(archive, f"{name}_motion_lengths", lengths, rows)
     for (a, b), motion in zip(edges.tolist(), motions, strict=True):
-        if len(motion):
-            graph.add_edge(a, b, motion=motion)
-        else:
-            graph.add_edge(a, b)
+        graph.add_edge(a, b, **({"motion": motion} if len(motion) else {}))
     return graph
 
 
-def _check_cells(archive: Archive, name: str, cells: NDArray[np.int64], count: int) -> None:
-    """Refuse numbers that are no cells."""
-    if ((cells < 0) | (cells >= count)).any():
+def read_cells(
+    archive: Archive, name: str, count: int, shape: tuple[int | None, ...] = (None,), low: int = 0
+) -> NDArray[np.int64]:
+    """An array of cells, each from `low` to `count` - 1.
+
+    Raises:
+        ArchiveError: it holds anything else.
+    """
+    cells = archive.array(name, np.int64, shape)
+    if ((cells < low) | (cells >= count)).any():
         raise archive.error(f"{name!r} holds numbers that are no cells of {count}")
+    return cells
 
 
 def _cut(archive: Archive, name: str, lengths: NDArray[np.int64], values: NDArray) -> list[NDArray]:
@@ -110,3 +114,69 @@ def _cut(archive: Archive, name: str, lengths: NDArray[np.int64], values: NDArra
     if ((lengths < 0) | (lengths > limit)).any() or sum(lengths.tolist()) != limit:
         raise archive.error(f"{name!r} does not fit the {limit} rows that there are")
     return np.split(values, np.cumsum(lengths)[:-1]) if len(lengths) else []
+
+
+CLOSE = 1e-9  # [m], [1]: tool points, axes, centres and normals that count as the same
+
+
+def probes(robot: Robot) -> NDArray[np.float64]:
+    """(n + 4, 6) numbers that tell one arm from another: limits, tool points and axes.
+
+    The limits fill the first n rows (2 of 6 columns, infinite ones as 0 with a flag beside them);
+    tool points and axes at four configurations the rest.
+    """
+    from robots import Kinematics
+
+    n = robot.n
+    low, high = np.clip(robot.lower, -3.0, 3.0), np.clip(robot.upper, -3.0, 3.0)
+    limits = np.zeros((n, 6))
+    for column, bound in enumerate((robot.lower, robot.upper)):
+        limits[:, column] = np.where(np.isfinite(bound), bound, 0.0)
+        limits[:, 2 + column] = np.isfinite(bound)
+    share = np.modf(0.17 + 0.23 * np.arange(4)[:, None] + 0.31 * np.arange(n))[0]
+    points, axes = Kinematics(robot).tools(low + share * (high - low))
+    return np.vstack([limits, np.hstack([points, axes])])
+
+
+def check_robot(robot: Robot, fields: Fields, archive: Archive) -> None:
+    """Refuse a robot that is no longer the one that the result was found for."""
+    same = fields.get("joints", list, "an array") == list(robot.joint_names)
+    if same and fields.text("tool_frame") == robot.tool_frame:
+        stored = archive.array("probes", np.float64, (robot.n + 4, 6))
+        same = bool(np.abs(stored - probes(robot)).max() <= CLOSE)
+    if not same:
+        raise archive.error(
+            f"was found for another {robot.name!r} than the one that is loaded now (its joints, "
+            "limits or geometry have changed); run the check again"
+        )
+
+
+def places(cells: Cells) -> NDArray[np.float64]:
+    """(N, 6) centre (m) and outward normal of each cell."""
+    return np.hstack([cells.centres, cells.normals])
+
+
+def check_cells(cells: Cells, label: str, archive: Archive) -> None:
+    """Refuse cells that are not the ones that the result was found for.
+
+    A mesh file may have changed since, and so may the way in which surfaces are cut.
+
+    Args:
+        cells: as the case makes them now.
+        label: what the surface is called.
+        archive: the file, with the array `places`.
+
+    Raises:
+        ArchiveError: they differ.
+    """
+    stored = archive.array("places", np.float64, (None, 6))
+    if stored.shape != (len(cells), 6):
+        how = f"has {len(cells):,} cells now, and had {len(stored):,} then"
+    elif len(stored) and np.abs(stored - places(cells)).max() > CLOSE:
+        how = "has its cells in other places now"
+    else:
+        return
+    raise archive.error(
+        f"was found for another surface than the one that is loaded now: {label} {how}; run the "
+        "check again"
+    )

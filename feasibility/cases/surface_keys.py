@@ -1,4 +1,4 @@
-"""Surfaces with parameters u and v in a case: the keys of each kind, and its constructor."""
+"""The kinds of surface that a case can name, whose keys are whose, and how patches are built."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from coverable_errors import MISSING, CoverableError, Fault, shown
-from feasibility.cases.table_reader import CaseError, Section, frozen
-from feasibility.safe_files import shown_path
+from coverable_errors import MISSING, alternatives, shown
+from feasibility.cases.mesh_keys import MESH_KEYS
+from feasibility.cases.table_reader import DEG, METRES, CaseError, Section, frozen, in_file
 
 if TYPE_CHECKING:
     from surfaces.patches import Patch
@@ -42,11 +42,15 @@ WHOLE = ("degree", "faces", "pieces")
 """Keys whose values hold no real numbers."""
 OPTIONAL = ("degree", "knots", "weights", "u", "v")
 """Keys that a bspline may leave out."""
-
-
-def patch_keys(kind: str) -> tuple[str, ...]:
-    """The keys that belong to a kind of patch."""
-    return (*(("file",) if kind == "bspline" else ()), *PATCHES[kind])
+PIECES_KEYS = ("pieces", "gap")
+OWN_KEYS: Mapping[str, tuple[str, ...]] = {
+    **{kind: tuple(keys) for kind, keys in PATCHES.items()},
+    "bspline": ("file", *PATCHES["bspline"]),
+    "piecewise": PIECES_KEYS,
+    "mesh": MESH_KEYS,
+}
+CLOSED_FORM_KINDS = ("sphere", "cylinder", "hyperboloid", "plane")
+"""The kinds that the greedy search knows."""
 
 
 def read_patch(section: Section, kind: str) -> dict[str, Any]:
@@ -145,9 +149,28 @@ def frozen_values(values: Mapping[str, Any]) -> dict[str, Any]:
     return {key: frozen(value, key in WHOLE) for key, value in values.items()}
 
 
-def in_file(error: CoverableError, file: str, table: str) -> list[Fault]:
-    """The faults of a file that a table of the case names."""
-    return [
-        Fault(f"{table}.file", f"{fault.key} {fault.message}".strip(), shown_path(file))
-        for fault in error.faults
-    ]
+def foreign_keys(kind: str) -> dict[str, str]:
+    """What to say about keys that belong to other kinds of surface."""
+    owners: dict[str, list[str]] = {}
+    for other, keys in OWN_KEYS.items():
+        for key in keys:
+            owners.setdefault(key, []).append(_a(other))
+    hints = {
+        key: f"belongs to {alternatives(names)}, not to {_a(kind)}; leave it out"
+        for key, names in owners.items()
+    }
+    for mine in ("u", "v", "u_deg", "v_deg"):
+        if mine in OWN_KEYS[kind]:
+            letter = mine[0]
+            other = letter if mine.endswith("_deg") else f"{letter}_deg"
+            unit = DEG if mine.endswith("_deg") else METRES
+            unit = "the numbers of the knots" if kind == "bspline" else unit
+            hints[other] = f"is not how {_a(kind)} is written; write {mine} in {unit}"
+    return {key: hint for key, hint in hints.items() if key not in OWN_KEYS[kind]}
+
+
+def _a(kind: str) -> str:
+    """The kind with its article."""
+    if kind == "piecewise":
+        return "a piecewise surface"
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
