@@ -75,7 +75,7 @@ class Case:
         """Load the arm and cut the surface.
 
         Raises:
-            CaseError: the robot cannot be loaded as asked, or the surface not be read or cut.
+            CaseError: the robot cannot be loaded, or the surface cannot be read or cut.
         """
         from robots import RobotError
 

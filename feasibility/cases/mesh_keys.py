@@ -67,7 +67,7 @@ def read_count(section: Section) -> int | None:
 
 
 def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
-    """Read the file, take the part that is asked for, and place it.
+    """Read the file, take the part that the keys select, and place it.
 
     Args:
         values: of `MESH_KEYS`.

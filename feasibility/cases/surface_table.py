@@ -220,7 +220,10 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
         section.make(check_pose, pose)
         return None
     values, cells = _values(section, kind)
-    section.refuse_others(_hints(kind))
+    hints = foreign_keys(kind)
+    if kind == "piecewise":
+        hints["cells"] = "is given for each piece; write cells = [3, 4] in each of surface.pieces"
+    section.refuse_others(hints)
     if kind in PATCHES:
         try_patch(section, kind, values, pose)
     else:
@@ -257,14 +260,6 @@ def _values(section: Section, kind: str) -> tuple[dict[str, Any], tuple[int, int
     if kind == "piecewise":
         return read_pieces(section), None
     return read_patch(section, kind), read_grid(section)
-
-
-def _hints(kind: str) -> dict[str, str]:
-    """What to say about keys that belong elsewhere."""
-    hints = foreign_keys(kind)
-    if kind == "piecewise":
-        hints["cells"] = "is given for each piece; write cells = [3, 4] in each of surface.pieces"
-    return hints
 
 
 def _written(value: Any) -> Any:

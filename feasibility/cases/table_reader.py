@@ -112,7 +112,7 @@ class Section(Checks):
         return found if len(self.faults) == before else None
 
     def refuse_others(self, hints: Mapping[str, str] = {}) -> None:
-        """Keep a fault for every key that nothing has asked for.
+        """Keep a fault for every key that was not read.
 
         Args:
             hints: what to say about keys that belong elsewhere.

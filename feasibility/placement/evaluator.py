@@ -74,7 +74,7 @@ class Trial:
     probed: float = 0.0
     """Share of the probed cells over which Newton's method found a configuration."""
     share: float = 0.0
-    """Share of the area that the best single motion found covers; 0 where none was looked for."""
+    """Share of the area that the best single motion found covers; 0 without a search."""
     margins: Margins | None = None
     """None unless that motion covers every cell."""
     covers: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
@@ -207,7 +207,7 @@ class LocalEvaluator:
 
         Args:
             pose: where the surface's frame stands.
-            causes: whether to look for the causes of missed cells.
+            causes: whether to determine the causes of missed cells.
         """
         from feasibility.checking import check
 

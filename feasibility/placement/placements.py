@@ -116,7 +116,7 @@ def place(
         robot: the arm.
         cells: the surface, wherever it stands now, cut into cells.
         task: standoff, cone and tolerance.
-        region: the poses of the surface's frame to look at.
+        region: the poses of the surface's frame to search.
         search: of each verdict; its seed also spreads the poses.
         count: poses spread over the region; refinement comes on top.
         around: poses tried around each of the best, a round; 0 for no refinement.
@@ -156,15 +156,8 @@ def place(
         with compiling_notice():
             warm_up()
         evaluator = LocalEvaluator(robot, cells, task, search)
-    refinement = Refinement(
-        evaluator=evaluator,
-        reach=reach,
-        region=region,
-        seed=search.seed,
-        early=early,
-        deadline=np.inf if time_limit is None else began + time_limit,
-        progress=progress,
-    )
+    deadline = np.inf if time_limit is None else began + time_limit
+    refinement = Refinement(evaluator, reach, region, search.seed, early, deadline, progress)
     refinement.sweep(count)
     refinement.refine(around)
     placements = _searched(answered, refinement, refinement.verified(keep))

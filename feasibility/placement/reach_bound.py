@@ -24,8 +24,8 @@ from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells, rotation_from_rpy
 
-MOST_BOXES = 4096  # boxes of poses looked at before the region is called open
-MOST_TARGETS = 200  # targets that boxes are asked about; a bound on some is one on all
+MOST_BOXES = 4096  # boxes of poses tested before the region counts as open
+MOST_TARGETS = 200  # targets that each box is tested for; a bound on some is one on all
 
 
 class Beyond(NamedTuple):
@@ -56,7 +56,7 @@ class Reach:
 
     @staticmethod
     def of(robot: Robot, cells: Cells, task: Task) -> Reach:
-        """What is asked about placements of these cells."""
+        """The targets of a task on these cells, in the surface's frame."""
         surface = cells.surface
         return Reach(
             targets=(task.targets(cells).points - surface.position) @ surface.rotation,
@@ -89,31 +89,27 @@ class Reach:
     def beyond(self, region: Region) -> Beyond | None:
         """Whether every placement in a region has a target out of reach; None where not shown."""
         some = np.unique(np.linspace(0, len(self.targets) - 1, MOST_TARGETS).astype(np.int64))
+        furthest = float(np.linalg.norm(self.targets, axis=1).max())
         boxes = [(region.low, region.high)]
-        nearest, looked = np.inf, 0
+        nearest, tested = np.inf, 0
         while boxes:
             low, high = boxes.pop()
-            looked += 1
+            tested += 1
             least = self._least(low, high, self.targets[some])
             if least > self.reach + self.tolerance:
                 nearest = min(nearest, least)
                 continue
             middle = 0.5 * (low + high)
             # A pose in reach ends it at once, and so do boxes too many or too small.
-            if looked + len(boxes) >= MOST_BOXES or self.within(middle[None]).all():
+            if tested + len(boxes) >= MOST_BOXES or self.within(middle[None]).all():
                 return None
-            effect = (high - low) * self._effects()
-            axis = int(np.argmax(effect))
+            # How far each width moves the furthest target, m.
+            axis = int(np.argmax((high - low) * [1.0, 1.0, 1.0, *[np.radians(furthest)] * 3]))
             for start, end in ((low[axis], middle[axis]), (middle[axis], high[axis])):
                 one, other = low.copy(), high.copy()
                 one[axis], other[axis] = start, end
                 boxes.append((one, other))
-        return Beyond(nearest, self.reach, looked)
-
-    def _effects(self) -> Array:
-        """(6,) how far a metre or a degree of each axis moves the furthest target, m."""
-        furthest = float(np.linalg.norm(self.targets, axis=1).max())
-        return np.array([1.0, 1.0, 1.0, *[np.radians(furthest)] * 3])
+        return Beyond(nearest, self.reach, tested)
 
     def _least(self, low: Array, high: Array, targets: Array) -> float:
         """m: in every pose of the box some target is at least so far from the first joint."""

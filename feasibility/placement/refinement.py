@@ -69,7 +69,7 @@ class Refinement:
     """Random sequences used so far, so that each is another one."""
 
     def sweep(self, count: int) -> None:
-        """Spread poses over the region, and look into those that the bound leaves."""
+        """Spread poses over the region, and try those that the bound leaves."""
         values = self.region.samples(count, self._stream())[:count]
         self.drawn = len(values)
         if not self.early:

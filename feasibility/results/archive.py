@@ -1,7 +1,7 @@
 """A file of named arrays and one JSON text: a zip of .npy members, read without trusting it.
 
 `numpy.load` without pickles reads it: numpy 2 refuses a header that claims more than there is
-before it makes room. What the members inflate to is looked up in the zip first.
+before it makes room. The inflated size of the members is read from the zip first.
 """
 
 from __future__ import annotations

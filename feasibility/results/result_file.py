@@ -1,8 +1,8 @@
 """Result files: a verdict with its case in one file that loads again, without pickles.
 
-The file is a zip of .npy arrays and one `meta.json` (see `feasibility.archive`). The robot and the
-cells are not stored: they are built again from the case, and compared with numbers in the file, so
-that a result is never shown on another arm or surface than the ones it was found for.
+The file is a zip of .npy arrays and one `meta.json` (see `archive`). The robot and the cells are not
+stored: they are built again from the case, and compared with numbers in the file, so that a result
+is never shown on another arm or surface than the ones it was found for.
 """
 
 from __future__ import annotations
@@ -74,11 +74,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "version": version(),
-        "case": {
-            "name": case.name,
-            "description": case.description,
-            "toml": case.to_toml(),
-        },
+        "case": {"name": case.name, "description": case.description, "toml": case.to_toml()},
         "robot": {
             "name": verdict.robot.name,
             "tool_frame": verdict.robot.tool_frame,
@@ -134,7 +130,10 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         fields = Fields(archive, archive.meta(), "")
         found = _format(fields)
         written = fields.text("version")
-        case = _case(fields.table("case"), archive)
+        text = fields.table("case")
+        name = text.text("name")
+        case = Case.from_toml(text.text("toml"), name=f"{archive.name}: case {shown(name)}")
+        case = replace(case, name=name, description=text.text("description"))
         setup = case.build()
         check_robot(setup.robot, fields.table("robot"), archive)
         if found > 1 or case.surface.kind not in CLOSED_FORM_KINDS:
@@ -175,13 +174,6 @@ def _format(fields: Fields) -> int:
             f"coverable {version()} reads formats 1 to {FORMAT_VERSION}"
         )
     return int(found)
-
-
-def _case(fields: Fields, archive: Archive) -> Case:
-    """The case of the file."""
-    name = fields.text("name")
-    case = Case.from_toml(fields.text("toml"), name=f"{archive.name}: case {shown(name)}")
-    return replace(case, name=name, description=fields.text("description"))
 
 
 def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verdict:

@@ -10,6 +10,8 @@ from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from coverable_errors import Fault, shown
 from feasibility.cases import (
     CaseError,
@@ -42,14 +44,6 @@ def put(tables: Tables, path: Sequence[str | int], value: Any) -> None:
             table[step] = {}
         table = table[step]
     table[path[-1]] = value
-
-
-def get(tables: Tables, path: Sequence[str | int]) -> Any:
-    """What stands at a path."""
-    value: Any = tables
-    for step in path:
-        value = value[step]
-    return value
 
 
 def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[StudyTask, ...]:
@@ -135,13 +129,8 @@ def draw(varied: Variation) -> list[tuple[float, ...]]:
     sequence = qmc.Sobol(len(varied.ranges), scramble=True, seed=varied.seed)
     # The sequence is balanced at powers of two only; what is left over is not taken.
     unit = sequence.random_base2((varied.count - 1).bit_length())[: varied.count]
-    return [
-        tuple(
-            span.low + (span.high - span.low) * float(t)
-            for span, t in zip(varied.ranges, row, strict=True)
-        )
-        for row in unit
-    ]
+    low, high = np.array([(span.low, span.high) for span in varied.ranges]).T
+    return [tuple(row) for row in (low + (high - low) * unit).tolist()]
 
 
 def faults_of(tables: Tables) -> list[Fault]:

@@ -58,7 +58,7 @@ class DaskWorkers:
             raise WorkersError(
                 f"the Dask scheduler at {address!r} has no workers; start some with `dask worker`"
             ) from error
-        self._width, self._asked = 1, -ASK
+        self._width, self._queried = 1, -ASK
         # Not pure: a task that is submitted again is run again.
         self._pool: Executor = self._client.get_executor(pure=False)
 
@@ -66,9 +66,9 @@ class DaskWorkers:
     def width(self) -> int:
         """Threads of all workers, as of late; at least 1, for while they are replaced."""
         now = time.monotonic()
-        if now > self._asked + ASK:
+        if now > self._queried + ASK:
             self._width = max(sum(self._client.nthreads().values()), 1)
-            self._asked = now
+            self._queried = now
         return self._width
 
     @property

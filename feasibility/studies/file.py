@@ -23,6 +23,8 @@ import copy
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
+from operator import getitem
 from typing import Any
 
 from coverable_errors import Fault, close, printable, shown
@@ -39,7 +41,7 @@ from feasibility.cases import (
 )
 from feasibility.safe_files import shown_path
 from feasibility.studies.axes import TITLES, Axis, Range, Variation, read_variation
-from feasibility.studies.combinations import cause_of, faults_of, get, put, tasks_of
+from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
 from feasibility.studies.run import StudyTask
 
 MOST_TASKS = 1_000_000
@@ -191,10 +193,10 @@ def _absolute(varied: Variation, base_dir: str | os.PathLike[str] | None) -> Var
     def values(axis: Axis) -> tuple[Any, ...]:
         made = []
         for value in axis.values:
-            tables: Tables = {}
+            tables: Any = {}
             put(tables, axis.path, copy.deepcopy(value))
             make_absolute(tables, base_dir)
-            made.append(get(tables, axis.path))
+            made.append(reduce(getitem, axis.path, tables))
         return tuple(made)
 
     files = ("urdf", "package_dirs", "file", "pieces")

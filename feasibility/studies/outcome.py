@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
+from feasibility.division import undominated
 from feasibility.verdict import CauseKind, Verdict
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def arm_of(case: Case) -> Robot:
     """The arm of a case, loaded once.
 
     Raises:
-        RobotError: it cannot be loaded as asked.
+        RobotError: it cannot be loaded so.
     """
     return _load(toml_document({"robot": case.robot.table()}))
 
@@ -169,7 +170,7 @@ def outcome_of(verdict: Verdict) -> Outcome:
             (0..1) that it covers.
         edges, pairs: neighbouring cells that a motion joins, and all of them.
         causes: missed cells by cause, the most frequent first; `examined` says how many of them
-            were looked at, the others counting as the nearest of these.
+            were examined, the others counting as the nearest of these.
         components: the sets of cells that single motions cover, none within another, the best
             first, as hexadecimal bits (see `cells_of`).
         margins: what the covering motion leaves (see `margins_of`), None unless feasible.
@@ -179,6 +180,11 @@ def outcome_of(verdict: Verdict) -> Outcome:
     areas = np.asarray(verdict.cells.areas)
     whole = float(areas.sum())
     causes, examined = cause_counts(verdict)
+    measured = verdict.certificate
+    components = sorted(verdict.components, key=len, reverse=True)
+    covers = np.zeros((len(components), len(areas)), dtype=bool)
+    for row, cells in zip(covers, components, strict=True):
+        row[cells] = True
     return {
         "verdict": str(verdict.answer),
         "evidence": str(verdict.evidence),
@@ -192,9 +198,15 @@ def outcome_of(verdict: Verdict) -> Outcome:
         "pairs": len(verdict.cells.pairs),
         "causes": causes,
         "examined": examined,
-        "components": [bits_of(cells) for cells in _largest(verdict)],
+        "components": [bits_of(cover) for cover in covers[undominated(covers)]],
         "margins": margins_of(verdict),
-        "certificate": _certificate(verdict),
+        "certificate": None
+        if measured is None
+        else {
+            "waypoints": int(measured.waypoints),
+            "max_position_error_m": finite(measured.max_position_error),
+            "max_angle_deg": finite(math.degrees(measured.max_angle)),
+        },
         "fk": int(verdict.statistics.get("fk", 0)),
     }
 
@@ -243,29 +255,6 @@ def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
 def finite(value: float) -> float | None:
     """JSON has neither inf nor NaN."""
     return float(value) if math.isfinite(value) else None
-
-
-def _certificate(verdict: Verdict) -> dict[str, Any] | None:
-    """What the replay measured."""
-    certificate = verdict.certificate
-    if certificate is None:
-        return None
-    return {
-        "waypoints": int(certificate.waypoints),
-        "max_position_error_m": finite(certificate.max_position_error),
-        "max_angle_deg": finite(math.degrees(certificate.max_angle)),
-    }
-
-
-def _largest(verdict: Verdict) -> list[NDArray[np.bool_]]:
-    """Components (N,) that lie in no other one, in their order."""
-    kept: list[NDArray[np.bool_]] = []
-    for cells in sorted(verdict.components, key=len, reverse=True):
-        cover = np.zeros(len(verdict.cells), dtype=bool)
-        cover[cells] = True
-        if len(cells) and not any((cover <= other).all() for other in kept):
-            kept.append(cover)
-    return kept
 
 
 def bits_of(cover: NDArray[np.bool_]) -> str:

@@ -47,12 +47,12 @@ class Arm:
     cause: str | None = None
     """The most frequent cause of missed cells; None without any."""
     patches: int | None = None
-    """Continuous motions that together cover all that can be covered; None where not asked for."""
+    """Continuous motions that together cover all that can be covered; None where not requested."""
     patches_share: float | None = None
     """Of the area, 0..1, that these cover together."""
     critical_cone_deg: float | None = None
     """The smallest cone with a covering motion, to `CONE_STEP_DEG`; narrower ones than
-    `LEAST_CONE_DEG` are not looked at. None where there is none, or it was not asked for."""
+    `LEAST_CONE_DEG` are not tested. None where there is none, or it was not requested."""
     margins: dict[str, float | None] | None = None
     """What the covering motion leaves: limit_deg, limit_m, cone_deg, reach_m."""
     seconds: float = 0.0
@@ -68,7 +68,7 @@ class Comparison:
     divided: bool
     """Were patches counted?"""
     critical: bool
-    """Were critical cones looked for?"""
+    """Were critical cones searched for?"""
 
     @property
     def ranked(self) -> tuple[Arm, ...]:
@@ -112,9 +112,8 @@ def compare(
     """
     tasks = []
     for tables in _tables_of(case, robots):
-        asked = {"divide": divide, "critical": critical}
-        parameters = {"robot": tables["robot"]["name"]}
-        tasks.append(StudyTask({**tables, "compare": asked}, parameters, assess))
+        tables["compare"] = {"divide": divide, "critical": critical}
+        tasks.append(StudyTask(tables, {"robot": tables["robot"]["name"]}, assess))
     rows = run_tasks(tasks, workers, store, progress)
     arms = []
     for task, row in zip(tasks, rows, strict=True):
@@ -160,21 +159,20 @@ def assess(tables: Tables) -> dict[str, Any]:
     """In a worker: all that is said about one arm, but for the time that it took.
 
     Args:
-        tables: of a case, and `compare`: what is asked for.
+        tables: of a case, and `compare`: what is requested.
     """
     from feasibility.checking import check
 
-    asked = tables["compare"]
+    request = tables["compare"]
     case = case_of(tables)
     robot, cells = arm_of(case), cut_of(case)
     verdict = check(robot, cells, case.task, case.search)
     outcome = outcome_of(verdict)
-    patches, patches_share = (1, 1.0) if verdict.feasible else (None, None)
-    if asked["divide"] and not verdict.feasible and 0 < len(cells) <= MOST_DIVIDED:
+    patches, patches_share = (1, 1.0) if request["divide"] and verdict.feasible else (None, None)
+    if request["divide"] and not verdict.feasible and 0 < len(cells) <= MOST_DIVIDED:
         patches, patches_share = _patches(robot, cells, case)
-    cone = None
-    if asked["critical"]:
-        cone = critical_cone(robot, cells, case, verdict.feasible)
+    feasible = verdict.feasible
+    cone = critical_cone(robot, cells, case, feasible) if request["critical"] else None
     kept = ("verdict", "evidence", "message", "share", "covered", "cells", "margins")
     return {
         "robot": robot.name,
@@ -182,8 +180,8 @@ def assess(tables: Tables) -> dict[str, Any]:
         "reach_m": finite(robot.reach),
         **{key: outcome[key] for key in kept},
         "cause": next(iter(outcome["causes"]), None),
-        "patches": patches if asked["divide"] else None,
-        "patches_share": patches_share if asked["divide"] else None,
+        "patches": patches,
+        "patches_share": patches_share,
         "critical_cone_deg": cone,
     }
 
@@ -217,7 +215,7 @@ def critical_cone(robot: Robot, cells: Cells, case: Case, feasible: bool) -> flo
         task: Task = replace(case.task, cone_deg=step * CONE_STEP_DEG)
         return check(robot, cells, task, case.search).feasible
 
-    # Steps below the first one looked at count as failed; the case's own cone may lie between two.
+    # Steps below the first one tested count as failed; the case's own cone may lie between two.
     below = round(LEAST_CONE_DEG / CONE_STEP_DEG) - 1
     if feasible:
         good = math.ceil(case.task.cone_deg / CONE_STEP_DEG)

@@ -1,4 +1,4 @@
-"""A study: many cases decided, kept as they are, and told apart by what they are."""
+"""A study: many cases decided, each kept under a key of its content."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 from feasibility.search import Progress
@@ -32,7 +32,7 @@ class StudyTask:
     """
 
     tables: Tables
-    """What the work is told: JSON values; for verdicts a case, as `Case.to_tables` gives it."""
+    """The argument of the work: JSON values; for verdicts a case, as `Case.to_tables` gives it."""
     parameters: Mapping[str, Any]
     """What varies in the study, for its table: JSON values."""
     work: Work = evaluate
@@ -102,44 +102,33 @@ def run_tasks(
     kept = {} if store is None else store.find(task.key for task in tasks)
     found = {key: record for key, record in kept.items() if record.status == "done"}
     missing = list({task.key: task for task in tasks if task.key not in found}.values())
-    keeper = _Keeper(missing, store, found, progress, total=len(found) + len(missing))
+    keeper = _Keeper(store, found, progress, total=len(found) + len(missing))
     try:
         for work in dict.fromkeys(task.work for task in missing):
-            part = [k for k, task in enumerate(missing) if task.work is work]
-            keeper.begin(part)
-            schedule(work, [missing[k].tables for k in part], workers, keeper.receive)
+            part = [task for task in missing if task.work is work]
+            receive = partial(keeper.receive, part)
+            schedule(work, [task.tables for task in part], workers, receive)
     finally:
         keeper.flush()
     rows = [(task, found[task.key]) for task in tasks]
     return tuple(Row(task.parameters, r.status, r.result, r.seconds) for task, r in rows)
 
 
+@dataclass(slots=True)
 class _Keeper:
-    """Takes answers in, and writes them some times a second."""
+    """Collects answers in `found`, and writes them to the store some times a second."""
 
-    def __init__(
-        self,
-        tasks: Sequence[StudyTask],
-        store: Store | None,
-        found: dict[str, Record],
-        progress: Progress | None,
-        total: int,
-    ) -> None:
-        """Answers to `tasks` go to the store and into `found`."""
-        self.tasks, self.store, self.found = tasks, store, found
-        self.progress, self.total = progress, total
-        self.waiting: list[Record] = []
-        self.written = 0.0
-        self.part: Sequence[int] = ()
+    store: Store | None
+    found: dict[str, Record]
+    progress: Progress | None
+    total: int
+    waiting: list[Record] = field(default_factory=list)
+    written: float = 0.0
 
-    def begin(self, part: Sequence[int]) -> None:
-        """The next answers are to these tasks."""
-        self.part = part
-
-    def receive(self, answers: list[Answer]) -> None:
-        """Take in what has come."""
+    def receive(self, tasks: Sequence[StudyTask], answers: list[Answer]) -> None:
+        """Take in answers to some of `tasks`."""
         for answer in answers:
-            record = _record(self.tasks[self.part[answer.index]], answer)
+            record = _record(tasks[answer.index], answer)
             self.waiting.append(record)
             self.found[record.key] = record
         now = time.monotonic()
@@ -184,7 +173,7 @@ def _files_of(tables: Mapping[str, Any]) -> list[tuple[str, float, int]]:
 
 @lru_cache(maxsize=256)
 def digest(path: str, changed: float, size: int) -> str:
-    """What a file holds, in short; asked again when its time or size has changed."""
+    """What a file holds, in short; read again when its time or size has changed."""
     try:
         with open(path, "rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from coverable_errors import CoverableError
 
 AHEAD = 2  # tasks in flight for each worker: one at work, one waiting
-LOOK = 0.1  # [s] between two looks at what has come back
+LOOK = 0.1  # [s] between two queries of the futures
 MOST_BREAKS = 10  # of the pool, one after the other, with nothing finished in between
 
 BREAKS = (BrokenExecutor, CancelledError, EOFError, OSError, RuntimeError, ValueError)
@@ -97,7 +97,7 @@ def schedule(
     """Have all tasks done.
 
     A task that was in flight when the pool broke is done again, with nothing else in flight: so a
-    task that kills its worker is told apart from those in flight beside it.
+    task that kills its worker is distinguished from those in flight beside it.
 
     Args:
         work: called with one of `tables`, in a worker; a function of a module.

@@ -10,9 +10,9 @@ import json
 import os
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 from coverable_files import FileFault, open_regular
 from feasibility.safe_files import FileError, check_writable, shown_path
@@ -74,7 +74,7 @@ class Record:
     """Time that the task took."""
 
 
-class Store:
+class Store(AbstractContextManager["Store"]):
     """Records by key in one file. Use it as a context, so that it is closed.
 
     Example:
@@ -245,10 +245,6 @@ class Store:
     def close(self) -> None:
         """Close the file."""
         self._base.close()
-
-    def __enter__(self) -> Self:
-        """The store itself."""
-        return self
 
     def __exit__(self, *raised: object) -> None:
         """Close the file."""
