@@ -1,6 +1,6 @@
 """Result files: a verdict with its case in one file that loads again, without pickles.
 
-The file is a zip of .npy arrays and one `meta.json` (see `archive`). The robot and the cells are not
+The file is a zip of .npy arrays and one `meta.json`, see `archive`. The robot and the cells are not
 stored: they are built again from the case, and compared with numbers in the file, so that a result
 is never shown on another arm or surface than the ones it was found for.
 """
