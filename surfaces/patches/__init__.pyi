@@ -1,10 +1,7 @@
 from .closed_form_kernels import cell_at as cell_at
 from .closed_form_kernels import closest_on_patch as closest_on_patch
-from .cone_torus import cone as cone
-from .cone_torus import torus as torus
-from .elementary import cylinder as cylinder
-from .elementary import plane as plane
-from .elementary import sphere as sphere
+from .cone import cone as cone
+from .cylinder import cylinder as cylinder
 from .ellipsoid import ellipsoid as ellipsoid
 from .grid_cells import GridCells as GridCells
 from .grid_cells import closed_form_grid as closed_form_grid
@@ -14,4 +11,7 @@ from .nurbs import bspline as bspline
 from .nurbs import read_net as read_net
 from .patch import ClosedFormPatch as ClosedFormPatch
 from .patch import Patch as Patch
+from .plane import plane as plane
 from .revolution import revolution as revolution
+from .sphere import sphere as sphere
+from .torus import torus as torus

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.elementary import unit_sphere
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
+from surfaces.patches.sphere import unit_sphere
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
