@@ -102,7 +102,7 @@ class DaskWorkers:
         Raises:
             WorkersError: the scheduler is gone.
         """
-        self.close(at_once=True)
+        self.close()
         try:
             self._connect()
         except WorkersError as error:
@@ -111,9 +111,9 @@ class DaskWorkers:
                 "continue"
             ) from error
 
-    def close(self, at_once: bool) -> None:
+    def close(self) -> None:
         """Leave the cluster; it goes on without us."""
         with suppress(*self.breaks):  # perhaps nobody is there any more
-            self._pool.shutdown(wait=not at_once)
+            self._pool.shutdown(wait=False)
         with suppress(*self.breaks):
             self._client.close()

@@ -52,8 +52,8 @@ class Workers(Protocol):
     def renew(self) -> None:
         """Start anew after a break; the old pool's futures end no more."""
 
-    def close(self, at_once: bool) -> None:
-        """End the workers: after what they are doing, or at once."""
+    def close(self) -> None:
+        """End the workers, whatever they are doing."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ ATTEMPTS = 3  # to start worker processes anew
 def open_workers(
     count: int | None = None, address: str | None = None, *, warm: bool = True
 ) -> Iterator[Workers]:
-    """Workers for `run_tasks`, until the block ends.
+    """Workers for `run_tasks`, until the block ends, and with it their work.
 
     Args:
         count: processes on this machine; None for one on each processor, 0 for none: then tasks
@@ -59,10 +59,8 @@ def open_workers(
         workers = Processes(processors() if count is None else count, warm)
     try:
         yield workers
-    except BaseException:
-        workers.close(at_once=True)
-        raise
-    workers.close(at_once=False)
+    finally:
+        workers.close()
 
 
 def processors() -> int:
@@ -101,7 +99,7 @@ class Here:
     def renew(self) -> None:
         """Nothing can break."""
 
-    def close(self, at_once: bool) -> None:
+    def close(self) -> None:
         """Nothing is open."""
 
 
@@ -161,7 +159,7 @@ class Processes:
             WorkersError: they die before they do anything.
         """
         for _ in range(ATTEMPTS):
-            self.close(at_once=True)
+            self.close()
             with suppress(*self.breaks):
                 self._start()
                 self.submit(os.getpid).result()
@@ -171,13 +169,15 @@ class Processes:
             "kept: see that there is enough memory, or use fewer workers"
         )
 
-    def close(self, at_once: bool) -> None:
-        """End the processes."""
-        if at_once:
-            self._leash.close()
+    def close(self) -> None:
+        """End the processes.
+
+        They end themselves, as when this process dies. Asked by the pool they might not: one that
+        is killed while it waits for a task takes the lock of the others' queue with it.
+        """
+        self._leash.close()
         with suppress(*self.breaks):
             self._pool.shutdown(wait=True, cancel_futures=True)
-        self._leash.close()
         self._end.close()
         self._word.close()
         self._ear.join()

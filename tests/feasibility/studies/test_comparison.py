@@ -89,8 +89,8 @@ def test_the_best_comes_first(compared) -> None:
 
 def test_workers_change_nothing(strip, compared) -> None:
     with open_workers(2) as workers:
-        again = compare(strip, ROBOTS, workers)
-    for arm, other in zip(compared.arms, again.arms, strict=True):
+        again = compare(strip, ROBOTS[:2], workers)
+    for arm, other in zip(compared.arms[:2], again.arms, strict=True):
         assert replace(arm, seconds=0.0) == replace(other, seconds=0.0)
 
 
