@@ -107,7 +107,7 @@ class Processes:
     """Processes of this machine that have the kernels loaded.
 
     They are started afresh (spawn): a forked one would share locks of Pinocchio and numba. A pipe
-    is their leash: when this process dies, however it dies, its end closes and they end too.
+    tells them of this process's death: however it dies, its end closes and they end too.
     """
 
     breaks: tuple[type[BaseException], ...] = BREAKS
@@ -125,16 +125,16 @@ class Processes:
         from multiprocessing import get_context
 
         context = get_context("spawn")
-        self._end, self._leash = context.Pipe(duplex=False)
-        heard, self._word = context.Pipe(duplex=False)
-        self._ear = threading.Thread(target=_pass_on, args=[heard], daemon=True)
-        self._ear.start()
-        gate = context.Lock() if self._warm else None
+        self._death_read, self._death_write = context.Pipe(duplex=False)
+        heard, self._notices = context.Pipe(duplex=False)
+        self._listener = threading.Thread(target=_pass_on, args=[heard], daemon=True)
+        self._listener.start()
+        lock = context.Lock() if self._warm else None
         self._pool: Executor = ProcessPoolExecutor(
             self.width,
             mp_context=context,
             initializer=_begin,
-            initargs=(self._end, self._word, gate),
+            initargs=(self._death_read, self._notices, lock),
         )
 
     @property
@@ -175,12 +175,12 @@ class Processes:
         They end themselves, as when this process dies. Asked by the pool they might not: one that
         is killed while it waits for a task takes the lock of the others' queue with it.
         """
-        self._leash.close()
+        self._death_write.close()
         with suppress(*self.breaks):
             self._pool.shutdown(wait=True, cancel_futures=True)
-        self._end.close()
-        self._word.close()
-        self._ear.join()
+        self._death_read.close()
+        self._notices.close()
+        self._listener.join()
 
 
 def _pass_on(heard: Connection) -> None:
@@ -193,14 +193,14 @@ def _pass_on(heard: Connection) -> None:
     notify()
 
 
-def _begin(leash: Connection, word: Connection, gate: SharedLock | None) -> None:
-    """In a new worker: watch the leash; load the kernels, one worker first, if there is a gate."""
+def _begin(parent: Connection, notices: Connection, lock: SharedLock | None) -> None:
+    """In a new worker: watch the parent; load the kernels, one worker first, if there is a lock."""
 
     def watch() -> None:
-        leash.poll(None)  # nothing is ever sent: it returns when the other end is closed
+        parent.poll(None)  # nothing is ever sent: it returns when the other end is closed
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
-    if gate is not None:
-        warm_up_in_turn(gate, lambda: word.send_bytes(b"!"))
-    word.close()
+    if lock is not None:
+        warm_up_in_turn(lock, lambda: notices.send_bytes(b"!"))
+    notices.close()

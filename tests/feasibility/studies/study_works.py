@@ -50,10 +50,10 @@ def die_at_once(*arguments):
     os._exit(3)
 
 
-def begin_slowly(leash, word, gate):
+def begin_slowly(parent, notices, lock):
     """In the place of what a worker begins with: the first compiles, and says so."""
-    if gate.acquire(False):
-        word.send_bytes(b"!")
+    if lock.acquire(False):
+        notices.send_bytes(b"!")
 
 
 LOADED = []
