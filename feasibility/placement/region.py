@@ -28,7 +28,7 @@ class PlacementError(CoverableError):
 
 
 class Pose(NamedTuple):
-    """Where a surface's frame stands in the root frame, in the numbers of a case file."""
+    """Pose of a surface's frame in the root frame, in the numbers of a case file."""
 
     position: Triple
     """m."""

@@ -14,7 +14,7 @@ from feasibility.studies.scheduling import BREAKS, WorkersError
 
 CONNECT = 10.0  # [s] for a Dask scheduler to answer
 FIRST_WORKER = 60.0  # [s] for its first worker to be there
-ASK = 2.0  # [s] between two questions about how many workers there are
+ASK = 2.0  # [s] between two looks at how many workers there are
 
 
 class DaskWorkers:

@@ -92,7 +92,7 @@ def compare(
         case: surface, task and search; its own arm keeps its limits and tool if it is among the
             robots.
         robots: names of the library.
-        workers: where to, see `feasibility.study_workers.open_workers`.
+        workers: where they run, see `open_workers`.
         divide: count the patches that an arm needs where one motion will not do, on surfaces of
             up to `MOST_DIVIDED` cells.
         critical: look for the smallest cone that each arm can do with; some ten verdicts each.
@@ -156,7 +156,7 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
 
 
 def assess(tables: Tables) -> dict[str, Any]:
-    """In a worker: all that is said about one arm, but for the time that it took.
+    """In a worker: everything in the row of one arm, but for the time that it took.
 
     Args:
         tables: of a case, and `compare`: what is requested.

@@ -102,7 +102,7 @@ def schedule(
     Args:
         work: called with one of `tables`, in a worker; a function of a module.
         tables: of each task.
-        workers: where to.
+        workers: where they run.
         receive: called here with answers as they come, in any order, and with none several times
             a second; what it raises ends the work.
 

@@ -63,7 +63,7 @@ class Record:
     """One task that was worked on."""
 
     key: str
-    """Says what the task is; see `feasibility.study.StudyTask`."""
+    """Says what the task is; see `StudyTask`."""
     parameters: Mapping[str, Any]
     """What varies in the study, for people who read the file."""
     status: Status
