@@ -142,7 +142,7 @@ def test_a_process_of_its_own_gives_the_same_table(folder, capsys) -> None:
         ('base.case = "plate.toml"\nvary.robots = []', ["vary.robots"]),
         # An empty region, and one without an end.
         (STUDY + REGION.format("[0.4, 0.2]"), ["surface.position.y.range", "the wrong way"]),
-        (STUDY + REGION.format("[0.4, 0.4]"), ["position.y.range", "is an empty range"]),
+        (STUDY + REGION.format("[0.4, 0.4]"), ["position.y.range", "an empty range"]),
         (STUDY + REGION.format("[0.4, inf]"), ["position.y.range", "finite"]),
         ('base.case = "plate.toml"\n[vary]\n"task.cone_deg" = [20, nan]', ["task.cone_deg"]),
         ('base.case = "none.toml"\nvary.robots = ["ur5"]', ["base.case: there is no such file"]),
