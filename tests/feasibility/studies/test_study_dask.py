@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 import study_works
@@ -90,22 +93,43 @@ def test_no_scheduler(monkeypatch) -> None:
             pass
 
 
+CLUSTER = """
+import signal
+import distributed
+if __name__ == "__main__":
+    made = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
+    )
+    print(made.scheduler_address, flush=True)
+    signal.pause()
+"""
+
+
 def test_a_scheduler_that_is_lost(monkeypatch) -> None:
     """One clear message, and what was finished is kept."""
     tasks = [StudyTask({"number": k}, {"k": k}, study_works.double) for k in range(40)]
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None
-    ) as made:
+    folder = Path(__file__).parent
+    with subprocess.Popen(
+        [sys.executable, "-c", CLUSTER],
+        env={**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{folder.parent}"},
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    ) as process:
+        lost = []
 
-        def close(done, total, text) -> None:
-            if done > 5:
+        def kill(done, total, text) -> None:
+            if done > 5 and not lost:
                 monkeypatch.setattr("feasibility.studies.dask_workers.CONNECT", 0.3)
-                made.close()
+                os.killpg(process.pid, signal.SIGKILL)
+                lost.append(process.wait())
 
+        assert process.stdout is not None
         with Store(":memory:") as store:
             with (
                 pytest.raises(WorkersError, match="was lost; what was finished is kept"),
-                open_workers(address=made.scheduler_address) as there,
+                open_workers(address=process.stdout.readline().strip()) as there,
             ):
-                run_tasks(tasks, there, store, close)
+                run_tasks(tasks, there, store, kill)
+            assert lost
             assert 5 < len(store) < 40
