@@ -70,6 +70,11 @@ class StationPlan:
     refusals: tuple[str, ...]
     """For each station why the replay refuses its motion; empty where it accepts it."""
 
+    @property
+    def certified(self) -> bool:
+        """Is the motion of every station replayed and accepted?"""
+        return not any(self.refusals)
+
 
 def station_plan(
     placements: Placements,
