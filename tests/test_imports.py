@@ -283,3 +283,11 @@ def test_heavy_libraries_are_imported_where_they_are_used() -> None:
         now = {i.module.split(".")[0] for i in IMPORTS[name] if not i.deferred}
         allowed = {"matplotlib"} if name == "feasibility.viewer.figures" else set()
         assert not now & HEAVY - allowed, name
+
+
+def test_no_function_has_more_than_seventy_lines() -> None:
+    for name, path in FILES.items():
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                length = int(node.end_lineno or 0) - node.lineno + 1
+                assert length <= 70, f"{name}: {node.name} has {length} lines"

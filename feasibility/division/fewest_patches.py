@@ -101,14 +101,19 @@ def divide(
             "divide_s": time.monotonic() - searched,
             "total_s": time.monotonic() - called,
         },
-        statistics={
-            "fk": int(exploration.work.counts[0]),
-            "nodes": int(exploration.roadmap.counters[0]),
-            "components": len(exploration.roots()),
-            "boxes": exploration.boxes,
-            "rounds": exploration.rounds,
-        },
+        statistics=_statistics(exploration),
     )
+
+
+def _statistics(exploration: Exploration) -> dict[str, int]:
+    """Counts of the work done."""
+    return {
+        "fk": int(exploration.work.counts[0]),
+        "nodes": int(exploration.roadmap.counters[0]),
+        "components": len(exploration.roots()),
+        "boxes": exploration.boxes,
+        "rounds": exploration.rounds,
+    }
 
 
 def _searched(

@@ -146,9 +146,8 @@ def place(
     _check_settings(cells, search, count, around, keep, time_limit)
     began = time.monotonic()
     reach = Reach.of(robot, cells, task)
-    beyond = reach.beyond(region)
     answered = partial(Placements, robot, cells, task, region)
-    if beyond is not None:
+    if (beyond := reach.beyond(region)) is not None:
         placements = _ruled_out(answered, region, reach, beyond)
         placements.timing["total_s"] = time.monotonic() - began
         return placements
@@ -162,9 +161,8 @@ def place(
     refinement.refine(around)
     placements = _searched(answered, refinement, refinement.verified(keep))
     if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
-        placements = replace(
-            placements, message=f"{placements.message} Wherever it stands: {closed}"
-        )
+        message = f"{placements.message} Wherever it stands: {closed}"
+        placements = replace(placements, message=message)
     placements.timing["total_s"] = time.monotonic() - began
     return placements
 
