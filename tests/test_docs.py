@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import importlib.util
 import json
 import os
 import re
@@ -248,3 +249,17 @@ def test_notebooks_are_saved_with_their_outputs(path: Path) -> None:
     views = [page for page in pages if "<iframe srcdoc=" in page]
     assert len(views) >= (1 if path.stem.startswith("05") else len(pages))
     assert not any(re.search(r"(?:src|href)=[\"']?https?:", page) for page in pages)
+
+
+@pytest.mark.parametrize(
+    "path", sorted(ROOT.glob("tests/benchmarks/bench_*.py")), ids=lambda p: p.stem
+)
+def test_benchmarks_load(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in ("benchmarks", "paper", "oracle", "surfaces"):
+        monkeypatch.syspath_prepend(str(ROOT / "tests" / folder))
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert callable(module.rows)

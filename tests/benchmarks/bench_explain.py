@@ -11,7 +11,7 @@ from paper_cases import PAPER_CASES
 
 from feasibility import Evidence, Task, check
 from feasibility.sensitivity import explain
-from feasibility.sensitivity.parameters import Setup
+from feasibility.sensitivity.thresholds import Variant
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
 from surfaces.meshes import TriangleMesh, mesh
@@ -20,48 +20,48 @@ GRID = (9, 10)  # rows and columns of cells
 SOME = 5  # verdicts in a row
 
 
-def _paper(name: str) -> Setup:
+def _paper(name: str) -> Variant:
     case = PAPER_CASES[name]
-    return Setup(case.robot(), case.cells(), case.task())
+    return Variant(case.robot(), case.cells(), case.task())
 
 
 def _plate(
     arm: str, x: tuple[float, float], half: float, z: float, cone: float = 30.0, **limits_deg: float
-) -> Callable[[], Setup]:
+) -> Callable[[], Variant]:
     """A level plate before an arm, `half` of its width to either side; limits of some joints."""
 
-    def setup() -> Setup:
+    def setup() -> Variant:
         robot = load_robot(arm)
         robot = robot.with_limits({j: np.radians([-a, a]) for j, a in limits_deg.items()})
         patch = plane(x, (-half, half), "outside", (0.0, 0.0, z))
-        return Setup(robot, patch.cells(*GRID), Task(0.02, cone))
+        return Variant(robot, patch.cells(*GRID), Task(0.02, cone))
 
     return setup
 
 
-def _dome(arm: str, radius: float, x: float, z: float) -> Callable[[], Setup]:
+def _dome(arm: str, radius: float, x: float, z: float) -> Callable[[], Variant]:
     """A piece of a ball that looks at the arm."""
 
-    def setup() -> Setup:
+    def setup() -> Variant:
         patch = sphere(radius, (10, 50), (150, 230), position=(x, 0, z), side="outside")
-        return Setup(load_robot(arm), patch.cells(*GRID), Task(0.02, 25))
+        return Variant(load_robot(arm), patch.cells(*GRID), Task(0.02, 25))
 
     return setup
 
 
-def _bowl() -> Setup:
+def _bowl() -> Variant:
     patch = sphere(0.25, (120, 170), (0, 360), position=(0.5, 0, 0.4), side="inside")
-    return Setup(load_robot("ur5"), patch.cells(*GRID), Task(0.02, 40))
+    return Variant(load_robot("ur5"), patch.cells(*GRID), Task(0.02, 40))
 
 
-def _behind() -> Setup:
+def _behind() -> Variant:
     """A piece of a wall behind the arm, which joint 1 may go around to."""
     robot = load_robot("ur5").with_limits({"shoulder_pan_joint": (0.0, 2.0 * np.pi)})
     patch = cylinder(0.6, (150, 210), (0.1, 0.5), side="inside")
-    return Setup(robot, patch.cells(*GRID), Task(0.02, 30))
+    return Variant(robot, patch.cells(*GRID), Task(0.02, 30))
 
 
-def _mesh() -> Setup:
+def _mesh() -> Variant:
     """A piece of a drum before a panda, as triangles."""
     patch = cylinder(0.3, (140, 220), (0.1, 0.4), position=(0.75, 0, 0.1))
     u, v = np.meshgrid(
@@ -71,10 +71,10 @@ def _mesh() -> Setup:
     a, b, c, d = (side.ravel() for side in (k[:-1, :-1], k[1:, :-1], k[1:, 1:], k[:-1, 1:]))
     faces = np.vstack([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
     drum = mesh(TriangleMesh(patch.point(u, v).reshape(-1, 3), faces), side="outside")
-    return Setup(load_robot("panda"), drum.cells(count=90), Task(0.02, 30))
+    return Variant(load_robot("panda"), drum.cells(count=90), Task(0.02, 30))
 
 
-CASES: dict[str, Callable[[], Setup]] = {
+CASES: dict[str, Callable[[], Variant]] = {
     **{name: (lambda name=name: _paper(name)) for name in PAPER_CASES},  # type: ignore[misc]
     "ur5 plate": _plate("ur5", (0.3, 0.6), 0.15, 0.3),
     "ur5 plate, 1 deg": _plate("ur5", (0.3, 0.6), 0.15, 0.3, 1.0),
