@@ -146,6 +146,7 @@ def _decided(
         start=found.start,
         witness=found.motion if feasible else None,
         certificate=replayed.certificate if feasible and replayed is not None else None,
+        proof=found.proof if evidence is Evidence.PROOF else None,
         timing={
             "load_s": clock.began - called,
             "search_s": sum(one.search_s for one in tried),
@@ -170,8 +171,8 @@ def _answer(
     if replayed is not None:
         message = found.refused.replace("{refusal}", replayed.refusal)
         return Answer.UNDECIDED, Evidence.BUDGET, message
-    if found.proof:
-        return Answer.INFEASIBLE, Evidence.PROOF, found.proof
+    if found.proof is not None:
+        return Answer.INFEASIBLE, Evidence.PROOF, found.proved
     if found.unfinished:
         return Answer.UNDECIDED, Evidence.BUDGET, found.unfinished
     return Answer.INFEASIBLE, Evidence.EXHAUSTED, found.exhausted

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.cut_tree import CutTree
 from feasibility.verdict import Cause, Replay, Walk
 
 if TYPE_CHECKING:
@@ -39,8 +40,10 @@ class Found:
     """What to say when the replay accepts; {waypoints} stands for their number."""
     refused: str = ""
     """What to say when it refuses; {refusal} stands for its reason."""
-    proof: str = ""
-    """Why no motion covers all cells; empty where that is not proved."""
+    proof: CutTree | None = None
+    """Why no motion covers all cells; None where that is not proved."""
+    proved: str = ""
+    """What to say about the proof."""
     unfinished: str = ""
     """What was left untried, a time limit that ran out, say; empty where nothing was."""
     exhausted: str = ""

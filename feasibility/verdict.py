@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.cut_tree import CutTree
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
@@ -33,7 +34,7 @@ class Evidence(StrEnum):
     WITNESS = "witness"
     """A covering motion that an independent replay accepted."""
     PROOF = "proof"
-    """A bound that rules a cell out."""
+    """A bound that rules a cell out, or a cut tree that parts the cells."""
     EXHAUSTED = "exhausted"
     """The search ended at its stated resolution without finding a covering motion."""
     BUDGET = "budget"
@@ -155,6 +156,9 @@ class Verdict:
     """The covering motion; None unless feasible, and for the greedy search, whose tree enters
     cells without visiting their centres (its `certificate` is of the tree's motions)."""
     certificate: Certificate | None = None
+    proof: CutTree | None = None
+    """Why no motion covers every cell, to be verified without the search; None unless `evidence` is
+    proof."""
     timing: Mapping[str, float] = field(default_factory=dict)
     """Seconds: load_s, search_s, certify_s, total_s."""
     n_edges: int = 0

@@ -8,6 +8,7 @@ import numpy as np
 
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
+from feasibility.cut_tree import CutTree, Leaf
 from feasibility.found import Found
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
@@ -73,7 +74,8 @@ def _found(problem: Problem, exploration: Exploration, in_time: bool) -> Found:
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
         refused="A motion over every cell was found, but the independent replay refuses it: "
         "{refusal}.",
-        proof="" if complete else _proof(problem, exploration),
+        proof=None if complete else _proof(exploration),
+        proved=_proved(problem, exploration),
         unfinished="" if complete else _unfinished(problem, exploration, in_time),
         exhausted=f"The search ended without a covering motion {problem.within}: "
         f"{_shortfall(exploration)}; the best covers {covered} of {total} cells ({nodes} nodes, "
@@ -89,11 +91,16 @@ def _replayed(problem: Problem, walk: Walk) -> Replay:
     return replay(problem.robot, problem.cells, problem.task, walk, needed)
 
 
-def _proof(problem: Problem, exploration: Exploration) -> str:
-    """The sentence about proved cells; empty where none is."""
+def _proof(exploration: Exploration) -> CutTree | None:
+    """The first cell that is proved uncoverable, as a proof; None where none is."""
+    rulings = exploration.rulings.items()
+    cell = next((cell for cell, ruling in rulings if ruling is Ruling.PROVED), None)
+    return None if cell is None else CutTree(Leaf(cell))
+
+
+def _proved(problem: Problem, exploration: Exploration) -> str:
+    """The sentence about proved cells."""
     proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
-    if not proved:
-        return ""
     return (
         f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {problem.within} "
         f"(reach bound and branch and bound, {exploration.boxes} boxes); the best single motion "
