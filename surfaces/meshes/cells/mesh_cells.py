@@ -94,7 +94,8 @@ class MeshCells(Cells):
 
     @cached_property
     def curves(self) -> CellCurves:
-        """See `Cells.curves`; those over creases and tight bends are shaped for them."""
+        """See `Cells.curves`; those over creases and tight bends, or past notches, are reshaped."""
+        from surfaces.meshes.cells.curves_inside import fit_inside
         from surfaces.meshes.cells.reshaped_curves import (
             creases_of,
             fit_over_bends,
@@ -106,6 +107,7 @@ class MeshCells(Cells):
         if len(rough):
             fit_over_creases(fit, creases_of(self.surface, self.labels), self._crease_shares)
             fit_over_bends(fit)
+            fit_inside(fit, self.surface, self.labels, self.figures.faces)
         return fit.joined()
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
