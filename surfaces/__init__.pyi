@@ -8,6 +8,7 @@ from .meshes import cut_plane as cut_plane
 from .meshes import faces_within_cone as faces_within_cone
 from .meshes import mesh as mesh
 from .meshes import take_faces as take_faces
+from .parts import SurfaceParts as SurfaceParts
 from .patches import Patch as Patch
 from .patches import bspline as bspline
 from .patches import cone as cone

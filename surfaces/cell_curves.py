@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.surface import Protected
+from surfaces.protected import Protected
 
 Array = NDArray[np.float64]
 

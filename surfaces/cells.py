@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
-from surfaces.surface import Protected, Surface
+from surfaces.protected import Protected
+from surfaces.surface import Surface
 
 if TYPE_CHECKING:
     import networkx as nx

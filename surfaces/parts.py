@@ -11,29 +11,116 @@ so a search that starts at the root and discards parts misses nothing.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.surface import Protected
+from surfaces.protected import Protected
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_PARTS = 8192
+_RELATIVE, _ABSOLUTE = 1e-9, 1e-12  # what is added to a radius for rounding
+_COORDINATE = 1e-14  # of the largest coordinate, likewise
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class SurfaceParts(Protected):
     """K parts of one surface; the root is part 0, and children come after their parents."""
 
-    centre: NDArray[np.float64]
+    centre: Array
     """(K, 6) c_f (m) and c_n."""
-    slopes: NDArray[np.float64]
+    slopes: Array
     """(K, 2, 6) e_1, e_2 (m) beside g_1, g_2."""
-    radius: NDArray[np.float64]
+    radius: Array
     """(K, 2) r_f (m) and r_n."""
-    children: NDArray[np.int64]
+    children: Ints
     """(K, 2) the two parts that a part is cut into; -1, -1 for the finest ones."""
-    axis: NDArray[np.int64]
+    axis: Ints
     """(K,) 0 or 1 where the children are the halves x_axis <= 0 and x_axis >= 0 of the part, with
     x = 2 x_axis + 1 and 2 x_axis - 1 of their own; -1 where they are any two parts."""
 
     def __len__(self) -> int:
         """Number of parts."""
         return len(self.centre)
+
+
+class PartModels(NamedTuple):
+    """Affine models of k parts, and what their radii come from."""
+
+    centre: Array
+    """(k, 6) see `SurfaceParts`."""
+    slopes: Array
+    """(k, 2, 6)"""
+    radius: Array
+    """(k, 2)"""
+    along: Array
+    """(k, 2, 2) which share of r_f and r_n (last axis) comes from the extent along x_1, and x_2:
+    halving that axis takes most of it away. Only says how to cut."""
+
+    def placed(self, rotation: Array, position: Array, sign: float = 1.0) -> PartModels:
+        """After the rigid motion x -> rotation x + position; normals turned over by sign -1.0."""
+        centre = np.hstack(
+            [
+                self.centre[:, :3] @ rotation.T + position,
+                self.centre[:, 3:] @ (sign * rotation.T),
+            ]
+        )
+        slopes = np.concatenate(
+            [self.slopes[..., :3] @ rotation.T, self.slopes[..., 3:] @ (sign * rotation.T)], axis=-1
+        )
+        return self._replace(centre=centre, slopes=slopes)
+
+    def guarded(self) -> PartModels:
+        """The same with room for rounding; what is not finite becomes a model that always holds.
+
+        A unit vector lies within 1 of zero, so r_n is never more than that.
+        """
+        size = np.abs(self.centre[:, :3]).max(axis=1, initial=0.0)
+        radius = self.radius * (1.0 + _RELATIVE) + _ABSOLUTE
+        radius[:, 0] += _COORDINATE * size
+        centre, slopes = self.centre.copy(), self.slopes.copy()
+        for column, some in ((0, slice(0, 3)), (1, slice(3, 6))):
+            known = np.isfinite(centre[:, some]).all(axis=1) & np.isfinite(radius[:, column])
+            known &= np.isfinite(slopes[..., some]).all(axis=(1, 2))
+            if column == 1:
+                known &= radius[:, 1] < 1.0
+            if not known.all():
+                centre[~known, some], slopes[~known, :, some] = 0.0, 0.0
+                radius[~known, column] = 1.0 + _ABSOLUTE if column else np.inf
+        return PartModels(centre, slopes, radius, np.nan_to_num(self.along, posinf=0.0))
+
+    def rows(self, some: Ints | NDArray[np.bool_]) -> PartModels:
+        """Some of the parts."""
+        return PartModels(*(array[some] for array in self))
+
+
+def around(one: PartModels, other: PartModels) -> PartModels:
+    """Models of k parts that hold all of two others each: balls around them."""
+    balls = [_balls(models) for models in (one, other)]
+    (a, ra), (b, rb) = balls
+    centre, radius = np.empty((len(a), 6)), np.empty((len(a), 2))
+    for column, some in ((0, slice(0, 3)), (1, slice(3, 6))):
+        apart = np.linalg.norm(b[:, some] - a[:, some], axis=1)
+        p, q = ra[:, column], rb[:, column]
+        # From the far end of one ball to that of the other; or the larger one where it holds both.
+        whole = np.maximum((apart + p + q) / 2.0, np.maximum(p, q))
+        with np.errstate(invalid="ignore"):
+            share = np.clip((whole - p) / np.maximum(apart, 1e-300), 0.0, 1.0)
+        share = np.nan_to_num(share)
+        middle = a[:, some] + share[:, None] * (b[:, some] - a[:, some])
+        to_a, to_b = (np.linalg.norm(middle - end[:, some], axis=1) for end in (a, b))
+        centre[:, some], radius[:, column] = middle, np.maximum(to_a + p, to_b + q)
+    flat = np.zeros((len(centre), 2, 6))
+    return PartModels(centre, flat, radius, np.zeros((len(centre), 2, 2))).guarded()
+
+
+def _balls(models: PartModels) -> tuple[Array, Array]:
+    """Centres (k, 6), and radii (k, 2) of the balls that hold the points, and the normals."""
+    reach = [
+        np.linalg.norm(models.slopes[..., some], axis=2).sum(axis=1)
+        for some in (slice(0, 3), slice(3, 6))
+    ]
+    return models.centre, models.radius + np.stack(reach, axis=1)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError, CoverableError
+from surfaces.parts import MOST_PARTS, SurfaceParts
+from surfaces.protected import Protected
 
 Side = Literal["inside", "outside"]
 TURN_TOLERANCE = 1e-9  # [rad]: a range this close to a full turn is one
@@ -47,26 +49,6 @@ class ClosestPoint:
         """From rows (k, 6) of u, v, height and normal, and `inside` (k,), to a leading shape."""
         u, v, height = values.T[:3].reshape(3, *shape)
         return ClosestPoint(u, v, height, values[:, 3:].reshape(*shape, 3), inside.reshape(shape))
-
-
-@dataclass(frozen=True, eq=False, slots=True, repr=False)
-class Protected:
-    """A value whose arrays nobody changes, and which pickles as a call of its constructor."""
-
-    def __post_init__(self) -> None:
-        """Copy and write-protect the arrays; those in tuples are protected in place."""
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if isinstance(value, np.ndarray):
-                value = np.array(value)
-                object.__setattr__(self, field.name, value)
-            for array in value if isinstance(value, tuple) else (value,):
-                if isinstance(array, np.ndarray):
-                    array.flags.writeable = False
-
-    def __reduce__(self) -> tuple[object, ...]:
-        """What is derived is derived again, and arrays are protected again."""
-        return (type(self), tuple(getattr(self, item.name) for item in fields(self) if item.init))
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -108,6 +90,19 @@ class Surface(Protected, ABC):
         Raises:
             ArgumentError: `points` does not end in an axis of length 3.
         """
+
+    def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
+        """The whole surface, margins outside the outermost cell centres included, as a tree.
+
+        Parts are cut in halves, the roughest first, until none is rougher than asked or there are
+        `most` of them.
+
+        Args:
+            flat: m > 0, the largest r_f of a finest part; see `SurfaceParts`.
+            straight: > 0, the largest r_n.
+            most: how many parts may be made in all; never fewer than the surface begins with.
+        """
+        raise SurfaceError("no parts of this kind yet", self.kind)
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
         """The same surface after the rigid motion x -> rotation x + translation."""

@@ -24,7 +24,7 @@ coverable_files
 robots: errors arguments chain reach robot kinematics
 robots.urdf
 robots: joint_selection pinocchio_model library
-surfaces: surface parts cells adjacency cell_curves curve_fitting arguments
+surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.piecewise
@@ -33,7 +33,7 @@ surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection
 surfaces.meshes.cells
-feasibility: clock compiled cone cut_tree found notices problem read_only safe_files search target_curves task verdict version
+feasibility: clock compiled cone cut_tree found notices problem read_only safe_files search target_curves target_parts task verdict version
 feasibility.certification
 feasibility.paper
 feasibility.cases
@@ -266,7 +266,8 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
     ours = loaded_with("feasibility.certification.motion_replay")
     feasibility = {name for name in ours if name.startswith("feasibility.")}
     words = {
-        f"feasibility.{word}" for word in ("cone", "cut_tree", "target_curves", "task", "verdict")
+        f"feasibility.{word}"
+        for word in ("cone", "cut_tree", "target_curves", "target_parts", "task", "verdict")
     }
     assert {n for n in feasibility if room_of(n) != "feasibility.certification"} <= words
     assert "robots.chain" not in ours

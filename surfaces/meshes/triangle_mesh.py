@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.adjacency import components
-from surfaces.surface import Protected, SurfaceError
+from surfaces.protected import Protected
+from surfaces.surface import SurfaceError
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

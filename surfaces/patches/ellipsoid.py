@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
+from surfaces.patches.affine_models import SpaceModel, unit_space
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.patches.sphere import unit_sphere
+from surfaces.patches.sphere import unit_sphere, unit_sphere_models
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -86,6 +87,12 @@ class Ellipsoid(SmoothPatch):
     def _parameters(self, closest_point: Array) -> tuple[Array, Array]:
         x, y, z = (closest_point / np.array(self.semi_axes)).T
         return np.arctan2(np.hypot(x, y), z), azimuth(x, y, *self.v_range, size=1.0)
+
+    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
+        """The unit sphere, stretched both ways; the normal is along the gradient."""
+        axes = np.array(self.semi_axes)
+        points, gradients = (unit_sphere_models(low, high, s) for s in (axes, axes.min() / axes))
+        return points, unit_space(gradients)
 
 
 def nearest_on_ellipsoid(axes: Array, points: Array, toward: Array) -> Array:

@@ -14,10 +14,13 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from surfaces.part_growth import Boxes, grown
+from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
-from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, points_of
+from surfaces.surface import TURN_TOLERANCE, ClosestPoint, Surface, SurfaceError, points_of
 
 if TYPE_CHECKING:
+    from surfaces.patches.affine_models import SpaceModel
     from surfaces.patches.closed_form_kernels import PatchKernel
     from surfaces.patches.grid_cells import GridCells
 
@@ -82,6 +85,41 @@ class Patch(Surface):
         self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike
     ) -> NDArray[np.float64]:
         """Area (m^2) of the part u0..u1 by v0..v1; exact, vectorised."""
+
+    def part_models(
+        self, low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> tuple[SpaceModel, SpaceModel]:
+        """Bounds on points and normals, in the own frame, over boxes of parameters (k, 2)."""
+        raise SurfaceError("no parts of this kind yet", self.kind)
+
+    @property
+    def part_roots(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower and upper corners (m, 2) of boxes of parameters that together are the patch.
+
+        With the hair's breadth around it that still counts as on it.
+        """
+        ends = np.array([self.u_range, self.v_range])
+        return ends[None, :, 0] - 2.0 * EDGE, ends[None, :, 1] + 2.0 * EDGE
+
+    def placed_models(
+        self, low: NDArray[np.float64], high: NDArray[np.float64], sign: float = 1.0
+    ) -> PartModels:
+        """Models over boxes of parameters in the root frame; sign -1.0 turns normals over."""
+        from surfaces.patches.affine_models import part_models
+
+        found = part_models(*self.part_models(low, high))
+        return found.placed(self.rotation, self.position, sign)
+
+    def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
+        """See `Surface.parts`."""
+        low, high = self.part_roots
+        return grown(
+            Boxes(np.arange(len(low)), low, high),
+            lambda _, low, high: self.placed_models(low, high),
+            flat,
+            straight,
+            most,
+        )
 
     def point(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
         """Points (..., 3) m of the surface in the root frame."""

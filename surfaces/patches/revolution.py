@@ -15,7 +15,8 @@ from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.surface import Protected, Side
+from surfaces.protected import Protected
+from surfaces.surface import Side
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
+from surfaces.patches.affine_models import NO_STRETCH, SpaceModel, circle, turned
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
@@ -46,6 +47,18 @@ class Sphere(ClosedFormPatch):
     def curvature_slices(self, margin: float) -> CurvatureSlices:
         """1/R both ways."""
         return CurvatureSlices.constant(1.0 / self.radius, 1.0 / self.radius)
+
+    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
+        """Arcs of circles, turned; the normal is the point without its radius."""
+        normals = unit_sphere_models(low, high)
+        return normals.scaled(self.radius), normals
+
+
+def unit_sphere_models(low: Array, high: Array, stretch: Array = NO_STRETCH) -> SpaceModel:
+    """The unit sphere over boxes of polar angle and azimuth (k, 2) rad, and then stretched."""
+    middle, half = (low[:, 0] + high[:, 0]) / 2.0, (high[:, 0] - low[:, 0]) / 2.0
+    meridian = circle(np.pi / 2.0 - middle, half, 1.0, inward=True)
+    return turned(meridian, low[:, 1], high[:, 1], angle=1, stretch=stretch)
 
 
 def unit_sphere(u: Array, v: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_point import nearest_on_triangle
 from surfaces.meshes.triangle_mesh import sum_by
-from surfaces.surface import Protected
+from surfaces.protected import Protected
 
 kernel = njit(cache=True, error_model="numpy")
 

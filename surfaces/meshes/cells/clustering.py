@@ -21,7 +21,8 @@ from surfaces.adjacency import components
 from surfaces.meshes.cells.subdivision import MOST_FACES, Subdivision, subdivide
 from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps
 from surfaces.meshes.triangle_mesh import doubled_areas, edge_partners, sum_by
-from surfaces.surface import Protected, SurfaceError
+from surfaces.protected import Protected
+from surfaces.surface import SurfaceError
 
 FACES_PER_CELL = 80
 MOST_CELLS = 20_000

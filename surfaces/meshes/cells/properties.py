@@ -18,7 +18,8 @@ from surfaces.meshes.cells.borders import (
     shared_borders,
 )
 from surfaces.meshes.triangle_mesh import doubled_areas, edge_partners, sum_by
-from surfaces.surface import Protected, SurfaceError
+from surfaces.protected import Protected
+from surfaces.surface import SurfaceError
 
 MOST_TURN_DEG = 30.0
 

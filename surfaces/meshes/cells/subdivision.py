@@ -16,7 +16,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from surfaces.meshes.triangle_mesh import doubled_areas, half_edge_ends, half_edges
-from surfaces.surface import Protected, SurfaceError
+from surfaces.protected import Protected
+from surfaces.surface import SurfaceError
 
 kernel = njit(cache=True, error_model="numpy")
 

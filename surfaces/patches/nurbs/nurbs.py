@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
-from surfaces.surface import Protected
+from surfaces.protected import Protected
 
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline

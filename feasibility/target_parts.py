@@ -1,0 +1,37 @@
+"""The task applied to the parts of a surface: where tool point and axis have to be, all over it."""
+
+from __future__ import annotations
+
+from surfaces import Surface, SurfaceParts
+
+MOST = 8192
+
+
+def target_parts(
+    surface: Surface, standoff: float, flat: float, straight: float, most: int = MOST
+) -> SurfaceParts:
+    """The tree of parts of target points T = f + s d n and approach directions b = -s n.
+
+    f and n follow one model with the same x, so T follows that of f, shifted by s d times that of
+    n, within r_f + d r_n.
+
+    Args:
+        surface: s is its `side_sign`.
+        standoff: d, m.
+        flat: m > 0, the largest radius of target points on the finest parts.
+        straight: > 0, the largest radius of directions.
+        most: how many parts may be made.
+
+    Returns:
+        The same parts as `Surface.parts` has, with targets (m) in the place of points and approach
+        directions in that of normals.
+    """
+    bent = min(straight, flat / (2.0 * standoff)) if standoff > 0.0 else straight
+    parts = surface.parts(flat - standoff * bent, bent, most)
+    sign = surface.side_sign
+    centre, slopes, radius = parts.centre.copy(), parts.slopes.copy(), parts.radius.copy()
+    for array in (centre, slopes):
+        array[..., :3] += sign * standoff * array[..., 3:]
+        array[..., 3:] *= -sign
+    radius[:, 0] += standoff * radius[:, 1]
+    return SurfaceParts(centre, slopes, radius, parts.children, parts.axis)

@@ -1,0 +1,239 @@
+"""Affine models of curves and of what they sweep: the bounds behind the parts of smooth patches.
+
+Each bound holds for every place of a part, by one of these arguments; none is sampled.
+
+**Arc.** For |t| <= h <= pi let C = (1 + cos h) / 2. cos t lies in cos h .. 1, so |cos t - C| <=
+(1 - cos h) / 2. And sin t - (t / h) sin h is 0 at 0 and h, concave between them, hence >= 0 and
+largest where cos t = sin(h) / h.
+
+**Bend.** f of one parameter with |f''| <= M on a segment of half length h (f' Lipschitz is enough).
+Let s be its chord, D = f(0) - s(0) in the middle; |D| <= M h^2 / 2. E = f - s - D / 2 is D / 2 in
+the middle and -D / 2 at the ends. On either half, with 0 <= k <= 1 along it, E differs from the
+straight line between these by at most M h^2 k (1 - k) / 2, so
+|E| <= M h^2 / 4 (|1 - 2 k| + 2 k (1 - k)) <= M h^2 / 4. It holds for each coordinate apart.
+
+**Turning.** (r cos t, r sin t, z) for r = r_0 + r_1 x + e, |e| <= e_r, z likewise, and the arc
+cos t = C + c, sin t = S y + s. With the model (C (r_0 + r_1 x), r_0 S y, z_0 + z_1 x), what is left
+is (C e + r c, (r - r_0) S y + r s, e_z).
+
+**Unit vectors.** N = A + E, A affine, |E| <= e. See `unit_model`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.parts import PartModels
+
+Array = NDArray[np.float64]
+
+
+class Arc(NamedTuple):
+    """cos t and sin t over |t| <= h, k times: C + c and S t / h + s."""
+
+    mean: Array
+    """(k,) C."""
+    slope: Array
+    """(k,) S."""
+    bow: Array
+    """(k,) the largest |c|."""
+    sway: Array
+    """(k,) the largest |s|."""
+
+
+def arc(half: Array) -> Arc:
+    """The arc of half angles (k,) rad. Half a turn and more is the whole circle."""
+    h = np.minimum(half, np.pi)
+    bow = np.sin(h / 2.0) ** 2
+    cosine = np.clip(np.sinc(h / np.pi), -1.0, 1.0)
+    peak = np.arccos(cosine)
+    return Arc(1.0 - bow, np.sin(h), bow, np.maximum(np.sin(peak) - peak * cosine, 0.0))
+
+
+class CurveModel(NamedTuple):
+    """k pieces of curves in the half plane of r (away from the axis) and z, or their normals."""
+
+    centre: Array
+    """(k, 2)"""
+    slope: Array
+    """(k, 2)"""
+    error: Array
+    """(k, 2) the largest |r| and |z| of what is left."""
+
+
+def circle(middle: Array, half: Array, radius: float, inward: bool = False) -> CurveModel:
+    """An arc of a circle about the origin, (cos t, sin t) times the radius.
+
+    Args:
+        middle: (k,) rad, t in the middle.
+        half: (k,) rad, half its angle.
+        radius: m.
+        inward: whether t runs the other way round.
+    """
+    along = arc(half)
+    out = np.stack([np.cos(middle), np.sin(middle)], axis=1)
+    ahead = np.stack([-out[:, 1], out[:, 0]], axis=1)
+    error = np.abs(out) * along.bow[:, None] + np.abs(ahead) * along.sway[:, None]
+    sense = -radius if inward else radius
+    return CurveModel(
+        radius * along.mean[:, None] * out, sense * along.slope[:, None] * ahead, radius * error
+    )
+
+
+def bend(low: Array, middle: Array, high: Array, most: Array, half: Array) -> CurveModel:
+    """A curve from its places at both ends and in the middle.
+
+    Args:
+        low: (k, 2) at the lower end.
+        middle: (k, 2)
+        high: (k, 2)
+        most: (k, 2) bounds on the second derivatives.
+        half: (k,) half the range of the parameter.
+    """
+    error = most * (half**2 / 4.0)[:, None]
+    return CurveModel((low + 2.0 * middle + high) / 4.0, (high - low) / 2.0, error)
+
+
+def straight(low: Array, high: Array) -> CurveModel:
+    """A straight line between two ends (k, 2); or a place, where they are one."""
+    return CurveModel((low + high) / 2.0, (high - low) / 2.0, np.zeros_like(low))
+
+
+class SpaceModel(NamedTuple):
+    """k pieces of a surface, or its normals: |f - (centre + x_1 e_1 + x_2 e_2)| <= error."""
+
+    centre: Array
+    """(k, 3)"""
+    slopes: Array
+    """(k, 2, 3)"""
+    error: Array
+    """(k,)"""
+    along: Array
+    """(k, 2) what of the error comes from each axis; see `PartModels`."""
+
+    def scaled(self, factor: float) -> SpaceModel:
+        """Everything times a positive factor."""
+        return SpaceModel(*(factor * array for array in self))
+
+    @staticmethod
+    def exact(centre: Array, slopes: Array) -> SpaceModel:
+        """(k, 3) and (k, 2, 3), nothing left."""
+        return SpaceModel(centre, slopes, np.zeros(len(centre)), np.zeros((len(centre), 2)))
+
+
+NO_STRETCH = np.ones(3)
+
+
+def turned(
+    curve: CurveModel, low: Array, high: Array, angle: int, stretch: Array = NO_STRETCH
+) -> SpaceModel:
+    """The curve turned about z from low to high.
+
+    Args:
+        curve: k pieces.
+        low: (k,) rad.
+        high: (k,) rad.
+        angle: 0 or 1, which parameter the angle is; the other runs along the curve.
+        stretch: (3,) factors of x, y and z afterwards.
+    """
+    about = arc((high - low) / 2.0)
+    middle = (low + high) / 2.0
+    (r, z), (dr, dz), (er, ez) = curve.centre.T, curve.slope.T, curve.error.T
+    flat, one = np.zeros_like(r), np.ones_like(r)
+    away = np.stack([np.cos(middle), np.sin(middle), flat], axis=1)
+    beside = np.stack([-away[:, 1], away[:, 0], flat], axis=1)
+    frame = np.stack([away, beside, np.stack([flat, flat, one], axis=1)], axis=1) * stretch
+    change = np.abs(dr) + er
+    largest = np.abs(r) + change
+    left_curve = np.stack([about.mean * er, flat, ez], axis=1)
+    left_angle = np.stack([largest * about.bow, largest * about.sway, flat], axis=1)
+    mixed = np.stack([flat, change * about.slope, flat], axis=1)
+    along = np.stack([_length(frame, left + mixed / 2.0) for left in (left_curve, left_angle)], 1)
+    by_curve = np.stack([about.mean * dr, flat, dz], axis=1)
+    by_angle = np.stack([flat, r * about.slope, flat], axis=1)
+    local = np.stack([by_curve, by_angle], axis=1)
+    if angle == 0:
+        local, along = local[:, ::-1], along[:, ::-1]
+    return SpaceModel(
+        centre=_in_frame(np.stack([about.mean * r, flat, z], axis=1)[:, None], frame)[:, 0],
+        slopes=_in_frame(local, frame),
+        error=_length(frame, left_curve + left_angle + mixed),
+        along=along,
+    )
+
+
+def _in_frame(local: Array, frame: Array) -> Array:
+    """(k, m, 3) from coordinates (k, m, 3) along the rows of frames (k, 3, 3)."""
+    return np.asarray(np.einsum("kmi,kij->kmj", local, frame))
+
+
+def _length(frame: Array, parts: Array) -> Array:
+    """(k,) the largest length of a vector whose coordinates are no larger than (k, 3)."""
+    products = np.abs(np.einsum("kia,kja->kij", frame, frame))
+    return np.asarray(np.sqrt(np.einsum("ki,kij,kj->k", parts, products, parts)))
+
+
+def unit_model(centre: Array, slopes: Array, error: Array) -> tuple[Array, Array, Array]:
+    """A model of N / |N|, from one of N: |N - A| <= error, A = centre + sum x_i slopes_i.
+
+    With the unit vector c along A's centre, A = |A(0)| ((1 + a) c + t): the share along c changes
+    by |a| <= a_0, and t, square to c, is affine in x, |t| <= t_0. The model is
+    (1 - k / 2) c + t, where k = 1 - cos b and tan b = t_0 / (1 - a_0): b is the largest angle
+    between A and c, so A / |A| has along c a share from 1 - k to 1. Square to c it is t / L, with L
+    from 1 - a_0 to hypot(1 + a_0, t_0). Last, |N / |N| - A / |A|| <= 2 e / (|N| + |A|).
+
+    Where that says nothing, or less than "within 1 of zero", the model is zero with radius 1.
+
+    Args:
+        centre: (k, d)
+        slopes: (k, m, d)
+        error: (k,)
+
+    Returns:
+        centre (k, d), slopes (k, m, d) and radius (k,) of the unit vectors.
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        size = np.linalg.norm(centre, axis=1)
+        axis = centre / size[:, None]
+        by_axis = np.einsum("kmd,kd->km", slopes, axis) / size[:, None]
+        turn = slopes / size[:, None, None] - by_axis[..., None] * axis[:, None]
+        a, t = np.abs(by_axis).sum(axis=1), np.linalg.norm(turn, axis=2).sum(axis=1)
+        drop = 1.0 - 1.0 / np.sqrt(1.0 + (t / (1.0 - a)) ** 2)
+        beside = t * np.maximum(1.0 / (1.0 - a) - 1.0, 1.0 - 1.0 / np.hypot(1.0 + a, t))
+        least = size * (1.0 - a)
+        radius = np.hypot(drop / 2.0, beside) + 2.0 * error / (2.0 * least - error)
+        known = (a < 1.0) & (least > error) & (radius < 1.0)
+    shown = known[:, None]
+    return (
+        np.where(shown, axis * (1.0 - drop / 2.0)[:, None], 0.0),
+        np.where(shown[..., None], turn, 0.0),
+        np.where(known, radius, 1.0),
+    )
+
+
+def unit_curve(model: CurveModel) -> CurveModel:
+    """The unit vectors along the vectors of a curve's model."""
+    error = np.linalg.norm(model.error, axis=1)
+    centre, slopes, radius = unit_model(model.centre, model.slope[:, None], error)
+    return CurveModel(centre, slopes[:, 0], np.repeat(radius[:, None], 2, axis=1))
+
+
+def unit_space(model: SpaceModel) -> SpaceModel:
+    """The unit vectors along the vectors of a model."""
+    centre, slopes, radius = unit_model(model.centre, model.slopes, model.error)
+    size = np.maximum(np.linalg.norm(model.centre, axis=1), 1e-300)[:, None]
+    along = model.along / size + (slopes**2).sum(axis=2) / 4.0
+    return SpaceModel(centre, slopes, radius, along)
+
+
+def part_models(points: SpaceModel, normals: SpaceModel) -> PartModels:
+    """Both in one."""
+    return PartModels(
+        np.concatenate([points.centre, normals.centre], axis=-1),
+        np.concatenate([points.slopes, normals.slopes], axis=-1),
+        np.stack([points.error, normals.error], axis=-1),
+        np.stack([points.along, normals.along], axis=-1),
+    )

@@ -1,0 +1,70 @@
+"""Walks down trees of parts: whether places of a surface lie in what each part promises."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Used(NamedTuple):
+    """How much of its radii a walk has used, over all places and the parts that they lie on."""
+
+    points: float
+    """Largest |f - model| / r_f."""
+    normals: float
+    """Largest |n - model| / r_n."""
+    finest: np.ndarray
+    """(k,) the finest part that each place ended on, one of them."""
+
+
+def residuals(parts, part, x, points, normals):
+    """(k, 2) |f - model| and |n - model| of places at x (k, 2) of parts (k,)."""
+    model = parts.centre[part] + np.einsum("kc,kcd->kd", x, parts.slopes[part])
+    off = np.hstack([points, normals]) - model
+    return np.stack([np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1)], 1)
+
+
+def walk(parts, part, x, points, normals):
+    """Follow places (k,) from parts (k,), at x (k, 2) of each, to the finest parts."""
+    place, used = np.arange(len(x)), np.zeros(2)
+    finest = np.full(len(x), -1)
+    points, normals = np.asarray(points), np.asarray(normals)
+    while len(place):
+        off = residuals(parts, part, x, points[place], normals[place])
+        used = np.maximum(used, (off / parts.radius[part]).max(axis=0))
+        ends = parts.children[part, 0] < 0
+        finest[place[ends]] = part[ends]
+        place, part, x = place[~ends], part[~ends], x[~ends]
+        axis = parts.axis[part]
+        assert (axis >= 0).all(), "the halves of a box"
+        along = x[np.arange(len(x)), axis]
+        chosen = []
+        for side, sign in ((0, 1.0), (1, -1.0)):
+            there = np.flatnonzero(sign * along <= 0.0)
+            turned = x[there].copy()
+            turned[np.arange(len(there)), axis[there]] = 2.0 * along[there] + sign
+            chosen.append((place[there], parts.children[part[there], side], turned))
+        place, part, x = (np.concatenate(two) for two in zip(*chosen, strict=True))
+    assert (finest >= 0).all()
+    return Used(*used, finest)
+
+
+def at_parameters(surface, u, v):
+    """Roots (k,) of the patch's boxes that hold parameters (k,), and x (k, 2) in them."""
+    low, high = surface.part_roots
+    at = np.stack([u, v], axis=1)
+    inside = ((at[:, None] >= low) & (at[:, None] <= high)).all(axis=2)
+    assert inside.any(axis=1).all()
+    root = inside.argmax(axis=1)
+    return root, (2.0 * at - low[root] - high[root]) / (high[root] - low[root])
+
+
+def spread(surface, count, seed=7):
+    """Parameters (k,) all over a patch, on its borders and corners too."""
+    rng = np.random.default_rng(seed)
+    share = rng.uniform(0.0, 1.0, (count, 2))
+    edge = rng.uniform(size=(count, 2)) < 0.1
+    share[edge] = np.round(share[edge])
+    ends = np.array([surface.u_range, surface.v_range])
+    return (ends[:, 0] + share * np.diff(ends)[:, 0]).T
