@@ -23,6 +23,7 @@ from feasibility.timing.sampled_trajectory import (
     PLACES,
     Trajectory,
     accelerations_used,
+    held_inside,
     motion_between,
     past_limits,
     used,
@@ -30,7 +31,6 @@ from feasibility.timing.sampled_trajectory import (
 from feasibility.timing.smoothing import Curve, blended
 from feasibility.timing.speed_limits import MotionLimits, motion_limits, number
 from feasibility.timing.timed_curve import samples, timed_curve
-from feasibility.verdict import Walk
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ DEFAULT_SPEED = 0.1  # [m/s] of the tool point
 DEFAULT_PERIOD = 0.02  # [s] between samples
 SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be requested
 FINER = 4  # times that the period may be halved
-AT_LIMIT = 1e-6  # [rad] or [m] that interpolation may add where a path runs along a joint's limit
+MENDED = 1e-6  # [rad] or [m] past a joint's limit between samples: the motion is drawn in by that
 ROUNDS = 3  # timings of a curve, each with less for joints that exceeded a limit
 PARTS = (1.0, 0.95, 0.91, 0.86)  # [1] of a period: where samples lie between jumps is chance
 SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing all of it down
@@ -97,6 +97,8 @@ def trajectory(
     curve, refusal = blended(robot, cells, task, path.walk), ""
     for _ in range(FINER + 1):
         run = within_limits(robot, curve, limits, period)
+        if past_limits(robot, run).max(initial=0.0) <= MENDED:
+            run = held_inside(robot, run)
         refusal = _refusal(path, run)
         if not refusal:
             return run
@@ -137,12 +139,11 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
 def _refusal(path: CoveragePath, run: Trajectory) -> str:
     """Why the samples are refused, as straight lines or interpolated; empty if they are not."""
     robot, cells, task = path.robot, path.cells, path.task
-    past = past_limits(robot, run)
-    if past > AT_LIMIT:
+    past = float(past_limits(robot, run).max(initial=0.0))
+    if past > 0.0:
         return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
     for walk in (run.walk, *(motion_between(run, kind, PLACES) for kind in KINDS)):
-        held = Walk(q=np.clip(walk.q, robot.lower, robot.upper), cell=walk.cell)
-        replayed = replay(robot, cells, task, held, path.needed)
+        replayed = replay(robot, cells, task, walk, path.needed)
         if not replayed.accepted:
             return replayed.refusal
     return ""

@@ -8,7 +8,7 @@ polynomial nowhere leaves the range of its coefficients, so these bound it every
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -24,6 +24,7 @@ Kind = Literal["quintic", "cubic"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 
 PLACES = 4  # at which each polynomial is evaluated, its first end among them
+ROUNDING = 1e-12  # [rad] or [m] that is left free inside a joint's limits
 HALVINGS = 3  # times that each polynomial is halved, so that its coefficients bound it closely
 
 
@@ -225,10 +226,34 @@ def _fastest(speed: Array) -> float:
     return float((rows.max(axis=1) + 0.25 * bent).max())
 
 
-def past_limits(robot: Robot, run: Trajectory) -> float:
-    """rad or m, how far a controller that interpolates samples may go past a joint's limits."""
-    past = 0.0
+def past_limits(robot: Robot, run: Trajectory) -> Array:
+    """(n,) rad or m, how far each joint may go past its limits, however samples are interpolated.
+
+    A bound; negative where the joint keeps that far away from both.
+    """
+    past = np.full(robot.n, -np.inf)
     for kind in KINDS:
-        q = closely(coefficients(run, kind))
-        past = max(past, float(np.maximum(robot.lower - q, q - robot.upper).max(initial=0.0)))
+        q = closely(coefficients(run, kind)) if len(run) > 1 else run.q[None]
+        past = np.maximum(past, np.maximum(robot.lower - q, q - robot.upper).max(axis=(0, 1)))
     return past
+
+
+def held_inside(robot: Robot, run: Trajectory) -> Trajectory:
+    """The same motion, drawn in by what joints may pass their limits by between samples.
+
+    Each of them is scaled about the middle of its limits (or moved, where it has one limit only),
+    its velocities and accelerations too: the polynomials between samples are linear in all three,
+    so they are scaled alike.
+    """
+    past = past_limits(robot, run) + ROUNDING
+    if not (past > 0.0).any():
+        return run
+    past = np.maximum(past, 0.0)
+    both = np.isfinite(robot.lower) & np.isfinite(robot.upper)
+    lower, upper = np.where(both, robot.lower, -1.0), np.where(both, robot.upper, 1.0)
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    share = np.where(both & (past > 0.0), np.maximum(half - ROUNDING, 0.0) / (half + past), 1.0)
+    moved = np.where(both, 0.0, np.where(np.isfinite(robot.lower), past, -past))
+    q = np.where(past > 0.0, middle + share * (run.q - middle) + moved, run.q)
+    dq, ddq = share * run.dq, share * run.ddq
+    return replace(run, q=q, dq=dq, ddq=ddq, tool_speed=tool_slopes(robot, q, dq))

@@ -87,8 +87,8 @@ def assert_keeps_to_limits(verdict, run, limits):
     robot, kinematics = verdict.robot, Kinematics(verdict.robot)
     for degree in (3, 5):
         q, dq, ddq = interpolated(run, degree, per_interval=7)
-        assert (q >= robot.lower - 1e-6).all()
-        assert (q <= robot.upper + 1e-6).all()
+        assert (q >= robot.lower).all()
+        assert (q <= robot.upper).all()
         assert (np.abs(dq) <= limits.velocity * (1 + 1e-9)).all()
         assert (np.abs(ddq[:-1]) <= limits.acceleration * (1 + 1e-9)).all()
         speed = [np.linalg.norm(kinematics.jacobians(a)[0] @ b) for a, b in zip(q, dq, strict=True)]

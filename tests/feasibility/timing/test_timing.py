@@ -80,9 +80,9 @@ def test_a_controller_that_interpolates_the_samples_keeps_to_all_limits(name):
 def test_a_controller_that_interpolates_the_samples_stays_on_the_surface(name, degree):
     verdict, run = verdict_of(name), run_of(name)
     walk = interpolated(run, degree, per_interval=3)[0]
-    inside = np.clip(walk, verdict.robot.lower, verdict.robot.upper)
-    assert np.abs(walk - inside).max() < 1e-6
-    assert_motion(verdict, inside)
+    assert (walk >= verdict.robot.lower).all()
+    assert (walk <= verdict.robot.upper).all()
+    assert_motion(verdict, walk)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -125,8 +125,8 @@ def test_what_is_used_is_what_it_comes_to():
     weaker = replace(limits, acceleration=limits.acceleration / 9.0)
     assert used(robot, run, weaker).too_fast == pytest.approx(3.0 * here.acceleration.max() ** 0.5)
     jump = replace(run, q=np.where(run.cell[:, None] == 5, run.q + 10.0, run.q))
-    assert past_limits(robot, run) == 0.0
-    assert past_limits(robot, jump) > 1.0
+    assert (past_limits(robot, run) < 0.0).all()
+    assert past_limits(robot, jump).max() > 1.0
 
 
 def test_a_slower_motion_is_the_same():
