@@ -54,7 +54,7 @@ ifneq ($(NOTEBOOKS),)
 endif
 
 campaign: .venv/installed
-	$(BIN)/python -m pytest -n 2 --dist loadfile tests/campaigns/test_$(NAME).py
+	$(BIN)/python -m pytest -n 2 --dist loadfile -rP tests/campaigns/test_$(NAME).py
 
 bench: .venv/installed
 	$(BIN)/python tests/benchmarks/run.py

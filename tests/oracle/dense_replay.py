@@ -1,7 +1,7 @@
 """A replay of a witness that shares nothing with the packages but the numbers that define a case.
 
 Pinocchio places the tool at many points of every segment; heights, normals, parameters and cell
-centres come from the formulas of the four surfaces, written out here.
+centres come from the formulas of six kinds of surface, written out here.
 """
 
 from __future__ import annotations
@@ -42,6 +42,15 @@ def local_frame(surface: Surface, u: Floats, v: Floats) -> tuple[Floats, Floats]
     if kind == "sphere":
         normal = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1)
         return size[0] * normal, normal
+    if kind == "torus":
+        flat = np.cos(v)
+        normal = np.stack([flat * np.cos(u), flat * np.sin(u), np.sin(v)], -1)
+        return size[0] * np.stack([np.cos(u), np.sin(u), 0.0 * u], -1) + size[1] * normal, normal
+    if kind == "cone":
+        radius, normal = size[0] + size[1] * v, np.stack([np.cos(u), np.sin(u), 0.0 * u], -1)
+        point = radius[..., None] * normal + np.stack([0.0 * v, 0.0 * v, v], -1)
+        normal = (normal - np.array([0.0, 0.0, size[1]])) / np.hypot(1.0, size[1])
+        return point, normal
     slant = v / size[1] if kind == "hyperboloid" else 0.0 * v
     radius = size[0] * np.sqrt(1.0 + slant**2)
     slope = size[0] ** 2 * slant / (size[-1] * radius) if kind == "hyperboloid" else slant
@@ -58,6 +67,11 @@ def closest_points(surface: Surface, points: Floats) -> tuple[Floats, Floats]:
         return x, y
     if surface.kind == "sphere":
         return np.arctan2(across, z), np.arctan2(y, x)
+    if surface.kind == "torus":
+        return np.arctan2(y, x), np.arctan2(z, across - surface.lengths[0])
+    if surface.kind == "cone":
+        radius, slope = surface.lengths
+        return np.arctan2(y, x), (z + slope * (across - radius)) / (1.0 + slope**2)
     v = z.copy()
     if surface.kind == "hyperboloid":
         waist, flare = surface.lengths

@@ -72,14 +72,15 @@ def _edges(found: Fibres) -> tuple[Ints, Ints, int]:
 
 
 def spanning(
-    problem: Problem, resolution: Resolution = STANDARD, fine: int = 20
+    problem: Problem, resolution: Resolution = STANDARD, fine: int = 20, on: str = "net"
 ) -> dict[int, Motion]:
-    """Motions on the net from one configuration to each cell of the component that has most.
+    """Motions from one configuration to each cell of the component that has most.
 
     They all start alike, so that together they are one continuous motion over these cells (out and
-    back along each). `fine` is the number of samples of each step from node to node.
+    back along each). `fine` is the number of samples of each step from node to node; `on` is the
+    domain, see `oracle_cases`.
     """
-    domain, folds = domain_of(problem, "net", resolution)
+    domain, folds = domain_of(problem, on, resolution)
     found = fibres(problem, domain, folds, row_step(problem, resolution))
     cells, roots = components(found, domain)
     if len(roots) == 0:
