@@ -1,0 +1,193 @@
+"""The verifier of cut trees: what must accept a proof that no single motion covers every cell.
+
+It shares no code with the search that guessed the tree; kinematics are Pinocchio's. A tree (see
+`feasibility.cut_tree`) proves its claim if, with M the configurations inside the limits with the
+tool on the surface, within tolerance and cone,
+
+    no q in M and in the region of a cut has w . q = t, and
+    no q in the region of a leaf has the tool within tolerance and cone of its cell's target.
+
+Both say that a region is empty, which `feasibility.certification.empty_region` proves by bounds
+(`linear_models`, `box_exclusion`). A joint that the tree opens at t is to have no q in M at any
+t + 2 pi k; all turns place the tool alike, so one of them stands for all, and t .. t + 2 pi for the
+joint's interval. A joint that slides without limits may be as far out as the tool can reach.
+
+A tree comes from a file, so anything may be in it: what is no tree is refused with the reason.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from feasibility.certification.empty_region import Emptiness, Outcome
+from feasibility.certification.linear_models import (
+    Allowed,
+    Arm,
+    Array,
+    Parts,
+    one_target,
+    out_of_line,
+    stretched_length,
+    target_parts,
+)
+from feasibility.certification.parts_agreement import disagreement
+from feasibility.certification.refutation import Refuter
+from feasibility.certification.region import TURN, Region
+from feasibility.certification.tree_shape import malformed, named_cut
+from feasibility.cut_tree import Cut, CutTree, Leaf
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
+from surfaces.parts import SurfaceParts
+
+MOST_BOXES = 2_000_000
+FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may be off by
+ANY_AXIS = 4.0  # a chord that two unit vectors never have
+
+
+@dataclass(frozen=True, slots=True)
+class ProofCheck:
+    """What became of a proof."""
+
+    refusal: str
+    """Why it is refused; empty when it is accepted."""
+    boxes: int
+    """How many boxes of joints and surface were looked at."""
+
+    @property
+    def accepted(self) -> bool:
+        """True when every cut and every leaf of the tree is confirmed."""
+        return not self.refusal
+
+
+class _Claim(NamedTuple):
+    """A region that is to be empty."""
+
+    what: str
+    region: Region
+    cell: int | None
+    """The cell of a leaf; None where the tool may be anywhere on the surface."""
+
+
+def verify_proof(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    tree: CutTree,
+    tick: Callable[[], object] | None = None,
+    most: int = MOST_BOXES,
+) -> ProofCheck:
+    """Is it proved that no motion of the robot covers every cell?
+
+    Args:
+        robot: the arm; its limits are used exactly.
+        cells: the cells.
+        task: the task; its tolerance and cone are used exactly.
+        tree: the proof.
+        tick: called every few thousand boxes; what it raises ends the verification.
+        most: how many boxes may be looked at altogether.
+
+    Returns:
+        Whether the proof is accepted, and if not, which cut or leaf is refused and why.
+    """
+    fault = out_of_line(robot) or malformed(robot, len(cells), tree)
+    if fault:
+        return ProofCheck(fault, 0)
+    allowed_axis = min(task.cone_chord, ANY_AXIS)
+    parts = surface_parts(
+        cells.surface, FINE * task.effective_tolerance, FINE * min(allowed_axis, 1.0)
+    )
+    return verify_on(robot, cells, task, tree, parts, tick, most)
+
+
+def verify_on(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    tree: CutTree,
+    parts: SurfaceParts,
+    tick: Callable[[], object] | None = None,
+    most: int = MOST_BOXES,
+) -> ProofCheck:
+    """The same, with the surface's parts given; the tree is well formed."""
+    fault = disagreement(cells, parts)
+    if fault:
+        return ProofCheck(fault, 0)
+    surface = target_parts(parts, cells.surface.side_sign, task.standoff)
+    limits, fault = _finite_slides(robot, surface, task.effective_tolerance)
+    if fault:
+        return ProofCheck(fault, 0)
+    arm = Arm(robot, limits.low, limits.high)
+    length = max(0.5 * float(arm.caps.max()), 1e-3)
+    allowed = Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length)
+    emptiness = Emptiness(arm, allowed, tick or (lambda: None))
+    refuter = Refuter(arm, cells, task, length)
+    targets = task.targets(cells)
+    boxes = 0
+    for claim in _claims(robot, cells, tree, limits):
+        at = surface
+        if claim.cell is not None:
+            at = one_target(targets.points[claim.cell], targets.approaches[claim.cell])
+
+        def refute(starts: Array, region: Region, cell: int | None = claim.cell) -> Array | None:
+            return refuter.find(starts, region, cell)
+
+        found = emptiness.test(claim.region, at, refute, most - boxes)
+        boxes += found.boxes
+        if not found.empty:
+            return ProofCheck(_refusal(claim, found), boxes)
+    return ProofCheck("", boxes)
+
+
+def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[Region, str]:
+    """The limits, those of one joint that slides freely bounded by reach; or why that fails."""
+    low, high = robot.lower.copy(), robot.upper.copy()
+    (free,) = np.nonzero(robot.prismatic & ~np.isfinite(high - low))
+    if len(free) > 1:
+        names = " and ".join(robot.joint_names[j] for j in free)
+        return Region.box(low, high), f"{names} slide without limits, which no bound covers"
+    for j in free:
+        # p is the sum of the links' vectors and of the slides', so |q_j| <= |p| + all the others.
+        root = np.linalg.norm(surface.slopes[0, :, :3], axis=1).sum() + surface.radius[0, 0]
+        furthest = float(np.linalg.norm(surface.centre[0, :3]) + root) + tolerance
+        reach = 1.001 * (furthest + stretched_length(robot, without=int(j))) + 1e-6
+        low[j], high[j] = max(low[j], -reach), min(high[j], reach)
+    return Region.box(low, high), ""
+
+
+def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: Region) -> Iterator[_Claim]:
+    """Everything that a tree claims to be empty: joints opened, cuts and leaves."""
+    low, high = limits.low.copy(), limits.high.copy()
+    for joint, value in tree.opened:
+        at = limits.low.copy(), limits.high.copy()
+        at[0][joint] = at[1][joint] = value
+        opened = np.eye(robot.n)[joint]
+        yield _Claim(f"the opening {named_cut(robot, opened, value)}", Region.box(*at), None)
+        low[joint], high[joint] = value, value + TURN
+    waiting: list[tuple[Cut | Leaf, Region]] = [(tree.root, Region.box(low, high))]
+    leaves = 0
+    while waiting:
+        node, region = waiting.pop()
+        if isinstance(node, Leaf):
+            leaves += 1
+            name = list(cells.unravel(node.cell))
+            yield _Claim(f"leaf {leaves} (cell {name})", region, node.cell)
+            continue
+        weights = np.array(node.weights)
+        what = f"the cut {named_cut(robot, weights, node.value)}"
+        yield _Claim(what, region.within(weights, node.value, node.value), None)
+        waiting.append((node.above, region.within(weights, node.value, np.inf)))
+        waiting.append((node.below, region.within(weights, -np.inf, node.value)))
+
+
+def _refusal(claim: _Claim, found: Outcome) -> str:
+    """Why a claim is not confirmed, in words."""
+    if found.point is None:
+        return f"{claim.what} cannot be confirmed: after {found.boxes:,} boxes it is still open"
+    place = "on the surface" if claim.cell is None else "at its target"
+    q = ", ".join(f"{value:.4f}" for value in found.point)
+    return f"{claim.what} is wrong: the tool can be {place} at q = [{q}]"

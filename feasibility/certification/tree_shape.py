@@ -1,0 +1,108 @@
+"""What is a cut tree at all? Everything else is refused with the reason, before any proof."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.cut_tree import Cut, CutTree, Leaf
+from robots import Robot
+
+MOST_NODES = 10_000
+MOST_CUTS_DEEP = 1_000
+
+
+def malformed(robot: Robot, n_cells: int, tree: CutTree) -> str:
+    """Why this is no cut tree for the robot and so many cells; empty when it is one."""
+    if not isinstance(tree, CutTree):
+        return f"expected a CutTree, got {type(tree).__name__}"
+    return _fault_of_opened(robot, tree.opened) or _fault_of_nodes(robot, n_cells, tree)
+
+
+def _fault_of_opened(robot: Robot, opened: object) -> str:
+    """Why joints cannot be opened like that; empty when they can."""
+    if not isinstance(opened, tuple) or not all(
+        isinstance(pair, tuple) and len(pair) == 2 for pair in opened
+    ):
+        return "opened joints are no pairs of a joint and a value"
+    seen = set()
+    for joint, value in opened:
+        if not _is_index(joint, robot.n):
+            return f"opened joint {joint!r} is none of the {robot.n} joints"
+        name = robot.joint_names[joint]
+        if not _is_number(value):
+            return f"joint {name} is opened at {value!r}, which is no number"
+        if robot.prismatic[joint]:
+            return f"joint {name} slides and cannot be opened: there are no turns of it"
+        if joint in seen:
+            return f"joint {name} is opened twice"
+        seen.add(joint)
+    return ""
+
+
+def _fault_of_nodes(robot: Robot, n_cells: int, tree: CutTree) -> str:
+    """Why the nodes form no tree for this robot and so many cells; empty when they do."""
+    waiting: list[tuple[object, int]] = [(tree.root, 0)]
+    opened = {joint for joint, _ in tree.opened}
+    count = 0
+    while waiting:
+        node, depth = waiting.pop()
+        count += 1
+        if count > MOST_NODES:
+            return f"the tree has more than {MOST_NODES:,} nodes"
+        if depth > MOST_CUTS_DEEP:
+            return f"the tree is more than {MOST_CUTS_DEEP:,} cuts deep"
+        if isinstance(node, Leaf):
+            if not _is_index(node.cell, n_cells):
+                return f"a leaf names cell {node.cell!r}; there are {n_cells}, counted from 0"
+        elif isinstance(node, Cut):
+            fault = _fault_of_cut(robot, node, opened)
+            if fault:
+                return fault
+            waiting += [(node.above, depth + 1), (node.below, depth + 1)]
+        else:
+            return f"a node is neither a cut nor a leaf but {type(node).__name__}"
+    return ""
+
+
+def _fault_of_cut(robot: Robot, cut: Cut, opened: set[int]) -> str:
+    """Why a cut does not fit the robot; empty when it does."""
+    weights = cut.weights
+    if not isinstance(weights, tuple) or len(weights) != robot.n:
+        length = len(weights) if isinstance(weights, tuple) else "no"
+        return f"a cut has {length} weights for {robot.n} joints"
+    if not all(_is_number(weight) for weight in weights) or not _is_number(cut.value):
+        return f"a cut has weights {weights} and value {cut.value!r}, not all of them numbers"
+    weighed = [j for j in range(robot.n) if weights[j] != 0.0]
+    if not weighed:
+        return "a cut weighs no joint"
+    turning = ~np.isfinite(robot.upper - robot.lower) & ~robot.prismatic
+    free = [j for j in weighed if turning[j] and j not in opened]
+    if len(weighed) > 1 and free:
+        return f"a cut weighs {robot.joint_names[free[0]]}, which has no limits, beside others"
+    return ""
+
+
+def _is_index(value: object, count: int) -> bool:
+    """Is it a whole number from 0 to count - 1?"""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    return whole and 0 <= int(value) < count  # type: ignore[call-overload]
+
+
+def _is_number(value: object) -> bool:
+    """Is it a finite number?"""
+    return isinstance(value, float | int | np.floating | np.integer) and math.isfinite(value)
+
+
+def named_cut(robot: Robot, weights: NDArray[np.float64], value: float) -> str:
+    """A cut in words: "joint3 = -81.9 deg", or "joint1 + 0.5 joint2 = 1.2" in rad and m."""
+    (weighed,) = np.nonzero(weights)
+    if len(weighed) == 1:
+        j = weighed[0]
+        at = value / weights[j]
+        unit = f"{at:.4f} m" if robot.prismatic[j] else f"{np.degrees(at):.1f} deg"
+        return f"{robot.joint_names[j]} = {unit}"
+    terms = " + ".join(f"{weights[j]:.4g} {robot.joint_names[j]}" for j in weighed)
+    return f"{terms} = {value:.4g} (rad, m)"
