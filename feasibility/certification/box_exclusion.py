@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from feasibility.certification.linear_models import Array, Models
 
-SWEEPS = 4  # of the coordinate descent
-STEEPEST = 4  # columns of which the pairwise cross products are tried as directions
+SWEEPS = 2  # of the coordinate descent
+STEEPEST = 3  # columns of which the pairwise cross products are tried as directions
 PAD = 1e-12  # [rad], [m], [1] by which contracted intervals are widened
 TINY = 1e-300
 

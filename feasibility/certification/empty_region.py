@@ -8,7 +8,7 @@ the boxes that are left give starts for a search for a configuration that refute
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,7 +83,7 @@ class Emptiness:
                 point = refute(starts[:: len(starts) // STARTS + 1], region)
                 if point is not None:
                     return Outcome(done, left=True, point=point)
-            waiting.append(_smaller(open_boxes, models, parts, n))
+            waiting.append(_smaller(open_boxes, models, parts, self.allowed.length))
         return Outcome(done, left=False)
 
     def _examine(self, boxes: Boxes, parts: Parts, region: Region) -> tuple[Boxes, Models, Array]:
@@ -93,11 +93,9 @@ class Emptiness:
         )
         normals = parts.centre[boxes.part, 3:]
         low, high = contract(models, directions_for(models, normals))
-        kept = ~(low > high).any(axis=1)
+        kept = np.asarray(~(low > high).any(axis=1))
         models, boxes, low, high = models[kept], boxes[kept], low[kept], high[kept]
-        models = Models(
-            models.residual, models.columns, models.radius, low, high, models.reach, models.bend
-        )
+        models = replace(models, low=low, high=high)
         place, missed = nearest(models)
         kept = ~separated(models, missed)
         return boxes[kept], models[kept], place[kept]
@@ -117,8 +115,9 @@ def _next(waiting: list[Boxes]) -> Boxes:
     return Boxes.joined(taken)
 
 
-def _smaller(boxes: Boxes, models: Models, parts: Parts, n: int) -> Boxes:
+def _smaller(boxes: Boxes, models: Models, parts: Parts, length: float) -> Boxes:
     """What is left of open boxes: as it is where contraction did much, otherwise in halves."""
+    n = boxes.low.shape[1] - 2
     centre = boxes.centre
     low = np.maximum(centre + models.low, boxes.low)
     high = np.minimum(centre + models.high, boxes.high)
@@ -128,16 +127,15 @@ def _smaller(boxes: Boxes, models: Models, parts: Parts, n: int) -> Boxes:
     now = Boxes(low, high, boxes.part)
     rest, share = now[~much], share[~much]
     made = [now[much]]
-    over_surface = models.reach[~much, n:].sum(axis=1)
-    matter = models.bend[~much] + 0.3 * models.reach[~much]
-    residual = parts.radius[rest.part].sum(axis=1)
-    surface_first = 0.3 * over_surface + residual > matter[:, :n].max(axis=1)
+    reach = models.reach[~much]
+    over_surface = reach[:, n:].sum(axis=1) + parts.radius[rest.part] @ [1.0, length]
     finest = parts.children[rest.part, 0] < 0
-    surface_first &= ~finest | (over_surface > 0.0)
+    surface_first = over_surface > reach[:, :n].max(axis=1)
+    surface_first &= ~finest | (reach[:, n:] > 0.0).any(axis=1)
     by_joint = ~surface_first
-    made += _halves(rest[by_joint], np.argmax(matter[by_joint, :n], axis=1))
+    made += _halves(rest[by_joint], np.argmax(reach[by_joint, :n], axis=1))
     at_end = surface_first & finest
-    made += _halves(rest[at_end], n + np.argmax(models.reach[~much][at_end, n:], axis=1))
+    made += _halves(rest[at_end], n + np.argmax(reach[at_end, n:], axis=1))
     made += _children(rest[surface_first & ~finest], parts, n)
     return Boxes.joined(made)
 
@@ -165,5 +163,5 @@ def _children(boxes: Boxes, parts: Parts, n: int) -> list[Boxes]:
         low[axis < 0, n:], high[axis < 0, n:] = -1.0, 1.0
         low[:, n:], high[:, n:] = np.maximum(low[:, n:], -1.0), np.minimum(high[:, n:], 1.0)
         child = Boxes(low, high, parts.children[boxes.part, side])
-        made.append(child[~(low > high).any(axis=1)])
+        made.append(child[np.asarray(~(low > high).any(axis=1))])
     return made

@@ -10,8 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces import Cells
-from surfaces.parts import SurfaceParts
+from surfaces import Cells, SurfaceParts
 
 SAMPLES = 300
 ROUNDING = 1e-9  # [m], [1] that a radius is taken larger by

@@ -24,14 +24,13 @@ from typing import NamedTuple
 import numpy as np
 
 from feasibility.certification.empty_region import Emptiness, Outcome
+from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.certification.linear_models import (
     Allowed,
     Arm,
     Array,
     Parts,
     one_target,
-    out_of_line,
-    stretched_length,
     target_parts,
 )
 from feasibility.certification.parts_agreement import disagreement
@@ -41,8 +40,7 @@ from feasibility.certification.tree_shape import malformed, named_cut
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.task import Task
 from robots import Robot
-from surfaces import Cells
-from surfaces.parts import SurfaceParts
+from surfaces import Cells, SurfaceError, SurfaceParts
 
 MOST_BOXES = 2_000_000
 FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may be off by
@@ -97,10 +95,11 @@ def verify_proof(
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
         return ProofCheck(fault, 0)
-    allowed_axis = min(task.cone_chord, ANY_AXIS)
-    parts = surface_parts(
-        cells.surface, FINE * task.effective_tolerance, FINE * min(allowed_axis, 1.0)
-    )
+    cone = min(task.cone_chord, 1.0)
+    try:
+        parts = cells.surface.parts(FINE * task.effective_tolerance, FINE * cone)
+    except SurfaceError as error:
+        return ProofCheck(f"the surface has no bounds to prove anything with: {error}", 0)
     return verify_on(robot, cells, task, tree, parts, tick, most)
 
 

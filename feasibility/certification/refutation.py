@@ -96,7 +96,6 @@ class Refuter:
             np.concatenate([low, -np.ones((m, 2))], axis=1),
             np.concatenate([high, np.ones((m, 2))], axis=1),
             zeros,
-            zeros,
         )
         step, _ = nearest(region.with_sums(models, q), sweeps=12)
         return np.asarray(np.clip(q + step[:, :n], region.low, region.high))

@@ -1,0 +1,95 @@
+"""How far a tool moves over a box of joints, and how far off a linear model of that is.
+
+**Lemma.** Let L_j be at least the lever r_j of joint j, the distance of the tool point from its
+axis, everywhere in the box, and h_j its half width. Then for every d in the box
+
+    |p(c + d) - p(c) - J d| <= D / 2,    D = sum_j L_j h_j (h_j + 2 sum_{i before j} h_i),
+
+the sums over revolute joints; a prismatic j adds 2 h_j sum_{i before j} h_i. *Proof.* Joint i turns
+all that joint j >= i does, so d2p/dq_i dq_j = z_i x (z_j x (p - o_j)), at most r_j long; z_i x z_j,
+at most 1, if j slides; 0 if i slides. So g(s) = p(c + s d) has |g''| <= D, and Taylor's formula
+g(1) = g(0) + g'(0) + int_0^1 (1 - s) g''(s) ds bounds the remainder by D / 2. The axis likewise:
+s_j = |z_j x a| in place of r_j, and nothing from joints that slide. *Levers:* r_j depends on the
+joints behind j alone. Change these one by one, the last first: joint k moves the tool point by at
+most 2 sin(h_k / 2) L_k, not more than min(h_k, 2) L_k, or by h_k if it slides; so
+L_j = r_j(c) + sum_{k behind j} min(h_k, 2) L_k. A distance to a line changes by no more than the
+point does. QED
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+
+class LeverBounds(NamedTuple):
+    """Bounds over boxes of joints."""
+
+    largest: Array
+    """(m, n) L_j, of every lever."""
+    second: Array
+    """(m,) D."""
+
+
+def lever_bounds(
+    levers: Array, half: Array, prismatic: NDArray[np.bool_], cap: Array
+) -> LeverBounds:
+    """L_j and D of the lemma.
+
+    Args:
+        levers: (m, n) r_j or s_j at the centres; of a prismatic joint 1 for points, 0 for axes.
+        half: (m, n) h_j.
+        prismatic: (n,) which joints slide.
+        cap: (n,) what no lever exceeds anywhere.
+    """
+    largest = np.empty_like(levers)
+    behind = np.zeros(len(levers))
+    for j in range(levers.shape[1] - 1, -1, -1):
+        if prismatic[j]:
+            largest[:, j] = levers[:, j]
+            behind = behind + levers[:, j] * half[:, j]
+        else:
+            largest[:, j] = np.minimum(levers[:, j] + behind, cap[j])
+            behind = behind + largest[:, j] * np.minimum(half[:, j], 2.0)
+    turns = np.where(prismatic, 0.0, half)
+    before = np.cumsum(turns, axis=1) - turns
+    return LeverBounds(largest, (largest * half * (turns + 2.0 * before)).sum(axis=1))
+
+
+def out_of_line(robot: Robot) -> str:
+    """Why the joints are no serial chain, of which alone the lemma speaks; empty where they are."""
+    model = robot.model
+    in_line = model.nv == robot.n and all(model.parents[k] == k - 1 for k in range(1, robot.n + 1))
+    if in_line and model.frames[robot.tool_frame_id].parentJoint == robot.n:
+        return ""
+    return f"the joints of {robot.name!r} form no serial chain up to its tool"
+
+
+def _links(robot: Robot) -> Array:
+    """(n + 1,) m, distances from the root to the first joint, from joint to joint, to the tool."""
+    places = [*list(robot.model.jointPlacements)[1:]]
+    places.append(robot.model.frames[robot.tool_frame_id].placement)
+    return np.array([np.linalg.norm(place.translation) for place in places])
+
+
+def longest_levers(robot: Robot, low: Array, high: Array) -> Array:
+    """(n,) m, no lever of joint j exceeds this: the lengths of all links behind it, stretched out.
+
+    Joints that slide add the larger of their two ends in low .. high (n,).
+    """
+    strokes = np.where(robot.prismatic, np.maximum(np.abs(low), np.abs(high)), 0.0)
+    behind = _links(robot)[1:] + np.append(strokes[1:], 0.0)
+    return np.asarray(np.cumsum(behind[::-1])[::-1])
+
+
+def stretched_length(robot: Robot, without: int) -> float:
+    """m, all links and slides in one line, but for the slide of one joint."""
+    strokes = np.maximum(np.abs(robot.lower), np.abs(robot.upper))
+    counted = robot.prismatic & (np.arange(robot.n) != without)
+    return float(_links(robot).sum() + strokes[counted].sum())
