@@ -14,6 +14,8 @@ from __future__ import annotations
 from numba import njit
 
 kernel = njit(cache=True, error_model="numpy")
+# Written into its caller, of the same file: each array in a `NamedTuple` costs at every call.
+inlined = njit(cache=True, error_model="numpy", inline="always")
 
 
 @kernel

@@ -1,0 +1,148 @@
+"""What a box of joint values can reach, and what of it linear bounds leave: kernels.
+
+With r_j the largest distance of the tool point from axis j over a box with centre c and half widths
+h (the distance at c plus what the joints behind j can add), a tool point in the box is at most
+
+    sum_j r_j h_j                          from p(c)                (first order)
+    D / 2 = 1/2 sum_j r_j h_j (h_j + 2 sum_{i<j} h_i)   from p(c) + J d    (second order)
+
+and likewise for the axis, with sines s_j in place of r_j (D is that of
+`feasibility.roadmap.segment_bound`).
+
+Contraction: what must lie in a <= g . d <= b leaves each d_j the interval that the others' leave
+open. No comparison with NaN cuts anything off.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feasibility.compiled import kernel
+
+
+@kernel
+def contract(g, least_sum, most_sum, low, high):  # type: ignore[no-untyped-def]
+    """Cut the box to d with least_sum <= g . d <= most_sum; False when nothing is left.
+
+    Args:
+        g: (m,) weights of the first m intervals.
+        least_sum, most_sum: may be infinite.
+        low, high: (m or more,) the box, cut in place.
+    """
+    least, most = 0.0, 0.0
+    for j in range(g.shape[0]):
+        a, b = g[j] * low[j], g[j] * high[j]
+        least += min(a, b)
+        most += max(a, b)
+    if least > most_sum or most < least_sum:
+        return False
+    if least >= least_sum and most <= most_sum:
+        return True
+    for j in range(g.shape[0]):
+        if abs(g[j]) < 1e-9:
+            continue
+        a, b = g[j] * low[j], g[j] * high[j]
+        # What the other intervals leave open for this one.
+        left = (least_sum - (most - max(a, b))) / g[j]
+        right = (most_sum - (least - min(a, b))) / g[j]
+        if g[j] < 0.0:
+            left, right = right, left
+        if left > low[j]:
+            low[j] = left
+        if right < high[j]:
+            high[j] = right
+        if low[j] > high[j]:
+            return False
+        least += min(g[j] * low[j], g[j] * high[j]) - min(a, b)
+        most += max(g[j] * low[j], g[j] * high[j]) - max(a, b)
+    return True
+
+
+@kernel
+def contract_along(rows, gap, radius, direction, g, low, high):  # type: ignore[no-untyped-def]
+    """Cut the box to d with |direction . (rows d - gap)| <= radius; False when nothing is left.
+
+    Args:
+        rows: (3, m).
+        gap, direction: (3,).
+        radius: m, or a chord.
+        g: (m,) scratch.
+        low, high: (m,) the box, cut in place.
+    """
+    goal = direction[0] * gap[0] + direction[1] * gap[1] + direction[2] * gap[2]
+    for j in range(g.shape[0]):
+        g[j] = direction[0] * rows[0, j] + direction[1] * rows[1, j] + direction[2] * rows[2, j]
+    return contract(g, goal - radius, goal + radius, low, high)
+
+
+@kernel
+def contract_to_ball(rows, gap, distance, radius, directions, g, low, high):  # type: ignore[no-untyped-def]
+    """Cut the box to d with |rows d - gap| <= radius, along the gap and along every direction.
+
+    Returns False when nothing is left.
+    """
+    along = np.empty(3)
+    for k in range(3):
+        along[k] = gap[k] / max(distance, 1e-12)
+    if not contract_along(rows, gap, radius, along, g, low, high):
+        return False
+    for k in range(directions.shape[0]):
+        if not contract_along(rows, gap, radius, directions[k], g, low, high):
+            return False
+    return True
+
+
+@kernel
+def reach_of_box(arrays, work, half, longest, lever, sine):  # type: ignore[no-untyped-def]
+    """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2).
+
+    Args:
+        arrays: the `SearchArrays`.
+        work: the `Work`; slot 1 holds the box's centre.
+        half: (n,) half widths.
+        longest: (n,) of `static_levers`.
+        lever, sine: (n,) out.
+    """
+    n = longest.shape[0]
+    behind, behind_axis, before = 0.0, 0.0, 0.0
+    for j in range(n):
+        if not arrays.chain.prismatic[j]:
+            before += half[j]
+    first, second, first_axis, second_axis = 0.0, 0.0, 0.0, 0.0
+    for j in range(n - 1, -1, -1):
+        h = half[j]
+        if arrays.chain.prismatic[j]:
+            lever[j], sine[j] = 1.0, 0.0
+            first += h
+            second += h * before
+            behind += h
+            continue
+        before -= h
+        zx, zy, zz = work.axes[1, j, 0], work.axes[1, j, 1], work.axes[1, j, 2]
+        x = work.point[1, 0] - work.origins[1, j, 0]
+        y = work.point[1, 1] - work.origins[1, j, 1]
+        z = work.point[1, 2] - work.origins[1, j, 2]
+        r = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
+        x, y, z = work.axis[1, 0], work.axis[1, 1], work.axis[1, 2]
+        s = np.sqrt((zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2)
+        lever[j] = min(r + behind, longest[j])
+        sine[j] = min(1.0, s + behind_axis)
+        first += lever[j] * h
+        second += 0.5 * lever[j] * h * (h + 2.0 * before)
+        first_axis += sine[j] * h
+        second_axis += 0.5 * sine[j] * h * (h + 2.0 * before)
+        behind += lever[j] * h
+        behind_axis += sine[j] * h
+    return first, second, first_axis, second_axis
+
+
+@kernel
+def static_levers(arrays, longest):  # type: ignore[no-untyped-def]
+    """The longest lever (n,) that each joint can have: the links behind it, stretched out."""
+    total = 0.0
+    for j in range(longest.shape[0] - 1, -1, -1):
+        link = arrays.chain.translations[j + 1]
+        total += np.sqrt(link[0] ** 2 + link[1] ** 2 + link[2] ** 2)
+        longest[j] = total
+        if arrays.chain.prismatic[j]:
+            total += max(abs(arrays.lower[j]), abs(arrays.upper[j]))
