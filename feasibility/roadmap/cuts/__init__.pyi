@@ -1,0 +1,5 @@
+from .gaps import Component as Component
+from .known import components_of as components_of
+from .prover import Attempt as Attempt
+from .prover import Blocked as Blocked
+from .prover import Prover as Prover

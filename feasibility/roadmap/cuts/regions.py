@@ -1,0 +1,117 @@
+"""Regions of the joint space: an interval for each joint, and what cuts along several joints leave.
+
+The regions of a tree's root, see `feasibility.cut_tree`: the limits; for an opened joint one turn
+from t, which stands for every winding. A slide without ends is bounded by what it can reach: were
+it further out than all targets, the tolerance and all other links, the tool would be too.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.roadmap.arrays import SearchArrays
+from feasibility.roadmap.boxes import Boxes, Places, Slabs, box_of, no_slabs
+
+TURN = 2.0 * np.pi
+
+
+class Region(NamedTuple):
+    """Configurations low <= q <= high inside some slabs."""
+
+    low: NDArray[np.float64]
+    """(n,) rad or m"""
+    high: NDArray[np.float64]
+    """(n,) rad or m"""
+    slabs: Slabs
+
+    def sides(self, weights: NDArray[np.float64], value: float) -> tuple[Region, Region]:
+        """What a cut weights . q = value leaves on either side: w . q <= t, and w . q >= t."""
+        weighted = np.flatnonzero(weights)
+        if len(weighted) == 1 and weights[weighted[0]] == 1.0:
+            j = weighted[0]
+            high, low = self.high.copy(), self.low.copy()
+            high[j], low[j] = min(high[j], value), max(low[j], value)
+            return self._replace(high=high), self._replace(low=low)
+        return self._bounded(weights, -np.inf, value), self._bounded(weights, value, np.inf)
+
+    def on(self, weights: NDArray[np.float64], value: float) -> Region:
+        """The part of the region with weights . q = value."""
+        below, above = self.sides(weights, value)
+        if below.slabs is self.slabs:
+            return Region(above.low, below.high, self.slabs)
+        return self._bounded(weights, value, value)
+
+    def _bounded(self, weights: NDArray[np.float64], low: float, high: float) -> Region:
+        slabs = Slabs(
+            np.vstack([self.slabs.weights, weights]),
+            np.append(self.slabs.low, low),
+            np.append(self.slabs.high, high),
+        )
+        return self._replace(slabs=slabs)
+
+    def inside(self, q: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """(k,) which configurations (k, n) lie in the region."""
+        along = q @ self.slabs.weights.T
+        return (
+            ((q >= self.low) & (q <= self.high)).all(axis=1)
+            & ((along >= self.slabs.low) & (along <= self.slabs.high)).all(axis=1)
+        )  # fmt: skip
+
+    def holds(self, other: Region) -> bool:
+        """Does this region, of no slabs, hold another?"""
+        return (
+            len(self.slabs.low) == 0
+            and bool((self.low <= other.low).all())
+            and bool((self.high >= other.high).all())
+        )
+
+    @property
+    def empty(self) -> bool:
+        """Is nothing left of an interval?"""
+        return not bool((self.low <= self.high).all())
+
+    def boxes(self, parameters: int) -> Boxes:
+        """A stack of one box, the region; see `box_of`."""
+        return box_of(self.low, self.high, parameters)
+
+
+def limits_of(arrays: SearchArrays, places: Places) -> Region:
+    """The region inside the limits; slides without ends are bounded where that is simple."""
+    low, high = arrays.lower.copy(), arrays.upper.copy()
+    slides = np.flatnonzero(arrays.chain.prismatic & ~(np.isfinite(low) & np.isfinite(high)))
+    if len(slides) == 1:
+        ends = np.maximum(abs(low), abs(high))[arrays.chain.prismatic]
+        far = (
+            np.linalg.norm(places.centre[0, :3])
+            + np.linalg.norm(places.slopes[0, :, :3], axis=1).sum()
+            + places.radius[0, 0]
+            + arrays.tolerance
+            + np.linalg.norm(arrays.chain.translations, axis=1).sum()
+            + ends[np.isfinite(ends)].sum()
+        ) * (1.0 + 1e-9)
+        low[slides], high[slides] = np.maximum(low[slides], -far), np.minimum(high[slides], far)
+    return Region(low, high, no_slabs(len(low)))
+
+
+def wide_joints(arrays: SearchArrays) -> list[int]:
+    """Joints that turn freely, or through more than a turn."""
+    wide = ~(arrays.upper - arrays.lower <= TURN) & ~arrays.chain.prismatic
+    return [int(j) for j in np.flatnonzero(wide)]
+
+
+def one_turn(region: Region, joints: list[int]) -> Region:
+    """The region with one turn of some joints, -pi to pi, in place of their intervals."""
+    low, high = region.low.copy(), region.high.copy()
+    low[joints], high[joints] = -np.pi, np.pi
+    return region._replace(low=low, high=high)
+
+
+def folded(q: NDArray[np.float64], opened: dict[int, float]) -> NDArray[np.float64]:
+    """Configurations (k, n) with opened joints j inside their turn t_j .. t_j + 2 pi."""
+    q = np.array(q)
+    for joint, t in opened.items():
+        q[:, joint] = t + np.mod(q[:, joint] - t, TURN)
+    return q

@@ -1,0 +1,69 @@
+"""Points of the motion set: configurations that hold the tool on the surface, found by Newton.
+
+Nothing that is proved rests on them. They tell where a cut cannot be, and show the search motions
+that it does not know.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.compiled import kernel
+from feasibility.roadmap.arrays import NEXT, SearchArrays, Work, look_at, place
+from feasibility.roadmap.boxes import Places
+from feasibility.roadmap.cuts.regions import Region
+from feasibility.roadmap.projection import PROJECTION_SLACK, PROJECTION_STEPS, project
+
+
+@kernel
+def _project_rows(arrays, work, targets, q, enough, hit):  # type: ignore[no-untyped-def]
+    """Project rows of q (k, n), in place, onto the targets (k, 6), until there are enough hits."""
+    hits = 0
+    for i in range(q.shape[0]):
+        look_at(arrays, work, targets[i, :3], targets[i, 3:])
+        place(arrays, work, NEXT, q[i])
+        for j in range(q.shape[1]):
+            work.secondary_step[j] = 0.0
+        hit[i] = project(arrays, work, q[i], PROJECTION_SLACK, np.inf, PROJECTION_STEPS)
+        hits += hit[i]
+        if hits == enough:
+            return
+
+
+def projected(
+    arrays: SearchArrays,
+    work: Work,
+    region: Region,
+    targets: NDArray[np.float64],
+    enough: int,
+    rng: np.random.Generator,
+) -> NDArray[np.float64]:
+    """Random configurations of a region, projected onto targets, one each.
+
+    Args:
+        arrays, work: of the search.
+        region: its intervals take the place of the limits; what it leaves out is dropped.
+        targets: (k, 6) target points and approach directions.
+        enough: hits after which no more are tried.
+        rng: draws the guesses.
+
+    Returns:
+        (hits, n) configurations.
+    """
+    inside = arrays._replace(lower=region.low, upper=region.high)
+    q = rng.uniform(region.low, region.high, (len(targets), len(region.low)))
+    hit = np.zeros(len(targets), dtype=np.bool_)
+    _project_rows(inside, work, np.ascontiguousarray(targets), q, enough, hit)
+    q = q[hit]
+    return q[region.inside(q)]
+
+
+def random_targets(places: Places, k: int, rng: np.random.Generator) -> NDArray[np.float64]:
+    """(k, 6) targets at random places of the surface, up to the radius of the finest parts."""
+    finest = np.flatnonzero(places.children[:, 0] < 0)
+    part = rng.choice(finest, k)
+    x = rng.uniform(-1.0, 1.0, (k, 2, 1))
+    targets = places.centre[part] + (x * places.slopes[part]).sum(axis=1)
+    targets[:, 3:] /= np.linalg.norm(targets[:, 3:], axis=1)[:, None]
+    return targets
