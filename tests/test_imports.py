@@ -37,7 +37,9 @@ feasibility: clock compiled cone cut_tree found notices problem read_only safe_f
 feasibility.certification
 feasibility.paper
 feasibility.cases
-feasibility.roadmap
+feasibility.roadmap: arrays box_bounds box_contraction boxes branch_and_bound graph projection segment_bound self_motion
+feasibility.roadmap.cuts
+feasibility.roadmap: bridging complete diagnosis expansion exploration graph_g search tracking walk warmup
 feasibility: checking
 feasibility.paths
 feasibility.timing

@@ -55,10 +55,8 @@ class Region(NamedTuple):
     def inside(self, q: NDArray[np.float64]) -> NDArray[np.bool_]:
         """(k,) which configurations (k, n) lie in the region."""
         along = q @ self.slabs.weights.T
-        return (
-            ((q >= self.low) & (q <= self.high)).all(axis=1)
-            & ((along >= self.slabs.low) & (along <= self.slabs.high)).all(axis=1)
-        )  # fmt: skip
+        apart = np.maximum(self.slabs.low - along, along - self.slabs.high)
+        return np.hstack([self.low - q, q - self.high, apart]).max(axis=1) <= 0.0
 
     def holds(self, other: Region) -> bool:
         """Does this region, of no slabs, hold another?"""

@@ -1,0 +1,130 @@
+"""Boxes around known points of the motion set: contraction must keep the point."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from random_arms import rail_arm, random_arm, random_configuration, tilted, tools, turn_onto
+
+from feasibility import Task
+from feasibility.roadmap.arrays import arrays_of, work_for
+from feasibility.roadmap.box_bounds import static_levers
+from feasibility.roadmap.box_contraction import shrink
+from feasibility.roadmap.boxes import Slabs, box_work
+from feasibility.roadmap.branch_and_bound import DIRECTIONS
+from feasibility.roadmap.cuts.places import places_on
+from robots import load_robot
+from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus
+
+ARMS = {
+    "puma560": lambda rng: load_robot("puma560"),
+    "ur5": lambda rng: load_robot("ur5"),
+    "panda": lambda rng: load_robot("panda"),
+    "kinova": lambda rng: load_robot("kinova"),
+    "ur5 on a rail": lambda rng: rail_arm("ur5"),
+    "random": random_arm,
+}
+KINDS = ("plane", "sphere", "cylinder", "hyperboloid", "cone", "torus")
+
+
+class Known(NamedTuple):
+    """A configuration of the motion set, and the parts of the surface that explain it."""
+
+    arrays: object
+    places: object
+    q: np.ndarray
+    parts: np.ndarray
+    """(k,) parts that the place lies on."""
+    x: np.ndarray
+    """(k, 2) its parameters there."""
+
+
+def random_patch(kind, side, rng):
+    """A patch of some decimetres, in its own frame."""
+    size, (a, b) = float(rng.uniform(0.2, 1.0)), rng.uniform(20, 90, 2)
+    start = float(rng.uniform(0, 200))
+    if kind == "plane":
+        return plane((-0.3, 0.3), (-0.2, 0.4), side=side)
+    if kind == "sphere":
+        return sphere(size, (90 - a, 90 + a), (start, start + b), side=side)
+    if kind == "cylinder":
+        return cylinder(size, (start, start + b), (-0.2, 0.3), side=side)
+    if kind == "hyperboloid":
+        flare = float(rng.uniform(0.3, 1.0))
+        return hyperboloid(size, flare, (start, start + b), (-0.3, 0.2), side=side)
+    if kind == "cone":
+        return cone(size, float(rng.uniform(0.3, 1.0)), (start, start + b), (0.05, 0.2), side=side)
+    return torus(1.0, 0.3 * size, (start, start + b), (start, start + a), side=side)
+
+
+def known_point(arm, kind, rng):
+    """A random configuration, and a surface put where it just holds the tool over it."""
+    robot = ARMS[arm](rng)
+    q = random_configuration(robot, rng)
+    (point,), (axis,) = tools(robot, q[None])
+    surface = random_patch(kind, str(rng.choice(["inside", "outside"])), rng)
+    cone_deg = float(rng.choice([0.5, 5.0, 45.0, 120.0, 180.0]))
+    task = Task(float(rng.choice([0.0, 0.02])), cone_deg, float(rng.choice([1e-4, 1e-3, 0.02])))
+    cells = surface.cells(4, 5)
+    cell = int(rng.integers(len(cells)))
+    targets = task.targets(cells)
+    offset = rng.normal(size=3)
+    offset *= 0.999 * task.effective_tolerance / np.linalg.norm(offset)
+    approach = tilted(axis, 0.9999 * task.cone, rng)
+    turn = turn_onto(targets.approaches[cell], approach, rng)
+    surface = surface.moved(turn, point + offset - turn @ targets.points[cell])
+    arrays = arrays_of(robot, surface.cells(4, 5), task)
+    places = places_on(surface, task)
+    parts, x = explained(places, point + offset, approach)
+    assert len(parts) > 0
+    return Known(arrays, places, q, parts, x)
+
+
+def explained(places, point, approach):
+    """The parts (k,) of which a target and an approach direction obey the model, and x (k, 2)."""
+    at = np.concatenate([point, approach])
+    slopes = places.slopes.transpose(0, 2, 1)  # (K, 6, 2)
+    x = np.clip(np.einsum("kxd,kd->kx", np.linalg.pinv(slopes), at - places.centre), -1.0, 1.0)
+    off = at - places.centre - np.einsum("kdx,kx->kd", slopes, x)
+    lengths = np.stack([np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1)], 1)
+    parts = np.flatnonzero((lengths <= places.radius + 1e-12).all(axis=1))
+    return parts, x[parts]
+
+
+def random_slabs(q, rng):
+    """Up to two slabs that hold q, some of no width."""
+    m = int(rng.integers(3))
+    weights = np.where(rng.random((m, len(q))) < 0.5, rng.normal(size=(m, len(q))), 0.0)
+    along = weights @ q
+    width = np.where(rng.random((2, m)) < 0.4, 0.0, 10.0 ** rng.uniform(-4, 0, (2, m)))
+    width[rng.random((2, m)) < 0.3] = np.inf
+    return Slabs(weights, along - width[0], along + width[1])
+
+
+def loses(known, rng):
+    """Is a known point lost, or its box discarded, by one random box around it?"""
+    k = int(rng.integers(len(known.parts)))
+    n = len(known.q)
+    y = np.concatenate([known.q, known.x[k]])
+    width = 10.0 ** rng.uniform(-4.0, 0.5) * 10.0 ** rng.uniform(-1.0, 0.0, n + 2)
+    width[rng.random(n + 2) < 0.1] = 0.0
+    share = np.clip(rng.uniform(-0.2, 1.2, n + 2), 0.0, 1.0)
+    low, high = y - share * width, y + (1.0 - share) * width
+    low[n:], high[n:] = np.maximum(low[n:], -1.0), np.minimum(high[n:], 1.0)
+    low, high = np.minimum(low, y), np.maximum(high, y)
+    space = box_work(n, 2)
+    static_levers(known.arrays, space.longest)
+    code, _ = shrink(
+        known.arrays,
+        work_for(n),
+        known.places,
+        int(known.parts[k]),
+        random_slabs(known.q, rng),
+        DIRECTIONS,
+        space,
+        low,
+        high,
+    )
+    kept = (low - 1e-9 <= y).all() and (y <= high + 1e-9).all()
+    return code == 1 or not kept
