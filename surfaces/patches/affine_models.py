@@ -114,14 +114,44 @@ class SpaceModel(NamedTuple):
     along: Array
     """(k, 2) what of the error comes from each axis; see `PartModels`."""
 
-    def scaled(self, factor: float) -> SpaceModel:
-        """Everything times a positive factor."""
-        return SpaceModel(*(factor * array for array in self))
-
     @staticmethod
     def exact(centre: Array, slopes: Array) -> SpaceModel:
         """(k, 3) and (k, 2, 3), nothing left."""
         return SpaceModel(centre, slopes, np.zeros(len(centre)), np.zeros((len(centre), 2)))
+
+
+class Turned(NamedTuple):
+    """A curve turned about z, and stretched: what is left lies in a skew box."""
+
+    centre: Array
+    """(k, 3)"""
+    slopes: Array
+    """(k, 2, 3)"""
+    frame: Array
+    """(k, 3, 3) rows: what becomes of the unit vectors away from the axis, beside and along it."""
+    left: Array
+    """(k, 3) the largest coordinates along these of what is left."""
+    by_axis: Array
+    """(k, 2, 3) what of that comes from each parameter."""
+
+    def model(self, factor: float = 1.0) -> SpaceModel:
+        """As a model, times a positive factor."""
+        along = np.stack([_length(self.frame, self.by_axis[:, side]) for side in (0, 1)], axis=1)
+        error = _length(self.frame, self.left)
+        return SpaceModel(*(factor * each for each in (self.centre, self.slopes, error, along)))
+
+    def unit(self) -> SpaceModel:
+        """The unit vectors along the vectors."""
+        axis = _direction(self.centre)
+        shares = np.einsum("kid,kd->ki", self.frame, axis)
+        ahead = (np.abs(shares) * self.left).sum(axis=1)
+        beside = self.frame - shares[..., None] * axis[:, None]
+        across = _length(beside, self.left)
+        centre, slopes, radius = unit_model(self.centre, self.slopes, ahead, across)
+        size = np.maximum(np.linalg.norm(self.centre, axis=1), 1e-300)
+        by_axis = [_length(beside, self.by_axis[:, side]) / size for side in (0, 1)]
+        along = np.stack(by_axis, axis=1) + (slopes**2).sum(axis=2) / 4.0
+        return SpaceModel(centre, slopes, radius, along)
 
 
 NO_STRETCH = np.ones(3)
@@ -129,7 +159,7 @@ NO_STRETCH = np.ones(3)
 
 def turned(
     curve: CurveModel, low: Array, high: Array, angle: int, stretch: Array = NO_STRETCH
-) -> SpaceModel:
+) -> Turned:
     """The curve turned about z from low to high.
 
     Args:
@@ -148,49 +178,58 @@ def turned(
     frame = np.stack([away, beside, np.stack([flat, flat, one], axis=1)], axis=1) * stretch
     change = np.abs(dr) + er
     largest = np.abs(r) + change
-    left_curve = np.stack([about.mean * er, flat, ez], axis=1)
-    left_angle = np.stack([largest * about.bow, largest * about.sway, flat], axis=1)
+    by_curve = np.stack([about.mean * er, flat, ez], axis=1)
+    by_angle = np.stack([largest * about.bow, largest * about.sway, flat], axis=1)
     mixed = np.stack([flat, change * about.slope, flat], axis=1)
-    along = np.stack([_length(frame, left + mixed / 2.0) for left in (left_curve, left_angle)], 1)
-    by_curve = np.stack([about.mean * dr, flat, dz], axis=1)
-    by_angle = np.stack([flat, r * about.slope, flat], axis=1)
-    local = np.stack([by_curve, by_angle], axis=1)
+    slopes = np.stack(
+        [
+            np.stack([about.mean * dr, flat, dz], axis=1),
+            np.stack([flat, r * about.slope, flat], axis=1),
+        ],
+        axis=1,
+    )
+    by_axis = np.stack([by_curve + mixed / 2.0, by_angle + mixed / 2.0], axis=1)
     if angle == 0:
-        local, along = local[:, ::-1], along[:, ::-1]
-    return SpaceModel(
-        centre=_in_frame(np.stack([about.mean * r, flat, z], axis=1)[:, None], frame)[:, 0],
-        slopes=_in_frame(local, frame),
-        error=_length(frame, left_curve + left_angle + mixed),
-        along=along,
+        slopes, by_axis = slopes[:, ::-1], by_axis[:, ::-1]
+    centre = np.stack([about.mean * r, flat, z], axis=1)[:, None]
+    return Turned(
+        (centre @ frame)[:, 0], slopes @ frame, frame, by_curve + by_angle + mixed, by_axis
     )
 
 
-def _in_frame(local: Array, frame: Array) -> Array:
-    """(k, m, 3) from coordinates (k, m, 3) along the rows of frames (k, 3, 3)."""
-    return np.asarray(np.einsum("kmi,kij->kmj", local, frame))
+def _direction(vectors: Array) -> Array:
+    """(k, d) unit vectors; zero where there is none."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-300))
 
 
 def _length(frame: Array, parts: Array) -> Array:
     """(k,) the largest length of a vector whose coordinates are no larger than (k, 3)."""
-    products = np.abs(np.einsum("kia,kja->kij", frame, frame))
-    return np.asarray(np.sqrt(np.einsum("ki,kij,kj->k", parts, products, parts)))
+    products = np.abs(frame @ frame.transpose(0, 2, 1))
+    square = (products @ parts[:, :, None])[..., 0] * parts
+    return np.asarray(np.sqrt(square.sum(axis=1)))
 
 
-def unit_model(centre: Array, slopes: Array, error: Array) -> tuple[Array, Array, Array]:
-    """A model of N / |N|, from one of N: |N - A| <= error, A = centre + sum x_i slopes_i.
+def unit_model(
+    centre: Array, slopes: Array, ahead: Array, across: Array
+) -> tuple[Array, Array, Array]:
+    """A model of N / |N|, from one of N = A + E with A = centre + sum x_i slopes_i.
 
     With the unit vector c along A's centre, A = |A(0)| ((1 + a) c + t): the share along c changes
     by |a| <= a_0, and t, square to c, is affine in x, |t| <= t_0. The model is
     (1 - k / 2) c + t, where k = 1 - cos b and tan b = t_0 / (1 - a_0): b is the largest angle
     between A and c, so A / |A| has along c a share from 1 - k to 1. Square to c it is t / L, with L
-    from 1 - a_0 to hypot(1 + a_0, t_0). Last, |N / |N| - A / |A|| <= 2 e / (|N| + |A|).
+    from 1 - a_0 to hypot(1 + a_0, t_0).
+
+    Last, N and A are at an angle of at most d: square to A, E is no longer than its share square to
+    c and sin(b) times that along c, so sin d is at most that over the least |N|.
 
     Where that says nothing, or less than "within 1 of zero", the model is zero with radius 1.
 
     Args:
         centre: (k, d)
         slopes: (k, m, d)
-        error: (k,)
+        ahead: (k,) the largest |E . c|.
+        across: (k,) how long E is square to c, at most.
 
     Returns:
         centre (k, d), slopes (k, m, d) and radius (k,) of the unit vectors.
@@ -201,11 +240,14 @@ def unit_model(centre: Array, slopes: Array, error: Array) -> tuple[Array, Array
         by_axis = np.einsum("kmd,kd->km", slopes, axis) / size[:, None]
         turn = slopes / size[:, None, None] - by_axis[..., None] * axis[:, None]
         a, t = np.abs(by_axis).sum(axis=1), np.linalg.norm(turn, axis=2).sum(axis=1)
-        drop = 1.0 - 1.0 / np.sqrt(1.0 + (t / (1.0 - a)) ** 2)
+        tangent = t / (1.0 - a)
+        drop = 1.0 - 1.0 / np.hypot(1.0, tangent)
         beside = t * np.maximum(1.0 / (1.0 - a) - 1.0, 1.0 - 1.0 / np.hypot(1.0 + a, t))
-        least = size * (1.0 - a)
-        radius = np.hypot(drop / 2.0, beside) + 2.0 * error / (2.0 * least - error)
-        known = (a < 1.0) & (least > error) & (radius < 1.0)
+        least = size * (1.0 - a) - np.hypot(ahead, across)
+        sine = (across + ahead * tangent / np.hypot(1.0, tangent)) / least
+        off = 2.0 * np.sin(np.arcsin(np.minimum(sine, 1.0)) / 2.0)
+        radius = np.hypot(drop / 2.0, beside) + off
+        known = (a < 1.0) & (least > 0.0) & (radius < 1.0)
     shown = known[:, None]
     return (
         np.where(shown, axis * (1.0 - drop / 2.0)[:, None], 0.0),
@@ -216,17 +258,11 @@ def unit_model(centre: Array, slopes: Array, error: Array) -> tuple[Array, Array
 
 def unit_curve(model: CurveModel) -> CurveModel:
     """The unit vectors along the vectors of a curve's model."""
-    error = np.linalg.norm(model.error, axis=1)
-    centre, slopes, radius = unit_model(model.centre, model.slope[:, None], error)
+    axis = _direction(model.centre)
+    ahead = (model.error * np.abs(axis)).sum(axis=1)
+    across = (model.error * np.abs(axis[:, ::-1])).sum(axis=1)
+    centre, slopes, radius = unit_model(model.centre, model.slope[:, None], ahead, across)
     return CurveModel(centre, slopes[:, 0], np.repeat(radius[:, None], 2, axis=1))
-
-
-def unit_space(model: SpaceModel) -> SpaceModel:
-    """The unit vectors along the vectors of a model."""
-    centre, slopes, radius = unit_model(model.centre, model.slopes, model.error)
-    size = np.maximum(np.linalg.norm(model.centre, axis=1), 1e-300)[:, None]
-    along = model.along / size + (slopes**2).sum(axis=2) / 4.0
-    return SpaceModel(centre, slopes, radius, along)
 
 
 def part_models(points: SpaceModel, normals: SpaceModel) -> PartModels:

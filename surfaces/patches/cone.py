@@ -73,7 +73,9 @@ class Cone(SmoothPatch):
         out = np.array([1.0, -self.slope]) / math.hypot(1.0, self.slope)
         normal = np.tile(out, (len(low), 1))
         around = low[:, 0], high[:, 0], 0
-        return turned(straight(*ends), *around), turned(straight(normal, normal), *around)
+        return turned(straight(*ends), *around).model(), turned(
+            straight(normal, normal), *around
+        ).model()
 
 
 def cone(

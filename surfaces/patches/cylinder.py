@@ -52,7 +52,7 @@ class Cylinder(ClosedFormPatch):
         ends = (np.stack([self.radius * one, z], axis=1) for z in (low[:, 1], high[:, 1]))
         out = np.stack([one, zero], axis=1)
         around = low[:, 0], high[:, 0], 0
-        return turned(straight(*ends), *around), turned(straight(out, out), *around)
+        return turned(straight(*ends), *around).model(), turned(straight(out, out), *around).model()
 
 
 def cylinder(

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import SpaceModel, unit_space
+from surfaces.patches.affine_models import SpaceModel
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.patches.sphere import unit_sphere, unit_sphere_models
+from surfaces.patches.sphere import turned_sphere, unit_sphere
 from surfaces.surface import Side
 
 Array = NDArray[np.float64]
@@ -91,8 +91,8 @@ class Ellipsoid(SmoothPatch):
     def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
         """The unit sphere, stretched both ways; the normal is along the gradient."""
         axes = np.array(self.semi_axes)
-        points, gradients = (unit_sphere_models(low, high, s) for s in (axes, axes.min() / axes))
-        return points, unit_space(gradients)
+        points, gradients = (turned_sphere(low, high, s) for s in (axes, axes.min() / axes))
+        return points.model(), gradients.unit()
 
 
 def nearest_on_ellipsoid(axes: Array, points: Array, toward: Array) -> Array:

@@ -127,7 +127,7 @@ class Hyperboloid(ClosedFormPatch):
         )
         gradient = CurveModel(meridian.centre * [1, -square], meridian.slope * [1, -square], error)
         around = low[:, 0], high[:, 0], 0
-        return turned(meridian, *around), turned(unit_curve(gradient), *around)
+        return turned(meridian, *around).model(), turned(unit_curve(gradient), *around).model()
 
 
 def hyperboloid(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.patches.affine_models import NO_STRETCH, SpaceModel, circle, turned
+from surfaces.patches.affine_models import NO_STRETCH, SpaceModel, Turned, circle, turned
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
@@ -50,11 +50,11 @@ class Sphere(ClosedFormPatch):
 
     def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
         """Arcs of circles, turned; the normal is the point without its radius."""
-        normals = unit_sphere_models(low, high)
-        return normals.scaled(self.radius), normals
+        normals = turned_sphere(low, high)
+        return normals.model(self.radius), normals.model()
 
 
-def unit_sphere_models(low: Array, high: Array, stretch: Array = NO_STRETCH) -> SpaceModel:
+def turned_sphere(low: Array, high: Array, stretch: Array = NO_STRETCH) -> Turned:
     """The unit sphere over boxes of polar angle and azimuth (k, 2) rad, and then stretched."""
     middle, half = (low[:, 0] + high[:, 0]) / 2.0, (high[:, 0] - low[:, 0]) / 2.0
     meridian = circle(np.pi / 2.0 - middle, half, 1.0, inward=True)

@@ -66,7 +66,7 @@ class Torus(SmoothPatch):
         normal, tube = (circle(middle, half, radius) for radius in (1.0, self.tube))
         tube = tube._replace(centre=tube.centre + np.array([self.ring, 0.0]))
         around = low[:, 0], high[:, 0], 0
-        return turned(tube, *around), turned(normal, *around)
+        return turned(tube, *around).model(), turned(normal, *around).model()
 
 
 def torus(

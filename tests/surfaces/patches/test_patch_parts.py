@@ -57,7 +57,8 @@ def test_a_smaller_radius_would_be_wrong(patch):
         assert parts.radius.max() < 2e-12
         return
     used = walked(patch, replace(parts, radius=0.8 * parts.radius))
-    assert max(used.points, used.normals) > 1.0
+    assert used.points > 1.0
+    assert used.normals > 1.0
 
 
 def test_parts_are_cut_until_they_are_as_flat_as_asked_or_as_many_as_allowed(patch):
@@ -83,3 +84,23 @@ def test_radii_fall_by_four_where_sides_are_halved(patch):
     coarse, fine = (patch.parts(flat, 1e9, 200_000) for flat in (4e-3, 1e-3))
     if patch.kind != "plane":
         assert len(fine) < 7 * len(coarse)
+
+
+def test_radii_are_near_the_least_possible(patch):
+    """No affine model leaves less than a third of the bound, over small boxes."""
+    rng = np.random.default_rng(3)
+    ends = np.array([patch.u_range, patch.v_range])
+    grid = np.linspace(-1.0, 1.0, 21)
+    x = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
+    affine = np.column_stack([np.ones(len(x)), x])
+    for _ in range(20):
+        middle = rng.uniform(ends[:, 0], ends[:, 1])
+        half = np.diff(ends)[:, 0] * rng.uniform(1e-3, 0.02, 2)
+        models = patch.part_models((middle - half)[None], (middle + half)[None])
+        u, v = (middle + x * half).T
+        for model, places in zip(
+            models, (patch.local_point(u, v), patch.local_normal(u, v)), strict=True
+        ):
+            best, *_ = np.linalg.lstsq(affine, places, rcond=None)
+            left = np.linalg.norm(places - affine @ best, axis=1).max()
+            assert model.error[0] <= 3.0 * left + 1e-12
