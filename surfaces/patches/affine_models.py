@@ -83,16 +83,15 @@ def circle(middle: Array, half: Array, radius: float, inward: bool = False) -> C
     )
 
 
-def bend(low: Array, middle: Array, high: Array, most: Array, half: Array) -> CurveModel:
+def bend(places: Array, most: Array, half: Array) -> CurveModel:
     """A curve from its places at both ends and in the middle.
 
     Args:
-        low: (k, 2) at the lower end.
-        middle: (k, 2)
-        high: (k, 2)
+        places: (3, k, 2) at the lower end, in the middle and at the upper end.
         most: (k, 2) bounds on the second derivatives.
         half: (k,) half the range of the parameter.
     """
+    low, middle, high = places
     error = most * (half**2 / 4.0)[:, None]
     return CurveModel((low + 2.0 * middle + high) / 4.0, (high - low) / 2.0, error)
 

@@ -4,189 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
-from surfaces.patches.closest_point import ClosestPointSearch, Jet
+from surfaces.patches.affine_models import SpaceModel, bend, turned, unit_curve
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
+from surfaces.patches.profile import Profile
 from surfaces.patches.quadrature import rectangle_areas
-from surfaces.protected import Protected
 from surfaces.surface import Side
-
-if TYPE_CHECKING:
-    from scipy.interpolate import CubicSpline
 
 Array = NDArray[np.float64]
 
 MOST_POINTS = 1000
-_SAMPLES = 16  # of each piece of the spline, for starts and for crossings
-_LEAST = 1e-6  # of the profile's extent: lengths below this are none
-
-
-@dataclass(frozen=True, eq=False)
-class Profile(Protected):
-    """A cubic spline over the chord length s, twice continuously differentiable.
-
-    An end on the axis is a pole: there the curve leaves the axis at a right angle and r has no
-    second derivative, so that the surface is smooth across it. At other ends the third derivative
-    is that of the next piece (not-a-knot).
-    """
-
-    points: Array
-    """(n, 2) m, r and z."""
-
-    @cached_property
-    def knots(self) -> Array:
-        """(n,) m, chord length up to each point."""
-        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
-        return np.concatenate([[0.0], np.cumsum(steps)])
-
-    @property
-    def length(self) -> float:
-        """Of all chords, m."""
-        return float(self.knots[-1])
-
-    @property
-    def poles(self) -> tuple[bool, bool]:
-        """Whether the first and the last point lie on the axis."""
-        return bool(self.points[0, 0] == 0.0), bool(self.points[-1, 0] == 0.0)
-
-    @cached_property
-    def _splines(self) -> tuple[CubicSpline, CubicSpline]:
-        from scipy.interpolate import CubicSpline  # takes longer to load than many a search
-
-        ends = [[(k, 0.0) if pole else "not-a-knot" for pole in self.poles] for k in (2, 1)]
-        r, z = (
-            CubicSpline(self.knots, values, bc_type=tuple(at))
-            for values, at in zip(self.points.T, ends, strict=True)
-        )
-        return r, z
-
-    def at(self, s: Array, order: int = 0) -> Array:
-        """(..., 2) r and z, or their derivative of the given order, at chord lengths s."""
-        return np.stack([spline(s, order) for spline in self._splines], axis=-1)
-
-    def fractions(self, count: int) -> Array:
-        """Chord lengths that cut each piece into `count` equal ones."""
-        steps = np.arange(count) / count
-        inner = self.knots[:-1, None] + steps * np.diff(self.knots)[:, None]
-        return np.append(inner.reshape(-1), self.knots[-1])
-
-    @cached_property
-    def search(self) -> ClosestPointSearch:
-        """Nearest points of the curve in the half plane."""
-
-        def jet(x: Array) -> Jet:
-            s = x[:, 0]
-            return Jet(self.at(s), self.at(s, 1)[:, None], self.at(s, 2)[:, None, None])
-
-        line = self.fractions(_SAMPLES)
-        return ClosestPointSearch(lambda x: self.at(x[:, 0]), jet, (line,), (False,))
-
-    def faults(self) -> list[Fault]:
-        """What keeps the curve from making a smooth surface; empty if nothing does."""
-        extent = float(np.abs(self.points - self.points.mean(axis=0)).max())
-        return self._spot_faults(extent) or [
-            Fault("profile", text)
-            for text in (self._axis_fault(), self._speed_fault(), self._crossing_fault())
-            if text
-        ]
-
-    def _spot_faults(self, extent: float) -> list[Fault]:
-        """Faults of the points themselves."""
-        faults = []
-        r = self.points[:, 0]
-        for k in np.flatnonzero(r < _LEAST * max(extent, float(r.max()))).tolist():
-            if r[k] != 0.0 or 0 < k < len(r) - 1:
-                expected = (
-                    "must keep clear of the axis (r > 0), where only the first and the last point "
-                    "may be (r = 0)"
-                )
-                faults.append(Fault(f"profile[{k}]", f"got r = {r[k]:g}", expected=expected))
-        steps = np.linalg.norm(np.diff(self.points, axis=0), axis=1)
-        for k in np.flatnonzero(steps <= _LEAST * extent).tolist():
-            text = "is the point before it; leave one of them out"
-            faults.append(Fault(f"profile[{k + 1}]", text))
-        ends = np.linalg.norm(self.points[0] - self.points[-1])
-        if len(r) > 2 and not faults and ends <= _LEAST * extent:
-            text = "must not end where it begins; use a torus, or two profiles"
-            faults.append(Fault("profile", text))
-        return faults
-
-    def _axis_fault(self) -> str:
-        """Where the curve reaches the axis between the points: exact, from its extrema."""
-        radius = self._splines[0]
-        turns = radius.derivative().roots(extrapolate=False)
-        turns = turns[(turns > 0.0) & (turns < self.length)]
-        if len(turns):
-            lowest = turns[np.argmin(radius(turns))]
-            if radius(lowest) <= _LEAST * float(self.points[:, 0].max()):
-                r, z = self.at(lowest)
-                return (
-                    f"must stay clear of the axis between its points; the smooth curve "
-                    f"reaches r = {r:g} near z = {z:g}; add points there"
-                )
-        return ""
-
-    def _speed_fault(self) -> str:
-        """Where the curve stops or turns back.
-
-        The second derivative is linear on each piece, so its ends bound how much the first one
-        changes between samples: no place between them is missed.
-        """
-        s = self.fractions(_SAMPLES)
-        speed = np.linalg.norm(self.at(s, 1), axis=1)
-        bend = np.linalg.norm(self.at(self.knots, 2), axis=1)
-        most = np.repeat(np.maximum(bend[:-1], bend[1:]), _SAMPLES)
-        least = np.minimum(speed[:-1], speed[1:]) - most * np.diff(s) / 2.0
-        worst = int(np.argmin(least))
-        wrong_way = [
-            (end, turn)
-            for end, turn, pole in ((0, 1.0, self.poles[0]), (-1, -1.0, self.poles[1]))
-            if pole and turn * self.at(self.knots[end], 1)[0] <= 0.0
-        ]
-        if least[worst] > 0.0 and not wrong_way:
-            return ""
-        place = self.knots[wrong_way[0][0]] if wrong_way else s[worst]
-        r, z = self.at(np.asarray(place))
-        return (
-            f"must not turn back on itself; the smooth curve does near (r, z) = "
-            f"({r:.4g}, {z:.4g}); space the points evenly, or add some there"
-        )
-
-    def _crossing_fault(self) -> str:
-        """Where the curve crosses itself, looked for on the chords between its samples."""
-        from scipy.spatial import cKDTree
-
-        points = self.at(self.fractions(_SAMPLES))
-        a, b = points[:-1], points[1:]
-        tree = cKDTree((a + b) / 2.0)
-        longest = float(np.linalg.norm(b - a, axis=1).max())
-        pairs = tree.query_pairs(longest, output_type="ndarray")
-        pairs = pairs[np.abs(pairs[:, 0] - pairs[:, 1]) > 1]
-        i, j = pairs.T
-        apart = (np.minimum(a[i], b[i]) > np.maximum(a[j], b[j])).any(axis=1)
-        apart |= (np.minimum(a[j], b[j]) > np.maximum(a[i], b[i])).any(axis=1)
-        crossing = ~apart & _straddles(a[i], b[i], a[j], b[j]) & _straddles(a[j], b[j], a[i], b[i])
-        if not crossing.any():
-            return ""
-        r, z = a[i[np.argmax(crossing)]]
-        return (
-            f"must not cross itself; the smooth curve does near (r, z) = "
-            f"({r:.4g}, {z:.4g}); add points there, or cut it into two surfaces"
-        )
-
-
-def _straddles(a: Array, b: Array, c: Array, d: Array) -> NDArray[np.bool_]:
-    """True where c and d do not lie strictly on one side of the line through a and b."""
-    along = b - a
-    first, second = (along[:, 0] * (e - a)[:, 1] - along[:, 1] * (e - a)[:, 0] for e in (c, d))
-    return np.asarray(np.sign(first) * np.sign(second) <= 0.0)
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -234,6 +67,29 @@ class Revolution(SmoothPatch):
 
         around = rectangle_areas(element, u0, u1, 0.0, 1.0, u_breaks=self.profile.knots)
         return np.asarray((np.asarray(v1, float) - np.asarray(v0, float)) * around)
+
+    @property
+    def part_roots(self) -> tuple[Array, Array]:
+        """Closest points never lie beyond the profile's ends."""
+        low, high = super(Revolution, self).part_roots
+        low[:, 0], high[:, 0] = self.u_range
+        return low, high
+
+    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
+        """The profile turned about z, and its normal, along (-z', r').
+
+        r'' and z'' are linear on each piece of the spline, so the largest are at its ends, and the
+        third derivatives, which are the second ones of the normal's direction, are constant there.
+        """
+        u0, u1 = low[:, 0], high[:, 0]
+        half = (u1 - u0) / 2.0
+        bends, changes = self.profile.most(u0, u1)
+        at = np.stack([u0, u0 + half, u1])
+        curve = bend(self.profile.at(at), bends, half)
+        leftward = self.profile.at(at, 1)[..., ::-1] * np.array([-1.0, 1.0])
+        normal = unit_curve(bend(leftward, changes[:, ::-1], half))
+        around = low[:, 1], high[:, 1], 1
+        return turned(curve, *around).model(), turned(normal, *around).model()
 
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """The nearest point of the profile, turned to the point's azimuth."""

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks, table
+from surfaces.patches.affine_models import SpaceModel
 from surfaces.patches.nurbs.nurbs import SplineMap
 from surfaces.patches.nurbs.nurbs_checks import (
     MOST_DEGREE,
@@ -20,6 +21,7 @@ from surfaces.patches.nurbs.nurbs_checks import (
     checked_weights,
     regularity_faults,
 )
+from surfaces.patches.nurbs.spline_parts import spline_models
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.surface import Side, SurfaceError
@@ -67,6 +69,16 @@ class SplinePatch(SmoothPatch):
         """By quadrature of |S_u x S_v|, cut at the knots."""
         breaks = self.net.breaks(0), self.net.breaks(1)
         return rectangle_areas(self.net.element, u0, u1, v0, v1, *breaks)
+
+    @property
+    def part_roots(self) -> tuple[Array, Array]:
+        """The ranges: closest points never lie beyond them."""
+        ends = np.array([self.u_range, self.v_range])
+        return ends[None, :, 0], ends[None, :, 1]
+
+    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
+        """See `surfaces.patches.nurbs.spline_parts`."""
+        return spline_models(self.net.spans, low, high)
 
     def local_closest_points(self, points: Array) -> LocalClosestPoints:
         """By search; see `surfaces.patches.closest_point`."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
+from surfaces.patches.nurbs.spline_parts import SpanNets, span_nets
 from surfaces.protected import Protected
 
 if TYPE_CHECKING:
@@ -150,6 +151,12 @@ class SplineMap(Protected):
         low, high = np.array(self.low), np.array(self.high)
         turned = low + np.mod(x - low, high - low)
         return np.where(np.array(self.closed) & ((x < low) | (x > high)), turned, x)
+
+    @cached_property
+    def spans(self) -> SpanNets:
+        """The same as polynomials."""
+        breaks = self.breaks(0), self.breaks(1)
+        return span_nets(self.points, self.weights, self.knots, self.degree, breaks)
 
     @cached_property
     def search(self) -> ClosestPointSearch:

@@ -16,7 +16,7 @@ from smooth_probes import (
 )
 
 from surfaces import SurfaceError, cone, revolution
-from surfaces.patches.revolution import Profile
+from surfaces.patches.profile import Profile
 
 VASE = [(0.2, 0.0), (0.35, 0.2), (0.15, 0.5), (0.25, 0.7)]
 BOWL = [(0.0, -0.4), (0.2, -0.35), (0.4, -0.1), (0.45, 0.1)]

@@ -1,0 +1,308 @@
+"""Bounds on parts of splines and NURBS: control points hold everything between them.
+
+Over one span a spline is a polynomial; in Bernstein's basis its values are means of its
+coefficients, with weights >= 0. The coefficients of an affine function lie on it. So what is left
+of an affine model is no longer than it is at the longest coefficient. For a rational spline P / w
+the left over (P - A w) / w is no longer than the largest ratio of coefficients of P - A w and w,
+both of the degree of A w, as all of those of w are > 0.
+
+The normal is along S_u x S_v, which is a polynomial too: N = P_u x P_v, or for a rational spline
+N = w P_u x P_v + w_v P x P_u + w_u P_v x P, w^3 times it. A model of N gives one of N / |N|, see
+`unit_model`.
+
+A box of parameters is cut at the knots and, where that is not too dear, at its middle, which brings
+the coefficients nearer to the values.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.patches.affine_models import SpaceModel, unit_model
+from surfaces.patches.nurbs.bernstein import (
+    abscissae,
+    cross,
+    derivative,
+    part_of,
+    product,
+    span_matrix,
+)
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+_QUARTERED = 128  # coefficients of N, with more a box is not cut at its middle
+_BLOCK = 200_000  # numbers held at a time, about
+_ROUNDING = 1e-13  # [1] of the products that N is the sum of
+
+
+class SpanNets(NamedTuple):
+    """A spline as polynomials over its spans, U along u and V along v."""
+
+    breaks: tuple[Array, Array]
+    """(U + 1,) and (V + 1,) where spans end."""
+    origin: Array
+    """(3,) m, from which the points are counted, so that nothing cancels in N."""
+    points: Array
+    """(U V, p + 1, q + 1, 3) m, coefficients; those of w P where there are weights."""
+    weights: Array | None
+    """(U V, p + 1, q + 1, 1) of w; None where all are one."""
+    normals: Array
+    """(U V, ..., 3) of N."""
+    rounding: Array
+    """(U V,) how wrong the coefficients of N may be."""
+
+
+def span_nets(
+    points: Array,
+    weights: Array | None,
+    knots: tuple[Array, Array],
+    degree: tuple[int, int],
+    breaks: tuple[Array, Array],
+) -> SpanNets:
+    """See `SplineMap` for the arguments, all but `breaks`: where its smooth spans begin and end."""
+    origin = points.mean(axis=(0, 1))
+    net = points - origin
+    if weights is not None:
+        net = np.concatenate([weights[..., None] * net, weights[..., None]], axis=-1)
+    by_u = [
+        span_matrix(knots[0], degree[0], *ends)
+        for ends in zip(breaks[0][:-1], breaks[0][1:], strict=True)
+    ]
+    by_v = [
+        span_matrix(knots[1], degree[1], *ends)
+        for ends in zip(breaks[1][:-1], breaks[1][1:], strict=True)
+    ]
+    p, q = degree
+    nets = np.array(
+        [
+            np.einsum("ab,cd,bdx->acx", a, c, net[i : i + p + 1, j : j + q + 1])
+            for i, a in by_u
+            for j, c in by_v
+        ]
+    )
+    own, w = nets[..., :3], (None if weights is None else nets[..., 3:])
+    normals, rounding = _normal_nets(own, w)
+    # Derivatives by 0..1 of each span, to those by parameters, which do not jump between spans.
+    sides = [np.diff(line) / (line[-1] - line[0]) for line in breaks]
+    area = np.outer(*sides).ravel()
+    return SpanNets(breaks, origin, own, w, normals / area[:, None, None, None], rounding / area)
+
+
+def _normal_nets(points: Array, weights: Array | None) -> tuple[Array, Array]:
+    """The nets of N over 0..1 of each span, and how wrong they may be."""
+    by_u, by_v = derivative(points, 1), derivative(points, 2)
+    if weights is None:
+        return cross(by_u, by_v), _ROUNDING * _largest(by_u) * _largest(by_v)
+    w_u, w_v = derivative(weights, 1), derivative(weights, 2)
+    net = (
+        product(weights, cross(by_u, by_v))
+        + product(w_v, cross(points, by_u))
+        + product(w_u, cross(by_v, points))
+    )
+    size = (
+        _largest(weights) * _largest(by_u) * _largest(by_v)
+        + _largest(w_v) * _largest(points) * _largest(by_u)
+        + _largest(w_u) * _largest(points) * _largest(by_v)
+    )
+    return net, _ROUNDING * size
+
+
+def _largest(nets: Array) -> Array:
+    """(k,) the longest coefficient of each net."""
+    return np.asarray(np.linalg.norm(nets, axis=-1).max(axis=(1, 2)))
+
+
+def spline_models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
+    """Bounds on points and normals over boxes of parameters (k, 2)."""
+    entries = nets.normals[0].size + 2 * nets.points[0].size
+    step = max(1, _BLOCK // (4 * entries))
+    blocks = [
+        _models(nets, low[first : first + step], high[first : first + step])
+        for first in range(0, len(low), step)
+    ]
+    points, normals = (
+        SpaceModel(*(np.concatenate(arrays) for arrays in zip(*models, strict=True)))
+        for models in zip(*blocks, strict=True)
+    )
+    return points._replace(centre=points.centre + nets.origin), normals
+
+
+class _Pieces(NamedTuple):
+    """What of the boxes lies in single spans, box by box."""
+
+    starts: Ints
+    """(k,) where each box's pieces begin."""
+    box: Ints
+    """(j,) the box of each piece."""
+    span: Ints
+    """(j,)"""
+    low: Array
+    """(j, 2) share of the span."""
+    high: Array
+    """(j, 2)"""
+    middle: Array
+    """(j, 2) of the piece, in -1..1 of the box."""
+    half: Array
+    """(j, 2)"""
+
+    def affine(self, values: Array, m: int = 2, n: int = 2) -> Array:
+        """(j, m, n, d) nets over the pieces of affine functions of x, (k, 3, d): 1, x_1, x_2."""
+        own = values[self.box]
+        middle, by_x, by_y = own[:, 0], own[:, 1], own[:, 2]
+        middle = middle + self.middle[:, :1] * by_x + self.middle[:, 1:] * by_y
+        x = (self.half[:, :1] * abscissae(m))[..., None] * by_x[:, None]
+        y = (self.half[:, 1:] * abscissae(n))[..., None] * by_y[:, None]
+        return np.asarray((middle[:, None] + x)[:, :, None] + y[:, None])
+
+
+def _pieces(breaks: tuple[Array, Array], low: Array, high: Array, quartered: bool) -> _Pieces:
+    """Cut boxes at the knots, and in the middle."""
+    if quartered:
+        centre = (low + high) / 2.0
+        ends = np.stack([low, centre, high])
+        corners = [(i, j) for i in (0, 1) for j in (0, 1)]
+        begin = np.stack([ends[list(c), :, [0, 1]].T for c in corners], axis=1).reshape(-1, 2)
+        stop = np.stack([ends[[i + 1, j + 1], :, [0, 1]].T for i, j in corners], axis=1)
+        stop = stop.reshape(-1, 2)
+    else:
+        begin, stop = low, high
+    first, count = np.empty((2, len(begin)), np.int64), np.empty((2, len(begin)), np.int64)
+    for axis, line in enumerate(breaks):
+        spans = len(line) - 1
+        first[axis] = np.clip(np.searchsorted(line, begin[:, axis], "right") - 1, 0, spans - 1)
+        last = np.clip(np.searchsorted(line, stop[:, axis], "left") - 1, 0, spans - 1)
+        count[axis] = np.maximum(last - first[axis], 0) + 1
+    total = count[0] * count[1]
+    owner = np.repeat(np.arange(len(begin)), total)
+    within = np.arange(len(owner)) - np.repeat(np.cumsum(total) - total, total)
+    along = np.stack(np.divmod(within, count[1][owner])) + first[:, owner]
+    box = owner // (4 if quartered else 1)
+    shares, places = [], []
+    for axis, line in enumerate(breaks):
+        a, b = line[along[axis]], line[along[axis] + 1]
+        ends = np.clip(np.stack([begin[owner, axis], stop[owner, axis]]), a, b)
+        shares.append(np.clip((ends - a) / (b - a), 0.0, 1.0))
+        middle, width = (low[box, axis] + high[box, axis]) / 2.0, high[box, axis] - low[box, axis]
+        places.append(2.0 * (ends - middle) / width)
+    (low_u, high_u), (low_v, high_v) = shares
+    (x0, x1), (y0, y1) = places
+    return _Pieces(
+        starts=np.searchsorted(box, np.arange(len(low))),
+        box=box,
+        span=along[0] * (len(breaks[1]) - 1) + along[1],
+        low=np.stack([low_u, low_v], 1),
+        high=np.stack([high_u, high_v], 1),
+        middle=np.stack([x0 + x1, y0 + y1], 1) / 2.0,
+        half=np.stack([x1 - x0, y1 - y0], 1) / 2.0,
+    )
+
+
+def _models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
+    """Of boxes that are few enough to be held at a time."""
+    quartered = nets.normals[0].size <= 3 * _QUARTERED
+    pieces = _pieces(nets.breaks, low, high, quartered)
+
+    def cut(net: Array) -> Array:
+        inner = part_of(net[pieces.span], pieces.low[:, 0], pieces.high[:, 0], 1)
+        return part_of(inner, pieces.low[:, 1], pieces.high[:, 1], 2)
+
+    points = cut(nets.points)
+    weights = None if nets.weights is None else cut(nets.weights)
+    place = _Fit.of(pieces, points, weights)
+    points_model = SpaceModel(place.centre, place.slopes, place.longest(), place.along())
+    return points_model, _unit_normals(pieces, cut(nets.normals), nets.rounding)
+
+
+def _unit_normals(pieces: _Pieces, net: Array, rounding: Array) -> SpaceModel:
+    """From the nets (j, m, n, 3) of N of each piece, and what is wrong with those of spans.
+
+    N is divided by an affine function first, that is nearly its length: the direction is the same,
+    and where only the length of N changes nothing is left.
+    """
+    long = _Fit.of(pieces, net, None)
+    size = np.maximum(np.linalg.norm(long.centre, axis=1), 1e-300)
+    shares = np.concatenate([long.centre[:, None], long.slopes], axis=1)
+    length = np.einsum("kad,kd->ka", shares, long.centre) / size[:, None]
+    least = length[:, 0] - np.abs(length[:, 1:]).sum(axis=1)
+    known = least > 1e-6 * size
+    length[~known] = [1.0, 0.0, 0.0]
+    flat = np.ones((len(net), net.shape[1] - 1, net.shape[2] - 1, 1))
+    fit = _Fit.of(pieces, net, product(flat, pieces.affine(length[..., None])))
+    own = np.maximum(np.linalg.norm(fit.centre, axis=1), 1e-300)[:, None]
+    wrong = np.maximum.reduceat(rounding[pieces.span], pieces.starts)
+    wrong = np.where(known, wrong / np.where(known, least, 1.0), np.inf)
+    ahead, across = fit.split(fit.centre / own)
+    unit = unit_model(fit.centre, fit.slopes, ahead + wrong, across + wrong)
+    return SpaceModel(*unit, fit.along() + (unit[1] ** 2).sum(axis=2) / 4.0)
+
+
+class _Fit(NamedTuple):
+    """An affine model of each box, and the coefficients of what it leaves of the pieces."""
+
+    pieces: _Pieces
+    centre: Array
+    """(k, 3)"""
+    slopes: Array
+    """(k, 2, 3)"""
+    left: Array
+    """(j, m, n, 3)"""
+
+    @staticmethod
+    def of(pieces: _Pieces, net: Array, weights: Array | None) -> _Fit:
+        """Least squares over the coefficients, the middle moved between the extremes."""
+        values = net if weights is None else net / weights
+        (_, m, n, _), starts = net.shape, pieces.starts
+        x, y = abscissae(m), abscissae(n)
+        rows = values.sum(axis=2)
+        total, by_x = rows.sum(axis=1), np.einsum("m,jmd->jd", x, rows)
+        by_y = np.einsum("n,jnd->jd", y, values.sum(axis=1))
+        at = np.concatenate([np.ones((len(net), 1)), pieces.middle], axis=1)
+        steps = np.stack([total, by_x, by_y], axis=1) * np.insert(pieces.half, 0, 1.0, 1)[..., None]
+        steps[:, 1:] += pieces.middle[..., None] * total[:, None]
+        square = m * n * at[:, :, None] * at[:, None, :]
+        square[:, [1, 2], [1, 2]] += pieces.half**2 * [n * (x @ x), m * (y @ y)]
+        square, right = np.add.reduceat(square, starts), np.add.reduceat(steps, starts)
+        square += 1e-12 * square[:, :1, :1] * np.eye(3)
+        best = np.linalg.solve(square, right)
+        off = values - pieces.affine(best, m, n)
+        low = np.minimum.reduceat(off.min(axis=(1, 2)), starts)
+        high = np.maximum.reduceat(off.max(axis=(1, 2)), starts)
+        best[:, 0] += (low + high) / 2.0
+        if weights is None:
+            left = off - ((low + high) / 2.0)[pieces.box][:, None, None]
+        else:
+            left = _rational_left(pieces, net, weights, best)
+        return _Fit(pieces, best[:, 0], best[:, 1:], left)
+
+    def longest(self) -> Array:
+        """(k,) of what is left."""
+        return self._most(np.linalg.norm(self.left, axis=-1))
+
+    def along(self) -> Array:
+        """(k, 2) what of it comes from each axis."""
+        means = [
+            np.linalg.norm(self.left.mean(axis=2 - axis), axis=-1).max(axis=1) for axis in (0, 1)
+        ]
+        return np.stack([np.maximum.reduceat(m, self.pieces.starts) for m in means], axis=1)
+
+    def split(self, axis: Array) -> tuple[Array, Array]:
+        """(k,) its largest share along unit vectors (k, 3), and square to them."""
+        own = axis[self.pieces.box]
+        share = np.einsum("jmnd,jd->jmn", self.left, own)
+        beside = self.left - share[..., None] * own[:, None, None]
+        return self._most(np.abs(share)), self._most(np.linalg.norm(beside, axis=-1))
+
+    def _most(self, values: Array) -> Array:
+        return np.asarray(np.maximum.reduceat(values.max(axis=(1, 2)), self.pieces.starts))
+
+
+def _rational_left(pieces: _Pieces, net: Array, weights: Array, best: Array) -> Array:
+    """(j, m + 1, n + 1, 3) coefficients of P - A w over those of w, of one degree more each way."""
+    one = np.ones((len(net), 2, 2, 1))
+    return np.asarray(
+        (product(one, net) - product(pieces.affine(best), weights)) / product(one, weights)
+    )
