@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 from numpy.typing import ArrayLike
 
+from coverable_errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search
 from feasibility.task import Task
-from feasibility.verdict import Answer, Evidence, Replay, Verdict, deferred
+from feasibility.verdict import Answer, Evidence, Replay, Verdict, Walk, deferred
 from robots import Robot
 from surfaces import Cells
 
@@ -24,6 +26,7 @@ def check(
     task: Task,
     search: Search | None = None,
     progress: Progress | None = None,
+    seeds: Walk | None = None,
 ) -> Verdict:
     """Can this arm move its tool over all of these cells in one continuous motion?
 
@@ -34,6 +37,8 @@ def check(
         search: method and settings; the complete search by default.
         progress: called as progress(done, total, text) some times a second: cells covered by the
             best motion so far, all cells, and what is going on. What it raises ends the search.
+        seeds: a motion over these cells, or over those of a case nearby, that the complete search
+            begins from: the `witness` of another verdict, say.
 
     Returns:
         The verdict. An infeasible surface is a result, not an error. The first call on a machine
@@ -43,6 +48,7 @@ def check(
         TypeError: an argument is something else, such as a surface that is not cut into cells.
         RobotError: the arm is no serial chain of one-dof joints.
         SurfaceError: the greedy search does not know this kind of surface.
+        ArgumentError: the seeds fit neither arm nor cells, or the search is the greedy one.
 
     Example:
         >>> from robots import load_robot
@@ -59,8 +65,10 @@ def check(
     settings = (search, "search", Search, "a Search, such as Search(seed=1)")
     problem = Problem.of(robot, cells, task, settings)
     if search.method == "greedy":
+        if seeds is not None:
+            raise ArgumentError("seeds are for the complete search; the greedy one has a start")
         return _decided(problem, search, progress, greedy_search)
-    return _decided(problem, search, progress, complete_search)
+    return _decided(problem, search, progress, partial(complete_search, seeds=seeds))
 
 
 def greedy_check(

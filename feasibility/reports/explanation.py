@@ -15,6 +15,7 @@ HEADS = {
     Answer.INFEASIBLE: "infeasible. What would make it feasible, one change at a time:",
     Answer.UNDECIDED: "undecided. What was found to make it feasible, one change at a time:",
 }
+SEEDED = "[1]"  # behind thresholds that a search without known motions did not find
 
 
 def as_text(explanation: Explanation, case_name: str) -> str:
@@ -22,6 +23,8 @@ def as_text(explanation: Explanation, case_name: str) -> str:
     verdict = explanation.verdict
     head = HEADS[verdict.answer] if explanation.thresholds else f"{verdict.answer}."
     lines = [f"{case_name}: {head}", filled("  ", verdict.message)]
+    if explanation.alone is not None:
+        lines.append(filled("  ", _seeded(explanation.alone)))
     if len(verdict.cells) == 0:
         return f"{case_name}: there are no cells to cover, so there is nothing to explain."
     helps = [t for t in explanation.thresholds if t.feasible is not None]
@@ -39,6 +42,8 @@ def as_text(explanation: Explanation, case_name: str) -> str:
             lines.append(filled("  - ", f"proved: {'; '.join(ruled_out)}."))
         for threshold in (t for t in others if not t.ruled_out):
             lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
+    if any(t.feasible is not None and t.feasible.unaided is False for t in helps):
+        lines += ["", filled("  ", f"{SEEDED} {_from_nearby(verdict)}")]
     if explanation.dropped is not None:
         lines += ["", filled("  ", _dropped(verdict, explanation.dropped))]
     if explanation.left_out:
@@ -50,6 +55,22 @@ def helpful(explanation: Explanation) -> list[str]:
     """The thresholds at which a feasible value was found, a sentence each."""
     feasible = explanation.verdict.feasible
     return [sentence(t, feasible) for t in explanation.thresholds if t.feasible is not None]
+
+
+def _seeded(alone: Verdict) -> str:
+    """Why `check` may say something else."""
+    return (
+        f"The motion was found beside the case as given; `check` alone, with seed {alone.seed}, "
+        f"says: {alone.answer} ({alone.evidence})."
+    )
+
+
+def _from_nearby(verdict: Verdict) -> str:
+    """What the mark behind a threshold stands for."""
+    return (
+        "from a motion nearby, replayed; the search of `check` alone, with seed "
+        f"{verdict.seed}, did not find one there."
+    )
 
 
 def _unknown(explanation: Explanation) -> str:
@@ -105,7 +126,7 @@ def sentence(threshold: Threshold, tightened: bool) -> str:
         text += f"; {_against(quantity, threshold.other)}"
     elif tightened and found.value == quantity.end:
         text += ", the furthest value tried"
-    return text + "."
+    return text + ("." if found.unaided is not False else f" {SEEDED}.")
 
 
 def _margin(quantity: Quantity, value: str, now: str) -> str:
@@ -240,6 +261,7 @@ def _finding(quantity: Quantity, finding: Finding | None) -> dict[str, Any] | No
         "verdict": str(finding.answer),
         "evidence": str(finding.evidence),
         "detail": finding.detail,
+        "unaided": finding.unaided,
     }
 
 

@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from coverable_errors import Checks
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.cut_tree import CutTree, Leaf
@@ -15,7 +16,7 @@ from feasibility.problem import Problem
 from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.diagnosis import causes_of
-from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.graph_g import graph_of
 from feasibility.roadmap.search import close, explore
 from feasibility.roadmap.walk import covering_walk
@@ -25,39 +26,78 @@ from feasibility.target_curves import blocked_curves
 from feasibility.verdict import Replay, Walk
 
 
-def complete_search(problem: Problem, search: Search, clock: Clock) -> Found:
+def complete_search(
+    problem: Problem, search: Search, clock: Clock, seeds: Walk | None = None
+) -> Found:
     """Search until one component of the roadmap covers every cell, or rounds gain nothing more.
 
     Args:
         problem: arm, cells and task.
         search: the seed is used, and the time limit for its message.
         clock: started once the kernels are loaded; reports the cells of the best component.
+        seeds: a motion to begin from, see `check`.
+
+    Raises:
+        ArgumentError: the seeds do not fit the arm or the cells.
     """
+    if seeds is not None:
+        _check_seeds(problem, seeds)
     with compiling_notice():
         warm_up()
     problem.cells.curves  # noqa: B018 - part of the cells, made once
     clock.start()
     arrays = arrays_of(problem.robot, problem.cells, problem.searched)
     exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock)
-    in_time = True
+    in_time, known = True, None
     try:
-        explore(exploration)
+        if seeds is not None:
+            known = seeds if _replayed(problem, seeds).accepted else None
+            _plant(exploration, seeds)
+        if known is None:
+            explore(exploration)
         close(exploration)
     except OutOfTime:
         in_time = False
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
-    return _found(problem, exploration, in_time)
+    return _found(problem, exploration, in_time, known)
 
 
-def _found(problem: Problem, exploration: Exploration, in_time: bool) -> Found:
-    """The best component, and the sentences about it."""
+def _check_seeds(problem: Problem, seeds: Walk) -> None:
+    """Refuse a motion of another arm, or over other cells.
+
+    Raises:
+        ArgumentError: it is one.
+    """
+    n, total = problem.robot.n, len(problem.cells)
+    checks = Checks("seeds")
+    if seeds.q.ndim != 2 or seeds.q.shape[1] != n or not np.isfinite(seeds.q).all():
+        checks.wrong("q", seeds.q.shape, f"must be (m, {n}) finite numbers, one column per joint")
+    if seeds.cell.shape != seeds.q.shape[:1] or (seeds.cell >= total).any():
+        checks.wrong("cell", seeds.cell.shape, f"must be (m,) cells below {total}, or negative")
+    checks.done()
+
+
+def _plant(exploration: Exploration, seeds: Walk) -> None:
+    """Seed the cells that a known motion passes, as long as the best component misses some."""
+    for row in np.flatnonzero(seeds.cell >= 0).tolist():
+        if exploration.complete:
+            return
+        cell = int(seeds.cell[row])
+        if not exploration.covered[cell]:
+            exploration.add_seeds(cell, wound(exploration.arrays, seeds.q[row])[None])
+
+
+def _found(
+    problem: Problem, exploration: Exploration, in_time: bool, known: Walk | None = None
+) -> Found:
+    """The best component, and the sentences about it; `known` is a motion that covers all cells."""
     total = len(problem.cells)
     complete = exploration.complete and total > 0
-    walk = covering_walk(exploration.roadmap, exploration.best) if complete else None
+    walk = covering_walk(exploration.roadmap, exploration.best) if complete else known
     covered = int(exploration.covered.sum())
     nodes, motions = (int(count) for count in exploration.roadmap.counters[:2])
     return Found(
-        covered=exploration.covered,
+        covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
         components=tuple(np.flatnonzero(exploration.covers(r)) for r in exploration.roots()),
         start=None if walk is None else int(walk.cell[0]),
         n_edges=exploration.n_edges,
@@ -74,9 +114,9 @@ def _found(problem: Problem, exploration: Exploration, in_time: bool) -> Found:
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
         refused="A motion over every cell was found, but the independent replay refuses it: "
         "{refusal}.",
-        proof=None if complete else _proof(exploration),
+        proof=None if walk is not None else _proof(exploration),
         proved=_proved(problem, exploration),
-        unfinished="" if complete else _unfinished(problem, exploration, in_time),
+        unfinished="" if walk is not None else _unfinished(problem, exploration, in_time),
         exhausted=f"The search ended without a covering motion {problem.within}: "
         f"{_shortfall(exploration)}; the best covers {covered} of {total} cells ({nodes} nodes, "
         f"{exploration.rounds} rounds, seed {exploration.seed}).",

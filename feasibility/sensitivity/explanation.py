@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,17 +26,19 @@ from feasibility.sensitivity.thresholds import (
     quantities,
 )
 from feasibility.task import Task
-from feasibility.verdict import Verdict
+from feasibility.verdict import Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
 SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search should have
 EXTRA = 3  # the same, for margins that are still wide once the others have had their share
+ALL_IN_ALL = 35  # verdicts of the case itself, where it is also tried what `check` alone finds at the thresholds
 LEAST = 20_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
 SAME = 0.05  # [1], postures nearer than that are taken for one, see `_posture`
+NEAREST = 4  # changed cases whose motions are tried on the case as given
 PATIENCE = 20.0  # times the time limit of the verdict
 
 AS_GIVEN = "checking the case as given"
@@ -89,7 +92,23 @@ def explain(
     began = time.monotonic()
     if len(cells) == 0:
         return Explanation(verdict, (), (), None, 0, 0.0)
-    variant = Variant(robot, cells, task)
+    limit = np.inf if search.time_limit is None else PATIENCE * search.time_limit
+    found, motion = _explained(verdict, began, began + limit, progress)
+    if motion is None:
+        return found
+    seeded = check(robot, cells, task, search, seeds=motion)
+    if not seeded.feasible:
+        return found
+    again, _ = _explained(seeded, began, began + limit, progress)
+    evaluations = found.evaluations + again.evaluations
+    return replace(again, alone=verdict, evaluations=evaluations)
+
+
+def _explained(
+    verdict: Verdict, began: float, deadline: float, progress: Progress | None
+) -> tuple[Explanation, Walk | None]:
+    """The thresholds of a case, and a motion over it as given that was found on the way."""
+    variant = Variant(verdict.robot, verdict.cells, verdict.task)
     varied = quantities(variant, widen=not verdict.feasible)
     done: list[Threshold] = []
 
@@ -97,8 +116,7 @@ def explain(
         if progress is not None:
             progress(len(done), len(varied), "looking for thresholds")
 
-    deadline = np.inf if search.time_limit is None else began + PATIENCE * search.time_limit
-    prober = Prober(variant, search.seed, deadline, tick)
+    prober = Prober(variant, verdict.seed, deadline, tick)
     q = known_configurations(verdict)
     dropped = None if verdict.feasible else drop(prober, verdict, q)
     motions = _motions(prober, verdict, q) if verdict.feasible else []
@@ -107,9 +125,36 @@ def explain(
         searches.append(made)
         done.append(threshold)  # one by one: `tick` counts them
     _refine(prober, verdict, searches, done)
+    motion = None if verdict.feasible else _over_given(prober, verdict, searches)
+    if motion is None:
+        most = ALL_IN_ALL * float(verdict.statistics["fk"])
+        done = [made.alone(found, most) for made, found in zip(searches, done, strict=True)]
     left_out = tuple(quantity.name for quantity in varied[len(done) :])
     seconds = time.monotonic() - began
-    return Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds)
+    found = Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds)
+    return found, motion
+
+
+def _over_given(
+    prober: Prober, verdict: Verdict, searches: Sequence[ThresholdSearch]
+) -> Walk | None:
+    """A motion over the case as given, from those found near it; None where there is none.
+
+    A search that was exhausted may have missed it.
+    """
+    if verdict.evidence is Evidence.PROOF:
+        return None
+    good = sorted((made.good for made in searches if made.good is not None), key=lambda g: g.k)
+    for probe in good:  # limits that were widened need not be used
+        attempt = prober.confirmed(prober.given, replace(probe.attempt, angle=None))
+        if attempt.walk is not None:
+            return attempt.walk
+    for probe in good[:NEAREST]:
+        attempt = prober.attempt(prober.arrays, probe.attempt.q, cost_of(verdict), deep=True)
+        attempt = prober.confirmed(prober.given, attempt)
+        if attempt.walk is not None:
+            return attempt.walk
+    return None
 
 
 def cost_of(verdict: Verdict) -> int:

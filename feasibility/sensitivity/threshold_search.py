@@ -8,8 +8,9 @@ what it finds instead is a configuration of another branch, which may go further
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ SCAN = 20  # values tried on the way to the end of a quantity that is not monoto
 SEARCHES = 2  # short of one that failed, even when none should be begun any more
 MORE_SEARCHES = 4  # the same where none has found anything
 BACKS = (0.1, 0.3)  # [1] where the search fails at the end: the next ones are that much nearer
+ALONE = 3.0  # verdicts' worth of evaluations that a search may take without any seeds
 SHORT = 0.8  # verdicts' worth of evaluations that a search from known configurations may take
 
 
@@ -68,7 +70,7 @@ class ThresholdSearch:
     rivals: list[Probe] = field(default_factory=list)
     """The same, as far as each goes unchanged, the furthest first; none that was tried."""
     good: Probe | None = None
-    """The last feasible probe of a margin that was found."""
+    """The last feasible probe that was found."""
 
     # -- a case that is feasible as given -------------------------------------------------------
 
@@ -97,7 +99,28 @@ class ThresholdSearch:
             return found
         good, beyond = self._narrow(good, bad, other)
         reported = self._reported(good)
-        return Threshold(self.quantity, reported, beyond) if reported.feasible else found
+        if not reported.feasible:
+            return found
+        self.good = good
+        return Threshold(self.quantity, reported, beyond)
+
+    def alone(self, found: Threshold, stop: float) -> Threshold:
+        """The same threshold; its feasible side tells whether a search without seeds finds it.
+
+        Args:
+            found: what this search found.
+            stop: evaluations (of the prober) at which that is left open.
+        """
+        most = min(ALONE * self.verdict_cost, stop - self.prober.spent)
+        if found.feasible is None or self.good is None or self.good.k == 0 or most <= 0.0:
+            return found
+        arrays = self.prober.arrays_at(self.quantity, self.good.k)
+        nothing = np.full_like(self.good.attempt.q, np.nan)
+        attempt = self.prober.attempt(arrays, nothing, most, deep=True)
+        late = time.monotonic() > self.prober.deadline
+        cut_short = late or most < ALONE * self.verdict_cost
+        unaided = None if cut_short and not attempt.found else attempt.found
+        return replace(found, feasible=replace(found.feasible, unaided=unaided))
 
     def _outwards(self, here: Probe) -> tuple[Probe, Finding | None]:
         """The last feasible probe on the way to the end, what was found past it, if anything."""
@@ -138,6 +161,7 @@ class ThresholdSearch:
             reported = self._reported(good)
             if not reported.feasible:
                 return Threshold(self.quantity, None, reported)
+            self.good = good
             return Threshold(self.quantity, reported, other or known, self._span(entry))
         tried = ""
         if not self.quantity.monotone:
@@ -314,7 +338,9 @@ class ThresholdSearch:
     def _finding(self, probe: Probe) -> Finding:
         """A probe as a finding."""
         value, attempt = self.quantity.value(probe.k), probe.attempt
-        return Finding(value, attempt.answer, attempt.evidence, attempt.detail)
+        return Finding(
+            value, attempt.answer, attempt.evidence, attempt.detail, witness=attempt.walk
+        )
 
     def _proof(self, k: int, cell: int) -> Finding:
         """A cell that is proved uncoverable at k steps."""

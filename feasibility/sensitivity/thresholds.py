@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
-from feasibility.verdict import Answer, Evidence, Verdict
+from feasibility.verdict import Answer, Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
@@ -144,7 +144,10 @@ def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
 
 
 def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
-    """One limit of one joint, outwards up to the cap, or inwards as far as the other limit."""
+    """One limit of one joint, outwards up to the cap, or inwards to a step from the other limit.
+
+    Limits without any width are no limits that a case may have.
+    """
     slides = bool(robot.prismatic[joint])
     lower, upper = float(robot.lower[joint]), float(robot.upper[joint])
     given, opposite = (lower, upper) if kind is Kind.LOWER else (upper, lower)
@@ -152,12 +155,14 @@ def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
     if not math.isfinite(opposite):  # tightened by no more than it would be widened
         opposite = given + (most if kind is Kind.LOWER else -most)
     outwards = given + (most if kind is Kind.UPPER else -most)
+    step = LENGTH_STEP if slides else math.radians(ANGLE_STEP_DEG)
+    inwards = max(opposite - step, given), min(opposite + step, given)
     return Quantity(
         kind=kind,
         name=f"{robot.joint_names[joint]} {'lower' if kind is Kind.LOWER else 'upper'} limit",
         unit="m" if slides else "rad",
         given=given,
-        end=outwards if widen else opposite,
+        end=outwards if widen else inwards[kind is Kind.UPPER],
         step=LENGTH_STEP if slides else ANGLE_STEP_DEG,
         monotone=True,
         joint=joint,
@@ -178,6 +183,11 @@ class Finding:
     """What was found, proved or tried, in one sentence."""
     cell: int | None = None
     """The cell that a proof is about; None without a proof."""
+    witness: Walk | None = None
+    """The covering motion; None unless feasible."""
+    unaided: bool | None = None
+    """Does the search of `check`, with the seed given and no motion known, find a covering motion
+    too? None where that was not tried. With `witness` as its `seeds`, `check` finds it."""
 
     @property
     def feasible(self) -> bool:
@@ -273,3 +283,6 @@ class Explanation:
     """Evaluations of the arm that the thresholds took, a box of a proof counting as one."""
     seconds: float
     """Time that they took."""
+    alone: Verdict | None = None
+    """What `check` says with the seed given and no motion known, where `verdict` owes its motion to
+    the witness of a threshold; None where `verdict` is that."""
