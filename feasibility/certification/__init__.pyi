@@ -1,6 +1,10 @@
+from .kinematic_bounds import placements as placements
+from .kinematic_bounds import second_derivatives as second_derivatives
 from .motion_replay import Replay as Replay
-from .motion_replay import placements as placements
 from .motion_replay import replay as replay
-from .motion_replay import second_derivatives as second_derivatives
+from .motion_replay import replay_along_curves as replay_along_curves
 from .proof_verification import ProofCheck as ProofCheck
 from .proof_verification import verify_proof as verify_proof
+from .surface_replay import MotionFault as MotionFault
+from .surface_replay import MotionReplay as MotionReplay
+from .surface_replay import replay_over_surface as replay_over_surface

@@ -2,104 +2,25 @@
 
 It shares no code with the search but the curves between cell centres, and compares these with the
 surface's own closest points and normals (`feasibility.certification.curve_matching`). Besides, it
-uses Pinocchio's frame placements and joint Jacobians, and the bound between samples; it sees only
-the walk, not how it was found. The bound D is derived in `feasibility.roadmap.segment_bound`; here
-it is evaluated again from Pinocchio's Jacobian: the linear part of column j, moved to the tool
-point, has the length r_j (the lever arm), and |z_j x a| = s_j for its angular part z_j.
+uses Pinocchio's frame placements and joint Jacobians, and the bound between samples
+(`kinematic_bounds`); it sees only the walk, not how it was found.
 """
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.curve_matching import match_to_curves
+from feasibility.certification.kinematic_bounds import peaks, placements, second_derivatives
+from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
-from robots import Kinematics, Robot
+from robots import Robot
 from surfaces import Cells
 
 CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on metres and unit vectors
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Placements:
-    """What Pinocchio computes for m configurations."""
-
-    points: NDArray[np.float64]
-    """(m, 3) tool points, m."""
-    axes: NDArray[np.float64]
-    """(m, 3) approach axes."""
-    levers: NDArray[np.float64]
-    """(m, n) distance of the tool point from each revolute axis, m; 1 for a prismatic joint."""
-    sines: NDArray[np.float64]
-    """(m, n) sine of the angle between each revolute axis and the approach axis; 0 if prismatic."""
-
-
-def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
-    """Tool points, axes and lever arms at q (m, n) by Pinocchio."""
-    kinematics = Kinematics(robot)
-    points, axes = kinematics.tools(q)
-    linear, angular = np.split(kinematics.twists(q).transpose(0, 2, 1), 2, axis=2)
-    levers = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
-    sines = np.linalg.norm(np.cross(angular, axes[:, None]), axis=2)
-    return Placements(points, axes, levers, sines)
-
-
-def second_derivatives(
-    steps: NDArray[np.float64],
-    prismatic: NDArray[np.bool_],
-    levers: NDArray[np.float64],
-    cap: float,
-    bent: NDArray[np.float64] | None = None,
-) -> NDArray[np.float64]:
-    """Bound D of |p''| (or Da of |a''|) along segments, straight ones in joint space by default.
-
-    Args:
-        steps: (m, n) absolute joint changes; of bent segments, bounds on |dq/ds|, s from 0 to 1.
-        prismatic: (n,) which joints slide.
-        levers: (m + 1, n) r_j (or s_j) at the ends of the segments.
-        cap: upper bound of every lever (1 for sines, inf for lengths).
-        bent: (m, n) bounds on the joints' own |d^2q/ds^2|; each adds that times its lever.
-
-    Returns:
-        (m,) bounds.
-    """
-    m, n = steps.shape
-    own = np.zeros((m, n)) if bent is None else bent
-    is_length = cap > 1.0
-    turns = np.where(prismatic, 0.0, steps)
-    before = np.cumsum(turns, axis=1) - turns  # turn of the revolute joints before j
-    total, behind = np.zeros(m), np.zeros(m)
-    ends = np.maximum(levers[:-1], levers[1:])
-    for j in range(n - 1, -1, -1):
-        d = steps[:, j]
-        if prismatic[j]:
-            if is_length:
-                total += 2.0 * d * before[:, j] + own[:, j]
-                behind += d
-            continue
-        lever = np.minimum(ends[:, j] + 0.5 * behind, cap)
-        total += lever * d * (d + 2.0 * before[:, j]) + lever * own[:, j]
-        behind += lever * d
-    return total
-
-
-def _peaks(
-    a: NDArray[np.float64], b: NDArray[np.float64], most: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(m,) largest values along m segments of a norm with the values a and b (m,) at their ends.
-
-    `most` (m,) bounds the second derivative, so the norm is at most
-    (1 - s) a + s b + s (1 - s) most / 2, whose largest value this is. NaN comes out as NaN.
-    """
-    slope = np.abs(b - a)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        inner = 0.5 * (a + b) + most / 8.0 + slope**2 / (2.0 * most)
-    return np.where(2.0 * slope >= most, np.maximum(a, b), inner)
 
 
 def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
@@ -119,6 +40,10 @@ def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
 def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]) -> Replay:
     """Check a walk: limits, tool point and cone at and between waypoints, and the cells it visits.
 
+    A walk that the curves between cell centres do not show to be right, because it leaves them or
+    because of how far they may be from the surface, is judged over the surface itself
+    (`surface_replay`). Its marked waypoints have to be where they say they are.
+
     Args:
         robot: the arm.
         cells: the cells.
@@ -129,6 +54,37 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     Returns:
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
     """
+    along_curves = replay_along_curves(robot, cells, task, walk, needed)
+    if along_curves.accepted or _malformed(robot, cells, walk):
+        return along_curves
+    if not _marks_are_right(robot, cells, task, walk, needed):
+        return along_curves
+    over_surface = replay_over_surface(robot, cells, task, walk.q, needed)
+    if over_surface.accepted:
+        return Replay(over_surface.certificate, "")
+    if along_curves.narrowly_refused:
+        return along_curves
+    return Replay(along_curves.certificate, f"{along_curves.refusal}; {over_surface.refusal}")
+
+
+def _marks_are_right(
+    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
+) -> bool:
+    """Are the marked waypoints at the targets of their cells, and every needed cell marked?"""
+    at = np.flatnonzero(walk.cell >= 0)
+    visited = np.zeros(len(cells), dtype=bool)
+    visited[walk.cell[at]] = True
+    aims, poses = task.targets(cells), placements(robot, walk.q[at])
+    off = np.linalg.norm(poses.points - aims.points[walk.cell[at]], axis=1)
+    chord = np.linalg.norm(poses.axes - aims.approaches[walk.cell[at]], axis=1)
+    right = (off <= task.effective_tolerance) & (chord <= task.cone_chord + CLOSE_TO_ZERO)
+    return bool(visited[needed].all() and right.all())
+
+
+def replay_along_curves(
+    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
+) -> Replay:
+    """`replay` by the curves alone, of a walk that goes from centre to centre along them."""
     fault = _malformed(robot, cells, walk)
     if fault:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
@@ -153,8 +109,8 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
         # differs from the one at its target.
         before = chord[:-1] + curvature * error[:-1]
         after = chord[1:] + curvature * error[1:]
-    deviated = _peaks(error[:-1], error[1:], derivative_bound) + matched.deviations[:, 0]
-    tilted = _peaks(before, after, axis_bound) + matched.deviations[:, 1]
+    deviated = peaks(error[:-1], error[1:], derivative_bound) + matched.deviations[:, 0]
+    tilted = peaks(before, after, axis_bound) + matched.deviations[:, 1]
     position = np.max(deviated, initial=np.max(error, initial=0.0))
     at_waypoints = chord + matched.centre_curvature * error if len(chord) == 1 else chord
     worst = np.max(tilted, initial=np.max(at_waypoints, initial=0.0))

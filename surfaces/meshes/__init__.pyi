@@ -1,5 +1,7 @@
+from .closest_point import nearest_of_each as nearest_of_each
 from .mesh_surface import MeshSurface as MeshSurface
 from .mesh_surface import mesh as mesh
+from .normals import WIDTH as WIDTH
 from .selection import checked_box as checked_box
 from .selection import checked_cone as checked_cone
 from .selection import checked_plane as checked_plane

@@ -16,7 +16,7 @@ from random_arms import QUESTIONS, between, deviation, planar_arm, question, rob
 
 import feasibility
 from feasibility import Task, check
-from feasibility.certification import replay
+from feasibility.certification import replay_along_curves as replay
 from feasibility.verdict import Walk
 from surfaces import cylinder, plane, sphere
 

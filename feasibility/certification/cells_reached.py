@@ -1,0 +1,120 @@
+"""Which cells a motion reaches: where its tool is within tolerance and cone of their centres.
+
+A cell counts as reached by one exact configuration of the motion, so no bound is needed. Cells that
+no sample reaches are looked for between samples, where the tool passes nearest.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.stretches import CLOSE_TO_ZERO, Samples
+from feasibility.task import Task
+from robots import Kinematics, Robot
+from surfaces import Cells
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TRIES = np.linspace(0.0, 1.0, 9)  # of the part of a stretch that passes within the tolerance
+NAMED = 5  # cells that are listed
+
+
+def in_order(samples: Samples) -> Samples:
+    """The same samples as the motion passes them."""
+    return samples.of(np.lexsort((samples.share, samples.row)))
+
+
+def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: Samples) -> Mask:
+    """(N,) cells that a motion reaches.
+
+    Args:
+        robot: the arm.
+        cells: the cells.
+        task: its tolerance and cone.
+        rows: (m, n) the motion.
+        samples: of it, in the order of `in_order`, all rows among them.
+    """
+    from scipy.spatial import cKDTree
+
+    reached = np.zeros(len(cells), dtype=bool)
+    if not len(cells) or not len(samples.row):
+        return reached
+    aims, tolerance = task.targets(cells), task.effective_tolerance
+    tree = cKDTree(samples.points)
+    near = tree.query_ball_point(aims.points, tolerance)
+    cell, sample = _flat(near)
+    good = _at(task, samples.points[sample], samples.axes[sample], aims.points[cell],
+               aims.approaches[cell])  # fmt: skip
+    reached[cell[good]] = True
+    left = np.flatnonzero(~reached)
+    starts, ends = samples.points[:-1], samples.points[1:]
+    if not len(left) or not len(starts):
+        return reached
+    half = 0.5 * np.linalg.norm(ends - starts, axis=1)
+    tree = cKDTree(0.5 * (starts + ends))
+    # Of stretches much longer than others there are few; a tool may bend off its chord a little.
+    some, piece = _flat(tree.query_ball_point(aims.points[left], 2.0 * tolerance + half.max()))
+    some = left[some]
+    low, high = _passing(aims.points[some], starts[piece], ends[piece], 2.0 * tolerance)
+    passes = low <= high
+    some, piece, low, high = some[passes], piece[passes], low[passes], high[passes]
+    t = low[:, None] + TRIES * (high - low)[:, None]
+    row = samples.row[piece]
+    stop = np.where(samples.row[piece + 1] > row, 1.0, samples.share[piece + 1])
+    share = samples.share[piece][:, None] + t * (stop - samples.share[piece])[:, None]
+    following = np.minimum(row + 1, len(rows) - 1)
+    q = rows[row][:, None] + share[..., None] * (rows[following] - rows[row])[:, None]
+    points, axes = Kinematics(robot).tools(q.reshape(-1, rows.shape[1]))
+    cell = np.repeat(some, len(TRIES))
+    good = _at(task, points, axes, aims.points[cell], aims.approaches[cell])
+    reached[cell[good]] = True
+    return reached
+
+
+def _flat(lists: NDArray[np.object_]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Which list, and what in it, of all entries of all lists."""
+    counts = [len(found) for found in lists]
+    owner = np.repeat(np.arange(len(lists)), counts)
+    return owner, np.array([k for found in lists for k in found], dtype=np.int64)
+
+
+def _at(task: Task, points: Array, axes: Array, aims: Array, approaches: Array) -> Mask:
+    """(k,) within the tolerance of the target, and the cone of the approach."""
+    off = np.linalg.norm(points - aims, axis=1)
+    chord = np.linalg.norm(axes - approaches, axis=1)
+    inside = chord <= task.cone_chord + CLOSE_TO_ZERO
+    return np.asarray((off <= task.effective_tolerance) & inside)
+
+
+def _passing(aims: Array, starts: Array, ends: Array, within: float) -> tuple[Array, Array]:
+    """(k,) from where to where on lines, 0..1, they are near (within, m); low > high: never."""
+    along, off = ends - starts, starts - aims
+    a, b = (along**2).sum(axis=1), (along * off).sum(axis=1)
+    safe = np.maximum(a, 1e-300)
+    nearest = np.clip(-b / safe, 0.0, 1.0)
+    least = ((off + nearest[:, None] * along) ** 2).sum(axis=1)
+    rest = within**2 - ((off - (b / safe)[:, None] * along) ** 2).sum(axis=1)
+    reach = np.sqrt(np.maximum(rest, 0.0) / safe)
+    low, high = np.clip(-b / safe - reach, 0.0, 1.0), np.clip(-b / safe + reach, 0.0, 1.0)
+    never = least > within**2
+    return np.where(never, 1.0, low), np.where(never, 0.0, high)
+
+
+def missed_text(
+    cells: Cells, task: Task, missed: NDArray[np.int64], samples: Samples
+) -> tuple[str, int]:
+    """Which cells are missed, and by how much the nearest sample misses the first; its index."""
+    names = [str(list(cells.unravel(int(k)))) for k in missed[:NAMED]]
+    more = f" and {len(missed) - NAMED:,} more" if len(missed) > NAMED else ""
+    what = f"cell {names[0]} is" if len(missed) == 1 else f"cells {', '.join(names)}{more} are"
+    if not len(samples.row):
+        return f"{what} never reached", -1
+    aims, first = task.targets(cells), missed[0]
+    off = np.linalg.norm(samples.points - aims.points[first], axis=1)
+    nearest = int(np.argmin(off))
+    where = f"comes no nearer to the target of {names[0]} than about {1e3 * off[nearest]:.4g} mm"
+    if off[nearest] <= task.effective_tolerance:
+        where = f"is at the target of {names[0]}, but not inside the cone there"
+    return f"{what} never reached: the tool {where}", nearest

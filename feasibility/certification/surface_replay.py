@@ -1,0 +1,241 @@
+"""The replay of any joint motion over a surface, whoever made it.
+
+A motion is straight in joint space between its rows. It is accepted where, at every instant, the
+joints are inside their limits, and some place x of the surface that moves continuously has the tool
+point within the tolerance of its target T(x) and the tool axis within the cone of its approach
+direction b(x); and where every needed cell is reached at some instant. No curve between cells is
+asked for, nor where the motion says that it is.
+
+Between rows, bounds are used (`stretches`). A stretch that they do not accept is halved: they fall
+to a quarter, and one exact configuration is added. What is wrong at an exact configuration is
+refused, and so is what is still open after many halvings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
+from feasibility.certification.kinematic_bounds import placements
+from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
+from feasibility.cone import angle_of
+from feasibility.task import Task
+from feasibility.verdict import Certificate
+from robots import Robot
+from surfaces import Cells
+from surfaces.places import offset_surface
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+LEVELS = 26  # halvings of a segment between two rows
+MOST_SAMPLES = 1_000_000  # configurations looked at between rows
+ENOUGH = 1000  # wrong configurations, after which no more are looked for
+
+
+@dataclass(frozen=True, slots=True)
+class MotionFault:
+    """One thing that is wrong with a motion, and where."""
+
+    row: int
+    """Index of the row, or of the row before; -1 where the whole motion is meant."""
+    share: float
+    """How far the motion has come from there to the next row, 0..1."""
+    text: str
+
+    def __str__(self) -> str:
+        """Place and fault; rows are counted from 1."""
+        if self.row < 0:
+            return self.text
+        if self.share == 0.0:
+            return f"row {self.row + 1}: {self.text}"
+        way = f"row {self.row + 1} to {self.row + 2}, {self.share:.3g} of the way"
+        return f"{way}: {self.text}"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class MotionReplay:
+    """What the replay of a motion over a surface found."""
+
+    certificate: Certificate
+    """Bounds over all of an accepted motion; of a refused one what was measured."""
+    faults: tuple[MotionFault, ...]
+    """Why the motion is refused, the worst of each kind; none when it is accepted."""
+    reached: Mask
+    """(N,) cells that are reached."""
+
+    @property
+    def accepted(self) -> bool:
+        """True when every constraint holds along the whole motion and every cell is reached."""
+        return not self.faults
+
+    @property
+    def refusal(self) -> str:
+        """All faults in words; empty when the motion is accepted."""
+        return "; ".join(map(str, self.faults))
+
+
+def replay_over_surface(
+    robot: Robot, cells: Cells, task: Task, q: NDArray[np.float64], needed: Mask | None = None
+) -> MotionReplay:
+    """Judge a motion by the module's rules.
+
+    Args:
+        robot: the arm.
+        cells: the surface and its cells.
+        task: its tolerance and cone are used exactly.
+        q: (m, n) rows, rad or m, unwrapped.
+        needed: (N,) cells that have to be reached; all by default.
+    """
+    rows = np.asarray(q, dtype=float)
+    nowhere = np.zeros(len(cells), dtype=bool)
+    fault = _malformed(robot, rows)
+    if fault is not None:
+        unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
+        return MotionReplay(unknown, (fault,), nowhere)
+    sign = cells.surface.side_sign
+    judge = Judge(robot, task, offset_surface(cells.surface, sign * task.standoff), -sign)
+    margin, faults = _limits(robot, rows)
+    poses = placements(robot, rows)
+    count = np.arange(len(rows))
+    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes)
+    good = judge.within(at_rows.error, at_rows.chord)
+    faults += _exact_faults(judge, at_rows.of(~good), "row")
+    stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
+    looked = _Between(judge, rows, stretches)
+    faults += looked.faults
+    samples = in_order(Samples.join([at_rows, *looked.samples]))
+    reached = cells_reached(robot, cells, task, rows, samples)
+    missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
+    if len(missed):
+        text, near = missed_text(cells, task, missed, samples)
+        where = (-1, 0.0) if near < 0 else (int(samples.row[near]), float(samples.share[near]))
+        faults.append(MotionFault(*where, text))
+    error = max(looked.error, float(np.max(samples.error, initial=0.0)))
+    chord = max(looked.chord, float(np.max(samples.chord, initial=0.0)))
+    certificate = Certificate(len(rows), error, angle_of(chord), margin)
+    return MotionReplay(certificate, tuple(faults), reached)
+
+
+class _Between:
+    """What is found between rows: stretches judged, and halved as needed."""
+
+    def __init__(self, judge: Judge, rows: Array, stretches: Stretches) -> None:
+        """Judge stretches whose ends are good."""
+        self.judge, self.rows = judge, rows
+        self.error = self.chord = 0.0
+        self.faults: list[MotionFault] = []
+        self.samples: list[Samples] = []
+        wrong: list[Samples] = []
+        left, seen = stretches, 0
+        for level in range(LEVELS + 1):
+            bounds = judge.bounds(left)
+            good = judge.within(bounds.error, bounds.chord)
+            self.error = max(self.error, float(np.max(bounds.error[good], initial=0.0)))
+            self.chord = max(self.chord, float(np.max(bounds.chord[good], initial=0.0)))
+            left, bounds = left.of(~good), bounds.of(~good)
+            seen += len(left.length)
+            enough = sum(len(part.row) for part in wrong) > ENOUGH
+            if not len(left.length) or enough or level == LEVELS or seen > MOST_SAMPLES:
+                break
+            left = self._halved(left, wrong)
+        if wrong:
+            self.faults = _exact_faults(judge, Samples.join(wrong), "place")
+        elif len(left.length):
+            self.faults = [_open_fault(judge, left, bounds)]
+
+    def _halved(self, left: Stretches, wrong: list[Samples]) -> Stretches:
+        """The halves of stretches whose middles are good."""
+        start = left.start
+        share = start.share + 0.5 * left.length
+        ahead = self.rows[start.row + 1] - self.rows[start.row]
+        q = self.rows[start.row] + share[:, None] * ahead
+        middle = self.judge.sampled(start.row, share, q)
+        good = self.judge.within(middle.error, middle.chord)
+        self.samples.append(middle)
+        if not good.all():
+            wrong.append(middle.of(~good))
+        return left.of(good).halves(middle.of(good))
+
+
+def _malformed(robot: Robot, rows: Array) -> MotionFault | None:
+    """Why rows are no motion of this arm; None when they are one."""
+    if rows.ndim != 2 or rows.shape[1] != robot.n:
+        return MotionFault(-1, 0.0, f"rows of shape {rows.shape} are no motion of {robot.n} joints")
+    finite = np.isfinite(rows)
+    if not finite.all():
+        row, joint = np.argwhere(~finite)[0]
+        return MotionFault(int(row), 0.0, f"{robot.joint_names[joint]} is not a finite number")
+    return None
+
+
+def _limits(robot: Robot, rows: Array) -> tuple[float, list[MotionFault]]:
+    """The smallest distance from a limit, and the worst row that passes one; limits are convex."""
+    margins = np.minimum(rows - robot.lower, robot.upper - rows)
+    least = float(margins.min(initial=np.inf))
+    if least >= 0.0:
+        return least, []
+    row, joint = np.unravel_index(np.argmin(margins), margins.shape)
+    slides = robot.prismatic[joint]
+    by = f"{-1e3 * least:.4g} mm" if slides else f"{-np.degrees(least):.4g} deg"
+    text = f"{robot.joint_names[joint]} passes its limit by {by}"
+    others = int((margins < 0.0).any(axis=1).sum()) - 1
+    return least, [MotionFault(int(row), 0.0, text + _others(others, "row"))]
+
+
+def _exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
+    """The worst of configurations that are wrong: the furthest off, and the most tilted."""
+    task, faults = judge.task, []
+    tolerance = task.effective_tolerance
+    off = np.flatnonzero(~(wrong.error <= tolerance))
+    if len(off):
+        worst = off[np.argmax(np.nan_to_num(wrong.error[off], nan=np.inf))]
+        text = (
+            f"the tool point is {1e3 * wrong.error[worst]:.4g} mm off its surface, "
+            f"{1e3 * tolerance:g} mm are allowed" + _others(len(off) - 1, noun)
+        )
+        faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
+    tilted = np.flatnonzero(~judge.within(np.zeros(len(wrong.chord)), wrong.chord))
+    if len(tilted):
+        worst = tilted[np.argmax(np.nan_to_num(wrong.chord[tilted], nan=np.inf))]
+        text = (
+            f"the tool axis tilts {np.degrees(angle_of(float(wrong.chord[worst]))):.4f} deg, "
+            f"{task.cone_deg:g} deg are allowed" + _others(len(tilted) - 1, noun)
+        )
+        faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
+    return faults
+
+
+def _others(number: int, noun: str) -> str:
+    """' (the worst; wrong at 3 other rows, too)', or nothing."""
+    plural = "s" if number != 1 else ""
+    return f" (the worst; wrong at {number:,} other {noun}{plural}, too)" if number > 0 else ""
+
+
+def _open_fault(judge: Judge, left: Stretches, bounds: Bounds) -> MotionFault:
+    """What to say of a stretch that neither bounds nor exact configurations decide."""
+    # One with a jump first, then the shortest: what is wrong there is nearest to a place.
+    one = int(np.lexsort((left.length, bounds.joined))[0])
+    row, share = int(left.start.row[one]), float(left.start.share[one] + 0.5 * left.length[one])
+    if not bounds.joined[one]:
+        target = [
+            judge.offset.at(s.places.of(np.array([one])))[0][0] for s in (left.start, left.end)
+        ]
+        jump = 1e3 * float(np.linalg.norm(target[1] - target[0]))
+        text = f"the place on the surface that the tool is over jumps, by {jump:.3g} mm"
+    elif not bounds.error[one] <= judge.task.effective_tolerance:
+        text = (
+            "not certified: the tool point is at the edge of the tolerance, or its place on the "
+            f"surface jumps (within {1e3 * bounds.error[one]:.6g} mm, "
+            f"{1e3 * judge.task.effective_tolerance:g} mm are allowed)"
+        )
+    else:
+        text = (
+            "not certified: the tool axis is at the rim of the cone (within "
+            f"{np.degrees(angle_of(float(bounds.chord[one]))):.6f} deg, {judge.task.cone_deg:g} "
+            "deg are allowed)"
+        )
+    return MotionFault(row, share, text)

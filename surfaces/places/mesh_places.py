@@ -1,0 +1,164 @@
+"""Places of a triangle mesh: a face, and the weights of its second and third corner.
+
+The offset surface over a face is f + h n with the normal n interpolated between the corners, see
+`surfaces.meshes.normals`. On the strip along a crease n = v / |v| with
+
+    v = sum of w_c (own_c + t (crease_c - own_c)),    t from 0 at the strip's inner border to 1,
+
+so along a straight line in the weights v is straight beside the strip and of second order on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.meshes import WIDTH, MeshSurface
+from surfaces.places.offset_triangles import OffsetTriangles
+from surfaces.places.places import (
+    ROUNDING,
+    Array,
+    Ints,
+    OffsetSurface,
+    PlacePaths,
+    Places,
+    second_derivative_of_unit,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class MeshPlaces(OffsetSurface):
+    """The places of a mesh. Paths lead over one edge or vertex at most."""
+
+    surface: MeshSurface
+
+    def at(self, places: Places) -> tuple[Array, Array]:
+        """See `OffsetSurface.at`."""
+        face, weights = np.maximum(places.chart, 0), _weights(places.x)
+        normals = self.surface.normals_at(face, weights)
+        points = self.surface.points_at(face, weights) + self.height * normals
+        for values in (points, normals):
+            values[places.chart < 0] = np.nan
+        return points, normals
+
+    @cached_property
+    def _triangles(self) -> OffsetTriangles:
+        return OffsetTriangles.of(self.surface, self.height)
+
+    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+        """See `OffsetSurface.nearest`: on the flat triangles between the offset corners."""
+        face, weights = self._triangles.nearest(points)
+        return Places(face, weights[:, 1:])
+
+    def paths(self, start: Places, end: Places) -> PlacePaths:
+        """See `OffsetSurface.paths`."""
+        none = np.full((len(start.x), 2), np.inf)
+        made = PlacePaths.straight((self.at(start), self.at(end)), none)
+        same = (start.chart == end.chart) & (start.chart >= 0)
+        row = np.flatnonzero(same)
+        made.bends[row, 2] = self._bends(start.chart[row], start.x[row], end.x[row])
+        row = np.flatnonzero(~same & (start.chart >= 0) & (end.chart >= 0))
+        faces = self.surface.mesh.faces
+        equal = faces[start.chart[row]][:, :, None] == faces[end.chart[row]][:, None, :]
+        touching = equal.any(axis=(1, 2))
+        row, equal = row[touching], equal[touching]
+        if len(row):
+            made.put(row, self._across(start.of(row), end.of(row), equal))
+        return made
+
+    def _across(self, start: Places, end: Places, equal: NDArray[np.bool_]) -> PlacePaths:
+        """Paths from one face to another that shares an edge or a vertex with it.
+
+        The edge is crossed where it comes closest to the straight line. There the place belongs to
+        both faces; normals on either side differ only if a crease ends there.
+
+        Args:
+            start: places.
+            end: places on other faces.
+            equal: (k, 3, 3) which corners of both faces are one vertex.
+        """
+        one = np.asarray(equal.any(axis=2))
+        count = one.sum(axis=1)
+        row = np.arange(len(count))
+        corner = np.argmax(one, axis=1)
+        last = np.where(count >= 2, 2 - np.argmax(one[:, ::-1], axis=1), corner)
+        mates = np.argmax(equal[row, corner], axis=1), np.argmax(equal[row, last], axis=1)
+        ends = self.at(start)[0], self.at(end)[0]
+        eye = np.eye(3)
+        along = [self.at(Places(start.chart, eye[c][:, 1:]))[0] for c in (corner, last)]
+        t = np.where(count >= 2, _crossing(*ends, *along), 0.0)[:, None]
+        before = Places(start.chart, ((1.0 - t) * eye[corner] + t * eye[last])[:, 1:])
+        after = Places(end.chart, ((1.0 - t) * eye[mates[0]] + t * eye[mates[1]])[:, 1:])
+        placed = [self.at(places) for places in (start, before, after, end)]
+        points = np.stack([point for point, _ in placed], axis=1)
+        to = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        fro = np.linalg.norm(points[:, 3] - points[:, 2], axis=1)
+        share = np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
+        zero = np.zeros_like(share)
+        bends = [
+            self._bends(start.chart, start.x, before.x),
+            np.zeros((len(row), 2)),
+            self._bends(end.chart, after.x, end.x),
+        ]
+        return PlacePaths(
+            np.stack([zero, share, share, zero + 1.0], axis=1),
+            points,
+            np.stack([normal for _, normal in placed], axis=1),
+            np.stack(bends, axis=1),
+        )
+
+    def _bends(self, face: Ints, start: Array, stop: Array) -> Array:
+        """(k, 2) see `PlacePaths.bends`, for straight lines in the weights of a face.
+
+        On one side of the strip's border v is smooth: v'' = 2 t' g' for the sum g of
+        w_c (crease_c - own_c). A line over that border has a kink there; its slope is at most
+        |o'| + |t'| |g| + |g'|, with o the sum of w_c own_c, and a curve of slope M differs from a
+        straight line by at most 2 M s (1 - s).
+        """
+        surface = self.surface
+        a, b = _weights(start), _weights(stop)
+        own = surface.corner_normals[face]
+        turn = surface.crease_normals[face] - own
+        level = [(w * surface.on_crease[face]).sum(axis=1) for w in (a, b)]
+        o = [np.einsum("kc,kci->ki", w, own) for w in (a, b)]
+        g = [np.einsum("kc,kci->ki", w, turn) for w in (a, b)]
+        rate = (level[1] - level[0]) / WIDTH
+        inner = 1.0 - WIDTH
+        beside = np.maximum(*level) <= inner
+        within = np.minimum(*level) >= inner
+        rate = np.where(beside, 0.0, rate)
+        do, dg = o[1] - o[0], g[1] - g[0]
+        most = np.maximum(*(np.linalg.norm(part, axis=1) for part in g))
+        size_dg = np.where(beside, 0.0, np.linalg.norm(dg, axis=1))
+        slope = np.linalg.norm(do, axis=1) + np.abs(rate) * most + size_dg
+        middle = 0.5 * (a + b)
+        shared = surface.crease_share(face, middle)[:, None]
+        v = np.einsum("kc,kci->ki", middle, own + shared[..., None] * turn)
+        least = np.linalg.norm(v, axis=1) - 0.5 * slope
+        smooth = second_derivative_of_unit(least, slope, 2.0 * np.abs(rate) * size_dg)
+        positive = least > 0.0
+        kinked = np.where(positive, 4.0 * slope / np.where(positive, least, 1.0), np.inf)
+        normal = np.where(beside | within, smooth, kinked)
+        normal = np.where((start == stop).all(axis=1), 0.0, normal) * ROUNDING
+        bend = abs(self.height) * normal if self.height else np.zeros_like(normal)
+        return np.stack([np.where(positive, bend, np.inf), normal], axis=1)
+
+
+def _weights(x: Array) -> Array:
+    """(k, 3) weights of all corners."""
+    return np.concatenate([1.0 - x.sum(axis=1, keepdims=True), x], axis=1)
+
+
+def _crossing(start: Array, end: Array, first: Array, last: Array) -> Array:
+    """(k,) 0..1, where lines from `first` to `last` are closest to lines from start to end."""
+    d, e, off = end - start, last - first, start - first
+    a, b, c = ((x * y).sum(axis=1) for x, y in ((d, d), (d, e), (e, e)))
+    p, q = (d * off).sum(axis=1), (e * off).sum(axis=1)
+    square = a * c - b * b
+    along = np.divide(b * q - c * p, square, out=np.zeros_like(a), where=square > 1e-30)
+    along = np.clip(along, 0.0, 1.0)
+    t = np.divide(along * b + q, c, out=np.zeros_like(a), where=c > 0.0)
+    return np.asarray(np.clip(t, 0.0, 1.0))

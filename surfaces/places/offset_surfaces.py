@@ -1,0 +1,36 @@
+"""The offset surface of any surface, for whoever has to say where on it a tool is."""
+
+from __future__ import annotations
+
+from surfaces.meshes import MeshSurface
+from surfaces.patches import Patch
+from surfaces.piecewise import Piecewise
+from surfaces.places.mesh_places import MeshPlaces
+from surfaces.places.patch_places import PatchPlaces
+from surfaces.places.piece_places import PiecePlaces
+from surfaces.places.places import OffsetSurface
+from surfaces.surface import Surface, SurfaceError
+
+
+def offset_surface(surface: Surface, height: float) -> OffsetSurface:
+    """The surface's parallel at a signed height (m) along its outward normal.
+
+    Raises:
+        SurfaceError: the surface is of a kind that is not known here.
+
+    Example:
+        >>> import numpy as np
+        >>> from surfaces import sphere
+        >>> dome = offset_surface(sphere(1.0, (10, 90), (0, 180)), -0.25)
+        >>> point = np.array([[0.0, 0.5, 0.5]])
+        >>> places = dome.nearest(point, point, 0.01)
+        >>> np.linalg.norm(dome.at(places)[0], axis=1).round(6).tolist()
+        [0.75]
+    """
+    if isinstance(surface, Patch):
+        return PatchPlaces(height, surface)
+    if isinstance(surface, Piecewise):
+        return PiecePlaces(height, surface)
+    if isinstance(surface, MeshSurface):
+        return MeshPlaces(height, surface)
+    raise SurfaceError(f"a surface of kind {surface.kind} has no places to follow")

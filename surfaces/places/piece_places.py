@@ -1,0 +1,105 @@
+"""Places of a piecewise surface: a piece, and u and v on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from surfaces.piecewise import Piecewise
+from surfaces.places.patch_places import GUESSES, PatchPlaces
+from surfaces.places.places import Array, OffsetSurface, PlacePaths, Places
+
+BORDERS = 2.0  # [1] of the gap that seams may have: so far apart may two sides of one place be
+
+
+@dataclass(frozen=True, eq=False)
+class PiecePlaces(OffsetSurface):
+    """The places of several patches, `Places.chart` the number of the patch.
+
+    A path from one piece to another goes to their seam, changes sides there, and goes on. Where the
+    surface has a crease, normals jump with the side; who follows the path has to be right for both.
+    """
+
+    surface: Piecewise
+
+    @cached_property
+    def pieces(self) -> tuple[PatchPlaces, ...]:
+        """The places of each piece."""
+        both = zip(self.surface.placed, self.surface.signs, strict=True)
+        return tuple(PatchPlaces(self.height, patch, sign) for patch, sign in both)
+
+    def at(self, places: Places) -> tuple[Array, Array]:
+        """See `OffsetSurface.at`."""
+        points, normals = np.full((2, len(places.chart), 3), np.nan)
+        for k in np.unique(places.chart[places.chart >= 0]):
+            some = np.flatnonzero(places.chart == k)
+            points[some], normals[some] = self.pieces[k].at(places.of(some))
+        return points, normals
+
+    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+        """See `OffsetSurface.nearest`."""
+        places = self._closest(points)
+        away = np.linalg.norm(points - self.at(places)[0], axis=1)
+        rest = np.flatnonzero(~(away <= within))
+        guess = ahead[rest].copy()
+        for _ in range(GUESSES if len(rest) else 0):
+            found = self._closest(guess)
+            offset, normal = self.at(found)
+            there = np.linalg.norm(points[rest] - offset, axis=1)
+            nearer = there < away[rest]
+            places.put(rest[nearer], found.of(nearer))
+            away[rest[nearer]] = there[nearer]
+            guess = points[rest] - self.height * normal
+        return places
+
+    def _closest(self, points: Array) -> Places:
+        found = self.surface.nearest(points)
+        return Places(found.piece.copy(), np.stack([found.u, found.v], axis=-1))
+
+    def paths(self, start: Places, end: Places) -> PlacePaths:
+        """See `OffsetSurface.paths`."""
+        made = PlacePaths.straight(
+            (self.at(start), self.at(end)), np.full((len(start.x), 2), np.inf)
+        )
+        pairs = np.stack([start.chart, end.chart], axis=1)
+        for a, b in np.unique(pairs[(pairs >= 0).all(axis=1)], axis=0):
+            some = np.flatnonzero((pairs == (a, b)).all(axis=1))
+            one, other = start.of(some), end.of(some)
+            found = self.pieces[a].paths(one, other) if a == b else self._across(one, other)
+            made.put(some, found)
+        return made
+
+    def _across(self, start: Places, end: Places) -> PlacePaths:
+        """Paths from one piece to another, over the place of their seam that is closest to both."""
+        a, b = self.pieces[start.chart[0]], self.pieces[end.chart[0]]
+        middle = 0.5 * (_on(a, start.x) + _on(b, end.x))
+        before = a.closest(middle)
+        for _ in range(2):  # back and forth, from one border to the other
+            after = b.closest(_on(a, before))
+            before = a.closest(_on(b, after))
+        apart = np.linalg.norm(_on(a, before) - _on(b, after), axis=1)
+        joined = apart <= BORDERS * self.surface.gap
+        first = a.paths(start, Places(start.chart, before))
+        last = b.paths(Places(end.chart, after), end)
+        ends = ((first, 0), (first, 3), (last, 0), (last, 3))
+        points = np.stack([path.points[:, k] for path, k in ends], axis=1)
+        normals = np.stack([path.normals[:, k] for path, k in ends], axis=1)
+        # Each side's path must be one straight piece: one over a kink or a pole is cut up first.
+        bends = np.zeros((len(points), 3, 2))
+        for piece, path in ((0, first), (2, last)):
+            single = (path.share[:, 2] == 0.0) & joined
+            bends[:, piece] = np.where(single[:, None], path.bends[:, 2], np.inf)
+        to = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
+        fro = np.linalg.norm(points[:, 3] - points[:, 2], axis=1)
+        share = np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
+        zero = np.zeros_like(to)
+        return PlacePaths(
+            np.stack([zero, share, share, zero + 1.0], axis=1), points, normals, bends
+        )
+
+
+def _on(piece: PatchPlaces, x: Array) -> Array:
+    """(k, 3) m, points of the surface itself."""
+    return piece.patch.point(x[:, 0], x[:, 1])

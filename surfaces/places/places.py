@@ -1,0 +1,132 @@
+"""Places of a surface, and continuous paths from one to another with bounds along them.
+
+A place is a point of the surface by its parameters: u and v on a patch, weights on the face of a
+mesh. Over a place x with the point f(x) and the outward unit normal n(x), the offset surface at a
+signed height h has the point T(x) = f(x) + h n(x). A path of places runs straight in the parameters
+between up to four of them. Along each straight piece, with its own parameter s in 0..1, T and n
+differ from straight lines by at most s (1 - s) / 2 times a bound; so whoever knows both at the ends
+of a piece knows them along it.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+ROUNDING = 1.0 + 1e-9  # covers the rounding of the bounds' own operations
+
+
+class Places(NamedTuple):
+    """k places of a surface."""
+
+    chart: Ints
+    """(k,) which patch or face; -1 for no place, whose point is NaN."""
+    x: Array
+    """(k, 2) u and v; on a face the weights of its second and third corner."""
+
+    def of(self, rows: Ints | NDArray[np.bool_] | slice) -> Places:
+        """Some of the places."""
+        return Places(self.chart[rows], self.x[rows])
+
+    @staticmethod
+    def join(*parts: Places) -> Places:
+        """Places one after the other."""
+        return Places(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+
+    def put(self, rows: Ints | NDArray[np.bool_], others: Places) -> None:
+        """Replace some of the places."""
+        self.chart[rows], self.x[rows] = others.chart, others.x
+
+
+class PlacePaths(NamedTuple):
+    """k continuous paths of places, of three straight pieces each, some of them without length."""
+
+    share: Array
+    """(k, 4) rising from 0 to 1: when a motion along the path is to be at the four places."""
+    points: Array
+    """(k, 4, 3) m, the offset surface's points over them."""
+    normals: Array
+    """(k, 4, 3) the surface's outward unit normals there."""
+    bends: Array
+    """(k, 3, 2) along each piece offset point (m) and normal differ from the straight line between
+    its ends by at most s (1 - s) / 2 times this; inf where nothing is known."""
+
+    @staticmethod
+    def straight(ends: tuple[tuple[Array, Array], tuple[Array, Array]], bends: Array) -> PlacePaths:
+        """Paths of one piece each.
+
+        Args:
+            ends: points and normals (k, 3) of the first, and of the last places.
+            bends: (k, 2) of that piece.
+        """
+        (point, normal), (end, end_normal) = ends
+        count = len(point)
+        share = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (count, 4)).copy()
+        points = np.stack([point, point, point, end], axis=1)
+        normals = np.stack([normal, normal, normal, end_normal], axis=1)
+        every = np.zeros((count, 3, 2))
+        every[:, 2] = bends
+        return PlacePaths(share, points, normals, every)
+
+    def of(self, rows: Ints | NDArray[np.bool_]) -> PlacePaths:
+        """Some of the paths."""
+        return PlacePaths(*(part[rows] for part in self))
+
+    def put(self, rows: Ints | NDArray[np.bool_], others: PlacePaths) -> None:
+        """Replace some of the paths."""
+        for mine, other in zip(self, others, strict=True):
+            mine[rows] = other
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetSurface(ABC):
+    """The points f + h n over a surface, all in the root frame."""
+
+    height: float
+    """m, h along the outward normal."""
+
+    @abstractmethod
+    def at(self, places: Places) -> tuple[Array, Array]:
+        """Points T (k, 3) m of the offset surface, and the surface's normals (k, 3)."""
+
+    @abstractmethod
+    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+        """Places whose offset points are near to given points; the nearest, if all goes well.
+
+        Args:
+            points: (k, 3) m.
+            ahead: (k, 3) m, points of space near which the surface may be: a second guess.
+            within: m, the distance from which on a second guess is worth its while.
+        """
+
+    @abstractmethod
+    def paths(self, start: Places, end: Places) -> PlacePaths:
+        """Continuous paths from places to places, meant for such that are near to each other."""
+
+
+def second_derivative_of_unit(length: Array, first: Array, second: Array) -> Array:
+    """Bound of |d2/ds2 (g / |g|)| for a curve g(s).
+
+    With P the projection across n = g / |g|, and g' = a n + b with b across n,
+
+        n'' = P g'' / |g| - (2 a b + |b|^2 n) / |g|^2
+
+    where |2 a b + |b|^2 n|^2 = |b|^2 (4 a^2 + |b|^2), which for a^2 + |b|^2 = |g'|^2 is at most
+    (4 / 3) |g'|^4.
+
+    Args:
+        length: lower bounds of |g|; where they are not positive, the answer is inf.
+        first: bounds of |g'|.
+        second: bounds of |g''|.
+    """
+    known = length > 0.0
+    safe = np.where(known, length, 1.0)
+    bound = second / safe + (2.0 / np.sqrt(3.0)) * (first / safe) ** 2
+    return np.where(known, bound, np.inf)
