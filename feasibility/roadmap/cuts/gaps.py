@@ -11,8 +11,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.cuts.regions import Region
-
 NARROWEST = 1e-3  # [rad], [m]: gaps that are not worth a try
 KEPT = 8  # gaps kept of those between the same two components
 
@@ -44,17 +42,19 @@ class Gap(NamedTuple):
         return 0.5 * (self.low + self.high)
 
 
-def gaps(region: Region, components: list[Component], samples: NDArray[np.float64]) -> list[Gap]:
-    """The gaps of every joint, the most promising first.
+def gaps(
+    joints: tuple[int, ...], components: list[Component], samples: NDArray[np.float64]
+) -> list[Gap]:
+    """The gaps of some joints, the most promising first.
 
     Args:
-        region: where.
-        components: those inside the region.
+        joints: which.
+        components: those inside a region.
         samples: (k, n) other points of the motion set inside it.
     """
     found: list[Gap] = []
-    for weights in np.eye(len(region.low)):
-        found += gaps_along(weights, components, samples)
+    for joint in joints:
+        found += gaps_along(np.eye(samples.shape[1])[joint], components, samples)
     return sorted(found, key=lambda gap: -gap.promise)
 
 

@@ -8,7 +8,7 @@ search did not know: they are handed back as seeds. What was proved is kept for 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,8 +20,15 @@ from feasibility.roadmap.arrays import SearchArrays, Work, work_for
 from feasibility.roadmap.boxes import Places, place_at_rest
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.cuts.counting import TURNS, Counted, Statement
-from feasibility.roadmap.cuts.gaps import Component, Gap, gaps
-from feasibility.roadmap.cuts.regions import Region, folded, limits_of, one_turn, wide_joints
+from feasibility.roadmap.cuts.gaps import Component, gaps
+from feasibility.roadmap.cuts.opening import openings
+from feasibility.roadmap.cuts.regions import (
+    Region,
+    folded,
+    limits_of,
+    turn_from,
+    wide_joints,
+)
 from feasibility.roadmap.cuts.samples import projected, random_targets
 from robots.chain import tool
 
@@ -103,32 +110,70 @@ class Prover:
             tick: called between batches of boxes; may raise, and then nothing is lost but this
                 attempt.
         """
-        counted = Counted(self.arrays, self.work, budget, tick)
-        run = _Run(self, counted)
+        run = _Run(self, Counted(self.arrays, self.work, budget, tick))
         limits = limits_of(self.arrays, self.places)
-        self._sample(limits)
-        region = run.open_joints(limits, components)
-        root = None
-        if region is not None:
-            inside = [c._replace(q=folded(c.q, self.opened)) for c in components]
-            run.samples = folded(self.samples, self.opened)
-            root = run.node(region, inside, DEEPEST)
+        tree = None
+        if limits.over_one_turn().is_finite:
+            self._sample(limits)
+            tree = self._tree(run, limits, components)
         return Attempt(
-            tree=None if root is None else CutTree(root, tuple(self.opened.items())),
-            boxes=counted.spent,
-            seeds=() if root is not None else tuple(run.seeds[:MOST_SEEDS]),
-            blocked=() if root is not None else tuple(run.blocked),
+            tree=tree,
+            boxes=run.counted.spent,
+            seeds=() if tree is not None else tuple(run.seeds[:MOST_SEEDS]),
+            blocked=() if tree is not None else tuple(run.blocked),
         )
+
+    def _tree(self, run: _Run, limits: Region, components: list[Component]) -> CutTree | None:
+        """A proof: first without cuts through wide joints, whose windings then do not matter."""
+        wide = wide_joints(self.arrays)
+        narrow = tuple(j for j in range(len(limits.low)) if j not in wide)
+        whole = run.counted.left
+        if wide:
+            run.counted.left = whole // 2
+        root = run.tree_of(limits, components, narrow)
+        if root is not None:
+            return CutTree(root)
+        run.counted.left += whole - whole // 2 if wide else 0
+        if wide:
+            self._open(run, limits, components)
+        for opened in self._openings():
+            region = limits
+            for joint, t in opened.items():
+                region = turn_from(region, joint, t)
+            bounded = tuple(np.flatnonzero(np.isfinite(region.high - region.low)).tolist())
+            folds = [c._replace(q=folded(c.q, opened)) for c in components]
+            run.samples = folded(run.samples, opened)
+            root = run.tree_of(region, folds, bounded)
+            if root is not None:
+                return CutTree(root, tuple(opened.items()))
+        return None
+
+    def _openings(self) -> list[dict[int, float]]:
+        """Joints to be opened: all that can be; then only those without limits."""
+        free = {j: t for j, t in self.opened.items() if np.isinf(self.arrays.upper[j])}
+        plans = [self.opened] if self.opened else []
+        bounded = [j for j in wide_joints(self.arrays) if np.isfinite(self.arrays.upper[j])]
+        return [*plans, free] if bounded and (free != self.opened or not plans) else plans
+
+    def _open(self, run: _Run, limits: Region, components: list[Component]) -> None:
+        """Open wide joints where that is possible."""
+        for joint in wide_joints(self.arrays):
+            if joint in self.opened:
+                continue
+            weights = np.eye(len(limits.low))[joint]
+            cut = run.first_proved(
+                (weights, t, turn_from(limits, joint, t).on(weights, t))
+                for t in openings(joint, components, self.samples)
+            )
+            if cut is not None:
+                self.opened[joint] = cut[1]
 
     def _sample(self, limits: Region) -> None:
         """More points of the motion set, unless there are enough."""
-        wide = [j for j in wide_joints(self.arrays) if not np.isfinite(limits.low[j])]
-        region = one_turn(limits, wide)
-        if not self.newton or len(self.samples) >= MOST_SAMPLES or not _is_finite(region):
-            return
-        targets = random_targets(self.places, SAMPLES, self.rng)
-        q = projected(self.arrays, self.work, region, targets, SAMPLES, self.rng)
-        self.samples = np.vstack([self.samples, q])
+        if self.newton and len(self.samples) < MOST_SAMPLES:
+            targets = random_targets(self.places, SAMPLES, self.rng)
+            q = projected(self.arrays, self.work, limits, targets, SAMPLES, self.rng)
+            self.samples = np.vstack([self.samples, q])
 
 
 @dataclass(eq=False)
@@ -139,11 +184,20 @@ class _Run:
     counted: Counted
     seeds: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
     blocked: list[Blocked] = field(default_factory=list)
+    joints: tuple[int, ...] = ()
+    """Those that cuts may go through."""
     samples: NDArray[np.float64] = field(init=False)
 
     def __post_init__(self) -> None:
         """The points of the motion set that are known."""
         self.samples = self.prover.samples
+
+    def tree_of(
+        self, region: Region, components: list[Component], joints: tuple[int, ...]
+    ) -> Cut | Leaf | None:
+        """The tree of a region, with cuts through some joints only; None where none was found."""
+        self.joints = joints
+        return self.node(region, components, DEEPEST)
 
     def node(self, region: Region, components: list[Component], depth: int) -> Cut | Leaf | None:
         """The tree of a region; None where none was found."""
@@ -210,34 +264,39 @@ class _Run:
         if known is not None:
             return known
         for _ in range(REFINED):
-            statements: list[tuple[Gap, Statement]] = []
-            found = gaps(region, inside, self._samples_in(region))
-            for gap in found:
-                on = region.on(gap.weights, gap.middle)
-                if not self._on_cut(on):
-                    statements.append((gap, Statement(on, self.prover.places, 2)))
-                if len(statements) == CANDIDATES:
-                    break
-            if not statements:
-                break
-            proved = self._in_turns(region, statements)
-            if proved is not None or self.counted.left <= 0:
-                return proved
+            before = len(self.samples)
+            found = gaps(self.joints, inside, self._samples_in(region))
+            cut = self.first_proved(
+                (gap.weights, gap.middle, region.on(gap.weights, gap.middle)) for gap in found
+            )
+            if cut is not None:
+                self.prover.cuts.append(_ProvedCut(region, *cut))
+                return cut
+            if len(self.samples) == before or self.counted.left <= 0:
+                break  # no point has made the gaps smaller: they would be the same
         self._note_blocked(region, inside)
         return None
 
-    def _in_turns(
-        self, region: Region, statements: list[tuple[Gap, Statement]]
+    def first_proved(
+        self, candidates: Iterable[tuple[NDArray[np.float64], float, Region]]
     ) -> tuple[NDArray[np.float64], float] | None:
-        """The first of some cuts that is proved."""
+        """The first of some cuts (w, t, where w . q = t) on which the tool is never.
+
+        Those without a known point of the motion set are proved in turns.
+        """
+        statements: list[tuple[NDArray[np.float64], float, Statement]] = []
+        for weights, value, on in candidates:
+            if not self._on_cut(on):
+                statements.append((weights, value, Statement(on, self.prover.places, 2)))
+            if len(statements) == CANDIDATES:
+                break
         for most in TURNS:
-            for gap, statement in statements:
+            for weights, value, statement in statements:
                 if statement.ruling is not Ruling.OPEN:
                     continue
                 ruling = self.counted.examine(statement, most)
                 if ruling is Ruling.PROVED:
-                    self.prover.cuts.append(_ProvedCut(region, gap.weights, gap.middle))
-                    return gap.weights, gap.middle
+                    return weights, value
                 if ruling is Ruling.REACHED:
                     self._keep(statement.found[None], -1)
         return None
@@ -286,7 +345,7 @@ class _Run:
         """Say which gaps of a region stayed open."""
         samples = self._samples_in(region)
         seen = set()
-        for gap in gaps(region, inside, samples):
+        for gap in gaps(self.joints, inside, samples):
             along = samples @ gap.weights
             low, high = gap.between
             key = (*gap.weights.tolist(), low)
@@ -294,15 +353,3 @@ class _Run:
                 points = int(((along > low) & (along < high)).sum())
                 self.blocked.append(Blocked(gap.weights, low, high, points))
             seen.add(key)
-
-    # -- the root ------------------------------------------------------------------------------
-
-    def open_joints(self, limits: Region, components: list[Component]) -> Region | None:
-        """The region of the root: wide joints opened where that is needed."""
-        if not _is_finite(limits):
-            return None
-        return limits
-
-
-def _is_finite(region: Region) -> bool:
-    return bool(np.isfinite(region.low).all() and np.isfinite(region.high).all())

@@ -1,8 +1,12 @@
 """Regions of the joint space: an interval for each joint, and what cuts along several joints leave.
 
-The regions of a tree's root, see `feasibility.cut_tree`: the limits; for an opened joint one turn
-from t, which stands for every winding. A slide without ends is bounded by what it can reach: were
-it further out than all targets, the tolerance and all other links, the tool would be too.
+The region of a tree's root has the limits (see `feasibility.cut_tree`), and for an opened joint one
+turn from t, which stands for every winding. A slide without ends is bounded by what it can reach:
+were it further out than all targets, the tolerance and all other links, the tool would be too.
+
+A statement that the tool is nowhere in a region is proved over one turn of each joint that has a
+full turn or more there: the other windings place the tool alike. (The region itself, and the cuts
+through it, keep their windings.)
 """
 
 from __future__ import annotations
@@ -16,6 +20,7 @@ from feasibility.roadmap.arrays import SearchArrays
 from feasibility.roadmap.boxes import Boxes, Places, Slabs, box_of, no_slabs
 
 TURN = 2.0 * np.pi
+WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they tell
 
 
 class Region(NamedTuple):
@@ -25,6 +30,8 @@ class Region(NamedTuple):
     """(n,) rad or m"""
     high: NDArray[np.float64]
     """(n,) rad or m"""
+    turning: NDArray[np.bool_]
+    """(n,) joints that turn, rather than slide."""
     slabs: Slabs
 
     def sides(self, weights: NDArray[np.float64], value: float) -> tuple[Region, Region]:
@@ -41,7 +48,7 @@ class Region(NamedTuple):
         """The part of the region with weights . q = value."""
         below, above = self.sides(weights, value)
         if below.slabs is self.slabs:
-            return Region(above.low, below.high, self.slabs)
+            return above._replace(high=below.high)
         return self._bounded(weights, value, value)
 
     def _bounded(self, weights: NDArray[np.float64], low: float, high: float) -> Region:
@@ -71,9 +78,22 @@ class Region(NamedTuple):
         """Is nothing left of an interval?"""
         return not bool((self.low <= self.high).all())
 
+    def over_one_turn(self) -> Region:
+        """The region with no more than one turn of any joint: what the tool can do is the same."""
+        wide = self.turning & (self.high - self.low >= TURN) & ~self.slabs.weights.any(axis=0)
+        start = np.where(np.isfinite(self.low), self.low, -np.pi)
+        low = np.where(wide, start, self.low)
+        return self._replace(low=low, high=np.where(wide, start + TURN, self.high))
+
+    @property
+    def is_finite(self) -> bool:
+        """Has every interval two ends?"""
+        return bool(np.isfinite(self.low).all() and np.isfinite(self.high).all())
+
     def boxes(self, parameters: int) -> Boxes:
-        """A stack of one box, the region; see `box_of`."""
-        return box_of(self.low, self.high, parameters)
+        """A stack of one box, see `box_of`: the region, with one turn for several."""
+        box = self.over_one_turn()
+        return box_of(box.low, box.high, parameters)
 
 
 def limits_of(arrays: SearchArrays, places: Places) -> Region:
@@ -91,19 +111,19 @@ def limits_of(arrays: SearchArrays, places: Places) -> Region:
             + ends[np.isfinite(ends)].sum()
         ) * (1.0 + 1e-9)
         low[slides], high[slides] = np.maximum(low[slides], -far), np.minimum(high[slides], far)
-    return Region(low, high, no_slabs(len(low)))
+    return Region(low, high, ~arrays.chain.prismatic, no_slabs(len(low)))
 
 
 def wide_joints(arrays: SearchArrays) -> list[int]:
-    """Joints that turn freely, or through more than a turn."""
-    wide = ~(arrays.upper - arrays.lower <= TURN) & ~arrays.chain.prismatic
+    """Joints that turn freely, or through much more than a turn."""
+    wide = ~(arrays.upper - arrays.lower < WIDE) & ~arrays.chain.prismatic
     return [int(j) for j in np.flatnonzero(wide)]
 
 
-def one_turn(region: Region, joints: list[int]) -> Region:
-    """The region with one turn of some joints, -pi to pi, in place of their intervals."""
+def turn_from(region: Region, joint: int, t: float) -> Region:
+    """The region with one turn of a joint, from t."""
     low, high = region.low.copy(), region.high.copy()
-    low[joints], high[joints] = -np.pi, np.pi
+    low[joint], high[joint] = t, t + TURN
     return region._replace(low=low, high=high)
 
 

@@ -13,7 +13,9 @@ from feasibility.compiled import kernel
 from feasibility.roadmap.arrays import NEXT, SearchArrays, Work, look_at, place
 from feasibility.roadmap.boxes import Places
 from feasibility.roadmap.cuts.regions import Region
-from feasibility.roadmap.projection import PROJECTION_SLACK, PROJECTION_STEPS, project
+from feasibility.roadmap.projection import PROJECTION_SLACK, project
+
+NEWTON_STEPS = np.int64(16)  # of a try: most that succeed need fewer, and the rest are many
 
 
 @kernel
@@ -25,7 +27,7 @@ def _project_rows(arrays, work, targets, q, enough, hit):  # type: ignore[no-unt
         place(arrays, work, NEXT, q[i])
         for j in range(q.shape[1]):
             work.secondary_step[j] = 0.0
-        hit[i] = project(arrays, work, q[i], PROJECTION_SLACK, np.inf, PROJECTION_STEPS)
+        hit[i] = project(arrays, work, q[i], PROJECTION_SLACK, np.inf, NEWTON_STEPS)
         hits += hit[i]
         if hits == enough:
             return
@@ -43,7 +45,7 @@ def projected(
 
     Args:
         arrays, work: of the search.
-        region: its intervals take the place of the limits; what it leaves out is dropped.
+        region: one turn of it takes the place of the limits; what its slabs leave out is dropped.
         targets: (k, 6) target points and approach directions.
         enough: hits after which no more are tried.
         rng: draws the guesses.
@@ -51,8 +53,9 @@ def projected(
     Returns:
         (hits, n) configurations.
     """
-    inside = arrays._replace(lower=region.low, upper=region.high)
-    q = rng.uniform(region.low, region.high, (len(targets), len(region.low)))
+    box = region.over_one_turn()
+    inside = arrays._replace(lower=box.low, upper=box.high)
+    q = rng.uniform(box.low, box.high, (len(targets), len(box.low)))
     hit = np.zeros(len(targets), dtype=np.bool_)
     _project_rows(inside, work, np.ascontiguousarray(targets), q, enough, hit)
     q = q[hit]
