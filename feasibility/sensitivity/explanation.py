@@ -33,7 +33,7 @@ from surfaces import Cells
 SHARE = 24  # verdicts' worth of evaluations that all thresholds together may take
 FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search should have
 EXTRA = 3  # the same, for margins that are still wide once the others have had their share
-ALL_IN_ALL = 35  # verdicts of the case itself, where it is also tried what `check` alone finds at the thresholds
+ALL_IN_ALL = 35  # verdicts of the case itself: all, with what `check` alone finds at thresholds
 LEAST = 20_000  # evaluations that they may always take
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
