@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,6 +66,43 @@ class CutTree:
     def kind(self) -> str:
         """'cell' where one leaf is the whole proof, 'cut' otherwise."""
         return "cell" if isinstance(self.root, Leaf) and not self.opened else "cut"
+
+    @property
+    def n_cuts(self) -> int:
+        """Number of cuts, those that open turning joints not counted."""
+        return sum(isinstance(node, Cut) for node in self.nodes())
+
+    def leaves(self) -> Iterator[Leaf]:
+        """The leaves, those below a cut before those above it."""
+        for node in self.nodes():
+            if isinstance(node, Leaf):
+                yield node
+
+    def folded(self, q: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Configurations (..., n) with opened joints turned into t .. t + 2 pi."""
+        q = np.array(q, dtype=float)
+        for joint, value in self.opened:
+            q[..., joint] = value + np.mod(q[..., joint] - value, 2.0 * np.pi)
+        return q
+
+    def way(self, q: NDArray[np.float64]) -> tuple[tuple[Cut, bool], ...]:
+        """The cuts on the way from the root to the leaf whose region holds q (n,).
+
+        Each with whether q is above it. All of a motion is in the same region.
+        """
+        found, node, q = [], self.root, self.folded(q)
+        while isinstance(node, Cut):
+            above = bool(q @ np.asarray(node.weights) > node.value)
+            found.append((node, above))
+            node = node.above if above else node.below
+        return tuple(found)
+
+    def parting(self, q: NDArray[np.float64], other: NDArray[np.float64]) -> Cut | None:
+        """The cut between two configurations (n,) that no motion joins; None in one region."""
+        for (cut, above), (_, beyond) in zip(self.way(q), self.way(other), strict=False):
+            if above != beyond:
+                return cut
+        return None
 
     def nodes(self) -> Iterator[Cut | Leaf]:
         """Every node, a cut before the nodes below and above it."""

@@ -1,0 +1,142 @@
+"""Cut trees in words: where the joints cannot be, and which cell is lost on either side."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from feasibility.cut_tree import Cut, CutTree, Leaf
+from robots import Robot
+from surfaces import Cells
+
+INDENT = "  "
+MOST_NAMED = 4  # cuts that one sentence names
+
+
+def joint_value(robot: Robot, joint: int, value: float) -> str:
+    """A joint's value with its unit.
+
+    Example:
+        >>> from robots import load_robot
+        >>> joint_value(load_robot("ur5"), 2, -1.4312)
+        '-82 deg'
+    """
+    if robot.prismatic[joint]:
+        return f"{_number(1e3 * value)} mm"
+    return f"{_number(math.degrees(value))} deg"
+
+
+def place_of(cut: Cut, robot: Robot) -> str:
+    """Where a cut is: "joint3 = -82 deg", or a sum of joints."""
+    if cut.joint is not None:
+        return f"{robot.joint_names[cut.joint]} = {joint_value(robot, cut.joint, cut.value)}"
+    return f"{_sum(cut, robot)} = {_sum_value(cut, robot)}"
+
+
+def nowhere(cut: Cut, robot: Robot) -> str:
+    """What a cut says: "nowhere on the surface can joint3 be -82 deg"."""
+    if cut.joint is not None:
+        name = robot.joint_names[cut.joint]
+        return f"nowhere on the surface can {name} be {joint_value(robot, cut.joint, cut.value)}"
+    return f"nowhere on the surface can {_sum(cut, robot)} be {_sum_value(cut, robot)}"
+
+
+def opened(tree: CutTree, robot: Robot) -> list[str]:
+    """What is said about joints that turn freely, or by more than a turn."""
+    return [
+        f"{robot.joint_names[joint]} can nowhere be at {joint_value(robot, joint, value)} "
+        "(or whole turns away)"
+        for joint, value in tree.opened
+    ]
+
+
+def sentence(tree: CutTree, robot: Robot, cells: Cells) -> str:
+    """A cut tree in one sentence, without a full stop.
+
+    Example:
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> tree = CutTree(Cut((0, 0, 1.0, 0, 0, 0), -1.4312, Leaf(13), Leaf(2)))
+        >>> sentence(tree, load_robot("ur5"), plane((0, 1), (0, 1)).cells(5, 3))
+        ... # doctest: +NORMALIZE_WHITESPACE
+        'below elbow_joint = -82 deg cell [4, 1] cannot be covered, above it cell [0, 2] cannot,
+         and nowhere on the surface can elbow_joint be -82 deg'
+    """
+    root = tree.root
+    if isinstance(root, Leaf):
+        text = f"cell {_cell(root, cells)} cannot be covered"
+    elif isinstance(root.below, Leaf) and isinstance(root.above, Leaf):
+        text = (
+            f"below {place_of(root, robot)} cell {_cell(root.below, cells)} cannot be covered, "
+            f"above it cell {_cell(root.above, cells)} cannot, and {nowhere(root, robot)}"
+        )
+    else:
+        text = _of_many(tree, robot, cells)
+    return "; ".join([*opened(tree, robot), text])
+
+
+def lines(tree: CutTree, robot: Robot, cells: Cells) -> list[str]:
+    """A cut tree as lines, those of a region indented by two blanks more than its cut's."""
+    made = [f"{text}." for text in opened(tree, robot)]
+    if isinstance(tree.root, Leaf) or tree.n_cuts == 1:
+        text = sentence(CutTree(tree.root), robot, cells)
+        return [*made, f"{text[0].upper()}{text[1:]}."]
+    # On a stack, not by calls: a tree may be deep.
+    left: list[tuple[str, int, Cut | Leaf]] = [("", 0, tree.root)]
+    while left:
+        head, depth, node = left.pop()
+        if isinstance(node, Leaf):
+            text = f"cell {_cell(node, cells)} cannot be covered"
+        else:
+            text = nowhere(node, robot)
+            left += [("above: ", depth + 1, node.above), ("below: ", depth + 1, node.below)]
+        text = f"{head}{text}" if head else f"{text[0].upper()}{text[1:]}"
+        made.append(f"{INDENT * depth}{text}.")
+    return made
+
+
+def _of_many(tree: CutTree, robot: Robot, cells: Cells) -> str:
+    """A tree of several cuts in one sentence: the cuts, and the cells that are lost."""
+    cuts = [place_of(node, robot) for node in tree.nodes() if isinstance(node, Cut)]
+    named = list(dict.fromkeys(cuts))
+    more = f" and {len(named) - MOST_NAMED} more" if len(named) > MOST_NAMED else ""
+    leaves = list(tree.leaves())
+    lost = list(dict.fromkeys(str(_cell(leaf, cells)) for leaf in leaves))
+    others = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
+    return (
+        f"{len(cuts)} cuts that no motion crosses ({', '.join(named[:MOST_NAMED])}{more}) leave "
+        f"{len(leaves)} regions of the joint space, and in each a cell cannot be covered "
+        f"({', '.join(lost[:MOST_NAMED])}{others})"
+    )
+
+
+def _cell(leaf: Leaf, cells: Cells) -> list[int]:
+    """The cell of a leaf, as reports name it."""
+    return list(cells.unravel(leaf.cell))
+
+
+def _sum(cut: Cut, robot: Robot) -> str:
+    """A weighted sum of joints: "0.6 joint2 - 0.8 joint3"."""
+    text = ""
+    for j in np.flatnonzero(cut.weights):
+        weight, name = cut.weights[j], robot.joint_names[j]
+        sign = ("-" if weight < 0.0 else "") if not text else (" - " if weight < 0.0 else " + ")
+        times = "" if abs(weight) == 1.0 else f"{abs(weight):.3g} "
+        text += f"{sign}{times}{name}"
+    return text
+
+
+def _sum_value(cut: Cut, robot: Robot) -> str:
+    """The value of a weighted sum, with the unit that all its joints share."""
+    slides = robot.prismatic[np.flatnonzero(cut.weights)]
+    if slides.all():
+        return f"{_number(1e3 * cut.value)} mm"
+    if not slides.any():
+        return f"{_number(math.degrees(cut.value))} deg"
+    return f"{cut.value:.4g} (joints in radians and metres)"
+
+
+def _number(value: float) -> str:
+    """To a tenth, without a trailing zero."""
+    return f"{round(value, 1) + 0.0:.10g}"
