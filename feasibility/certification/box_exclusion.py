@@ -49,14 +49,14 @@ def nearest(models: Models, sweeps: int = SWEEPS) -> tuple[Array, Array]:
     per_square = -1.0 / np.maximum((columns**2).sum(axis=1), TINY)
     for _ in range(sweeps):
         for j in range(len(columns)):
-            step = np.einsum("km,km->m", columns[j], _excess(values, radius)) * per_square[j]
+            step = np.einsum("km,km->m", columns[j], excess(values, radius)) * per_square[j]
             moved = np.minimum(np.maximum(place[j] + step, low[j]), high[j])
             values += (moved - place[j]) * columns[j]
             place[j] = moved
-    return place.T, _excess(values, radius).T
+    return place.T, excess(values, radius).T
 
 
-def _excess(values: Array, radius: Array) -> Array:
+def excess(values: Array, radius: Array) -> Array:
     """What is left of values (6 + k, m) when each group is cut down by its radius (2 + k, m)."""
     three = values[:6].reshape(2, 3, -1)
     lengths = np.sqrt(np.einsum("gkm,gkm->gm", three, three))

@@ -23,7 +23,8 @@ from feasibility.certification.linear_models import Allowed, Arm, Array, Boxes, 
 from feasibility.certification.region import Region
 
 BATCH = 2048  # boxes at a time
-FIRST_TRY = 2000  # boxes after which a refutation is first tried; then twice as many, and so on
+FIRST_TRY = 100  # boxes after which a refutation is first tried
+RARER = 4  # times as many boxes until the next try
 STARTS = 16  # of a search for a configuration that refutes the claim
 KEPT = 0.7  # share of a box's width, in its shortest joint, over which contraction is no progress
 
@@ -78,7 +79,7 @@ class Emptiness:
             if not len(open_boxes):
                 continue
             if done >= next_try:
-                next_try *= 2
+                next_try *= RARER
                 starts = (open_boxes.centre + place)[:, :n]
                 point = refute(starts[:: len(starts) // STARTS + 1], region)
                 if point is not None:

@@ -44,6 +44,7 @@ from surfaces import Cells, SurfaceError, SurfaceParts
 
 MOST_BOXES = 2_000_000
 FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may be off by
+NARROWEST = 1e-6  # a chord that parts of the surface are made for, at least
 ANY_AXIS = 4.0  # a chord that two unit vectors never have
 
 
@@ -95,7 +96,7 @@ def verify_proof(
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
         return ProofCheck(fault, 0)
-    cone = min(task.cone_chord, 1.0)
+    cone = max(min(task.cone_chord, 1.0), NARROWEST)
     try:
         parts = cells.surface.parts(FINE * task.effective_tolerance, FINE * cone)
     except SurfaceError as error:

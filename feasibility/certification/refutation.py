@@ -9,14 +9,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.box_exclusion import nearest
+from feasibility.certification.box_exclusion import excess
 from feasibility.certification.linear_models import Arm, Array, Models, derivatives
 from feasibility.certification.region import Region
 from feasibility.task import Task
 from surfaces import Cells
 
-STEPS = 12  # of Newton's method
+STEPS = 20  # of Newton's method
 LONGEST = 0.7  # [rad], [m] of a joint in one step
+DAMPING = 1e-4  # of the sum of squares
 SLIDE = 0.3  # [m] of the place on the surface in one step
 INNER_TOLERANCE, INNER_CONE = 0.5, 0.95  # what the steps aim at, as shares
 
@@ -86,19 +87,31 @@ class Refuter:
             INNER_TOLERANCE * self.task.effective_tolerance,
             self.length * INNER_CONE * min(self.task.cone_chord, 4.0),
         ]
-        low = np.maximum(region.low - q, -LONGEST)
-        high = np.minimum(region.high - q, LONGEST)
-        zeros = np.zeros((m, n + 2))
-        models = Models(
-            residual,
-            columns,
-            np.tile(aim, (m, 1)),
-            np.concatenate([low, -np.ones((m, 2))], axis=1),
-            np.concatenate([high, np.ones((m, 2))], axis=1),
-            zeros,
-        )
-        step, _ = nearest(region.with_sums(models, q), sweeps=12)
+        low = np.append(np.maximum(region.low - q, -LONGEST), -np.ones((m, 2)), axis=1)
+        high = np.append(np.minimum(region.high - q, LONGEST), np.ones((m, 2)), axis=1)
+        models = Models(residual, columns, np.tile(aim, (m, 1)), low, high, np.zeros((m, n + 2)))
+        step = least_step(region.with_sums(models, q))
         return np.asarray(np.clip(q + step[:, :n], region.low, region.high))
+
+
+def least_step(models: Models) -> Array:
+    """The short steps d (m, n + 2) inside low .. high that undo what is missed, by damped squares.
+
+    A second solution goes without the variables that the first one put at an end.
+    """
+    missed = excess(models.residual.T, models.radius.T).T
+    step, may_move = np.zeros_like(models.low), models.low < models.high
+    for _ in range(2):
+        columns = models.columns * may_move[..., None]
+        squares = np.einsum("mjk,mjl->mkl", columns, columns)
+        size = np.einsum("mkk->m", squares)[:, None, None]
+        damped = squares + (DAMPING * size + 1e-12) * np.eye(missed.shape[1])
+        left = missed + np.einsum("mjk,mj->mk", models.columns, np.where(may_move, 0.0, step))
+        solved = np.linalg.solve(damped, left[..., None])[..., 0]
+        found = np.where(may_move, -np.einsum("mjk,mk->mj", columns, solved), step)
+        step = np.clip(found, models.low, models.high)
+        may_move &= step == found
+    return step
 
 
 def _tangents(normals: Array) -> Array:
