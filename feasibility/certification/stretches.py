@@ -13,6 +13,13 @@ part that goes with a piece
 with e0 and e1 bounds of |p - T| at its ends: there p is known to s (1 - s) / 2 D_p. The same holds
 for |a - b|. Nothing else is assumed of the surface: not that closest points are unique, nor that
 they move continuously.
+
+**On a mesh** the normals of targets are interpolated, and the tool point has to keep its distance
+from the triangles themselves, too: standoff less tolerance from all of them, so that nothing
+protrudes into it, and no concave crease is entered. The squared distance of p from any set is the
+least of |p - f|^2 over its points f; along a straight line each of these is a parabola with the
+second derivative 2 |p'|^2, so their least lies at most s (1 - s) |p'|^2 below the straight line
+between its ends; and p is off its chord by D_p / 8 at most.
 """
 
 from __future__ import annotations
@@ -31,7 +38,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
-CLOSE_TO_ZERO = 1e-12  # [1]: rounding of double arithmetic on unit vectors
+CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on unit vectors
 
 
 class Samples(NamedTuple):
@@ -50,22 +57,24 @@ class Samples(NamedTuple):
     """(k,) m, |p - T| over these places."""
     chord: Array
     """(k,) |a - b|."""
+    facets: Array
+    """(k,) m, distance from the triangles of a mesh; inf where the surface is smooth."""
 
     def of(self, rows: Mask | Ints) -> Samples:
         """Some of them."""
         return Samples(
             self.row[rows], self.share[rows], self.points[rows], self.axes[rows],
-            self.places.of(rows), self.error[rows], self.chord[rows],
+            self.places.of(rows), self.error[rows], self.chord[rows], self.facets[rows],
         )  # fmt: skip
 
     @staticmethod
     def join(parts: list[Samples]) -> Samples:
         """Samples one after the other; at least one part."""
-        row, share, points, axes, error, chord = (
-            np.concatenate([part[k] for part in parts]) for k in (0, 1, 2, 3, 5, 6)
+        row, share, points, axes, error, chord, facets = (
+            np.concatenate([part[k] for part in parts]) for k in (0, 1, 2, 3, 5, 6, 7)
         )
         places = Places.join(*(part.places for part in parts))
-        return Samples(row, share, points, axes, places, error, chord)
+        return Samples(row, share, points, axes, places, error, chord, facets)
 
 
 class Stretches(NamedTuple):
@@ -97,12 +106,14 @@ class Bounds(NamedTuple):
     """(k,) m, bounds of |p - T|."""
     chord: Array
     """(k,) of |a - b|."""
+    facets: Array
+    """(k,) m, lower bounds of the distance from the triangles of a mesh."""
     joined: Mask
     """(k,) whether a path of places from one end to the other is known."""
 
     def of(self, rows: Mask | Ints) -> Bounds:
         """Some of them."""
-        return Bounds(self.error[rows], self.chord[rows], self.joined[rows])
+        return Bounds(self.error[rows], self.chord[rows], self.facets[rows], self.joined[rows])
 
 
 class Judge:
@@ -124,7 +135,8 @@ class Judge:
         target, normal = self.offset.at(places)
         error = np.linalg.norm(points - target, axis=1)
         chord = np.linalg.norm(axes - self.sign * normal, axis=1)
-        return Samples(row, share, points, axes, places, error, chord)
+        facets = self.offset.facets(points)
+        return Samples(row, share, points, axes, places, error, chord, facets)
 
     def between_rows(self, rows: Array, poses: Placements, at: Samples) -> Stretches:
         """The stretches from row to row."""
@@ -154,9 +166,27 @@ class Judge:
             peak = peaks(off[:, :-1], off[:, 1:], width * bend + bends)
             found.append(peak.max(axis=1, initial=0.0))
         joined = np.asarray(np.isfinite(path.bends).all(axis=(1, 2)))
-        return Bounds(found[0], found[1], joined)
+        return Bounds(found[0], found[1], _apart(s), joined)
 
-    def within(self, error: Array, chord: Array) -> Mask:
-        """(k,) inside tolerance and cone; NaN is not."""
-        inside = error <= self.task.effective_tolerance
-        return np.asarray(inside & (chord <= self.task.cone_chord + CLOSE_TO_ZERO))
+    def within(self, one: Samples | Bounds) -> Mask:
+        """(k,) inside tolerance and cone, and apart from a mesh's triangles; NaN is not."""
+        cone = self.task.cone_chord + CLOSE_TO_ZERO
+        inside = (one.error <= self.task.effective_tolerance) & (one.chord <= cone)
+        return np.asarray(inside & (one.facets >= self.least_distance - CLOSE_TO_ZERO))
+
+    @property
+    def least_distance(self) -> float:
+        """m, of the tool point from the triangles of a mesh."""
+        return self.task.standoff - self.task.effective_tolerance
+
+
+def _apart(s: Stretches) -> Array:
+    """(k,) m, lower bounds of the tool point's distance from the triangles of a mesh."""
+    a, b = s.start.facets, s.end.facets
+    known = np.isfinite(a) & np.isfinite(b)
+    least = np.where(np.isnan(a) | np.isnan(b), np.nan, np.inf)
+    if known.any():
+        step = ((s.end.points[known] - s.start.points[known]) ** 2).sum(axis=1)
+        square = -peaks(-(a[known] ** 2), -(b[known] ** 2), 2.0 * step)
+        least[known] = np.sqrt(np.maximum(square, 0.0)) - s.bends[known, 0] / 8.0
+    return least

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.kinematic_bounds import placements
-from feasibility.certification.stretches import Bounds, Judge, Samples, Stretches
+from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
@@ -102,7 +102,7 @@ def replay_over_surface(
     poses = placements(robot, rows)
     count = np.arange(len(rows))
     at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes)
-    good = judge.within(at_rows.error, at_rows.chord)
+    good = judge.within(at_rows)
     faults += _exact_faults(judge, at_rows.of(~good), "row")
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
     looked = _Between(judge, rows, stretches)
@@ -133,7 +133,7 @@ class _Between:
         left, seen = stretches, 0
         for level in range(LEVELS + 1):
             bounds = judge.bounds(left)
-            good = judge.within(bounds.error, bounds.chord)
+            good = judge.within(bounds)
             self.error = max(self.error, float(np.max(bounds.error[good], initial=0.0)))
             self.chord = max(self.chord, float(np.max(bounds.chord[good], initial=0.0)))
             left, bounds = left.of(~good), bounds.of(~good)
@@ -154,7 +154,7 @@ class _Between:
         ahead = self.rows[start.row + 1] - self.rows[start.row]
         q = self.rows[start.row] + share[:, None] * ahead
         middle = self.judge.sampled(start.row, share, q)
-        good = self.judge.within(middle.error, middle.chord)
+        good = self.judge.within(middle)
         self.samples.append(middle)
         if not good.all():
             wrong.append(middle.of(~good))
@@ -198,12 +198,21 @@ def _exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
             f"{1e3 * tolerance:g} mm are allowed" + _others(len(off) - 1, noun)
         )
         faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
-    tilted = np.flatnonzero(~judge.within(np.zeros(len(wrong.chord)), wrong.chord))
+    tilted = np.flatnonzero(~(wrong.chord <= task.cone_chord + CLOSE_TO_ZERO))
     if len(tilted):
         worst = tilted[np.argmax(np.nan_to_num(wrong.chord[tilted], nan=np.inf))]
         text = (
             f"the tool axis tilts {np.degrees(angle_of(float(wrong.chord[worst]))):.4f} deg, "
             f"{task.cone_deg:g} deg are allowed" + _others(len(tilted) - 1, noun)
+        )
+        faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
+    near = np.flatnonzero(~(wrong.facets >= judge.least_distance - CLOSE_TO_ZERO))
+    if len(near) and not len(off):
+        worst = near[np.argmin(wrong.facets[near])]
+        text = (
+            f"the tool point comes within {1e3 * wrong.facets[worst]:.4g} mm of the mesh's "
+            f"triangles, nearer than the standoff of {1e3 * task.standoff:g} mm: something "
+            "protrudes there, or its facets are too coarse for this standoff"
         )
         faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
     return faults
@@ -232,6 +241,8 @@ def _open_fault(judge: Judge, left: Stretches, bounds: Bounds) -> MotionFault:
             f"surface jumps (within {1e3 * bounds.error[one]:.6g} mm, "
             f"{1e3 * judge.task.effective_tolerance:g} mm are allowed)"
         )
+    elif not bounds.facets[one] >= judge.least_distance - CLOSE_TO_ZERO:
+        text = "not certified: the tool point may come too near to the mesh's triangles"
     else:
         text = (
             "not certified: the tool axis is at the rim of the cone (within "

@@ -53,6 +53,10 @@ class MeshPlaces(OffsetSurface):
         face, weights = self._triangles.nearest(points)
         return Places(face, weights[:, 1:])
 
+    def facets(self, points: Array) -> Array:
+        """See `OffsetSurface.facets`."""
+        return self.surface.beside(points, *self.surface.nearest(points))[0]
+
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
         none = np.full((len(start.x), 2), np.inf)
@@ -86,9 +90,9 @@ class MeshPlaces(OffsetSurface):
         corner = np.argmax(one, axis=1)
         last = np.where(count >= 2, 2 - np.argmax(one[:, ::-1], axis=1), corner)
         mates = np.argmax(equal[row, corner], axis=1), np.argmax(equal[row, last], axis=1)
-        ends = self.at(start)[0], self.at(end)[0]
+        ends = self._on(start), self._on(end)
         eye = np.eye(3)
-        along = [self.at(Places(start.chart, eye[c][:, 1:]))[0] for c in (corner, last)]
+        along = [self._on(Places(start.chart, eye[c][:, 1:])) for c in (corner, last)]
         t = np.where(count >= 2, _crossing(*ends, *along), 0.0)[:, None]
         before = Places(start.chart, ((1.0 - t) * eye[corner] + t * eye[last])[:, 1:])
         after = Places(end.chart, ((1.0 - t) * eye[mates[0]] + t * eye[mates[1]])[:, 1:])
@@ -109,6 +113,11 @@ class MeshPlaces(OffsetSurface):
             np.stack([normal for _, normal in placed], axis=1),
             np.stack(bends, axis=1),
         )
+
+    def _on(self, places: Places) -> Array:
+        """(k, 3) m, points of the mesh itself; there the weights are straight, and on a crease's
+        strip the offset surface is not."""
+        return self.surface.points_at(places.chart, _weights(places.x))
 
     def _bends(self, face: Ints, start: Array, stop: Array) -> Array:
         """(k, 2) see `PlacePaths.bends`, for straight lines in the weights of a face.

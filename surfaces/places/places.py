@@ -106,6 +106,13 @@ class OffsetSurface(ABC):
             within: m, the distance from which on a second guess is worth its while.
         """
 
+    def facets(self, points: Array) -> Array:
+        """(k,) m, how far points (k, 3) are from the triangles of a mesh themselves.
+
+        Without interpolated normals; inf where the surface is smooth.
+        """
+        return np.full(len(points), np.inf)
+
     @abstractmethod
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """Continuous paths from places to places, meant for such that are near to each other."""
