@@ -75,7 +75,7 @@ class Emptiness:
             self.tick()
             boxes = _next(waiting)
             done += len(boxes)
-            open_boxes, models, place = self._examine(boxes, parts, region)
+            open_boxes, models, place = self.examine(boxes, parts, region)
             if not len(open_boxes):
                 continue
             if done >= next_try:
@@ -84,10 +84,10 @@ class Emptiness:
                 point = refute(starts[:: len(starts) // STARTS + 1], region)
                 if point is not None:
                     return Outcome(done, left=True, point=point)
-            waiting.append(_smaller(open_boxes, models, parts, self.allowed.length))
+            waiting.append(smaller(open_boxes, models, parts, self.allowed.length))
         return Outcome(done, left=False)
 
-    def _examine(self, boxes: Boxes, parts: Parts, region: Region) -> tuple[Boxes, Models, Array]:
+    def examine(self, boxes: Boxes, parts: Parts, region: Region) -> tuple[Boxes, Models, Array]:
         """The boxes that are not proved empty, their models, and where these come nearest."""
         models = region.with_sums(
             self.arm.models(boxes, parts, self.allowed), boxes.centre[:, : self.arm.n]
@@ -116,7 +116,7 @@ def _next(waiting: list[Boxes]) -> Boxes:
     return Boxes.joined(taken)
 
 
-def _smaller(boxes: Boxes, models: Models, parts: Parts, length: float) -> Boxes:
+def smaller(boxes: Boxes, models: Models, parts: Parts, length: float) -> Boxes:
     """What is left of open boxes: as it is where contraction did much, otherwise in halves."""
     n = boxes.low.shape[1] - 2
     centre = boxes.centre

@@ -1,0 +1,146 @@
+"""Configurations with the tool on a surface by construction, and random boxes around them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from part_walks import at_parameters
+from random_arms import random_arm
+from scipy.spatial.transform import Rotation
+
+from feasibility.certification.empty_region import Emptiness, smaller
+from feasibility.certification.linear_models import Allowed, Arm, Boxes, target_parts
+from feasibility.certification.region import Region
+from robots import Kinematics
+from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus
+
+PATCHES = (
+    plane((-0.3, 0.3), (-0.2, 0.4)),
+    sphere(0.5, (10, 170), (-160, 160), side="outside"),
+    sphere(1.2, (40, 100), (0, 90), side="inside"),
+    cylinder(0.3, (-100, 100), (-0.4, 0.4), side="outside"),
+    hyperboloid(0.4, 0.3, (0, 200), (-0.3, 0.4), side="inside"),
+    cone(0.4, 0.5, (0, 300), (-0.2, 0.3), side="outside"),
+    torus(0.5, 0.2, (0, 360), (0, 360), side="outside"),
+)
+EXACT = 0.3  # share of deviations, tilts and box faces that are as large as they may be
+
+
+class Known(NamedTuple):
+    """A configuration, boxes that hold it, and how it lies in them."""
+
+    emptiness: Emptiness
+    parts: object
+    region: Region
+    boxes: Boxes
+    places: np.ndarray
+    """(m, n + 2) the configuration and x in the part of each box."""
+
+
+def up_to(rng, most):
+    """A random number up to `most`, often `most` itself."""
+    return most if rng.random() < EXACT else most * rng.random()
+
+
+def turned_by(rng, vector, angle):
+    """A unit vector at an angle (rad) from another."""
+    across = np.cross(vector, rng.normal(size=3))
+    return Rotation.from_rotvec(angle * across / np.linalg.norm(across)).apply(vector)
+
+
+def known(rng, boxes=50):
+    """A random arm at a random configuration, a patch moved to its tool, and boxes around both."""
+    robot = random_arm(rng)
+    finite = np.clip(np.column_stack([robot.lower, robot.upper]), -4.0, 4.0)
+    robot = robot.with_limits(finite)
+    q = rng.uniform(robot.lower, robot.upper)
+    point, axis = Kinematics(robot).tool(q)
+    tolerance, angle = np.exp(rng.uniform(np.log([1e-4, 1e-3]), np.log([0.05, 3.0])))
+    patch = PATCHES[rng.integers(len(PATCHES))]
+    standoff = rng.choice([0.0, 0.01])
+    u, v = (np.array([rng.uniform(*span)]) for span in (patch.u_range, patch.v_range))
+    approach = turned_by(rng, axis, up_to(rng, angle))
+    turn = Rotation.align_vectors(approach[None], -patch.side_sign * patch.normal(u, v))[0]
+    turn = (Rotation.from_rotvec(approach * rng.uniform(-np.pi, np.pi)) * turn).as_matrix()
+    patch = patch.moved(turn, np.zeros(3))
+    off = rng.normal(size=3)
+    target = point + up_to(rng, tolerance) * off / np.linalg.norm(off)
+    patch = patch.moved(
+        np.eye(3), target - (patch.point(u, v) + patch.side_sign * standoff * patch.normal(u, v))[0]
+    )
+    chord = 2.0 * np.sin(angle / 2.0)
+    parts = target_parts(patch.parts(0.3 * tolerance, 0.3 * chord, 600), patch.side_sign, standoff)
+    arm = Arm(robot, robot.lower, robot.upper)
+    emptiness = Emptiness(arm, Allowed(tolerance, chord, 0.5), lambda: None)
+    part, x = at_parameters(patch, u, v)
+    made, places = boxes_around(rng, robot, q, parts, int(part[0]), x[0], boxes)
+    return Known(emptiness, parts, region_around(rng, robot, q), made, places)
+
+
+def boxes_around(rng, robot, q, parts, part, x, count):
+    """Random boxes (count) that hold q and x, which belongs to `part`, and the places in them."""
+    path = [(part, x)]
+    while parts.children[path[-1][0], 0] >= 0:
+        path.append(child_of(parts, *path[-1]))
+    low, high, places, which = [], [], [], []
+    for _ in range(count):
+        part, x = path[rng.integers(len(path))]
+        place = np.append(q, x)
+        size = np.exp(rng.uniform(np.log(1e-7), np.log(3.0))) * np.exp(rng.normal(size=len(place)))
+        below, above = (up_to(rng, 1.0) * size * rng.random(len(place)) for _ in range(2))
+        below[rng.random(len(place)) < 0.15] = 0.0
+        above[rng.random(len(place)) < 0.15] = 0.0
+        ends = [np.append(robot.lower, [-1.0, -1.0]), np.append(robot.upper, [1.0, 1.0])]
+        low.append(np.maximum(place - below, ends[0]))
+        high.append(np.minimum(place + above, ends[1]))
+        places.append(place)
+        which.append(part)
+    return Boxes(np.array(low), np.array(high), np.array(which)), np.array(places)
+
+
+def child_of(parts, part, x):
+    """A child that holds the place x of a part, and x in it."""
+    axis = parts.axis[part]
+    side = 0 if x[axis] <= 0.0 else 1
+    inner = x.copy()
+    inner[axis] = 2.0 * x[axis] + (1.0 if side == 0 else -1.0)
+    return int(parts.children[part, side]), inner
+
+
+def region_around(rng, robot, q):
+    """All limits, and up to two weighted sums of q inside intervals, at an end of them or equal."""
+    region = Region.box(robot.lower, robot.upper)
+    for _ in range(rng.integers(3)):
+        weights = rng.normal(size=robot.n) * (rng.random(robot.n) < 0.6)
+        value = float(weights @ q)
+        below, above = (rng.choice([0.0, 1e-6, 1.0, np.inf]) for _ in range(2))
+        if np.count_nonzero(weights) > 1:
+            region = region.within(weights, value - below, value + above)
+    return region
+
+
+def lost(case):
+    """(m,) boxes that the verifier drops, or contracts or cuts so that the place is outside."""
+    missed = np.zeros(len(case.boxes), dtype=bool)
+    for k in range(len(case.boxes)):
+        box, place = case.boxes[np.array([k])], case.places[k]
+        left, models, _ = case.emptiness.examine(box, case.parts, case.region)
+        if not len(left):
+            missed[k] = True
+            continue
+        made = smaller(left, models, case.parts, case.emptiness.allowed.length)
+        missed[k] = not any(
+            holds(made, i, case.parts, box.part[0], place) for i in range(len(made))
+        )
+    return missed
+
+
+def holds(boxes, i, parts, part, place):
+    """Whether box i holds the place, given in the coordinates of `part` or of its parent."""
+    if boxes.part[i] != part:
+        side = parts.children[part].tolist().index(boxes.part[i])
+        place = place.copy()
+        along = -2 + parts.axis[part]
+        place[along] = 2.0 * place[along] + (1.0 if side == 0 else -1.0)
+    return ((place >= boxes.low[i] - 1e-15) & (place <= boxes.high[i] + 1e-15)).all()

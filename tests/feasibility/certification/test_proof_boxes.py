@@ -1,0 +1,55 @@
+"""The verifier's bounds: no box around a known place is lost, and no remainder is too small."""
+
+import numpy as np
+import pytest
+from known_points import known, lost
+from random_arms import random_arm
+
+from feasibility.certification import linear_models
+from feasibility.certification.lever_bounds import LeverBounds, lever_bounds, longest_levers
+from feasibility.certification.linear_models import derivatives
+from robots import Kinematics
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_box_around_a_known_place_is_lost(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(12):
+        assert not lost(known(rng)).any()
+
+
+def test_with_smaller_remainders_some_are_lost(monkeypatch):
+    """So the test above can fail."""
+
+    def halved(*values):
+        found = lever_bounds(*values)
+        return LeverBounds(found.largest, 0.3 * found.second)
+
+    monkeypatch.setattr(linear_models, "lever_bounds", halved)
+    rng = np.random.default_rng(0)
+    assert sum(lost(known(rng)).sum() for _ in range(20)) > 0
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_remainders_and_levers_hold_all_over_random_boxes(seed):
+    rng = np.random.default_rng(seed)
+    robot = random_arm(rng)
+    low, high = np.maximum(robot.lower, -4.0), np.minimum(robot.upper, 4.0)
+    kinematics = Kinematics(robot)
+    cap = longest_levers(robot, low, high)
+    half = np.minimum(np.exp(rng.uniform(-5, 1)) * rng.random(robot.n), 0.5 * (high - low))
+    centre = rng.uniform(low + half, high - half)
+    d = rng.uniform(-1, 1, (300, robot.n))
+    d = np.where(rng.random(d.shape) < 0.5, np.sign(d), d) * half
+    columns, tool = derivatives(kinematics, centre[None], 1.0)
+    moved_columns, moved = derivatives(kinematics, centre + d, 1.0)
+    off = moved - tool - np.einsum("mj,jk->mk", d, columns[0])
+    for first, caps in ((0, cap), (3, np.ones(robot.n))):
+        part = slice(first, first + 3)
+        levers = np.linalg.norm(columns[..., part], axis=2)
+        bounds = lever_bounds(levers, half[None], robot.prismatic, caps)
+        assert (np.linalg.norm(off[:, part], axis=1) <= 0.5 * bounds.second + 1e-12).all()
+        turned = ~robot.prismatic
+        seen = np.linalg.norm(moved_columns[..., part], axis=2)[:, turned]
+        assert (seen <= bounds.largest[:, turned] + 1e-12).all()
+        assert (seen <= caps[turned] + 1e-9).all()
