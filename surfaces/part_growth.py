@@ -1,9 +1,11 @@
-"""Growing the tree of parts of a parametric surface: boxes of parameters, cut in halves."""
+"""Growing the tree of parts of a surface: the roughest pieces are cut in two, again and again."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,33 +14,84 @@ from surfaces.parts import PartModels, SurfaceParts, around
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Rows = Ints | NDArray[np.bool_]
 
-Models = Callable[[Ints, Array, Array], PartModels]
-"""(which root (k,), low (k, 2), high (k, 2)) -> the models of the surface over these boxes."""
-
-_TURNS = 4.0  # parts this much better than the worst wait until that is cut
+_WAIT = 4.0  # parts this much better than the worst wait until that is cut
 
 
-class Boxes(NamedTuple):
+class Pieces(ABC):
+    """k pieces of a surface that can be cut in two."""
+
+    in_halves: ClassVar[bool]
+    """Whether the two are the halves of what x runs over, as `SurfaceParts.axis` says."""
+
+    @abstractmethod
+    def models(self) -> PartModels:
+        """Rigorous bounds on each."""
+
+    @abstractmethod
+    def rows(self, some: Rows) -> Self:
+        """Some of them."""
+
+    @abstractmethod
+    def with_more(self, more: Self) -> Self:
+        """These, and others behind them."""
+
+    @abstractmethod
+    def cut(self, axis: Ints) -> Self:
+        """(2k) both halves of each across its own axis, the lower beside the upper one."""
+
+    @property
+    @abstractmethod
+    def sides(self) -> Array:
+        """(k, 2) how long they are: the longer one is cut where errors do not tell."""
+
+    @property
+    def divisible(self) -> NDArray[np.bool_]:
+        """(k,) which can be cut."""
+        return np.ones(len(self.sides), dtype=bool)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Boxes(Pieces):
     """k boxes of parameters."""
 
+    in_halves: ClassVar[bool] = True
+
+    bounds: Callable[[Ints, Array, Array], PartModels]
+    """(root, low, high) -> models of the surface over these boxes."""
     root: Ints
-    """(k,) which of the roots each is cut from: they may be of different patches."""
+    """(k,) which of the boxes that the tree began with each is cut from."""
     low: Array
     """(k, 2)"""
     high: Array
     """(k, 2)"""
 
-    def rows(self, some: Ints | NDArray[np.bool_]) -> Boxes:
-        """Some of them."""
-        return Boxes(self.root[some], self.low[some], self.high[some])
+    def models(self) -> PartModels:
+        """See `Pieces`, as for the others."""
+        return self.bounds(self.root, self.low, self.high)
 
-    def halves(self, axis: Ints) -> Boxes:
-        """(2k) both halves across each box's own axis, the lower beside the upper one."""
+    def rows(self, some: Rows) -> Boxes:
+        """Some of them."""
+        return Boxes(self.bounds, self.root[some], self.low[some], self.high[some])
+
+    def with_more(self, more: Boxes) -> Boxes:
+        """Both."""
+        root = np.concatenate([self.root, more.root])
+        low, high = np.concatenate([self.low, more.low]), np.concatenate([self.high, more.high])
+        return Boxes(self.bounds, root, low, high)
+
+    def cut(self, axis: Ints) -> Boxes:
+        """In the middle."""
         row, middle = np.arange(len(axis)), (self.low + self.high) / 2.0
         low, high = np.repeat(self.low, 2, axis=0), np.repeat(self.high, 2, axis=0)
         high[2 * row, axis] = low[2 * row + 1, axis] = middle[row, axis]
-        return Boxes(np.repeat(self.root, 2), low, high)
+        return Boxes(self.bounds, np.repeat(self.root, 2), low, high)
+
+    @property
+    def sides(self) -> Array:
+        """In parameters."""
+        return self.high - self.low
 
 
 class _Waiting(NamedTuple):
@@ -47,69 +100,71 @@ class _Waiting(NamedTuple):
     number: Ints
     score: Array
     axis: Ints
-    boxes: Boxes
+    pieces: Pieces
 
-    def rows(self, some: Ints | NDArray[np.bool_]) -> _Waiting:
-        return _Waiting(self.number[some], self.score[some], self.axis[some], self.boxes.rows(some))
+    def rows(self, some: Rows) -> _Waiting:
+        return _Waiting(
+            self.number[some], self.score[some], self.axis[some], self.pieces.rows(some)
+        )
 
     def with_more(self, more: _Waiting) -> _Waiting:
-        boxes = Boxes(*(np.concatenate(two) for two in zip(self.boxes, more.boxes, strict=True)))
-        number, score, axis = (
-            np.concatenate([a, b]) for a, b in zip(self[:3], more[:3], strict=True)
+        return _Waiting(
+            np.concatenate([self.number, more.number]),
+            np.concatenate([self.score, more.score]),
+            np.concatenate([self.axis, more.axis]),
+            self.pieces.with_more(more.pieces),
         )
-        return _Waiting(number, score, axis, boxes)
 
 
-def grown(roots: Boxes, models: Models, flat: float, straight: float, most: int) -> SurfaceParts:
+def grown(roots: Pieces, flat: float, straight: float, most: int) -> SurfaceParts:
     """The tree of the parts of a surface; see `Surface.parts`.
 
-    The worst parts are cut first: those within a factor of `_TURNS` of the worst, all at once.
+    The worst parts are cut first: those within a factor of `_WAIT` of the worst, all at once.
 
     Args:
-        roots: boxes that together are the whole surface; `root` is 0, 1, ...
-        models: bounds on the surface over boxes.
+        roots: pieces that together are the whole surface.
         flat: m, the largest r_f wanted.
         straight: the largest r_n wanted.
         most: how many parts may be made.
     """
     limits = np.array([flat, straight])
-    width = (roots.high - roots.low).max(axis=0)
-    found = models(roots.root, roots.low, roots.high).guarded()
+    width = roots.sides.max(axis=0)
+    found = roots.models().guarded()
     top = _joined(found)
+    first = len(top.children)
+    count = first + len(found.centre)
     blocks = [top.models, found]
-    count = len(top.children) + len(roots.root)
     children = np.full((max(most, count), 2), -1, dtype=np.int64)
     axes = np.full(len(children), -1, dtype=np.int64)
-    children[: len(top.children)] = top.children
-    waiting = _rough(roots, found, len(top.children), limits, width)
+    children[:first] = top.children
+    waiting = _rough(roots, found, first, limits, width)
     while len(waiting.number) and count + 2 <= most:
-        now = waiting.score >= waiting.score.max() / _TURNS
-        some = np.flatnonzero(now)
+        some = np.flatnonzero(waiting.score >= waiting.score.max() / _WAIT)
         order = np.argsort(-waiting.score[some], kind="stable")
         some = some[order[: (most - count) // 2]]
         cut = waiting.rows(some)
-        boxes = cut.boxes.halves(cut.axis)
-        found = models(boxes.root, boxes.low, boxes.high).guarded()
+        pieces = cut.pieces.cut(cut.axis)
+        found = pieces.models().guarded()
         children[cut.number] = count + np.arange(2 * len(some)).reshape(-1, 2)
-        axes[cut.number] = cut.axis
+        axes[cut.number] = cut.axis if roots.in_halves else -1
         blocks.append(found)
         left = np.ones(len(waiting.number), dtype=bool)
         left[some] = False
-        more = _rough(boxes, found, count, limits, width)
+        more = _rough(pieces, found, count, limits, width)
         waiting, count = waiting.rows(left).with_more(more), count + 2 * len(some)
     centre, slopes, radius, _ = (np.concatenate(part) for part in zip(*blocks, strict=True))
     return SurfaceParts(centre, slopes, radius, children[:count], axes[:count])
 
 
-def _rough(boxes: Boxes, found: PartModels, first: int, limits: Array, width: Array) -> _Waiting:
-    """The boxes that are rougher than the limits allow, and across which axis each is to be cut."""
+def _rough(pieces: Pieces, found: PartModels, first: int, limits: Array, width: Array) -> _Waiting:
+    """Pieces that are rougher than the limits allow, and across which axis each is to be cut."""
     score = (found.radius / limits).max(axis=1)
-    some = np.flatnonzero(score > 1.0)
+    some = np.flatnonzero((score > 1.0) & pieces.divisible)
     by_axis = (found.along[some] / limits).max(axis=2)
-    sides = (boxes.high[some] - boxes.low[some]) / width
+    sides = pieces.sides[some] / width
     even = by_axis[:, 0] == by_axis[:, 1]
     axis = np.where(even, sides[:, 1] > sides[:, 0], by_axis[:, 1] > by_axis[:, 0])
-    return _Waiting(first + some, score[some], axis.astype(np.int64), boxes.rows(some))
+    return _Waiting(first + some, score[some], axis.astype(np.int64), pieces.rows(some))
 
 
 class _Top(NamedTuple):
@@ -135,7 +190,7 @@ def _joined(roots: PartModels) -> _Top:
         if len(group) == 1:
             continue
         made += 1
-        centre = np.nan_to_num(roots.centre[group, :3])
+        centre = roots.centre[group, :3]
         axis = int(np.argmax(np.ptp(centre, axis=0)))
         group = group[np.argsort(centre[:, axis], kind="stable")]
         half = len(group) // 2

@@ -91,6 +91,7 @@ class Surface(Protected, ABC):
             ArgumentError: `points` does not end in an axis of length 3.
         """
 
+    @abstractmethod
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """The whole surface, margins outside the outermost cell centres included, as a tree.
 
@@ -102,7 +103,6 @@ class Surface(Protected, ABC):
             straight: > 0, the largest r_n.
             most: how many parts may be made in all; never fewer than the surface begins with.
         """
-        raise SurfaceError("no parts of this kind yet", self.kind)
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
         """The same surface after the rigid motion x -> rotation x + translation."""

@@ -28,7 +28,7 @@ surfaces: protected parts surface part_growth cells adjacency cell_curves curve_
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.piecewise
-surfaces.meshes: triangle_mesh normals closest_point
+surfaces.meshes: triangle_mesh normals closest_point facets mesh_parts
 surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection

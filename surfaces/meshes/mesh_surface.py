@@ -11,8 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.meshes.normals import WIDTH, blended, carried, corner_normals, sectors, unit
+from surfaces.meshes.facets import facets_of
+from surfaces.meshes.mesh_parts import Clusters
+from surfaces.meshes.normals import (
+    WIDTH,
+    blended,
+    carried,
+    corner_normals,
+    crease_share,
+    sectors,
+    unit,
+)
 from surfaces.meshes.triangle_mesh import TriangleMesh
+from surfaces.part_growth import grown
+from surfaces.parts import MOST_PARTS, SurfaceParts
 from surfaces.surface import ClosestPoint, Side, Surface, points_of
 
 if TYPE_CHECKING:
@@ -71,6 +83,17 @@ class MeshSurface(Surface):
         values = np.column_stack([nowhere, np.where(outer, distance, -distance), normals])
         return ClosestPoint.of_rows(points.shape[:-1], values, np.ones(len(flat), dtype=bool))
 
+    def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
+        """See `Surface.parts`; clusters of triangles."""
+        turned = self.rotation.T
+        facets = facets_of(
+            self.face_balls[0] @ turned + self.position,
+            self.corner_normals @ turned,
+            self.crease_normals @ turned,
+            self.on_crease,
+        )
+        return grown(Clusters.whole(facets), flat, straight, most)
+
     def nearest(self, points: Array) -> tuple[Ints, Array]:
         """Faces (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m."""
         return self._nearest((points - self.position) @ self.rotation)
@@ -122,8 +145,7 @@ class MeshSurface(Surface):
 
     def crease_share(self, face: Ints, weights: Array) -> Array:
         """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it."""
-        along = (weights * self.on_crease[face]).sum(axis=-1)  # 1 on the crease
-        return np.asarray(np.clip(1.0 - (1.0 - along) / WIDTH, 0.0, 1.0))
+        return crease_share(self.on_crease[face], weights)
 
     def cells(self, count: int | None = None, size: float | None = None) -> MeshCells:
         """Cut the mesh into connected cells of even area.

@@ -119,6 +119,17 @@ def sectors(mesh: TriangleMesh) -> Ints:
     return components(pairs, mesh.faces.size).reshape(-1, 3)
 
 
+def crease_share(on_crease: NDArray[np.bool_], weights: Floats) -> Floats:
+    """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it.
+
+    Args:
+        on_crease: (..., 3) which corners of the face lie on a crease.
+        weights: (..., 3) of the place on the face.
+    """
+    along = (weights * on_crease).sum(axis=-1)  # 1 on the crease
+    return np.asarray(np.clip(1.0 - (1.0 - along) / WIDTH, 0.0, 1.0))
+
+
 def unit(vectors: NDArray[Any]) -> Floats:
     """The vectors (..., 3) at length 1."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -89,8 +89,16 @@ class Patch(Surface):
     def part_models(
         self, low: NDArray[np.float64], high: NDArray[np.float64]
     ) -> tuple[SpaceModel, SpaceModel]:
-        """Bounds on points and normals, in the own frame, over boxes of parameters (k, 2)."""
-        raise SurfaceError("no parts of this kind yet", self.kind)
+        """Bounds on points and normals, in the own frame, over boxes of parameters (k, 2).
+
+        Raises:
+            SurfaceError: the kind has none.
+        """
+        raise SurfaceError(
+            "no bounds are known between places of this kind, so nothing can be proved of the "
+            "whole surface",
+            self.kind,
+        )
 
     @property
     def part_roots(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -113,13 +121,13 @@ class Patch(Surface):
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """See `Surface.parts`."""
         low, high = self.part_roots
-        return grown(
-            Boxes(np.arange(len(low)), low, high),
-            lambda _, low, high: self.placed_models(low, high),
-            flat,
-            straight,
-            most,
-        )
+        roots = Boxes(self._root_models, np.arange(len(low)), low, high)
+        return grown(roots, flat, straight, most)
+
+    def _root_models(
+        self, root: NDArray[np.int64], low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> PartModels:
+        return self.placed_models(low, high)
 
     def point(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
         """Points (..., 3) m of the surface in the root frame."""

@@ -14,6 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from coverable_errors import Fault
 from surfaces.adjacency import components
 from surfaces.arguments import ORIGIN, Checks
+from surfaces.part_growth import Boxes, grown
+from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches import Patch
 from surfaces.piecewise.closest_point import PieceClosestPoints, nearest_places
 from surfaces.piecewise.seams import Seam, on_each_other, sides_of, survey, turned_pieces
@@ -113,6 +115,24 @@ class Piecewise(Surface):
         nowhere = np.full((len(found.height), 2), np.nan)
         values = np.column_stack([nowhere, found.height, found.normals])
         return ClosestPoint.of_rows(points.shape[:-1], values, found.inside)
+
+    def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
+        """See `Surface.parts`: those of all pieces, their normals turned over where theirs are."""
+        roots = [piece.part_roots for piece in self.placed]
+        owner = np.repeat(np.arange(len(roots)), [len(low) for low, _ in roots])
+
+        def bounds(root: Ints, low: Array, high: Array) -> PartModels:
+            some = [np.flatnonzero(owner[root] == k) for k in range(len(roots))]
+            models = [
+                piece.placed_models(low[rows], high[rows], sign)
+                for piece, sign, rows in zip(self.placed, self.signs, some, strict=True)
+                if len(rows)
+            ]
+            back = np.argsort(np.concatenate(some), kind="stable")
+            return PartModels(*(np.concatenate(each)[back] for each in zip(*models, strict=True)))
+
+        low, high = (np.concatenate(ends) for ends in zip(*roots, strict=True))
+        return grown(Boxes(bounds, np.arange(len(low)), low, high), flat, straight, most)
 
     def cells(self, counts: Any) -> PieceCells:
         """Cut every piece into a grid of cells.

@@ -68,3 +68,25 @@ def spread(surface, count, seed=7):
     share[edge] = np.round(share[edge])
     ends = np.array([surface.u_range, surface.v_range])
     return (ends[:, 0] + share * np.diff(ends)[:, 0]).T
+
+
+def survivors(parts, points, normals):
+    """(k,) which places reach a finest part through parts whose models all hold them.
+
+    With x that brings the model nearest to the point: for parts whose slopes are square to each
+    other. A search that discards only parts that cannot hold a place never loses a survivor.
+    """
+    place, part = np.arange(len(points)), np.zeros(len(points), dtype=int)
+    reached = np.zeros(len(points), dtype=bool)
+    while len(place):
+        slopes = parts.slopes[part]
+        away = points[place] - parts.centre[part, :3]
+        square = np.maximum((slopes[..., :3] ** 2).sum(axis=2), 1e-300)
+        x = np.clip(np.einsum("kcd,kd->kc", slopes[..., :3], away) / square, -1.0, 1.0)
+        off = residuals(parts, part, x, points[place], normals[place])
+        held = (off <= parts.radius[part]).all(axis=1)
+        place, part = place[held], part[held]
+        ends = parts.children[part, 0] < 0
+        reached[place[ends]] = True
+        place, part = np.repeat(place[~ends], 2), parts.children[part[~ends]].ravel()
+    return reached

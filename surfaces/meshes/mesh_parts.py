@@ -1,0 +1,190 @@
+"""Parts of a mesh: clusters of facets, cut in two through the middle of their longest side.
+
+The points of a cluster lie between two planes, seen from above in a rectangle that holds all
+corners; x are the coordinates in it. On every facet the normal is m / |m|, see
+`surfaces.meshes.facets`, with m in the hull of its coefficients. For an affine function of x, which
+is one of the place, the difference to m is in the hull of the differences at the coefficients'
+places. So it is no longer than the longest of these; and |n - m| = |1 - |m||.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.meshes.facets import Facets
+from surfaces.part_growth import Pieces, Rows
+from surfaces.parts import PartModels
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# The mean square of a coordinate of the normals in -1..1, by area: a third where they are spread
+# evenly. With less most are alike, with more they are of two sorts.
+_FEW, _TWO = 0.12, 0.6
+_TURNS = 8  # of a right angle, by which rectangles are tried
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Clusters(Pieces):
+    """k clusters of facets."""
+
+    in_halves: ClassVar[bool] = False
+
+    facets: Facets
+    order: Ints
+    """(G,) facets; each cluster is a run of them. Cutting clusters sorts their runs."""
+    begin: Ints
+    """(k,)"""
+    end: Ints
+    """(k,)"""
+
+    @staticmethod
+    def whole(facets: Facets) -> Clusters:
+        """All facets in one."""
+        count = len(facets.corners)
+        return Clusters(facets, np.arange(count), np.zeros(1, np.int64), np.full(1, count))
+
+    def rows(self, some: Rows) -> Clusters:
+        """See `Pieces`, as for the others."""
+        return Clusters(self.facets, self.order, self.begin[some], self.end[some])
+
+    def with_more(self, more: Clusters) -> Clusters:
+        """Both."""
+        ends = (np.concatenate(two) for two in ((self.begin, more.begin), (self.end, more.end)))
+        return Clusters(self.facets, self.order, *ends)
+
+    @property
+    def sides(self) -> Array:
+        """Alike."""
+        return np.ones((len(self.begin), 2))
+
+    @property
+    def divisible(self) -> NDArray[np.bool_]:
+        """Those of more than one facet."""
+        return self.end - self.begin > 1
+
+    def cut(self, axis: Ints) -> Clusters:
+        """At the median along the axis of the frame along which the facets' middles spread most.
+
+        Where normals are the worse (axis 1), and most are alike but for some, or of two sorts, as
+        at creases, those are parted instead: in the middle along the axis along which they differ.
+        """
+        run, cluster, starts = self._runs()
+        facet = self.order[run]
+        corners = self.facets.corners[facet]
+        keys, _ = _widest(corners.mean(axis=1), cluster, starts)
+        size = self.end - self.begin
+        first = size // 2
+        normals, ends = _widest(self.facets.normals[facet].mean(axis=1), cluster, starts)
+        area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        total = np.maximum(np.add.reduceat(area, starts), 1e-300)
+        mean = np.add.reduceat(area * normals, starts) / total
+        square = np.add.reduceat(area * (normals - mean[cluster]) ** 2, starts) / total
+        even = square / np.maximum((ends[1] - ends[0]) ** 2 / 4.0, 1e-300)
+        below = np.add.reduceat((normals <= ends.mean(axis=0)[cluster]).astype(np.int64), starts)
+        apart = (axis == 1) & ((even < _FEW) | (even > _TWO)) & (below > 0) & (below < size)
+        self.order[run] = facet[np.lexsort((np.where(apart[cluster], normals, keys), cluster))]
+        middle = self.begin + np.where(apart, below, first)
+        begin, end = np.stack([self.begin, middle], axis=1), np.stack([middle, self.end], axis=1)
+        return Clusters(self.facets, self.order, begin.ravel(), end.ravel())
+
+    def _runs(self) -> tuple[Ints, Ints, Ints]:
+        """Where in `order` the facets are, cluster by cluster; which cluster; where each begins."""
+        size = self.end - self.begin
+        starts = np.cumsum(size) - size
+        cluster = np.repeat(np.arange(len(size)), size)
+        return np.arange(len(cluster)) - starts[cluster] + self.begin[cluster], cluster, starts
+
+    def models(self) -> PartModels:
+        """See the module's text."""
+        run, cluster, starts = self._runs()
+        facet = self.order[run]
+        corners, count = self.facets.corners[facet], len(starts)
+        centre, slopes, radius = np.empty((count, 6)), np.empty((count, 2, 6)), np.empty((count, 2))
+        middle, frame = _frames(corners, cluster, starts)
+        local = np.einsum("gkd,ged->gke", corners - middle[cluster, None], frame[cluster])
+        low, high = _extremes(local, starts)
+        half, mid = (high - low) / 2.0, (high + low) / 2.0
+        centre[:, :3] = middle + np.einsum("ke,ked->kd", mid, frame)
+        slopes[..., :3] = half[:, :2, None] * frame[:, :2]
+        radius[:, 0] = half[:, 2]
+        off = self.facets.places[facet] - centre[cluster, None, :3]
+        across = np.einsum("gkd,ged->gke", off, frame[cluster, :2])
+        x = across / np.maximum(half[:, :2], 1e-300)[cluster, None]
+        fit = _fitted(x, self.facets.normals[facet], cluster, starts)
+        centre[:, 3:], slopes[..., 3:], left = fit[:, 0], fit[:, 1:3], fit[:, 3, 0]
+        radius[:, 1] = left + np.maximum.reduceat(self.facets.off[facet], starts)
+        return PartModels(centre, slopes, radius, radius[:, None] * np.eye(2))
+
+
+def _widest(values: Array, cluster: Ints, starts: Ints) -> tuple[Array, Array]:
+    """(g,) the coordinate along which values (g, 3) of each cluster spread most; ends (2, k)."""
+    low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
+    axis = (high - low).argmax(axis=1)[:, None]
+    ends = np.stack([np.take_along_axis(end, axis, axis=1)[:, 0] for end in (low, high)])
+    return np.take_along_axis(values, axis[cluster], axis=1)[:, 0], ends
+
+
+def _extremes(values: Array, starts: Ints) -> tuple[Array, Array]:
+    """(k, d) lowest and highest of the values (g, m, d) of each cluster."""
+    return (
+        np.minimum.reduceat(values.min(axis=1), starts),
+        np.maximum.reduceat(values.max(axis=1), starts),
+    )
+
+
+def _frames(corners: Array, cluster: Ints, starts: Ints) -> tuple[Array, Array]:
+    """A point of each cluster (k, 3), and unit vectors (k, 3, 3): two in its plane, one across.
+
+    The plane is the one nearest to the corners in the mean; the two vectors are those with the
+    rectangle of least area.
+    """
+    size = np.diff(np.append(starts, len(corners)))[:, None]
+    middle = np.add.reduceat(corners.mean(axis=1), starts) / size
+    off = corners - middle[cluster, None]
+    spread = np.add.reduceat(np.einsum("gki,gkj->gij", off, off), starts)
+    frame = np.linalg.eigh(spread)[1][:, :, ::-1].transpose(0, 2, 1)  # the least spread is last
+    flat = np.einsum("gkd,ged->gke", off, frame[cluster, :2])
+    angles = np.arange(_TURNS) * (np.pi / 2.0 / _TURNS)
+    cosine, sine = np.cos(angles), np.sin(angles)
+    u, v = (
+        flat[..., :1] * cosine + flat[..., 1:] * sine,
+        flat[..., 1:] * cosine - flat[..., :1] * sine,
+    )
+    areas = [high - low for low, high in (_extremes(each, starts) for each in (u, v))]
+    best = np.argmin(areas[0] * areas[1], axis=1)
+    c, s = cosine[best][:, None], sine[best][:, None]
+    first, second = c * frame[:, 0] + s * frame[:, 1], c * frame[:, 1] - s * frame[:, 0]
+    return middle, np.stack([first, second, frame[:, 2]], axis=1)
+
+
+def _fitted(x: Array, values: Array, cluster: Ints, starts: Ints) -> Array:
+    """(k, 4, 3): an affine function of x for each cluster, and the longest difference to values.
+
+    Least squares, then moved between the extremes.
+
+    Args:
+        x: (g, m, 2) of each value.
+        values: (g, m, 3)
+        cluster: (g,) of each facet.
+        starts: (k,) where clusters begin.
+    """
+    at = np.concatenate([np.ones((*x.shape[:2], 1)), x], axis=2)
+    square = np.add.reduceat(at.transpose(0, 2, 1) @ at, starts)
+    right = np.add.reduceat(at.transpose(0, 2, 1) @ values, starts)
+    square += 1e-12 * square[:, :1, :1] * np.eye(3)
+    fit = np.zeros((len(starts), 4, 3))
+    fit[:, :3] = np.linalg.solve(square, right)
+    off = values - at @ fit[cluster, :3]
+    low, high = _extremes(off, starts)
+    shift = (low + high) / 2.0
+    fit[:, 0] += shift
+    left = np.linalg.norm(off - shift[cluster, None], axis=2).max(axis=1)
+    fit[:, 3] = np.maximum.reduceat(left, starts)[:, None]
+    return fit
