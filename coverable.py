@@ -25,8 +25,10 @@ if TYPE_CHECKING:
         Search,
         Task,
         Verdict,
+        Verification,
         check,
         greedy_check,
+        verify,
     )
     from feasibility.cases import Case, CaseError, builtin_cases, load_case
     from feasibility.certification import replay
@@ -52,7 +54,13 @@ if TYPE_CHECKING:
     from feasibility.reports.placement import as_text as placement_text
     from feasibility.reports.placement import settings_of
     from feasibility.reports.study import as_text as study_text
-    from feasibility.results import load_result, load_trajectory, save_result, save_trajectory
+    from feasibility.results import (
+        load_motion,
+        load_result,
+        load_trajectory,
+        save_result,
+        save_trajectory,
+    )
     from feasibility.sensitivity import Explanation, explain
     from feasibility.studies import (
         Comparison,
@@ -113,17 +121,18 @@ __all__ = [
     "Answer", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Comparison", "CoveragePath",
     "Division", "Evidence", "Explanation", "Local", "LocalEvaluator", "MeshSurface", "Patch",
     "PathError", "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot", "RobotError",
-    "Search", "Store", "Study", "Surface", "SurfaceError", "Task", "Trajectory", "Verdict", "View",
-    "__version__", "bspline", "builtin_cases", "check", "compare", "comparison_chart",
-    "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane", "cylinder", "divide",
-    "division_text", "ellipsoid", "explain", "explanation_text", "faces_within_cone",
-    "greedy_check", "hyperboloid", "list_robots", "load_case", "load_result", "load_robot",
-    "load_study", "load_trajectory", "mesh", "motion_limits", "open_workers", "path", "path_text",
-    "piecewise", "place", "placement_map", "placement_text", "plane", "plot_causes", "plot_graph",
-    "plot_map", "plot_transition", "read_net", "read_study", "replay", "revolution", "run_tasks",
-    "save_result", "save_trajectory", "settings_of", "show", "sphere", "starts", "station_plan",
-    "study_text", "take_faces", "torus", "trajectory", "unrolled_edges", "view", "view_division",
-    "view_path", "view_placements", "view_study",
+    "Search", "Store", "Study", "Surface", "SurfaceError", "Task", "Trajectory", "Verdict",
+    "Verification", "View", "__version__", "bspline", "builtin_cases", "check", "compare",
+    "comparison_chart", "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane",
+    "cylinder", "divide", "division_text", "ellipsoid", "explain", "explanation_text",
+    "faces_within_cone", "greedy_check", "hyperboloid", "list_robots", "load_case", "load_motion",
+    "load_result", "load_robot", "load_study", "load_trajectory", "mesh", "motion_limits",
+    "open_workers", "path", "path_text", "piecewise", "place", "placement_map", "placement_text",
+    "plane", "plot_causes", "plot_graph", "plot_map", "plot_transition", "read_net", "read_study",
+    "replay", "revolution", "run_tasks", "save_result", "save_trajectory", "settings_of", "show",
+    "sphere", "starts", "station_plan", "study_text", "take_faces", "torus", "trajectory",
+    "unrolled_edges", "verify", "view", "view_division", "view_path", "view_placements",
+    "view_study",
 ]
 # fmt: on
 

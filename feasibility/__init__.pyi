@@ -7,3 +7,6 @@ from .verdict import Cause as Cause
 from .verdict import CauseKind as CauseKind
 from .verdict import Evidence as Evidence
 from .verdict import Verdict as Verdict
+from .verifying import NothingToVerifyError as NothingToVerifyError
+from .verifying import Verification as Verification
+from .verifying import verify as verify

@@ -47,6 +47,7 @@ feasibility.timing
 feasibility.division
 feasibility.sensitivity
 feasibility.results
+feasibility: verifying
 feasibility.studies
 feasibility.placement
 feasibility.viewer

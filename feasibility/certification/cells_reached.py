@@ -102,19 +102,18 @@ def _passing(aims: Array, starts: Array, ends: Array, within: float) -> tuple[Ar
     return np.where(never, 1.0, low), np.where(never, 0.0, high)
 
 
-def missed_text(
-    cells: Cells, task: Task, missed: NDArray[np.int64], samples: Samples
-) -> tuple[str, int]:
-    """Which cells are missed, and by how much the nearest sample misses the first; its index."""
+def missed_text(cells: Cells, task: Task, missed: NDArray[np.int64], samples: Samples) -> str:
+    """Which cells are missed, and by how much the nearest sample misses the first."""
     names = [str(list(cells.unravel(int(k)))) for k in missed[:NAMED]]
     more = f" and {len(missed) - NAMED:,} more" if len(missed) > NAMED else ""
     what = f"cell {names[0]} is" if len(missed) == 1 else f"cells {', '.join(names)}{more} are"
     if not len(samples.row):
-        return f"{what} never reached", -1
+        return f"{what} never reached"
     aims, first = task.targets(cells), missed[0]
     off = np.linalg.norm(samples.points - aims.points[first], axis=1)
     nearest = int(np.argmin(off))
     where = f"comes no nearer to the target of {names[0]} than about {1e3 * off[nearest]:.4g} mm"
     if off[nearest] <= task.effective_tolerance:
         where = f"is at the target of {names[0]}, but not inside the cone there"
-    return f"{what} never reached: the tool {where}", nearest
+    row = f"near row {samples.row[nearest] + 1}"
+    return f"{what} never reached: {row} the tool {where}"

@@ -111,9 +111,7 @@ def replay_over_surface(
     reached = cells_reached(robot, cells, task, rows, samples)
     missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
     if len(missed):
-        text, near = missed_text(cells, task, missed, samples)
-        where = (-1, 0.0) if near < 0 else (int(samples.row[near]), float(samples.share[near]))
-        faults.append(MotionFault(*where, text))
+        faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, samples)))
     error = max(looked.error, float(np.max(samples.error, initial=0.0)))
     chord = max(looked.chord, float(np.max(samples.chord, initial=0.0)))
     certificate = Certificate(len(rows), error, angle_of(chord), margin)

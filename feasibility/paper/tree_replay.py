@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from feasibility.cone import angle_of
 from feasibility.paper.jcell_steps import Steps
+from feasibility.search import Search
 from feasibility.task import Task
-from feasibility.verdict import Certificate, Replay
+from feasibility.verdict import Certificate, Replay, Verdict
 from robots import Kinematics, Robot
-from surfaces.patches import GridCells
+from surfaces.patches import GridCells, closed_form_grid
 
 SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one number meet
 
@@ -114,3 +115,21 @@ def _continuous(paths: Sequence[Path]) -> bool:
             return False
         entered[path.neighbour] = path.q[-1]
     return True
+
+
+def replay_stored(verdict: Verdict, search: Search) -> Replay:
+    """`replay_tree` of a verdict of the greedy search, with the settings of that search.
+
+    Besides, every cell has to be in its tree.
+    """
+    cells = closed_form_grid(verdict.cells)
+    steps = Steps.of(verdict.robot, cells.closed_form, verdict.task, search)
+    edges = [] if verdict.tree is None else verdict.tree.edges(data="motion")
+    paths = [Path(a, b, motion) for a, b, motion in edges]
+    found = replay_tree(verdict.robot, cells, verdict.task, steps, paths)
+    entered = set() if verdict.tree is None else set(verdict.tree.nodes)
+    missed = len(cells) - len(entered)
+    if missed:
+        text = f"{missed} cells are not in the tree"
+        return Replay(found.certificate, "; ".join(filter(None, (found.refusal, text))))
+    return found

@@ -5,3 +5,4 @@ from . import path as path
 from . import placement as placement
 from . import study as study
 from . import verdict as verdict
+from . import verification as verification

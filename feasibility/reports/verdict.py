@@ -19,6 +19,7 @@ from feasibility.reports.parts import (
     seconds_text,
     summary,
 )
+from feasibility.reports.proof import proof_json
 from feasibility.results import plain
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
 from feasibility.version import version
@@ -63,6 +64,9 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "edges": verdict.n_edges,
         "uncovered": causes_json(verdict.causes, verdict.cells),
         "certificate": _certificate(verdict),
+        "proof": None
+        if verdict.proof is None
+        else proof_json(verdict.proof, verdict.robot, verdict.cells),
         "timing": seconds(verdict.timing, PHASES, before_s),
         "robot": verdict.robot.name,
         "method": verdict.method,

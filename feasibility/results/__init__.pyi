@@ -1,3 +1,6 @@
+from .motion_file import Motion as Motion
+from .motion_file import load_motion as load_motion
+from .result_file import Result as Result
 from .result_file import ResultError as ResultError
 from .result_file import load_result as load_result
 from .result_file import plain as plain

@@ -18,6 +18,7 @@ import numpy as np
 from coverable_errors import ArgumentError, CoverableError, shown, worded
 from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
+from feasibility.results.proof_arrays import pack_proof, unpack_proof
 from feasibility.results.result_arrays import (
     check_cells,
     check_robot,
@@ -38,7 +39,7 @@ if TYPE_CHECKING:
     from robots import Robot
 
 FORMAT = "coverable-result"
-FORMAT_VERSION = 2  # 1 had no `places`, and the kinds `CLOSED_FORM_KINDS` alone
+FORMAT_VERSION = 3  # 2 had no proofs; 1 no `places`, and the kinds `CLOSED_FORM_KINDS` alone
 
 
 class ResultError(CoverableError):
@@ -96,6 +97,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         "statistics": plain(verdict.statistics),
         "has_tree": verdict.tree is not None,
         "has_witness": verdict.witness is not None,
+        "has_proof": verdict.proof is not None,
     }
     arrays = {
         "probes": probes(verdict.robot),
@@ -108,6 +110,8 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         arrays |= pack_graph("tree", verdict.tree, n)
     if verdict.witness is not None:
         arrays |= {"witness_q": verdict.witness.q, "witness_cell": verdict.witness.cell}
+    if verdict.proof is not None:
+        arrays |= pack_proof(verdict.proof, n)
     try:
         write_archive(Path(path), meta, arrays)
     except FileError as error:
@@ -186,6 +190,9 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
     if fields.flag("has_witness"):
         q = archive.array("witness_q", np.float64, (None, n))
         witness = Walk(q=q, cell=read_cells(archive, "witness_cell", count, (len(q),), low=-1))
+    proof = None  # a file of format 2 says nothing of it
+    if "has_proof" in fields.entries and fields.flag("has_proof"):
+        proof = unpack_proof(archive, count, n)
     start = None if fields.entries.get("start") is None else fields.cell("start", count)
     timing = fields.table("timing")
     return Verdict(
@@ -208,6 +215,7 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
         start=start,
         witness=witness,
         certificate=_certificate(fields),
+        proof=proof,
         timing={key: timing.number(key) for key in timing.entries},
         statistics=dict(fields.table("statistics").entries),
     )

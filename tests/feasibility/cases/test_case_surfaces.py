@@ -470,7 +470,7 @@ def repacked(saved, path, **changes):
     with zipfile.ZipFile(path, "w") as file:
         for name, data in members.items():
             if not (
-                meta["format_version"] != changes.get("format_version", 2) and "places" in name
+                meta["format_version"] != changes.get("format_version", 3) and "places" in name
             ):
                 file.writestr(name, data)
     return path

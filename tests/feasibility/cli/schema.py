@@ -20,6 +20,17 @@ class Maybe:
         self.inner = inner
 
 
+class Named:
+    """An object of any keys, with values that the inner schema says."""
+
+    def __init__(self, inner):
+        self.inner = inner
+
+
+class ProofTree:
+    """A cut with the nodes below and above it, or a leaf with its cell."""
+
+
 SECONDS = {"load_s": float, "search_s": float, "certify_s": float, "total_s": float}
 CHECK = {
     "verdict": OneOf("feasible", "infeasible", "undecided"),
@@ -45,6 +56,7 @@ CHECK = {
             "min_limit_margin_deg": Maybe(float),
         }
     ),
+    "proof": Maybe({"kind": OneOf("cell", "cut"), "opened": Named(float), "tree": ProofTree()}),
     "timing": SECONDS,
     "robot": str,
     "method": OneOf("complete", "greedy"),
@@ -61,6 +73,20 @@ def conforms(value: Any, schema: Any, path: str = "$") -> None:
             conforms(value, schema.inner, path)
     elif isinstance(schema, OneOf):
         assert value in schema.words, f"{path}: {value!r}"
+    elif isinstance(schema, Named):
+        assert isinstance(value, dict), f"{path}: {value!r}"
+        for key, item in value.items():
+            conforms(item, schema.inner, f"{path}.{key}")
+    elif isinstance(schema, ProofTree) and "cell" in value:
+        conforms(value, {"cell": [int]}, path)
+    elif isinstance(schema, ProofTree):
+        sides = {"below": ProofTree(), "above": ProofTree()}
+        cuts = (
+            {"joint": str, "value_deg": float, **sides},
+            {"joint": str, "value_m": float, **sides},
+            {"weights": Named(float), "value": float, **sides},
+        )
+        conforms(value, next(cut for cut in cuts if list(cut) == list(value)), path)
     elif isinstance(schema, dict):
         assert isinstance(value, dict), f"{path}: {value!r}"
         assert list(value) == list(schema), f"{path}: {list(value)}"

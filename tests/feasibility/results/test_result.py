@@ -141,7 +141,7 @@ DAMAGED = {
     "meta has NaN": (lambda m: {**m, "meta.json": b'{"seed": NaN}'}, "no JSON number"),
     "meta is deep": (lambda m: {**m, "meta.json": b"[" * 200_000}, "is not JSON"),
     "other format": (lambda m: meta(m, format="something"), "is not a result file"),
-    "later format": (lambda m: meta(m, format_version=3, version="9.1"), "'9.1'"),
+    "later format": (lambda m: meta(m, format_version=4, version="9.1"), "'9.1'"),
     "format true": (lambda m: meta(m, format_version=True), "not a whole number"),
     "no version": (lambda m: meta(m, version=...), "version is nothing, not text"),
     "no case": (lambda m: meta(m, case="x"), "case is 'x', not an object"),

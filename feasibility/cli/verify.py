@@ -1,0 +1,84 @@
+"""`coverable verify`: a motion, or a saved result, judged without searching."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from feasibility.cli.command import add_case, add_command, json_text, open_case
+from feasibility.cli.console import print_out, progress_bar
+from feasibility.safe_files import shown_path
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from feasibility.verifying import Verification
+
+
+def add(subcommands: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    parser = add_command(
+        subcommands, "verify", verify, add_case,
+        help="judge a motion that anybody made, or a saved result, without searching",
+        usage="coverable verify [--json] [--set KEY=VALUE] CASE MOTION\n"
+        "       coverable verify [--json] RESULT",
+        description="Judge a joint motion against a case by the independent replay alone: limits, "
+        "tool point and tool axis at every instant, between rows too, and every cell reached. Or "
+        "judge the witness or the proof of a result that `check --save` wrote.",
+        epilog="MOTION is CSV: a first line of joint names in any order, then a row a waypoint, in "
+        "rad (NAME_deg: degrees) or m, unwrapped; rows are joined by straight lines in joint "
+        "space, and counted from 1. exit status: 0 holds, 1 does not, 2 bad input, 130 interrupted",
+    )  # fmt: skip
+    parser.add_argument(
+        "motion", metavar="MOTION", nargs="?", help="a file of joint values; none for a RESULT"
+    )
+
+
+def verify(args: argparse.Namespace, began: float) -> int:
+    """`coverable verify CASE MOTION`, and `coverable verify RESULT`."""
+    return _result(args) if args.motion is None else _motion(args, began)
+
+
+def _motion(args: argparse.Namespace, began: float) -> int:
+    """Judge a motion file against a case."""
+    with open_case(args, began, {}) as opened:
+        from feasibility.results import load_motion
+        from feasibility.verifying import verify as run
+
+        robot, cells, task, _ = opened.setup
+        motion = load_motion(args.motion, robot)
+        opened.progress(0, None, "replaying the motion")
+        found = run(robot, cells, task, motion.q)
+    return _said(args, found, opened.case.name, args.motion, motion.notes)
+
+
+def _result(args: argparse.Namespace) -> int:
+    """Judge a saved result."""
+    with progress_bar() as progress:
+        from coverable_errors import CoverableError
+        from feasibility.results import ResultError, load_result
+        from feasibility.verifying import verify as run
+
+        if args.settings:
+            raise CoverableError("--set changes a case; a result holds the case it was found for")
+        try:
+            result = load_result(args.case)
+        except ResultError as error:
+            hint = "a motion is judged by `coverable verify CASE MOTION`"
+            raise ResultError(f"{error}; {hint}") from error
+        progress(0, None, "verifying")
+        found = run(result, tick=lambda: progress(0, None, "verifying"))
+    return _said(args, found, result.case.name, args.case, ())
+
+
+def _said(
+    args: argparse.Namespace, found: Verification, case: str, source: str, notes: Sequence[str]
+) -> int:
+    """Print the answer; the exit status."""
+    from feasibility.reports import verification as report
+
+    if args.json:
+        print_out(json_text(report.as_json(found, notes)))
+    else:
+        print_out(report.as_text(found, case, shown_path(source), notes))
+    return 0 if found.holds else 1

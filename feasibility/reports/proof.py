@@ -1,0 +1,41 @@
+"""A cut tree as JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from feasibility.cut_tree import Cut, CutTree, Leaf
+from robots import Robot
+from surfaces import Cells
+
+
+def proof_json(tree: CutTree, robot: Robot, cells: Cells) -> dict[str, Any]:
+    """The tree as CONTRACT words it.
+
+    A cut has its joint and `value_deg` (`value_m` of one that slides), or `weights` of several
+    joints and the `value` of their weighted sum, rad or m; and what is below and above it. A leaf
+    names its cell.
+    """
+    return {
+        "kind": tree.kind,
+        "opened": {robot.joint_names[joint]: float(value) for joint, value in tree.opened},
+        "tree": _node(tree.root, robot, cells),
+    }
+
+
+def _node(node: Cut | Leaf, robot: Robot, cells: Cells) -> dict[str, Any]:
+    """One node and those under it; trees are shallow, as the search and result files have them."""
+    if isinstance(node, Leaf):
+        return {"cell": list(cells.unravel(node.cell))}
+    sides = {
+        "below": _node(node.below, robot, cells),
+        "above": _node(node.above, robot, cells),
+    }
+    if node.joint is None:
+        weighted = zip(robot.joint_names, node.weights, strict=True)
+        weights = {name: float(weight) for name, weight in weighted if weight}
+        return {"weights": weights, "value": float(node.value), **sides}
+    slides = bool(robot.prismatic[node.joint])
+    key, value = ("value_m", node.value) if slides else ("value_deg", math.degrees(node.value))
+    return {"joint": robot.joint_names[node.joint], key: float(value), **sides}

@@ -1,0 +1,116 @@
+"""What became of a claim, as one JSON object and as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from feasibility.reports.parts import certificate_json, counted, summary
+from feasibility.reports.proof import proof_json
+from feasibility.results import plain
+from feasibility.verifying import Verification
+from feasibility.version import version
+
+WORDS = {
+    "motion": ("the motion covers the whole surface", "the motion does not do what is asked"),
+    "witness": ("the stored motion covers the whole surface", "the stored motion is refused"),
+    "tree": (
+        "the tree of the greedy search enters every cell, by the paper's definitions",
+        "the tree of the greedy search is refused",
+    ),
+    "proof": (
+        "no single continuous motion covers the whole surface",
+        "the stored proof is refused",
+    ),
+}
+
+
+def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
+    """The object that `coverable verify --json` prints.
+
+    Args:
+        found: what became of the claim.
+        notes: what was left aside in the file.
+    """
+    missed = () if found.reached is None else np.flatnonzero(~found.reached)
+    certificate = None
+    if found.certificate is not None:
+        margin = plain(_margin_deg(found))
+        certificate = {**certificate_json(found.certificate), "min_limit_margin_deg": margin}
+    return {
+        "verdict": "holds" if found.holds else "does not hold",
+        "claim": found.claim,
+        "cells": len(found.cells),
+        "reached": None if found.reached is None else int(found.reached.sum()),
+        "missed": [list(found.cells.unravel(int(k))) for k in missed],
+        "refusals": [
+            {
+                "row": None if fault.row < 0 else fault.row + 1,
+                "share": None if fault.row < 0 else float(fault.share),
+                "text": fault.text,
+            }
+            for fault in found.faults
+        ],
+        "certificate": certificate,
+        "proof": None if found.proof is None else proof_json(found.proof, found.robot, found.cells),
+        "boxes": found.boxes if found.proof is not None else None,
+        "notes": list(notes),
+        "robot": found.robot.name,
+        "version": version(),
+    }
+
+
+def _margin_deg(found: Verification) -> float:
+    """Smallest distance of a revolute joint from its limits, degrees; inf where there are none."""
+    robot = found.robot
+    if found.q is None and found.certificate is not None and not robot.prismatic.any():
+        return math.degrees(found.certificate.min_limit_margin)
+    if found.q is None or found.q.ndim != 2 or found.q.shape[1] != robot.n:
+        return math.inf
+    margins = np.minimum(found.q - robot.lower, robot.upper - found.q)[:, ~robot.prismatic]
+    return math.degrees(float(margins.min(initial=np.inf)))
+
+
+def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = ()) -> str:
+    """The same for people.
+
+    Args:
+        found: what became of the claim.
+        case: what the case is called.
+        source: the file that was judged.
+        notes: what was left aside in it.
+    """
+    head = "holds" if found.holds else "does not hold"
+    rows = [("case", case), (found.claim if found.claim != "tree" else "motion", source)]
+    rows += [("but" if not k else "and", str(fault)) for k, fault in enumerate(found.faults)]
+    if found.reached is not None:
+        reached = f"{int(found.reached.sum()):,} of {counted(len(found.cells), 'cell')} reached"
+        rows.append(("cells", reached))
+    rows += [("certificate" if found.holds else "measured", _measured(found))]
+    if found.proof is not None and found.holds:
+        boxes = "1 box" if found.boxes == 1 else f"{found.boxes:,} boxes"
+        rows.append(("checked", f"{boxes} of joints and surface"))
+    rows += [("note", note) for note in notes]
+    return "\n".join(summary(f"{head}: {WORDS[found.claim][not found.holds]}.", rows))
+
+
+def _measured(found: Verification) -> str:
+    """The figures of a motion in one line; empty where there are none."""
+    if found.certificate is None or not math.isfinite(found.certificate.max_position_error):
+        return ""
+    figures = certificate_json(found.certificate)
+    # A greedy search without a tolerance in its task has one of its own.
+    own = found.claim == "tree" and found.task.tolerance is None
+    allowed = "" if own else f" (allowed {1e3 * found.task.effective_tolerance:.3g})"
+    parts = [
+        counted(figures["waypoints"], "row"),
+        f"tool point within {1e3 * figures['max_position_error_m']:.3g} mm of its surface{allowed}",
+        f"tool axis within {figures['max_angle_deg']:.4g} deg (allowed {found.task.cone_deg:g})",
+    ]
+    margin = _margin_deg(found)
+    if math.isfinite(margin) and margin >= 0.0:
+        parts.append(f"joints at least {margin:.3g} deg from their limits")
+    return "; ".join(parts)

@@ -1,0 +1,189 @@
+"""A joint motion that anybody may have made, as a CSV file with a column for each joint.
+
+Columns go by name and stand in any order. A joint's values are radians (metres where it slides), or
+degrees in a column `NAME_deg`. What else our own files and those of other programs have beside the
+joints (cell, time, velocities) is left aside, and said to be; any other column is a fault. So are a
+joint without a column, one with two, ragged rows, what is no finite number, and values that can
+only be degrees.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import Fault, close, printable
+from feasibility.results.trajectory_files import load_trajectory
+from feasibility.safe_files import FileError, read_regular, shown_path
+from robots import Robot
+
+CAP = 64 << 20  # bytes
+MOST_ROWS = 1_000_000
+MOST_COLUMNS = 1000
+LEFT_ASIDE = ("cell", "time", "t", "tool_speed", "time_from_start", "index", "row", "waypoint")
+DERIVED = ("_velocity", "_acceleration", "_effort")
+SLACK = 1e-6  # rad or m, beyond limits, of values that are taken for another unit
+UNITS = (
+    ("revolute", math.radians(1.0), 1.0, "degrees", "rad",
+     "give radians, or call the columns {joint}_deg and so on"),
+    ("prismatic", 1e-3, 0.5, "millimetres", "m", "give metres"),
+)  # fmt: skip
+"""Kinds of joints: what a unit that people confuse is worth, how far (rad, m) beyond its limits a
+value is no small mistake, the names of both units, and the remedy."""
+DELIMITERS = (",", ";", "\t")
+
+
+class Motion(NamedTuple):
+    """A motion as it was read."""
+
+    q: NDArray[np.float64]
+    """(m, n) rows, rad or m, in the order of the robot's joints."""
+    notes: tuple[str, ...]
+    """What was left aside."""
+
+
+def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
+    """Read a joint motion for a robot: CSV, or a trajectory that `save_trajectory` wrote as JSON.
+
+    Raises:
+        FileError: it cannot be read, or is no motion of this robot: all faults, with places.
+    """
+    name = shown_path(path)
+    if Path(path).suffix.lower() == ".json":
+        found = load_trajectory(path)
+        columns, faults = _columns(list(found.joint_names), robot)
+        if faults:
+            raise FileError(faults, name)
+        note = "its times and velocities are not used: rows are joined by straight lines"
+        return _checked(found.q[:, [column for column, _ in columns]], robot, name, (note,))
+    data = read_regular(path, CAP, "a joint motion (.csv)")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise FileError(f"is not text: {error.reason} at byte {error.start}", name) from error
+    try:
+        return _from_csv(text, robot, name)
+    except csv.Error as error:
+        raise FileError(f"is not CSV: {error}", name) from error
+
+
+def _from_csv(text: str, robot: Robot, name: str) -> Motion:
+    """See `load_motion`."""
+    first = text.partition("\n")[0]
+    delimiter = max(DELIMITERS, key=first.count)
+    lines = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
+    rows = [(lines.line_num, row) for row in lines if any(word.strip() for word in row)]
+    if not rows:
+        raise FileError("is empty; expected a line of joint names, then a row a waypoint", name)
+    head = [word.strip() for word in rows[0][1]]
+    if all(map(_is_number, head)):
+        expected = f"expected a first line of joint names: {', '.join(robot.joint_names)}"
+        raise FileError(f"begins with numbers; {expected}", name)
+    if len(head) > MOST_COLUMNS or len(rows) - 1 > MOST_ROWS:
+        most = f"{MOST_ROWS:,} rows and {MOST_COLUMNS:,} columns"
+        raise FileError(f"has more than {most}", name)
+    columns, faults = _columns(head, robot)
+    if faults:
+        raise FileError(faults, name)
+    if len(rows) == 1:
+        raise FileError("has no rows", name)
+    q = np.full((len(rows) - 1, robot.n), np.nan)
+    for k, (line, row) in enumerate(rows[1:]):
+        if len(row) != len(head):
+            what = f"has {len(row)} fields, not the {len(head)} of the first line"
+            faults.append(Fault("", what, f"line {line}"))
+            continue
+        for joint, (column, in_degrees) in enumerate(columns):
+            value = _number(row[column])
+            if not math.isfinite(value):
+                what = f"{head[column]} is {printable(row[column])!r}, no finite number"
+                faults.append(Fault("", what, f"line {line}"))
+            q[k, joint] = math.radians(value) if in_degrees else value
+    if faults:
+        raise FileError(faults, name)
+    used = {column for column, _ in columns}
+    aside = [word for column, word in enumerate(head) if column not in used]
+    notes = [f"not used: {', '.join(map(printable, aside))}"] if aside else []
+    return _checked(q, robot, name, tuple(notes))
+
+
+def _is_number(word: str) -> bool:
+    """Can it be read as a number?"""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+def _number(word: str) -> float:
+    """The number; NaN for what is none."""
+    return float(word) if _is_number(word) else math.nan
+
+
+def _columns(head: Sequence[str], robot: Robot) -> tuple[list[tuple[int, bool]], list[Fault]]:
+    """For each joint its column, and whether that is in degrees; and all faults."""
+    faults, places = [], dict[str, list[tuple[int, bool]]]()
+    degrees = {
+        f"{joint}_deg": joint
+        for joint, slides in zip(robot.joint_names, robot.prismatic.tolist(), strict=True)
+        if not slides
+    }
+    for column, word in enumerate(head):
+        if word in robot.joint_names:
+            places.setdefault(word, []).append((column, False))
+        elif word in degrees:
+            places.setdefault(degrees[word], []).append((column, True))
+        elif not _is_aside(word, robot):
+            guess = close(word, robot.joint_names)
+            hint = f"; did you mean {guess}?" if guess else ""
+            text = f"is no joint of {robot.name}{hint}"
+            faults.append(Fault("", f"column {printable(word)!r} {text}", "line 1"))
+    for joint in robot.joint_names:
+        found = places.get(joint, [])
+        if len(found) != 1:
+            what = "has no column" if not found else f"has {len(found)} columns"
+            faults.append(Fault("", f"joint {joint} {what}", "line 1"))
+    if faults:
+        names = ", ".join(robot.joint_names)
+        faults.append(Fault("", f"expected a column for each of {names}"))
+        return [], faults
+    return [places[joint][0] for joint in robot.joint_names], []
+
+
+def _is_aside(word: str, robot: Robot) -> bool:
+    """Is it a column that motions often have beside the joints?"""
+    derived = {joint + end for joint in robot.joint_names for end in DERIVED}
+    return word in LEFT_ASIDE or word in derived
+
+
+def _checked(q: NDArray[np.float64], robot: Robot, name: str, notes: tuple[str, ...]) -> Motion:
+    """The motion, unless its values are in other units.
+
+    They are where one is far beyond its limits, and all of the same kind of joint would be inside
+    them in the other unit. Joints without limits say nothing.
+    """
+    for kind, factor, far, taken, unit, remedy in UNITS:
+        some = np.flatnonzero(robot.prismatic == (kind == "prismatic"))
+        low, high, values = robot.lower[some], robot.upper[some], q[:, some]
+        beyond = np.maximum(low - values, values - high)
+        other = factor * values
+        fits = (other >= low - SLACK).all() and (other <= high + SLACK).all()
+        if fits and beyond.max(initial=-np.inf) > far:
+            row, column = np.unravel_index(np.argmax(beyond), beyond.shape)
+            joint = robot.joint_names[some[column]]
+            limits = f"{low[column]:.4g} .. {high[column]:.4g} {unit}"
+            raise FileError(
+                f"holds {taken}, it seems: {joint} is {values[row, column]:g} where its limits are "
+                f"{limits}, and all values would fit as {taken}; {remedy.format(joint=joint)}",
+                name,
+            )
+    return Motion(q, notes)
