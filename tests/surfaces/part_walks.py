@@ -90,3 +90,31 @@ def survivors(parts, points, normals):
         reached[place[ends]] = True
         place, part = np.repeat(place[~ends], 2), parts.children[part[~ends]].ravel()
     return reached
+
+
+def size_of(surface):
+    """m, about how large."""
+    root = surface.parts(1.0, 1.0, 1)
+    return float(root.radius[0, 0] + np.linalg.norm(root.slopes[0, :, :3], axis=1).sum())
+
+
+def lost(surface, rng, count=2000):
+    """Whether a place's point or normal is outside the model of a part that it lies on."""
+    flat = size_of(surface) * 10.0 ** rng.uniform(-4, -1)
+    parts = surface.parts(flat, 10.0 ** rng.uniform(-3, 0), int(rng.integers(1, 3000)))
+    if surface.kind == "mesh":
+        face = rng.integers(len(surface.mesh.faces), size=count)
+        weights = rng.dirichlet([0.5, 0.5, 0.5], count)
+        places = surface.points_at(face, weights), surface.normals_at(face, weights)
+        return not survivors(parts, *places).all()
+    worst = 0.0
+    pieces, signs = [surface], [1.0]
+    if surface.kind == "piecewise":
+        pieces, signs = surface.placed, surface.signs
+    for k, (patch, sign) in enumerate(zip(pieces, signs, strict=True)):
+        u, v = spread(patch, count, int(rng.integers(2**31)))
+        _, x = at_parameters(patch, u, v)
+        first = np.full(count, len(pieces) - 1 + k)
+        used = walk(parts, first, x, patch.point(u, v), sign * patch.normal(u, v))
+        worst = max(worst, used.points, used.normals)
+    return worst > 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import cache
 from math import comb
 
 import numpy as np
@@ -37,24 +38,44 @@ def span_matrix(knots: Array, degree: int, low: float, high: float) -> tuple[int
     return first, matrix
 
 
-def part_of(nets: Array, low: Array, high: Array, axis: int) -> Array:
-    """The nets (k, ...) of the same polynomials over low..high (k,) of 0..1 along an axis >= 1.
+def part_matrices(degree: int, low: Array, high: Array) -> Array:
+    """(k, degree + 1, degree + 1) from coefficients over 0..1 to those over low..high (k,) of it.
 
-    By de Casteljau: convex combinations, which lose no accuracy.
+    By de Casteljau: the rows are convex combinations, which lose no accuracy.
     """
-    net = np.moveaxis(nets, axis, 1).copy()
-    degree = net.shape[1] - 1
-    shape = (-1,) + (1,) * (net.ndim - 2)
-    upper = high.reshape(shape)[:, None]
+    rows = np.broadcast_to(np.eye(degree + 1), (len(low), degree + 1, degree + 1)).copy()
+    upper = high[:, None, None]
     for step in range(1, degree + 1):  # 0..high
-        net[:, step:] = (1.0 - upper) * net[:, step - 1 : -1] + upper * net[:, step:]
-    share = np.divide(low, high, out=np.zeros_like(low), where=high > 0.0)
-    lower = share.reshape(shape)[:, None]
-    for step in range(1, degree + 1):  # and of that low..high
-        net[:, : degree + 1 - step] = (1.0 - lower) * net[:, : degree + 1 - step] + lower * net[
-            :, 1 : degree + 2 - step
-        ]
-    return np.moveaxis(net, 1, axis)
+        rows[:, step:] = (1.0 - upper) * rows[:, step - 1 : -1] + upper * rows[:, step:]
+    lower = np.divide(low, high, out=np.zeros_like(low), where=high > 0.0)[:, None, None]
+    for last in range(degree, 0, -1):  # and of that low..high
+        rows[:, :last] = (1.0 - lower) * rows[:, :last] + lower * rows[:, 1 : last + 1]
+    return rows
+
+
+def changed(nets: Array, by_u: Array, by_v: Array) -> Array:
+    """The nets (k, m, n, d) with matrices (k, p, m) or (p, m), and (k, q, n) or (q, n), applied."""
+    k, m, n, d = nets.shape
+    rows = (by_u @ nets.reshape(k, m, n * d)).reshape(k, -1, n, d)
+    return np.asarray((by_v[:, None] if by_v.ndim == 3 else by_v) @ rows)
+
+
+@cache
+def elevation(degree: int, to: int) -> Array:
+    """(to + 1, degree + 1) from coefficients to those of the same polynomial as of degree `to`."""
+    matrix = np.zeros((to + 1, degree + 1))
+    for i in range(to + 1):
+        for j in range(max(0, i - to + degree), min(degree, i) + 1):
+            matrix[i, j] = comb(degree, j) * comb(to - degree, i - j) / comb(to, i)
+    return matrix
+
+
+def elevated(nets: Array, degree: tuple[int, int]) -> Array:
+    """The same polynomials as of a higher degree, or the same."""
+    own = nets.shape[1] - 1, nets.shape[2] - 1
+    if own == degree:
+        return nets
+    return changed(nets, elevation(own[0], degree[0]), elevation(own[1], degree[1]))
 
 
 def derivative(nets: Array, axis: int) -> Array:

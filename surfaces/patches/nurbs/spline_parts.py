@@ -24,9 +24,11 @@ from numpy.typing import NDArray
 from surfaces.patches.affine_models import SpaceModel, unit_model
 from surfaces.patches.nurbs.bernstein import (
     abscissae,
+    changed,
     cross,
     derivative,
-    part_of,
+    elevated,
+    part_matrices,
     product,
     span_matrix,
 )
@@ -35,7 +37,7 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 _QUARTERED = 128  # coefficients of N, with more a box is not cut at its middle
-_BLOCK = 200_000  # numbers held at a time, about
+_BLOCK = 300_000  # numbers held at a time, about
 _ROUNDING = 1e-13  # [1] of the products that N is the sum of
 
 
@@ -207,8 +209,11 @@ def _models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, SpaceM
     pieces = _pieces(nets.breaks, low, high, quartered)
 
     def cut(net: Array) -> Array:
-        inner = part_of(net[pieces.span], pieces.low[:, 0], pieces.high[:, 0], 1)
-        return part_of(inner, pieces.low[:, 1], pieces.high[:, 1], 2)
+        by_u, by_v = (
+            part_matrices(net.shape[1 + axis] - 1, pieces.low[:, axis], pieces.high[:, axis])
+            for axis in (0, 1)
+        )
+        return changed(net[pieces.span], by_u, by_v)
 
     points = cut(nets.points)
     weights = None if nets.weights is None else cut(nets.weights)
@@ -223,15 +228,13 @@ def _unit_normals(pieces: _Pieces, net: Array, rounding: Array) -> SpaceModel:
     N is divided by an affine function first, that is nearly its length: the direction is the same,
     and where only the length of N changes nothing is left.
     """
-    long = _Fit.of(pieces, net, None)
-    size = np.maximum(np.linalg.norm(long.centre, axis=1), 1e-300)
-    shares = np.concatenate([long.centre[:, None], long.slopes], axis=1)
-    length = np.einsum("kad,kd->ka", shares, long.centre) / size[:, None]
+    long = _least_squares(pieces, net)
+    size = np.maximum(np.linalg.norm(long[:, 0], axis=1), 1e-300)
+    length = np.einsum("kad,kd->ka", long, long[:, 0]) / size[:, None]
     least = length[:, 0] - np.abs(length[:, 1:]).sum(axis=1)
     known = least > 1e-6 * size
     length[~known] = [1.0, 0.0, 0.0]
-    flat = np.ones((len(net), net.shape[1] - 1, net.shape[2] - 1, 1))
-    fit = _Fit.of(pieces, net, product(flat, pieces.affine(length[..., None])))
+    fit = _Fit.of(pieces, net, pieces.affine(length[..., None]))
     own = np.maximum(np.linalg.norm(fit.centre, axis=1), 1e-300)[:, None]
     wrong = np.maximum.reduceat(rounding[pieces.span], pieces.starts)
     wrong = np.where(known, wrong / np.where(known, least, 1.0), np.inf)
@@ -253,34 +256,35 @@ class _Fit(NamedTuple):
 
     @staticmethod
     def of(pieces: _Pieces, net: Array, weights: Array | None) -> _Fit:
-        """Least squares over the coefficients, the middle moved between the extremes."""
-        values = net if weights is None else net / weights
-        (_, m, n, _), starts = net.shape, pieces.starts
-        x, y = abscissae(m), abscissae(n)
-        rows = values.sum(axis=2)
-        total, by_x = rows.sum(axis=1), np.einsum("m,jmd->jd", x, rows)
-        by_y = np.einsum("n,jnd->jd", y, values.sum(axis=1))
-        at = np.concatenate([np.ones((len(net), 1)), pieces.middle], axis=1)
-        steps = np.stack([total, by_x, by_y], axis=1) * np.insert(pieces.half, 0, 1.0, 1)[..., None]
-        steps[:, 1:] += pieces.middle[..., None] * total[:, None]
-        square = m * n * at[:, :, None] * at[:, None, :]
-        square[:, [1, 2], [1, 2]] += pieces.half**2 * [n * (x @ x), m * (y @ y)]
-        square, right = np.add.reduceat(square, starts), np.add.reduceat(steps, starts)
-        square += 1e-12 * square[:, :1, :1] * np.eye(3)
-        best = np.linalg.solve(square, right)
-        off = values - pieces.affine(best, m, n)
-        low = np.minimum.reduceat(off.min(axis=(1, 2)), starts)
-        high = np.maximum.reduceat(off.max(axis=(1, 2)), starts)
-        best[:, 0] += (low + high) / 2.0
+        """Least squares over the coefficients, the middle moved between the extremes.
+
+        Args:
+            pieces: j of them.
+            net: (j, m, n, 3) of what is to be modelled, or of w times it.
+            weights: (j, p, q, 1) of w > 0; None where it is one.
+        """
+        w = np.ones(1)
+        if weights is not None:
+            (_, m, n, _), (_, p, q, _) = net.shape, weights.shape
+            degree = max(m - 1, p), max(n - 1, q)
+            net, w = elevated(net, degree), elevated(weights, degree)
+        values = net / w
+        best = _least_squares(pieces, values)
+        off = values - pieces.affine(best, *net.shape[1:3])
+        flat = off.reshape(len(off), -1, 3).transpose(0, 2, 1).copy()  # quick to run along
+        low = np.minimum.reduceat(flat.min(axis=2), pieces.starts)
+        high = np.maximum.reduceat(flat.max(axis=2), pieces.starts)
+        shift = (low + high) / 2.0
+        best[:, 0] += shift
         if weights is None:
-            left = off - ((low + high) / 2.0)[pieces.box][:, None, None]
+            left = off - shift[pieces.box][:, None, None]
         else:
-            left = _rational_left(pieces, net, weights, best)
+            left = (net - elevated(product(pieces.affine(best), weights), degree)) / w
         return _Fit(pieces, best[:, 0], best[:, 1:], left)
 
     def longest(self) -> Array:
         """(k,) of what is left."""
-        return self._most(np.linalg.norm(self.left, axis=-1))
+        return self._most(_lengths(self.left))
 
     def along(self) -> Array:
         """(k, 2) what of it comes from each axis."""
@@ -294,15 +298,29 @@ class _Fit(NamedTuple):
         own = axis[self.pieces.box]
         share = np.einsum("jmnd,jd->jmn", self.left, own)
         beside = self.left - share[..., None] * own[:, None, None]
-        return self._most(np.abs(share)), self._most(np.linalg.norm(beside, axis=-1))
+        return self._most(np.abs(share)), self._most(_lengths(beside))
 
     def _most(self, values: Array) -> Array:
-        return np.asarray(np.maximum.reduceat(values.max(axis=(1, 2)), self.pieces.starts))
+        most = values.reshape(len(values), -1).max(axis=1)
+        return np.asarray(np.maximum.reduceat(most, self.pieces.starts))
 
 
-def _rational_left(pieces: _Pieces, net: Array, weights: Array, best: Array) -> Array:
-    """(j, m + 1, n + 1, 3) coefficients of P - A w over those of w, of one degree more each way."""
-    one = np.ones((len(net), 2, 2, 1))
-    return np.asarray(
-        (product(one, net) - product(pieces.affine(best), weights)) / product(one, weights)
-    )
+def _lengths(vectors: Array) -> Array:
+    """(...,) of vectors (..., 3)."""
+    return np.asarray(np.sqrt(np.einsum("...d,...d->...", vectors, vectors)))
+
+
+def _least_squares(pieces: _Pieces, values: Array) -> Array:
+    """(k, 3, 3) for each box the affine function, 1, x_1, x_2, nearest to values (j, m, n, 3)."""
+    (_, m, n, _), starts = values.shape, pieces.starts
+    x, y = abscissae(m), abscissae(n)
+    basis = np.stack([np.ones(m * n), np.repeat(x, n), np.tile(y, m)])
+    sums = basis @ values.reshape(len(values), m * n, 3)
+    at = np.concatenate([np.ones((len(values), 1)), pieces.middle], axis=1)
+    right = sums * np.insert(pieces.half, 0, 1.0, 1)[..., None]
+    right[:, 1:] += pieces.middle[..., None] * sums[:, :1]
+    square = m * n * at[:, :, None] * at[:, None, :]
+    square[:, [1, 2], [1, 2]] += pieces.half**2 * [n * (x @ x), m * (y @ y)]
+    square = np.add.reduceat(square, starts)
+    square += 1e-12 * square[:, :1, :1] * np.eye(3)
+    return np.asarray(np.linalg.solve(square, np.add.reduceat(right, starts)))

@@ -9,7 +9,7 @@ from smooth_probes import POSE
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
 from surfaces import bspline, revolution
-from surfaces.patches.nurbs.bernstein import part_of, product
+from surfaces.patches.nurbs.bernstein import changed, elevated, part_matrices, product
 from surfaces.patches.profile import largest_between, running_largest
 
 RNG = np.random.default_rng(11)
@@ -91,11 +91,13 @@ def test_products_and_parts_of_polynomials_are_their_values():
             net = net[0]
         return net
 
-    both, inner = product(one, other), part_of(one, low, high, 2)
+    both, higher = product(one, other), elevated(one, (5, 4))
+    inner = changed(one, np.eye(4), part_matrices(1, low, high))
     for k in range(3):
         u, v = rng.uniform(size=2)
         assert at(both, k, u, v) == pytest.approx(at(one, k, u, v) * at(other, k, u, v))
         there = low[k] + v * (high[k] - low[k])
+        assert at(higher, k, u, v) == pytest.approx(at(one, k, u, v))
         assert at(inner, k, u, v) == pytest.approx(at(one, k, u, there))
 
 
