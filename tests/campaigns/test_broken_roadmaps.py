@@ -21,5 +21,5 @@ def test_a_feasible_case_is_never_proved(arm, newton, part):
         for _ in range(SPLITS)
     ]
     print(f"{outcomes.count(False)} refused, {outcomes.count(None)} without a covering component")
-    assert outcomes.count(False) >= SPLITS * 3
+    assert outcomes.count(False) >= SPLITS
     assert True not in outcomes

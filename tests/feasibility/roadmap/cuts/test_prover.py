@@ -42,7 +42,7 @@ def test_newton_finds_nothing_on_a_cut_or_in_a_leaf(proved):
             else:
                 region = region.on(np.array(node.weights), node.value)
                 targets = random_targets(prover.places, ATTACKS, rng)
-            hits = projected(prover.arrays, prover.work, region, targets, 1, rng)
+            hits = projected(prover.arrays, prover.findings.work, region, targets, 1, rng)
             assert not len(hits), node
 
 
@@ -59,7 +59,7 @@ def test_a_cut_through_the_motion_set_is_refuted(proved):
     for proving in proved:
         prover = proving.prover
         for region, node in nodes(root_region(prover, proving.tree), proving.tree.root):
-            inside = prover.samples[region.inside(prover.samples)]
+            inside = prover.findings.samples[region.inside(prover.findings.samples)]
             if not isinstance(node, Cut) or not len(inside):
                 continue
             for q in inside[:5]:

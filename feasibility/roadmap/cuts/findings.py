@@ -1,0 +1,128 @@
+"""What attempts at a proof find out and keep: points of the motion set, and statements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.roadmap.arrays import SearchArrays, Work, work_for
+from feasibility.roadmap.boxes import Places, place_at_rest
+from feasibility.roadmap.cuts.counting import Statement
+from feasibility.roadmap.cuts.regions import Region, folded
+from feasibility.roadmap.cuts.samples import projected, random_targets
+from robots.chain import tool
+
+SAMPLES = 100  # Newton tries onto the motion set, each attempt
+MOST_SAMPLES = 600
+CUT_TRIES = 60  # Newton tries on a cut before branch and bound
+ENOUGH = 3  # hits on a cut that end them
+LEAF_TRIES = 8  # Newton tries on a cell
+MOST_KEPT = 200  # unfinished statements
+
+
+class ProvedCut(NamedTuple):
+    """In the region the tool is nowhere on the surface with w . q = t."""
+
+    region: Region
+    weights: NDArray[np.float64]
+    """(n,) w"""
+    value: float
+    """t"""
+
+
+class ProvedLeaf(NamedTuple):
+    """In the region the cell cannot be covered."""
+
+    region: Region
+    cell: int
+
+
+@dataclass(eq=False)
+class Findings:
+    """What is known of the motion set of `arrays` over `places`."""
+
+    arrays: SearchArrays
+    places: Places
+    rng: np.random.Generator
+    newton: bool
+    work: Work = field(init=False)
+    samples: NDArray[np.float64] = field(init=False)
+    """(k, n) points of the motion set, at any winding."""
+    cuts: list[ProvedCut] = field(default_factory=list)
+    leaves: list[ProvedLeaf] = field(default_factory=list)
+    seeds: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
+    """(cell, configuration) that refuted a guess, in this attempt."""
+    unfinished: dict[tuple[object, ...], Statement] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Working memory, and no samples yet."""
+        n = len(self.arrays.lower)
+        self.work = work_for(n)
+        self.samples = np.empty((0, n))
+
+    # -- points of the motion set --------------------------------------------------------------
+
+    def look_around(self, limits: Region) -> None:
+        """More points of the motion set inside the limits, unless there are enough."""
+        if self.newton and len(self.samples) < MOST_SAMPLES:
+            targets = random_targets(self.places, SAMPLES, self.rng)
+            q = projected(self.arrays, self.work, limits, targets, SAMPLES, self.rng)
+            self.samples = np.vstack([self.samples, q])
+
+    def on_cut(self, on: Region) -> bool:
+        """Is the tool found on the surface in the region of a cut? It is kept, and a seed."""
+        if not self.newton:
+            return False
+        targets = random_targets(self.places, CUT_TRIES, self.rng)
+        q = projected(self.arrays, self.work, on, targets, ENOUGH, self.rng)
+        self.keep(q)
+        return len(q) > 0
+
+    def covers(self, region: Region, cell: int) -> bool:
+        """Is a configuration of the region found that covers a cell? It is kept, and a seed."""
+        if not self.newton:
+            return False
+        target = np.concatenate([self.arrays.points[cell], self.arrays.approaches[cell]])
+        targets = np.tile(target, (LEAF_TRIES, 1))
+        q = projected(self.arrays, self.work, region, targets, 1, self.rng)
+        self.keep(q, cell)
+        return len(q) > 0
+
+    def keep(self, q: NDArray[np.float64], cell: int = -1) -> None:
+        """Keep points of the motion set (k, n), and the first as a seed of a cell (the nearest)."""
+        self.samples = np.vstack([self.samples, q])
+        if len(q):
+            self.seeds.append((self._nearest(q[0]) if cell < 0 else cell, q[0]))
+
+    def samples_in(self, region: Region, opened: dict[int, float]) -> NDArray[np.float64]:
+        """(k, n) those in a region, with opened joints inside their turn."""
+        q = folded(self.samples, opened)
+        return q[region.inside(q)]
+
+    def _nearest(self, q: NDArray[np.float64]) -> int:
+        """The cell whose target point is nearest to the tool point."""
+        point, _ = tool(self.arrays.chain, q)
+        return int(np.argmin(np.linalg.norm(self.arrays.points - point, axis=1)))
+
+    # -- statements ----------------------------------------------------------------------------
+
+    def statement(self, region: Region, cell: int = -1) -> Statement:
+        """'In the region the tool is nowhere on the surface', or not over a cell; as it stands."""
+        key = (*(array.tobytes() for array in (region.low, region.high, *region.slabs)), cell)
+        if key not in self.unfinished:
+            if len(self.unfinished) >= MOST_KEPT:
+                del self.unfinished[next(iter(self.unfinished))]
+            places, parameters = self.places, 2
+            if cell >= 0:
+                places = place_at_rest(self.arrays.points[cell], self.arrays.approaches[cell])
+                parameters = 0
+            self.unfinished[key] = Statement(region, places, parameters)
+        return self.unfinished[key]
+
+    def known_leaf(self, region: Region, missed: NDArray[np.bool_]) -> int | None:
+        """A cell of `missed` (N,) that is proved already for the region."""
+        proved = (f.cell for f in self.leaves if missed[f.cell] and f.region.holds(region))
+        return next(proved, None)

@@ -1,0 +1,79 @@
+"""The leaves of a guessed tree: in each region one of some cells is to be proved uncoverable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.cuts.counting import TURNS, Counted, Statement
+from feasibility.roadmap.cuts.findings import Findings, ProvedLeaf
+from feasibility.roadmap.cuts.regions import Region
+
+CELLS = 4  # of a leaf that are examined in turns
+
+
+@dataclass(eq=False)
+class GuessedLeaf:
+    """A region in which all known components miss the same cells."""
+
+    region: Region
+    statements: dict[int, Statement] = field(default_factory=dict)
+    """By cell."""
+    cell: int | None = None
+    """The one that is proved."""
+
+    @property
+    def open(self) -> bool:
+        """Can it still be proved?"""
+        return any(s.ruling is Ruling.OPEN for s in self.statements.values())
+
+
+def guessed_leaf(findings: Findings, region: Region, cover: NDArray[np.bool_]) -> GuessedLeaf:
+    """The leaf of a region whose components cover `cover` (N,) and no more.
+
+    Its cells are those that Newton does not reach either, the furthest from `cover` first.
+    """
+    leaf = GuessedLeaf(region, cell=findings.known_leaf(region, ~cover))
+    if leaf.cell is None:
+        for cell in _furthest(findings.arrays.points, cover)[:CELLS]:
+            if not findings.covers(region, cell):
+                leaf.statements[cell] = findings.statement(region, cell)
+    return leaf
+
+
+def prove_leaves(findings: Findings, counted: Counted, leaves: list[GuessedLeaf]) -> bool:
+    """Prove one cell of each leaf, in turns; False when one cannot be, or the budget is spent."""
+    for most in TURNS:
+        for leaf in leaves:
+            for cell, statement in leaf.statements.items():
+                if leaf.cell is None and statement.ruling is Ruling.OPEN:
+                    _examine(findings, counted, leaf, cell, most)
+            if leaf.cell is None and not leaf.open:
+                return False
+        if all(leaf.cell is not None for leaf in leaves):
+            return True
+    return False
+
+
+def _examine(findings: Findings, counted: Counted, leaf: GuessedLeaf, cell: int, most: int) -> None:
+    """Go on with the proof of one cell; a configuration that refutes it is a seed."""
+    statement = leaf.statements[cell]
+    ruling = counted.examine(statement, most)
+    if ruling is Ruling.PROVED:
+        leaf.cell = cell
+        findings.leaves.append(ProvedLeaf(leaf.region, cell))
+    elif ruling is Ruling.REACHED:
+        findings.keep(statement.found[None], cell)
+    elif ruling is Ruling.UNKNOWN and np.isfinite(statement.found).all():
+        findings.seeds.append((cell, statement.found))
+
+
+def _furthest(points: NDArray[np.float64], cover: NDArray[np.bool_]) -> list[int]:
+    """Cells beyond `cover` (N,), the furthest from what it holds first."""
+    missed = np.flatnonzero(~cover)
+    kept = points[cover] if cover.any() else points.mean(axis=0)[None]
+    away = np.linalg.norm(points[missed, None] - kept[None], axis=2).min(axis=1)
+    return [int(cell) for cell in missed[np.argsort(-away, kind="stable")]]
