@@ -150,6 +150,7 @@ def _decided(
         covered=found.covered,
         causes=deferred(found.make_causes),
         components=found.components,
+        postures=found.postures,
         tree=deferred(found.make_tree),
         start=found.start,
         witness=found.motion if feasible else None,

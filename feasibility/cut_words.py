@@ -34,12 +34,12 @@ def place_of(cut: Cut, robot: Robot) -> str:
     return f"{_sum(cut, robot)} = {_sum_value(cut, robot)}"
 
 
-def nowhere(cut: Cut, robot: Robot) -> str:
+def nowhere(cut: Cut, robot: Robot, where: str = "on the surface") -> str:
     """What a cut says: "nowhere on the surface can joint3 be -82 deg"."""
     if cut.joint is not None:
         name = robot.joint_names[cut.joint]
-        return f"nowhere on the surface can {name} be {joint_value(robot, cut.joint, cut.value)}"
-    return f"nowhere on the surface can {_sum(cut, robot)} be {_sum_value(cut, robot)}"
+        return f"nowhere {where} can {name} be {joint_value(robot, cut.joint, cut.value)}"
+    return f"nowhere {where} can {_sum(cut, robot)} be {_sum_value(cut, robot)}"
 
 
 def opened(tree: CutTree, robot: Robot) -> list[str]:
@@ -89,7 +89,7 @@ def lines(tree: CutTree, robot: Robot, cells: Cells) -> list[str]:
         if isinstance(node, Leaf):
             text = f"cell {_cell(node, cells)} cannot be covered"
         else:
-            text = nowhere(node, robot)
+            text = nowhere(node, robot, "there" if head else "on the surface")
             left += [("above: ", depth + 1, node.above), ("below: ", depth + 1, node.below)]
         text = f"{head}{text}" if head else f"{text[0].upper()}{text[1:]}"
         made.append(f"{INDENT * depth}{text}.")

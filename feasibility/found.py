@@ -26,6 +26,8 @@ class Found:
     """(N,) cells that the best single component covers."""
     components: tuple[NDArray[np.int64], ...]
     """Cells of each connected component found, the best first."""
+    postures: NDArray[np.float64] | None = None
+    """(K, n) a configuration of each of `components`; None where none is kept."""
     start: int | None
     """Flat index of the cell where the best motion starts."""
     n_edges: int

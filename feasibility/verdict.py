@@ -148,6 +148,8 @@ class Verdict:
     components: tuple[NDArray[np.int64], ...] = ()
     """Cells of each connected component found, the best first; the greedy search keeps its best
     tree only."""
+    postures: NDArray[np.float64] | None = None
+    """(K, n) a configuration of each of `components`, in their order; None where none is kept."""
     tree: nx.DiGraph | None = None
     """Tree T of the paper's search; None for other methods."""
     start: int | None = None

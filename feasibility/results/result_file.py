@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, CoverableError, shown, worded
 from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError
@@ -98,6 +99,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         "has_tree": verdict.tree is not None,
         "has_witness": verdict.witness is not None,
         "has_proof": verdict.proof is not None,
+        "has_postures": verdict.postures is not None,
     }
     arrays = {
         "probes": probes(verdict.robot),
@@ -112,6 +114,8 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         arrays |= {"witness_q": verdict.witness.q, "witness_cell": verdict.witness.cell}
     if verdict.proof is not None:
         arrays |= pack_proof(verdict.proof, n)
+    if verdict.postures is not None:
+        arrays["postures"] = verdict.postures
     try:
         write_archive(Path(path), meta, arrays)
     except FileError as error:
@@ -193,6 +197,7 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
     proof = None  # a file of format 2 says nothing of it
     if "has_proof" in fields.entries and fields.flag("has_proof"):
         proof = unpack_proof(archive, count, n)
+    components = unpack_ragged(archive, "components", count)
     start = None if fields.entries.get("start") is None else fields.cell("start", count)
     timing = fields.table("timing")
     return Verdict(
@@ -208,7 +213,8 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
         n_edges=graph.number_of_edges(),
         covered=covered,
         causes=_causes(fields, count),
-        components=unpack_ragged(archive, "components", count),
+        components=components,
+        postures=_postures(fields, archive, len(components), n),
         tree=unpack_graph(archive, "tree", count, n, tree=True)
         if fields.flag("has_tree")
         else None,
@@ -219,6 +225,13 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
         timing={key: timing.number(key) for key in timing.entries},
         statistics=dict(fields.table("statistics").entries),
     )
+
+
+def _postures(fields: Fields, archive: Archive, count: int, n: int) -> NDArray[np.float64] | None:
+    """A configuration of each component; files of earlier versions hold none."""
+    if not ("has_postures" in fields.entries and fields.flag("has_postures")):
+        return None
+    return archive.array("postures", np.float64, (count, n))
 
 
 def _task(fields: Fields) -> Task:

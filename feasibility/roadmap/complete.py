@@ -99,6 +99,7 @@ def _found(
     return Found(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
         components=tuple(np.flatnonzero(exploration.covers(r)) for r in exploration.roots()),
+        postures=exploration.postures(),
         start=None if walk is None else int(walk.cell[0]),
         n_edges=exploration.n_edges,
         counts={

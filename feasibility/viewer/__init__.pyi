@@ -2,6 +2,7 @@ from .figures import Plot as Plot
 from .figures import plot_causes as plot_causes
 from .figures import plot_graph as plot_graph
 from .figures import plot_map as plot_map
+from .figures import plot_sides as plot_sides
 from .figures import plot_transition as plot_transition
 from .figures import unrolled_edges as unrolled_edges
 from .path_and_division import view_division as view_division

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from coverable_errors import ArgumentError
 from feasibility.placement import AXES, PlacementMap, Placements
 from feasibility.verdict import Verdict
+from feasibility.viewer.cut_sides import COLOURS, LOST, sides_of
 from feasibility.viewer.scene import CAUSES, CENTRES, EDGES, MISSED, START, missed_by_cause
 from robots import Kinematics
 from surfaces import Cells
@@ -30,6 +31,7 @@ BORDERS = (0.72, 0.75, 0.78)
 COVERED = (0.86, 0.91, 0.96)
 BEST, OTHERS = "#d62728", "white"
 UNKNOWN = "0.85"
+NOT_REACHED = (0.95, 0.95, 0.95)
 
 
 class Plot(Figure):
@@ -91,6 +93,40 @@ def plot_causes(verdict: Verdict, title: str | None = None) -> Plot:
         handles.append(Patch(color=colour, label=f"{words} ({len(cells)})"))
     _mark_start(axes, verdict)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
+    return figure
+
+
+def plot_sides(verdict: Verdict, title: str | None = None) -> Plot:
+    """Which cells are reached below the first cut of a proof, which above, and which on both sides.
+
+    Args:
+        verdict: infeasible by a cut tree.
+        title: above the figure; default says what is covered.
+
+    Raises:
+        ArgumentError: its proof is no cut.
+    """
+    from matplotlib.collections import PolyCollection
+    from matplotlib.patches import Patch
+
+    sides = sides_of(verdict)
+    if sides is None:
+        raise ArgumentError("sides are drawn of a verdict whose proof is a cut")
+    figure, axes = _over_parameters(verdict, title)
+    outlines, centres = verdict.cells.unrolled().outlines, verdict.cells.unrolled().centres
+    handles: list[Any] = []
+    names = (*sides.names, "not reached")
+    colours = (*COLOURS, NOT_REACHED)
+    for k, words in enumerate(names):
+        label, colour = k if k < len(COLOURS) else -1, colours[k]
+        which = np.flatnonzero(sides.labels == label)
+        if len(which):
+            shapes = [outlines[k] for k in which]
+            axes.add_collection(PolyCollection(shapes, facecolors=[colour], edgecolors="w"))
+            handles.append(Patch(color=colour, label=words))
+    x, y = centres[list(sides.lost)].T
+    handles.append(axes.scatter(x, y, s=40, marker="D", color=[LOST], label=sides.lost_name))
+    figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
     return figure
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from feasibility.verdict import CauseKind, Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, marks, patch
+from feasibility.viewer.cut_sides import COLOURS, LOST, Sides, sides_of
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Motion
@@ -47,6 +48,7 @@ PATCHES: tuple[Colour, ...] = (
 )
 COMPONENTS = tuple(PATCHES[k] for k in (4, 2, 3, 1))
 TRAIL_POINTS = 2_000
+LOST_SIZE = 0.16  # [1] of a cell's width, of a mark on a cell that is proved lost
 LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
 
 
@@ -65,10 +67,33 @@ def layers(verdict: Verdict) -> list[Layer]:
     cells = verdict.cells
     if len(cells) == 0:
         return []
-    missed = [missed_layer(cells, kind, which) for kind, which in missed_by_cause(verdict).items()]
+    missed = []
+    sides = sides_of(verdict)
+    for kind, which in missed_by_cause(verdict).items():
+        layer = missed_layer(cells, kind, which)
+        # These cells are in the colour of their side.
+        missed.append(layer if sides is None or kind != CauseKind.DISCONNECTED else hidden(layer))
+    parted = [] if sides is None else side_layers(cells, sides)
     return [
-        *cells_layers(cells), *_graph(verdict), *_start(verdict), *missed, *_components(verdict)
+        *cells_layers(cells), *_graph(verdict), *_start(verdict), *parted, *missed,
+        *_components(verdict),
     ]  # fmt: skip
+
+
+def side_layers(cells: Cells, sides: Sides) -> list[Layer]:
+    """Cells in the colour of the side of a cut on which they are reached, and those proved lost."""
+    parts = []
+    for label, (name, colour) in enumerate(zip(sides.names, COLOURS, strict=True)):
+        which = np.flatnonzero(sides.labels == label)
+        if len(which):
+            path = f"/cut/{threejs.safe_name(name)}"
+            parts.append(filled(cells, which, colour, path, name))
+    path = "/cut/proved"
+    lost = np.array(sides.lost, dtype=np.int64)
+    vertices, faces = marks(cells.centres[lost], LOST_SIZE * cell_size(cells))
+    dots = threejs.mesh(path, vertices, faces, LOST, lit=False)
+    parts.append(Layer((dots,), Entry(sides.lost_name, LOST, path), len(lost)))
+    return parts
 
 
 def cells_layers(cells: Cells) -> list[Layer]:

@@ -39,10 +39,10 @@ def test_a_tree_is_indented_lines() -> None:
     assert lines(THREE, PUMA, CELLS) == [
         "joint6 can nowhere be at 178 deg (or whole turns away).",
         "Nowhere on the surface can joint3 be -82 deg.",
-        "  below: nowhere on the surface can joint5 be 0 deg.",
+        "  below: nowhere there can joint5 be 0 deg.",
         "    below: cell [4, 1] cannot be covered.",
         "    above: cell [4, 0] cannot be covered.",
-        "  above: nowhere on the surface can joint2 be 12.5 deg.",
+        "  above: nowhere there can joint2 be 12.5 deg.",
         "    below: cell [0, 0] cannot be covered.",
         "    above: cell [4, 1] cannot be covered.",
     ]
