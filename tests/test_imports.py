@@ -40,7 +40,9 @@ feasibility.paper
 feasibility.cases
 feasibility.roadmap: arrays box_bounds box_contraction boxes branch_and_bound graph projection segment_bound self_motion
 feasibility.roadmap.cuts
-feasibility.roadmap: bridging complete diagnosis expansion exploration graph_g search tracking walk warmup
+feasibility.roadmap: bridging expansion exploration search tracking
+feasibility.roadmap.causes
+feasibility.roadmap: complete graph_g walk warmup
 feasibility: checking
 feasibility.paths
 feasibility.timing

@@ -17,12 +17,10 @@ from feasibility.roadmap import (
     Ruling,
     SearchArrays,
     arrays_of,
-    causes_of,
-    diagnose,
-    disconnected,
     explore,
     warm_up,
 )
+from feasibility.roadmap.causes import causes_of, diagnose, disconnected
 from feasibility.search import Progress, Search
 from feasibility.target_curves import blocked_curves
 from feasibility.task import Task

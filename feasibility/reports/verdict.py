@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from feasibility.cases import OWN_KEYS, Case
+from feasibility.cut_words import lines as proof_lines
 from feasibility.paper import tree_walk
 from feasibility.reports.parts import (
     causes_json,
@@ -40,6 +41,7 @@ EVIDENCE = {
     Evidence.EXHAUSTED: "the search ran to its end at the stated resolution",
     Evidence.BUDGET: "the search was stopped, or what it found could not be certified",
 }
+CUT = "cuts through the joint space, which no motion crosses, part cells from each other"
 CAUSES = {
     CauseKind.OUT_OF_REACH: "out of reach",
     CauseKind.JOINT_LIMITS: "joint limits",
@@ -110,12 +112,15 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("case", f"{case.name}  {case.description}".rstrip()),
         ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
         ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
-        ("evidence", f"{verdict.evidence}: {EVIDENCE[verdict.evidence]}"),
+        ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
         ("found", verdict.message),
         ("certificate", _certificate_text(verdict)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),
     ]
     lines = summary(head, rows)
+    if verdict.proof is not None and verdict.proof.n_cuts > 1:
+        lines += ["", "Why no single motion covers every cell:"]
+        lines += [f"  {line}" for line in proof_lines(verdict.proof, verdict.robot, verdict.cells)]
     groups = list(causes_listed(verdict.causes, verdict.cells))
     if groups:
         lines += ["", "Not covered:", *groups]
@@ -123,6 +128,13 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     if hints:
         lines += ["", "To try next:", *(f"  {hint}" for hint in hints)]
     return "\n".join(lines)
+
+
+def _evidence(verdict: Verdict) -> str:
+    """What the answer rests on."""
+    if verdict.proof is not None and verdict.proof.kind == "cut":
+        return CUT
+    return EVIDENCE[verdict.evidence]
 
 
 def _certificate_text(verdict: Verdict) -> str:

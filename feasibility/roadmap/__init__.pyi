@@ -12,9 +12,6 @@ from .branch_and_bound import Ruling as Ruling
 from .branch_and_bound import root_box as root_box
 from .branch_and_bound import rule as rule
 from .complete import complete_search as complete_search
-from .diagnosis import causes_of as causes_of
-from .diagnosis import diagnose as diagnose
-from .diagnosis import disconnected as disconnected
 from .expansion import CONNECT_STEPS as CONNECT_STEPS
 from .exploration import Exploration as Exploration
 from .exploration import wound as wound

@@ -10,12 +10,13 @@ from coverable_errors import Checks
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.cut_tree import CutTree, Leaf
+from feasibility.cut_words import sentence
 from feasibility.found import Found
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.diagnosis import causes_of
+from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.graph_g import graph_of
 from feasibility.roadmap.search import close, explore
@@ -95,11 +96,14 @@ def _found(
     complete = exploration.complete and total > 0
     walk = covering_walk(exploration.roadmap, exploration.best) if complete else known
     covered = int(exploration.covered.sum())
+    proof = None if walk is not None else _proof(exploration)
     nodes, motions = (int(count) for count in exploration.roadmap.counters[:2])
     return Found(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
         components=tuple(np.flatnonzero(exploration.covers(r)) for r in exploration.roots()),
-        postures=exploration.postures(),
+        postures=np.array([exploration.posture(r) for r in exploration.roots()]).reshape(
+            -1, problem.robot.n
+        ),
         start=None if walk is None else int(walk.cell[0]),
         n_edges=exploration.n_edges,
         counts={
@@ -115,14 +119,14 @@ def _found(
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
         refused="A motion over every cell was found, but the independent replay refuses it: "
         "{refusal}.",
-        proof=None if walk is not None else _proof(exploration),
-        proved=_proved(problem, exploration),
+        proof=proof,
+        proved="" if proof is None else _proved(problem, exploration, proof),
         unfinished="" if walk is not None else _unfinished(problem, exploration, in_time),
         exhausted=f"The search ended without a covering motion {problem.within}: "
         f"{_shortfall(exploration)}; the best covers {covered} of {total} cells ({nodes} nodes, "
         f"{exploration.rounds} rounds, seed {exploration.seed}).",
         make_graph=lambda: graph_of(exploration),
-        make_causes=lambda: causes_of(exploration),
+        make_causes=lambda: causes_of(exploration, proof),
     )
 
 
@@ -139,8 +143,14 @@ def _proof(exploration: Exploration) -> CutTree | None:
     return None if cell is None else CutTree(Leaf(cell))
 
 
-def _proved(problem: Problem, exploration: Exploration) -> str:
-    """The sentence about proved cells."""
+def _proved(problem: Problem, exploration: Exploration, proof: CutTree) -> str:
+    """The sentence about a proof: which cells are out of the question, or which cuts part them."""
+    if proof.kind == "cut":
+        return (
+            f"No single motion covers every cell {problem.within}, which is proved: "
+            f"{sentence(proof, problem.robot, problem.cells)} ({exploration.boxes} boxes); the "
+            f"best single motion covers {int(exploration.covered.sum())} of {len(problem.cells)}."
+        )
     proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
     return (
         f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {problem.within} "

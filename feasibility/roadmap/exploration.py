@@ -20,7 +20,6 @@ from feasibility.roadmap.graph import (
     DONE,
     FULL,
     HEAD,
-    NODES,
     TAIL,
     WAYPOINTS,
     Roadmap,
@@ -119,15 +118,13 @@ class Exploration:
         """(N,) cells of a component."""
         return self.roadmap.cover[root_of(self.roadmap, component)].astype(bool)
 
-    def postures(self) -> NDArray[np.float64]:
-        """(K, n) a configuration of each component, in the order of `roots`."""
-        nodes = np.arange(self.roadmap.counters[NODES])[::-1]  # the first is written last
-        root = self.roadmap.component[nodes]
-        while not np.array_equal(self.roadmap.parent[root], root):
-            root = self.roadmap.parent[root]
-        first = np.zeros(int(self.roadmap.counters[COMPONENTS]), dtype=np.int64)
-        first[root] = nodes
-        return self.roadmap.q[first[self.roots()]].reshape(-1, self.robot.n)
+    def posture(self, component: int) -> NDArray[np.float64]:
+        """(n,) a configuration of a component."""
+        root = root_of(self.roadmap, component)
+        node = int(self.roadmap.first_node[self.covers(root).argmax()])
+        while root_of(self.roadmap, self.roadmap.component[node]) != root:
+            node = int(self.roadmap.following[node])
+        return np.array(self.roadmap.q[node])
 
     # -- growing it ----------------------------------------------------------------------------
 

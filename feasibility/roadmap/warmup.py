@@ -48,7 +48,7 @@ def warm_up() -> None:
     from feasibility.certification import replay
     from feasibility.roadmap.arrays import arrays_of
     from feasibility.roadmap.branch_and_bound import root_box
-    from feasibility.roadmap.diagnosis import diagnose
+    from feasibility.roadmap.causes import diagnose
     from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.search import close, explore
     from feasibility.roadmap.walk import covering_walk

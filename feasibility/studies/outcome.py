@@ -47,7 +47,8 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     if verdict.method == "greedy":
         kinds = [str(cause.kind) for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
-    from feasibility.roadmap import Exploration, arrays_of, diagnose
+    from feasibility.roadmap import Exploration, arrays_of
+    from feasibility.roadmap.causes import diagnose
 
     reached = np.zeros(len(verdict.cells), dtype=bool)
     for cells in verdict.components:

@@ -15,7 +15,6 @@ from feasibility.viewer.threejs import Colour
 BELOW, ABOVE, BOTH = range(3)
 COLOURS: tuple[Colour, ...] = ((0.00, 0.45, 0.70), (0.90, 0.60, 0.00), (0.72, 0.75, 0.78))
 LOST: Colour = (0.84, 0.12, 0.12)
-MOST_NAMED = 4  # cells that a label names
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -61,8 +60,7 @@ def sides_of(verdict: Verdict) -> Sides | None:
 def _lost_name(verdict: Verdict, cut: Cut, lost: tuple[int, ...]) -> str:
     """Which cells are lost, and on which side where there are two sides only."""
     below, above = cut.below, cut.above
-    cells = [str(list(verdict.cells.unravel(cell))) for cell in lost[:MOST_NAMED]]
-    if isinstance(below, Leaf) and isinstance(above, Leaf) and len(cells) == 2:
+    if isinstance(below, Leaf) and isinstance(above, Leaf) and len(lost) == 2:
+        cells = [list(verdict.cells.unravel(cell)) for cell in lost]
         return f"proved: {cells[0]} not below, {cells[1]} not above"
-    more = f" and {len(lost) - MOST_NAMED} more" if len(lost) > MOST_NAMED else ""
-    return f"proved: each lost in a part of the joint space: {', '.join(cells)}{more}"
+    return f"proved: lost in one region or another ({len(lost)})"

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feasibility.cut_words import sentence
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
@@ -94,12 +95,18 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     parts = layers(verdict)
     if motion is not None:
         parts.append(trail(verdict.cells, motion))
+    text = (
+        f"{verdict.robot.name}: {verdict.n_covered} of {len(verdict.cells)} cells in one "
+        f"continuous motion ({verdict.method} search)"
+    )
+    if verdict.proof is not None:
+        said = sentence(verdict.proof, verdict.robot, verdict.cells)
+        text += f". Proved: {said}."
     return compose(
         verdict.robot,
         verdict.cells,
         titled(f"{verdict.answer} ({verdict.evidence})", case),
-        f"{verdict.robot.name}: {verdict.n_covered} of {len(verdict.cells)} cells in one "
-        f"continuous motion ({verdict.method} search)",
+        text,
         parts,
         motion,
         resting=_resting(verdict),

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from feasibility import Search, Task, check
 from feasibility.certification import replay
-from feasibility.roadmap.diagnosis import UNPROVED, decimals
+from feasibility.roadmap.causes import UNPROVED, decimals
 from robots import Kinematics, Robot, load_robot
 from surfaces import hyperboloid, sphere
 from surfaces.patches import GridCells, plane

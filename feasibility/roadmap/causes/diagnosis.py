@@ -21,22 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
+from feasibility.cut_tree import CutTree
 from feasibility.roadmap.arrays import (
-    CONE,
-    FOLD,
-    LIMIT,
-    LONG,
     NEXT,
-    SINGULAR,
     SearchArrays,
     Work,
     look_at,
     place,
 )
 from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import root_of
 from feasibility.roadmap.projection import PROJECTION_STEPS, cholesky_solve, project_onto_cell
 from feasibility.roadmap.search import evenly
 from feasibility.roadmap.self_motion import connect
@@ -289,33 +285,7 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
     return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
 
 
-def disconnected(exploration: Exploration, cell: int) -> Cause:
-    """Why the best component misses a cell that another one covers."""
-    roadmap, robot = exploration.roadmap, exploration.robot
-    roots, node = set[int](), int(roadmap.first_node[cell])
-    while node >= 0:
-        roots.add(int(root_of(roadmap, roadmap.component[node])))
-        node = int(roadmap.following[node])
-    other = max(roots, key=lambda root: int(roadmap.size[root]))
-    code, joint, stopped = (int(v) for v in roadmap.blocked[cell])
-    name = robot.joint_names[joint]
-    reason = {
-        LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
-        CONE: "the tool axis stops at the boundary of the cone",
-        SINGULAR: "the arm stops at a singularity",
-        LONG: "the motion takes too many steps",
-        FOLD: "the surface is creased, or its offset folds",
-    }.get(code)
-    detail = (
-        f"reached by another motion only, which covers {int(roadmap.size[other])} of "
-        f"{len(exploration.cells)} cells"
-    )
-    if reason and stopped >= 0 and root_of(roadmap, stopped) == exploration.best:
-        detail += f"; on the way there from the covered cells {reason}"
-    return Cause(cell, CauseKind.DISCONNECTED, False, detail)
-
-
-def causes_of(exploration: Exploration) -> tuple[Cause, ...]:
+def causes_of(exploration: Exploration, proof: CutTree | None = None) -> tuple[Cause, ...]:
     """One cause for each cell that the best component misses, in order of index.
 
     On fine grids `MOST_EXAMINED` cells, spread evenly, are diagnosed one by one. The others are
@@ -328,7 +298,7 @@ def causes_of(exploration: Exploration) -> tuple[Cause, ...]:
     missed = np.flatnonzero(~exploration.covered)
     causes: dict[int, Cause] = {}
     for cell in missed[reached[missed]].tolist():
-        causes[cell] = disconnected(exploration, cell)
+        causes[cell] = disconnected(exploration, cell, proof)
     lost = missed[~reached[missed]]
     examined = evenly(lost)[:MOST_EXAMINED]
     for cell in examined.tolist():

@@ -1,0 +1,63 @@
+"""Why the best motion misses a cell that another one covers: where it stopped, or a proved cut."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feasibility.cut_tree import CutTree
+from feasibility.cut_words import nowhere
+from feasibility.roadmap.arrays import CONE, FOLD, LIMIT, LONG, SINGULAR
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.graph import root_of
+from feasibility.verdict import Cause, CauseKind
+
+
+def disconnected(exploration: Exploration, cell: int, proof: CutTree | None = None) -> Cause:
+    """Why the best component misses a cell that another one covers; proved where a cut parts them.
+
+    Args:
+        exploration: a finished search.
+        cell: a cell that a component covers, but not the best one.
+        proof: that no motion covers every cell.
+    """
+    roadmap, robot = exploration.roadmap, exploration.robot
+    roots, node = set[int](), int(roadmap.first_node[cell])
+    while node >= 0:
+        roots.add(int(root_of(roadmap, roadmap.component[node])))
+        node = int(roadmap.following[node])
+    other = max(roots, key=lambda root: int(roadmap.size[root]))
+    detail = (
+        f"reached by another motion only, which covers {int(roadmap.size[other])} of "
+        f"{len(exploration.cells)} cells"
+    )
+    parted = "" if proof is None else _parted(exploration, proof, other, roots)
+    if parted:
+        return Cause(cell, CauseKind.DISCONNECTED, True, f"{detail}; {parted}")
+    code, joint, stopped = (int(v) for v in roadmap.blocked[cell])
+    name = robot.joint_names[joint]
+    reason = {
+        LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
+        CONE: "the tool axis stops at the boundary of the cone",
+        SINGULAR: "the arm stops at a singularity",
+        LONG: "the motion takes too many steps",
+        FOLD: "the surface is creased, or its offset folds",
+    }.get(code)
+    if reason and stopped >= 0 and root_of(roadmap, stopped) == exploration.best:
+        detail += f"; on the way there from the covered cells {reason}"
+    return Cause(cell, CauseKind.DISCONNECTED, False, detail)
+
+
+def _parted(exploration: Exploration, proof: CutTree, other: int, roots: set[int]) -> str:
+    """Which cut keeps the best component from another one; empty where none parts it from `roots`.
+
+    All of a component is on one side of each cut that it meets: one configuration tells which.
+    """
+    best = exploration.posture(exploration.best)
+    cuts = {root: proof.parting(best, exploration.posture(root)) for root in roots}
+    cut = cuts[other]
+    if cut is None or None in cuts.values():
+        return ""
+    where = "on the surface" if cut is proof.root else "in that part of the joint space"
+    above = float(proof.folded(best) @ np.asarray(cut.weights)) > cut.value
+    side = "above" if above else "below"
+    return f"{nowhere(cut, exploration.robot, where)}, and the best motion is {side}"
