@@ -131,9 +131,9 @@ __all__ = [
     "open_workers", "path", "path_text", "piecewise", "place", "placement_map", "placement_text",
     "plane", "plot_causes", "plot_graph", "plot_map", "plot_sides", "plot_transition", "read_net",
     "read_study", "replay", "revolution", "run_tasks", "save_result", "save_trajectory",
-    "settings_of", "show", "sphere", "starts", "station_plan", "study_text", "take_faces", "torus", "trajectory",
-    "unrolled_edges", "verify", "view", "view_division", "view_path", "view_placements",
-    "view_study",
+    "settings_of", "show", "sphere", "starts", "station_plan", "study_text", "take_faces", "torus",
+    "trajectory", "unrolled_edges", "verify", "view", "view_division", "view_path",
+    "view_placements", "view_study",
 ]
 # fmt: on
 
