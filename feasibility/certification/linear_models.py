@@ -55,11 +55,17 @@ def target_parts(parts: SurfaceParts, side_sign: float, standoff: float) -> Part
     return Parts(moved(parts.centre), moved(parts.slopes), radius, parts.children, parts.axis)
 
 
-def one_target(point: Array, approach: Array) -> Parts:
-    """A surface that is one point: where the tool has to be for one cell."""
-    finest = np.full((1, 2), -1)
-    centre = np.concatenate([point, approach])[None]
-    return Parts(centre, np.zeros((1, 2, 6)), np.zeros((1, 2)), finest, finest[0, :1])
+def with_cells(parts: Parts, points: Array, approaches: Array) -> Parts:
+    """The parts, and after them one that is a point for each cell's target (N, 3)."""
+    count = len(points)
+    finest = np.full((count, 2), -1)
+    return Parts(
+        np.concatenate([parts.centre, np.concatenate([points, approaches], axis=1)]),
+        np.concatenate([parts.slopes, np.zeros((count, 2, 6))]),
+        np.concatenate([parts.radius, np.zeros((count, 2))]),
+        np.concatenate([parts.children, finest]),
+        np.concatenate([parts.axis, finest[:, 0]]),
+    )
 
 
 class Allowed(NamedTuple):
@@ -83,6 +89,8 @@ class Boxes:
     """(m, n + 2)"""
     part: NDArray[np.int64]
     """(m,) index of the part."""
+    claim: NDArray[np.int64]
+    """(m,) number of what is to be proved about it."""
 
     def __len__(self) -> int:
         """Number of boxes."""
@@ -95,7 +103,7 @@ class Boxes:
 
     def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> Boxes:
         """Some of the boxes."""
-        return Boxes(self.low[which], self.high[which], self.part[which])
+        return Boxes(self.low[which], self.high[which], self.part[which], self.claim[which])
 
     @staticmethod
     def joined(boxes: list[Boxes]) -> Boxes:
@@ -104,6 +112,7 @@ class Boxes:
             np.concatenate([some.low for some in boxes]),
             np.concatenate([some.high for some in boxes]),
             np.concatenate([some.part for some in boxes]),
+            np.concatenate([some.claim for some in boxes]),
         )
 
 

@@ -19,19 +19,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
-from feasibility.certification.empty_region import Emptiness, Outcome
+from feasibility.certification.empty_region import Claim, Emptiness, Outcome
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.certification.linear_models import (
     Allowed,
     Arm,
-    Array,
     Parts,
-    one_target,
     target_parts,
+    with_cells,
 )
 from feasibility.certification.parts_agreement import disagreement
 from feasibility.certification.refutation import Refuter
@@ -61,15 +59,6 @@ class ProofCheck:
     def accepted(self) -> bool:
         """True when every cut and every leaf of the tree is confirmed."""
         return not self.refusal
-
-
-class _Claim(NamedTuple):
-    """A region that is to be empty."""
-
-    what: str
-    region: Region
-    cell: int | None
-    """The cell of a leaf; None where the tool may be anywhere on the surface."""
 
 
 def verify_proof(
@@ -124,23 +113,23 @@ def verify_on(
     arm = Arm(robot, limits.low, limits.high)
     length = max(0.5 * float(arm.caps.max()), 1e-3)
     allowed = Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length)
-    emptiness = Emptiness(arm, allowed, tick or (lambda: None))
-    refuter = Refuter(arm, cells, task, length)
     targets = task.targets(cells)
-    boxes = 0
-    for claim in _claims(robot, cells, tree, limits):
-        at = surface
-        if claim.cell is not None:
-            at = one_target(targets.points[claim.cell], targets.approaches[claim.cell])
 
-        def refute(starts: Array, region: Region, cell: int | None = claim.cell) -> Array | None:
-            return refuter.find(starts, region, cell)
+    def root_of(cell: int | None) -> int:
+        return 0 if cell is None else len(parts) + cell
 
-        found = emptiness.test(claim.region, at, refute, most - boxes)
-        boxes += found.boxes
-        if not found.empty:
-            return ProofCheck(_refusal(claim, found), boxes)
-    return ProofCheck("", boxes)
+    emptiness = Emptiness(
+        arm,
+        with_cells(surface, targets.points, targets.approaches),
+        root_of,
+        allowed,
+        tick or (lambda: None),
+    )
+    claims = list(_claims(robot, cells, tree, limits))
+    found = emptiness.test(claims, Refuter(arm, cells, task, length), most)
+    if found.failed is None:
+        return ProofCheck("", found.boxes)
+    return ProofCheck(_refusal(claims[found.failed], found), found.boxes)
 
 
 def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[Region, str]:
@@ -159,14 +148,14 @@ def _finite_slides(robot: Robot, surface: Parts, tolerance: float) -> tuple[Regi
     return Region.box(low, high), ""
 
 
-def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: Region) -> Iterator[_Claim]:
+def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: Region) -> Iterator[Claim]:
     """Everything that a tree claims to be empty: joints opened, cuts and leaves."""
     low, high = limits.low.copy(), limits.high.copy()
     for joint, value in tree.opened:
         at = limits.low.copy(), limits.high.copy()
         at[0][joint] = at[1][joint] = value
         opened = np.eye(robot.n)[joint]
-        yield _Claim(f"the opening {named_cut(robot, opened, value)}", Region.box(*at), None)
+        yield Claim(f"the opening {named_cut(robot, opened, value)}", Region.box(*at), None)
         low[joint], high[joint] = value, value + TURN
     waiting: list[tuple[Cut | Leaf, Region]] = [(tree.root, Region.box(low, high))]
     leaves = 0
@@ -175,16 +164,16 @@ def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: Region) -> Iterat
         if isinstance(node, Leaf):
             leaves += 1
             name = list(cells.unravel(node.cell))
-            yield _Claim(f"leaf {leaves} (cell {name})", region, node.cell)
+            yield Claim(f"leaf {leaves} (cell {name})", region, node.cell)
             continue
         weights = np.array(node.weights)
         what = f"the cut {named_cut(robot, weights, node.value)}"
-        yield _Claim(what, region.within(weights, node.value, node.value), None)
+        yield Claim(what, region.within(weights, node.value, node.value), None)
         waiting.append((node.above, region.within(weights, node.value, np.inf)))
         waiting.append((node.below, region.within(weights, -np.inf, node.value)))
 
 
-def _refusal(claim: _Claim, found: Outcome) -> str:
+def _refusal(claim: Claim, found: Outcome) -> str:
     """Why a claim is not confirmed, in words."""
     if found.point is None:
         return f"{claim.what} cannot be confirmed: after {found.boxes:,} boxes it is still open"

@@ -6,6 +6,8 @@ whatever the bounds say. What is not found proves nothing.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,11 +17,20 @@ from feasibility.certification.region import Region
 from feasibility.task import Task
 from surfaces import Cells
 
-STEPS = 20  # of Newton's method
+STEPS = 15  # of Newton's method
 LONGEST = 0.7  # [rad], [m] of a joint in one step
 DAMPING = 1e-4  # of the sum of squares
 SLIDE = 0.3  # [m] of the place on the surface in one step
 INNER_TOLERANCE, INNER_CONE = 0.5, 0.95  # what the steps aim at, as shares
+
+
+class Refutation(NamedTuple):
+    """A configuration that a tree says there is none of."""
+
+    q: Array
+    """(n,) rad or m."""
+    start: int
+    """Index of the start that led there."""
 
 
 class Refuter:
@@ -33,53 +44,57 @@ class Refuter:
         self.length = length
         self.targets = task.targets(cells)
 
-    def find(self, starts: Array, region: Region, cell: int | None = None) -> Array | None:
-        """A configuration (n,) of the region that keeps to the constraints, from starts (m, n).
+    def find(
+        self, starts: Array, at: list[tuple[Region, int | None]], sums: Region
+    ) -> Refutation | None:
+        """A configuration that keeps to the constraints, near one of the starts (m, n).
 
         Args:
             starts: rad or m.
-            region: what it has to lie in.
-            cell: at this cell's target; anywhere on the surface by default.
+            at: for each start the region that the configuration has to lie in, and the cell whose
+                target the tool has to be at, None where it may be anywhere on the surface.
+            sums: the region whose weighted sums bound all of them.
         """
-        q = np.clip(starts, region.low, region.high)
+        low = np.array([region.low for region, _ in at])
+        high = np.array([region.high for region, _ in at])
+        cell = np.array([-1 if one is None else one for _, one in at])
+        q = np.clip(starts, low, high)
         for _ in range(STEPS):
             points, axes = self.arm.kinematics.tools(q)
             target, approach, on_surface = self._targets(points, cell)
             error, tilt = points - target, axes - approach
             kept = on_surface & (np.linalg.norm(error, axis=1) <= self.task.effective_tolerance)
             kept &= np.linalg.norm(tilt, axis=1) <= self.task.cone_chord
-            kept &= region.holds(q)
+            kept &= sums.sums_hold(q)
             if kept.any():
-                return np.array(q[np.argmax(kept)])
+                first = int(np.argmax(kept))
+                return Refutation(q[first], first)
             residual = np.concatenate([error, self.length * tilt], axis=1)
-            slides = _tangents(approach) * (SLIDE if cell is None else 0.0)
-            q = self._stepped(q, residual, slides, region)
+            slides = _tangents(approach) * np.where(cell < 0, SLIDE, 0.0)[:, None, None]
+            q = self._stepped(q, residual, slides, low - q, high - q, sums)
         return None
 
-    def _targets(self, points: Array, cell: int | None) -> tuple[Array, Array, NDArray[np.bool_]]:
+    def _targets(
+        self, points: Array, cell: NDArray[np.int64]
+    ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Target points and approaches (m, 3) for tool points, and where they are on the patch."""
-        if cell is not None:
-            shape = points.shape
-            return (
-                np.broadcast_to(self.targets.points[cell], shape),
-                np.broadcast_to(self.targets.approaches[cell], shape),
-                np.ones(len(points), dtype=bool),
-            )
         surface = self.cells.surface
         found = surface.closest(points)
         sign, height = surface.side_sign, found.height[:, None]
         target = points + (sign * self.task.standoff - height) * found.normal
         away = np.linalg.norm(points[:, None] - self.targets.points, axis=2)
-        near = np.argmin(away, axis=1)
-        inside = found.inside[:, None]
+        near = np.where(cell < 0, np.argmin(away, axis=1), cell)
+        slides = (found.inside & (cell < 0))[:, None]
         return (
-            np.where(inside, target, self.targets.points[near]),
-            np.where(inside, -sign * found.normal, self.targets.approaches[near]),
-            found.inside,
+            np.where(slides, target, self.targets.points[near]),
+            np.where(slides, -sign * found.normal, self.targets.approaches[near]),
+            found.inside | (cell >= 0),
         )
 
-    def _stepped(self, q: Array, residual: Array, slides: Array, region: Region) -> Array:
-        """Configurations one step nearer to the constraints, inside the region."""
+    def _stepped(
+        self, q: Array, residual: Array, slides: Array, low: Array, high: Array, sums: Region
+    ) -> Array:
+        """Configurations one step of low .. high (m, n) nearer to the constraints."""
         n, m = self.arm.n, len(q)
         by_joint = derivatives(self.arm.kinematics, q, self.length)[0]
         columns = np.concatenate([by_joint, np.pad(-slides, ((0, 0), (0, 0), (0, 3)))], axis=1)
@@ -87,11 +102,16 @@ class Refuter:
             INNER_TOLERANCE * self.task.effective_tolerance,
             self.length * INNER_CONE * min(self.task.cone_chord, 4.0),
         ]
-        low = np.append(np.maximum(region.low - q, -LONGEST), -np.ones((m, 2)), axis=1)
-        high = np.append(np.minimum(region.high - q, LONGEST), np.ones((m, 2)), axis=1)
-        models = Models(residual, columns, np.tile(aim, (m, 1)), low, high, np.zeros((m, n + 2)))
-        step = least_step(region.with_sums(models, q))
-        return np.asarray(np.clip(q + step[:, :n], region.low, region.high))
+        models = Models(
+            residual,
+            columns,
+            np.tile(aim, (m, 1)),
+            np.append(np.maximum(low, -LONGEST), -np.ones((m, 2)), axis=1),
+            np.append(np.minimum(high, LONGEST), np.ones((m, 2)), axis=1),
+            np.zeros((m, n + 2)),
+        )
+        step = least_step(sums.with_sums(models, q))[:, :n]
+        return np.asarray(q + np.clip(step, low, high))
 
 
 def least_step(models: Models) -> Array:

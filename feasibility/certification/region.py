@@ -68,12 +68,11 @@ class Region:
         high = np.where(turns, low + TURN, self.high)
         return Region(low, high, self.weights, self.least, self.most)
 
-    def holds(self, q: Array) -> NDArray[np.bool_]:
-        """(m,) which configurations (m, n) lie in it; sums within `ON_CUT`."""
+    def sums_hold(self, q: Array) -> NDArray[np.bool_]:
+        """(m,) whose weighted sums of configurations (m, n) are in it, within `ON_CUT`."""
         sums = q @ self.weights.T
-        inside = ((q >= self.low) & (q <= self.high)).all(axis=1)
-        inside &= (sums >= self.least - ON_CUT).all(axis=1)
-        return np.asarray(inside & (sums <= self.most + ON_CUT).all(axis=1))
+        inside = (sums >= self.least - ON_CUT) & (sums <= self.most + ON_CUT)
+        return np.asarray(inside.all(axis=1))
 
     def with_sums(self, models: Models, centre: Array) -> Models:
         """Models at `centre` (m, n) with one more coordinate for each w: w . q minus its middle."""

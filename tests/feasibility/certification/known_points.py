@@ -9,7 +9,8 @@ from part_walks import at_parameters
 from random_arms import random_arm
 from scipy.spatial.transform import Rotation
 
-from feasibility.certification.empty_region import Emptiness, smaller
+from feasibility.certification.box_cutting import smaller
+from feasibility.certification.empty_region import Emptiness
 from feasibility.certification.linear_models import Allowed, Arm, Boxes, target_parts
 from feasibility.certification.region import Region
 from robots import Kinematics
@@ -31,7 +32,6 @@ class Known(NamedTuple):
     """A configuration, boxes that hold it, and how it lies in them."""
 
     emptiness: Emptiness
-    parts: object
     region: Region
     boxes: Boxes
     places: np.ndarray
@@ -72,10 +72,11 @@ def known(rng, boxes=50):
     chord = 2.0 * np.sin(angle / 2.0)
     parts = target_parts(patch.parts(0.3 * tolerance, 0.3 * chord, 600), patch.side_sign, standoff)
     arm = Arm(robot, robot.lower, robot.upper)
-    emptiness = Emptiness(arm, Allowed(tolerance, chord, 0.5), lambda: None)
+    allowed = Allowed(tolerance, chord, 0.5)
+    emptiness = Emptiness(arm, parts, lambda cell: 0, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
     made, places = boxes_around(rng, robot, q, parts, int(part[0]), x[0], boxes)
-    return Known(emptiness, parts, region_around(rng, robot, q), made, places)
+    return Known(emptiness, region_around(rng, robot, q), made, places)
 
 
 def boxes_around(rng, robot, q, parts, part, x, count):
@@ -96,7 +97,8 @@ def boxes_around(rng, robot, q, parts, part, x, count):
         high.append(np.minimum(place + above, ends[1]))
         places.append(place)
         which.append(part)
-    return Boxes(np.array(low), np.array(high), np.array(which)), np.array(places)
+    zeros = np.zeros(count, dtype=int)
+    return Boxes(np.array(low), np.array(high), np.array(which), zeros), np.array(places)
 
 
 def child_of(parts, part, x):
@@ -123,24 +125,30 @@ def region_around(rng, robot, q):
 def lost(case):
     """(m,) boxes that the verifier drops, or contracts or cuts so that the place is outside."""
     missed = np.zeros(len(case.boxes), dtype=bool)
+    parts = case.emptiness.parts
     for k in range(len(case.boxes)):
-        box, place = case.boxes[np.array([k])], case.places[k]
-        left, models, _ = case.emptiness.examine(box, case.parts, case.region)
+        left, models, _ = case.emptiness.examine(case.boxes[np.array([k])], case.region)
         if not len(left):
             missed[k] = True
             continue
-        made = smaller(left, models, case.parts, case.emptiness.allowed.length)
+        made = smaller(left, models, parts, case.emptiness.allowed.length)
+        at = dict(within(parts, int(case.boxes.part[k]), case.places[k]))
         missed[k] = not any(
-            holds(made, i, case.parts, box.part[0], place) for i in range(len(made))
+            part in at and holds(made.low[i], made.high[i], at[part])
+            for i, part in enumerate(made.part.tolist())
         )
     return missed
 
 
-def holds(boxes, i, parts, part, place):
-    """Whether box i holds the place, given in the coordinates of `part` or of its parent."""
-    if boxes.part[i] != part:
-        side = parts.children[part].tolist().index(boxes.part[i])
-        place = place.copy()
-        along = -2 + parts.axis[part]
-        place[along] = 2.0 * place[along] + (1.0 if side == 0 else -1.0)
-    return ((place >= boxes.low[i] - 1e-15) & (place <= boxes.high[i] + 1e-15)).all()
+def within(parts, part, place):
+    """The place in a part, its child there, the child of that, and so on."""
+    yield part, place
+    while parts.children[part, 0] >= 0:
+        part, x = child_of(parts, part, place[-2:])
+        place = np.append(place[:-2], x)
+        yield part, place
+
+
+def holds(low, high, place):
+    """Whether a box holds the place."""
+    return ((place >= low - 1e-15) & (place <= high + 1e-15)).all()

@@ -1,0 +1,97 @@
+"""Boxes cut into smaller ones: nothing of them is lost.
+
+A box is cut along what can move the tool furthest from, or along, the surface: a joint is halved,
+or the part of the surface gives way to its children. The finest parts are halved along x.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.linear_models import Array, Boxes, Models, Parts
+
+KEPT = 0.7  # share of a box's width, in its shortest joint, over which contraction is no progress
+FEW = 100  # boxes: so few are cut several times at once, as none of them will be proved empty yet
+TIMES = 3
+
+
+def smaller(boxes: Boxes, models: Models, parts: Parts, length: float) -> Boxes:
+    """What is left of open boxes: as it is where contraction did much, otherwise cut.
+
+    Args:
+        boxes: the boxes.
+        models: their models, contracted.
+        parts: the parts of the surface.
+        length: m, which differences of axes are multiplied by.
+    """
+    centre = boxes.centre
+    low = np.maximum(centre + models.low, boxes.low)
+    high = np.minimum(centre + models.high, boxes.high)
+    width = np.maximum(boxes.high - boxes.low, 1e-300)
+    share = np.where(boxes.high > boxes.low, (high - low) / width, 1.0)
+    much = share.min(axis=1) < KEPT
+    now = Boxes(low, high, boxes.part, boxes.claim)
+    rest, reach = now[~much], models.reach[~much]
+    for _ in range(TIMES if len(boxes) < FEW else 1):
+        rest, reach = cut(rest, reach, parts, length)
+    return Boxes.joined([now[much], rest])
+
+
+def cut(boxes: Boxes, reach: Array, parts: Parts, length: float) -> tuple[Boxes, Array]:
+    """Every box in two, or in the one of these that it lies in.
+
+    Args:
+        boxes: m boxes.
+        reach: (m, n + 2) m, by how much each variable can move the tool or the target, about.
+        parts: the parts of the surface.
+        length: m, which differences of normals are multiplied by.
+
+    Returns:
+        The smaller boxes and their reach.
+    """
+    n = reach.shape[1] - 2
+    over_surface = reach[:, n:].sum(axis=1) + parts.radius[boxes.part] @ [1.0, length]
+    finest = parts.children[boxes.part, 0] < 0
+    surface_first = over_surface > reach[:, :n].max(axis=1)
+    surface_first &= ~finest | (reach[:, n:] > 0.0).any(axis=1)
+    to_children = surface_first & ~finest
+    along = np.where(
+        surface_first, n + np.argmax(reach[:, n:], axis=1), np.argmax(reach[:, :n], axis=1)
+    )
+    halved = _halves(boxes[~to_children], reach[~to_children], along[~to_children])
+    made = halved + _children(boxes[to_children], reach[to_children], parts)
+    return Boxes.joined([some for some, _ in made]), np.concatenate([r for _, r in made])
+
+
+def _halves(boxes: Boxes, reach: Array, along: NDArray[np.int64]) -> list[tuple[Boxes, Array]]:
+    """Boxes (m) cut at the middle of one variable each (m,)."""
+    rows = np.arange(len(boxes))
+    low, high, reach = boxes.low.copy(), boxes.high.copy(), reach.copy()
+    middle = 0.5 * (low[rows, along] + high[rows, along])
+    high[rows, along] = middle
+    low[rows, along] = middle
+    reach[rows, along] *= 0.5
+    first = Boxes(boxes.low, high, boxes.part, boxes.claim)
+    return [(first, reach), (Boxes(low, boxes.high, boxes.part, boxes.claim), reach)]
+
+
+def _children(boxes: Boxes, reach: Array, parts: Parts) -> list[tuple[Boxes, Array]]:
+    """The same joints over the two children of each box's part."""
+    axis = parts.axis[boxes.part]
+    n = reach.shape[1] - 2
+    shrunk = reach.copy()
+    shrunk[:, n:] *= np.where(axis[:, None] < 0, 0.7, np.where(axis[:, None] == [0, 1], 0.5, 1.0))
+    made = []
+    for side, shift in ((0, 1.0), (1, -1.0)):
+        low, high = boxes.low.copy(), boxes.high.copy()
+        for a in (0, 1):
+            halved = axis == a
+            for ends in (low, high):
+                ends[halved, n + a] = 2.0 * ends[halved, n + a] + shift
+        low[axis < 0, n:], high[axis < 0, n:] = -1.0, 1.0
+        low[:, n:], high[:, n:] = np.maximum(low[:, n:], -1.0), np.minimum(high[:, n:], 1.0)
+        kept = np.asarray(~(low > high).any(axis=1))
+        child = Boxes(low, high, parts.children[boxes.part, side], boxes.claim)
+        made.append((child[kept], shrunk[kept]))
+    return made
