@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import Fault, close, printable
+from coverable_errors import Fault, close, printable, shown
 from feasibility.results.trajectory_files import load_trajectory
 from feasibility.safe_files import FileError, read_regular, shown_path
 from robots import Robot
@@ -104,7 +104,7 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
         for joint, (column, in_degrees) in enumerate(columns):
             value = _number(row[column])
             if not math.isfinite(value):
-                what = f"{head[column]} is {printable(row[column])!r}, no finite number"
+                what = f"{head[column]} is {shown(row[column].strip())}, no finite number"
                 faults.append(Fault("", what, f"line {line}"))
             q[k, joint] = math.radians(value) if in_degrees else value
     if faults:

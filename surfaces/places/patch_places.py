@@ -15,7 +15,7 @@ from surfaces.places.spline_bounds import kinks
 
 Mask = NDArray[np.bool_]
 
-GUESSES = 12  # closest points that lead from a guess to a place
+GUESSES = 6  # closest points that lead from a guess to a place
 AT = 1e-9  # [1] of a range: a path that passes a kink by less does not cross it
 AROUND = 0.5  # rad of azimuth between two places from which on a path over a pole is looked at
 

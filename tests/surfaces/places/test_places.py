@@ -171,7 +171,7 @@ def test_straight_paths_bend_no_more_than_is_said(named, height):
     """Points and normals at dense samples of straight lines in the parameters."""
     name, surface = named
     rng = np.random.default_rng(2)
-    start, end = random_places(surface, 2000, rng)
+    start, end = random_places(surface, 500, rng)
     offset = offset_surface(surface, height)
     if surface.kind == "mesh":
         bends = offset._bends(start.chart, start.x, end.x)
@@ -201,7 +201,7 @@ def test_straight_paths_bend_no_more_than_is_said(named, height):
 def test_paths_begin_and_end_where_they_should(named, height):
     _, surface = named
     offset = offset_surface(surface, height)
-    start, end = random_places(surface, 400, np.random.default_rng(1))
+    start, end = random_places(surface, 200, np.random.default_rng(1))
     path = offset.paths(start, end)
     for k, places in ((0, start), (3, end)):
         points, normals = offset.at(places)
@@ -224,7 +224,7 @@ def test_nearest_places_are_no_further_than_samples(named):
     rng = np.random.default_rng(3)
     height = 0.02
     offset = offset_surface(surface, height)
-    at, _ = random_places(surface, 300, rng)
+    at, _ = random_places(surface, 150, rng)
     point, normal = offset.at(at)
     point = point + 1e-3 * rng.normal(size=point.shape)
     found = offset.nearest(point, point - height * normal, 1e-3)
