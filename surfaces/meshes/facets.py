@@ -3,7 +3,7 @@
 On a face without creases the normal is along the mean of its corners' normals, which is linear. On
 the strip along a crease it turns to that on the crease: there each corner's normal is a linear
 function too, so the mean is quadratic. So a face with corners on a crease is cut into what lies off
-the strip, and the strip, in `STEPS` across.
+the strip, and the strip, in some steps across.
 
 A quadratic polynomial on a triangle lies in the hull of six coefficients: its values at the
 corners, and 2 m - (a + b) / 2 for each side, with the values m in its middle and a, b at its ends.
@@ -22,7 +22,7 @@ from surfaces.meshes.normals import WIDTH, crease_share
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-STEPS = 3  # triangles or pairs of them from the edge of a strip to its crease
+FEWEST, MOST = 2, 6  # triangles or pairs of them from the edge of a strip to its crease
 
 
 class Facets(NamedTuple):
@@ -30,16 +30,19 @@ class Facets(NamedTuple):
 
     corners: Array
     """(G, 3, 3) m."""
-    places: Array
-    """(G, 6, 3) m, the corners, and the middles of the sides from each to the next."""
     normals: Array
-    """(G, 6, 3) coefficients there of a polynomial m, the normal being m / |m|."""
+    """(G, 6, 3) coefficients of a polynomial m, the normal being m / |m|: at the corners, and in
+    the middles of the sides from each to the next."""
     off: Array
     """(G,) how far |m| may be from 1; inf where m may be 0."""
 
 
 def facets_of(
-    corners: Array, normals: Array, crease_normals: Array, on_crease: NDArray[np.bool_]
+    corners: Array,
+    normals: Array,
+    crease_normals: Array,
+    on_crease: NDArray[np.bool_],
+    straight: float,
 ) -> Facets:
     """Cut the faces of a mesh; see `MeshSurface` for its normals.
 
@@ -48,8 +51,11 @@ def facets_of(
         normals: (F, 3, 3) at the corners.
         crease_normals: (F, 3, 3) the same on creases.
         on_crease: (F, 3) which corners lie on one.
+        straight: by how much the normal may turn on a step of a strip, about.
     """
-    face, weights = _cut_faces(on_crease)
+    turns = np.linalg.norm(crease_normals - normals, axis=2)
+    steps = float(np.clip(np.ceil(turns.max() / straight), FEWEST, MOST))
+    face, weights = _cut_faces(on_crease, int(steps))
     middles = (weights + np.roll(weights, -1, axis=1)) / 2.0
     at = np.concatenate([weights, middles], axis=1)
     own, turn = normals[face], (crease_normals - normals)[face]
@@ -67,19 +73,25 @@ def facets_of(
     scale = np.where(known, (least + most) / 2.0, 1.0)
     off = np.where(known, (most - least) / 2.0 / scale, np.inf)
     net /= scale[:, None, None]
-    return Facets(weights @ corners[face], at @ corners[face], net, off)
+    return Facets(weights @ corners[face], net, off)
 
 
-def _cut_faces(on: NDArray[np.bool_]) -> tuple[Ints, Array]:
+def _cut_faces(on: NDArray[np.bool_], steps: int) -> tuple[Ints, Array]:
     """The face (G,) and the weights of the corners (G, 3, 3) of each facet.
 
     Args:
         on: (F, 3) which corners lie on a crease.
+        steps: from the edge of a strip to its crease.
     """
+    turn = np.linspace(0.0, WIDTH, steps + 1).tolist()
+    # The share is 1 - (1 - w) / WIDTH with the weight w of the corner on the crease, ...
+    at_corner = _bands([0.0, *(1.0 - w for w in reversed(turn))])
+    # ... or 1 - w / WIDTH with the weight w of the one off it.
+    at_edge = _bands([*turn, 1.0])
     count = on.sum(axis=1)
     whole = np.flatnonzero((count == 0) | (count == 3))
     faces, weights = [whole], [np.broadcast_to(np.eye(3), (len(whole), 3, 3))]
-    for corners, shapes in ((1, _AT_CORNER), (2, _AT_EDGE)):
+    for corners, shapes in ((1, at_corner), (2, at_edge)):
         some = np.flatnonzero(count == corners)
         # Turned so that the corner on the crease, or the one off it, is the first.
         first = np.argmax(on[some] == (corners == 1), axis=1)
@@ -101,10 +113,3 @@ def _bands(ends: list[float]) -> Array:
             made.append([a[0], b[1], b[0]])
         made.append([a[0], a[1], b[1]])
     return np.array(made)
-
-
-_TURN = np.linspace(0.0, WIDTH, STEPS + 1).tolist()
-# The share is 1 - (1 - w) / WIDTH with the weight w of the corner on the crease, ...
-_AT_CORNER = _bands([0.0, *(1.0 - w for w in reversed(_TURN))])
-# ... or 1 - w / WIDTH with the weight w of the one off it.
-_AT_EDGE = _bands([*_TURN, 1.0])

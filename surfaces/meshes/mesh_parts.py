@@ -22,10 +22,11 @@ from surfaces.parts import PartModels
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# The mean square of a coordinate of the normals in -1..1, by area: a third where they are spread
-# evenly. With less most are alike, with more they are of two sorts.
-_FEW, _TWO = 0.12, 0.6
+_ALIKE = 0.25  # [1] of what r_n is to be
+_BINS = 8  # of a coordinate of the normals
+_EMPTY = 0.03  # [1] of the area: where less of it is in one of these, they are of several sorts
 _TURNS = 8  # of a right angle, by which rectangles are tried
+_LARGE = 500  # facets, of more a rectangle along the largest spread will do
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -35,6 +36,8 @@ class Clusters(Pieces):
     in_halves: ClassVar[bool] = False
 
     facets: Facets
+    alike: float
+    """Normals that differ by less are of one sort."""
     order: Ints
     """(G,) facets; each cluster is a run of them. Cutting clusters sorts their runs."""
     begin: Ints
@@ -43,19 +46,21 @@ class Clusters(Pieces):
     """(k,)"""
 
     @staticmethod
-    def whole(facets: Facets) -> Clusters:
+    def whole(facets: Facets, straight: float) -> Clusters:
         """All facets in one."""
         count = len(facets.corners)
-        return Clusters(facets, np.arange(count), np.zeros(1, np.int64), np.full(1, count))
+        return Clusters(
+            facets, straight, np.arange(count), np.zeros(1, np.int64), np.full(1, count)
+        )
 
     def rows(self, some: Rows) -> Clusters:
         """See `Pieces`, as for the others."""
-        return Clusters(self.facets, self.order, self.begin[some], self.end[some])
+        return Clusters(self.facets, self.alike, self.order, self.begin[some], self.end[some])
 
     def with_more(self, more: Clusters) -> Clusters:
         """Both."""
         ends = (np.concatenate(two) for two in ((self.begin, more.begin), (self.end, more.end)))
-        return Clusters(self.facets, self.order, *ends)
+        return Clusters(self.facets, self.alike, self.order, *ends)
 
     @property
     def sides(self) -> Array:
@@ -70,29 +75,22 @@ class Clusters(Pieces):
     def cut(self, axis: Ints) -> Clusters:
         """At the median along the axis of the frame along which the facets' middles spread most.
 
-        Where normals are the worse (axis 1), and most are alike but for some, or of two sorts, as
-        at creases, those are parted instead: in the middle along the axis along which they differ.
+        Where normals are of several sorts, as beside creases, these are parted instead.
         """
         run, cluster, starts = self._runs()
         facet = self.order[run]
         corners = self.facets.corners[facet]
         keys, _ = _widest(corners.mean(axis=1), cluster, starts)
-        size = self.end - self.begin
-        first = size // 2
         normals, ends = _widest(self.facets.normals[facet].mean(axis=1), cluster, starts)
-        area = np.linalg.norm(
-            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-        )
-        total = np.maximum(np.add.reduceat(area, starts), 1e-300)
-        mean = np.add.reduceat(area * normals, starts) / total
-        square = np.add.reduceat(area * (normals - mean[cluster]) ** 2, starts) / total
-        even = square / np.maximum((ends[1] - ends[0]) ** 2 / 4.0, 1e-300)
-        below = np.add.reduceat((normals <= ends.mean(axis=0)[cluster]).astype(np.int64), starts)
-        apart = (axis == 1) & ((even < _FEW) | (even > _TWO)) & (below > 0) & (below < size)
+        between, share = _emptiest(normals, _areas(corners), ends, cluster, starts)
+        apart = (share < _EMPTY) & (ends[1] - ends[0] > self.alike)
+        below = np.add.reduceat((normals <= between[cluster]).astype(np.int64), starts)
         self.order[run] = facet[np.lexsort((np.where(apart[cluster], normals, keys), cluster))]
-        middle = self.begin + np.where(apart, below, first)
+        size = self.end - self.begin
+        apart &= (below > 0) & (below < size)
+        middle = self.begin + np.where(apart, below, size // 2)
         begin, end = np.stack([self.begin, middle], axis=1), np.stack([middle, self.end], axis=1)
-        return Clusters(self.facets, self.order, begin.ravel(), end.ravel())
+        return Clusters(self.facets, self.alike, self.order, begin.ravel(), end.ravel())
 
     def _runs(self) -> tuple[Ints, Ints, Ints]:
         """Where in `order` the facets are, cluster by cluster; which cluster; where each begins."""
@@ -108,19 +106,21 @@ class Clusters(Pieces):
         corners, count = self.facets.corners[facet], len(starts)
         centre, slopes, radius = np.empty((count, 6)), np.empty((count, 2, 6)), np.empty((count, 2))
         middle, frame = _frames(corners, cluster, starts)
-        local = np.einsum("gkd,ged->gke", corners - middle[cluster, None], frame[cluster])
+        local = (corners - middle[cluster, None]) @ frame[cluster].transpose(0, 2, 1)
         low, high = _extremes(local, starts)
         half, mid = (high - low) / 2.0, (high + low) / 2.0
         centre[:, :3] = middle + np.einsum("ke,ked->kd", mid, frame)
         slopes[..., :3] = half[:, :2, None] * frame[:, :2]
         radius[:, 0] = half[:, 2]
-        off = self.facets.places[facet] - centre[cluster, None, :3]
-        across = np.einsum("gkd,ged->gke", off, frame[cluster, :2])
-        x = across / np.maximum(half[:, :2], 1e-300)[cluster, None]
+        across = (local[..., :2] - mid[cluster, None, :2]) / np.maximum(half[:, :2], 1e-300)[
+            cluster, None
+        ]
+        # Where the coefficients are: at the corners, and in the middles of the sides.
+        x = np.concatenate([across, (across + across[:, [1, 2, 0]]) / 2.0], axis=1)
         fit = _fitted(x, self.facets.normals[facet], cluster, starts)
         centre[:, 3:], slopes[..., 3:], left = fit[:, 0], fit[:, 1:3], fit[:, 3, 0]
         radius[:, 1] = left + np.maximum.reduceat(self.facets.off[facet], starts)
-        return PartModels(centre, slopes, radius, radius[:, None] * np.eye(2))
+        return PartModels(centre, slopes, radius, np.zeros((count, 2, 2)))
 
 
 def _widest(values: Array, cluster: Ints, starts: Ints) -> tuple[Array, Array]:
@@ -131,12 +131,40 @@ def _widest(values: Array, cluster: Ints, starts: Ints) -> tuple[Array, Array]:
     return np.take_along_axis(values, axis[cluster], axis=1)[:, 0], ends
 
 
+def _areas(corners: Array) -> Array:
+    """(g,) of triangles (g, 3, 3)."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.asarray(0.5 * np.linalg.norm(across, axis=1))
+
+
+def _emptiest(
+    values: Array, areas: Array, ends: Array, cluster: Ints, starts: Ints
+) -> tuple[Array, Array]:
+    """(k,) the middle of the emptiest of `_BINS` bins between each cluster's ends, and its share.
+
+    The outermost bins do not count.
+
+    Args:
+        values: (g,)
+        areas: (g,) which count.
+        ends: (2, k) lowest and highest value.
+        cluster: (g,) of each value.
+        starts: (k,) where clusters begin.
+    """
+    low, width = ends[0], np.maximum((ends[1] - ends[0]) / _BINS, 1e-300)
+    at = np.clip((values - low[cluster]) / width[cluster], 0.0, _BINS - 1.0).astype(np.int64)
+    held = np.bincount(cluster * _BINS + at, areas, len(starts) * _BINS).reshape(-1, _BINS)
+    best = 1 + held[:, 1:-1].argmin(axis=1)
+    share = held[np.arange(len(starts)), best] / np.maximum(held.sum(axis=1), 1e-300)
+    return low + (best + 0.5) * width, share
+
+
 def _extremes(values: Array, starts: Ints) -> tuple[Array, Array]:
     """(k, d) lowest and highest of the values (g, m, d) of each cluster."""
-    return (
-        np.minimum.reduceat(values.min(axis=1), starts),
-        np.maximum.reduceat(values.max(axis=1), starts),
-    )
+    _, m, d = values.shape
+    flat = values.reshape(-1, d).T.copy()  # quick to run along
+    low, high = (f.reduceat(flat, m * starts, axis=1) for f in (np.minimum, np.maximum))
+    return low.T, high.T
 
 
 def _frames(corners: Array, cluster: Ints, starts: Ints) -> tuple[Array, Array]:
@@ -148,10 +176,11 @@ def _frames(corners: Array, cluster: Ints, starts: Ints) -> tuple[Array, Array]:
     size = np.diff(np.append(starts, len(corners)))[:, None]
     middle = np.add.reduceat(corners.mean(axis=1), starts) / size
     off = corners - middle[cluster, None]
-    spread = np.add.reduceat(np.einsum("gki,gkj->gij", off, off), starts)
+    spread = np.add.reduceat(off.transpose(0, 2, 1) @ off, starts)
     frame = np.linalg.eigh(spread)[1][:, :, ::-1].transpose(0, 2, 1)  # the least spread is last
-    flat = np.einsum("gkd,ged->gke", off, frame[cluster, :2])
-    angles = np.arange(_TURNS) * (np.pi / 2.0 / _TURNS)
+    flat = off @ frame[cluster, :2].transpose(0, 2, 1)
+    turns = _TURNS if size.max() <= _LARGE else 1
+    angles = np.arange(turns) * (np.pi / 2.0 / turns)
     cosine, sine = np.cos(angles), np.sin(angles)
     u, v = (
         flat[..., :1] * cosine + flat[..., 1:] * sine,
@@ -185,6 +214,7 @@ def _fitted(x: Array, values: Array, cluster: Ints, starts: Ints) -> Array:
     low, high = _extremes(off, starts)
     shift = (low + high) / 2.0
     fit[:, 0] += shift
-    left = np.linalg.norm(off - shift[cluster, None], axis=2).max(axis=1)
-    fit[:, 3] = np.maximum.reduceat(left, starts)[:, None]
+    off -= shift[cluster, None]
+    square = np.einsum("gkd,gkd->gk", off, off).max(axis=1)
+    fit[:, 3] = np.sqrt(np.maximum.reduceat(square, starts))[:, None]
     return fit

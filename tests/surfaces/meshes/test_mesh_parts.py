@@ -99,10 +99,10 @@ def test_smaller_radii_lose_places():
             assert not survivors(replace(parts, radius=radius), points, normals).all(), name
 
 
-def test_facets_are_the_mesh_and_their_normals_its_own(surface):
-    facets = facets_of(
-        surface.face_balls[0], surface.corner_normals, surface.crease_normals, surface.on_crease
-    )
+@pytest.mark.parametrize("straight", [0.02, 0.2, 5.0])
+def test_facets_are_the_mesh_and_their_normals_its_own(surface, straight):
+    normals = surface.corner_normals, surface.crease_normals
+    facets = facets_of(surface.face_balls[0], *normals, surface.on_crease, straight)
     sides = facets.corners[:, 1:] - facets.corners[:, :1]
     areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2.0
     assert areas.sum() == pytest.approx(surface.mesh.area)
