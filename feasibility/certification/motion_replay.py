@@ -64,7 +64,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
         return Replay(over_surface.certificate, "")
     if along_curves.narrowly_refused:
         return along_curves
-    return Replay(along_curves.certificate, f"{along_curves.refusal}; {over_surface.refusal}")
+    return Replay(over_surface.certificate, f"{along_curves.refusal}; {over_surface.refusal}")
 
 
 def _marks_are_right(

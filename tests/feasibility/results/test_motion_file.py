@@ -107,7 +107,7 @@ def test_millimetres_on_a_rail(tmp_path, read):
     from xml.etree import ElementTree as ET
 
     tree = on_a_base(bare(load_robot("ur5").urdf), "prismatic", limits=(0.0, 2.0))
-    robot = load_text(tmp_path, ET.tostring(tree, encoding="unicode"))
+    robot = load_text(tmp_path, ET.tostring(tree, encoding="unicode"), tool_frame="tool0")
     rows = np.column_stack([[0.5, 0.6], ROWS])
     assert np.array_equal(read(text_of(robot.joint_names, rows), robot).q, rows)
     rows[:, 0] *= 1e3
