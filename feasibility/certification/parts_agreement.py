@@ -7,13 +7,16 @@ closest points to random points near it. This finds mistakes; it proves nothing.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces import Cells, SurfaceParts
+from surfaces import Cells, Surface, SurfaceParts
 
 SAMPLES = 300
 ROUNDING = 1e-9  # [m], [1] that a radius is taken larger by
+ON_SURFACE = 1e-8  # [m], [1] by which a place and its own closest place may differ
 WITHIN = 2.0  # of (|df| / r_f)^2 + (|dn| / r_n)^2; a common x makes each at most 1
 
 Array = NDArray[np.float64]
@@ -38,12 +41,35 @@ def places(cells: Cells, samples: int) -> tuple[Array, Array]:
     chosen = rng.integers(len(cells), size=samples)
     size = np.sqrt(cells.areas[chosen])[:, None]
     near = cells.centres[chosen] + size * rng.uniform(-1.0, 1.0, (samples, 3))
-    found = cells.surface.closest(near)
-    feet = near - found.height[:, None] * found.normal
-    inside = found.inside
+    found = feet_of(cells.surface, near)
     some = np.linspace(0, len(cells) - 1, min(len(cells), samples)).astype(int)
-    points = np.concatenate([cells.centres[some], feet[inside]])
-    return points, np.concatenate([cells.normals[some], found.normal[inside]])
+    points = np.concatenate([cells.centres[some], found.points[found.on_patch]])
+    return points, np.concatenate([cells.normals[some], found.normals[found.on_patch]])
+
+
+class Feet(NamedTuple):
+    """Places of a surface below given points."""
+
+    points: Array
+    """(m, 3) m"""
+    normals: Array
+    """(m, 3) outward unit normals."""
+    on_patch: NDArray[np.bool_]
+    """(m,) False where there is no such place."""
+
+
+def feet_of(surface: Surface, points: Array) -> Feet:
+    """The places whose normals lead to points (m, 3).
+
+    Beyond the border of a mesh or a seam the normal that `closest` gives leads elsewhere; so each
+    place is asked for its own closest place.
+    """
+    found = surface.closest(points)
+    feet = points - found.height[:, None] * found.normal
+    again = surface.closest(feet)
+    alike = np.linalg.norm(again.normal - found.normal, axis=1) <= ON_SURFACE
+    alike &= np.abs(again.height) <= ON_SURFACE
+    return Feet(feet, found.normal, np.asarray(found.inside & alike))
 
 
 def on_a_finest_part(places: Array, parts: SurfaceParts) -> NDArray[np.bool_]:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.box_exclusion import excess
 from feasibility.certification.linear_models import Arm, Array, Models, derivatives
+from feasibility.certification.parts_agreement import feet_of
 from feasibility.certification.region import Region
 from feasibility.task import Task
 from surfaces import Cells
@@ -78,17 +79,16 @@ class Refuter:
         self, points: Array, cell: NDArray[np.int64]
     ) -> tuple[Array, Array, NDArray[np.bool_]]:
         """Target points and approaches (m, 3) for tool points, and where they are on the patch."""
-        surface = self.cells.surface
-        found = surface.closest(points)
-        sign, height = surface.side_sign, found.height[:, None]
-        target = points + (sign * self.task.standoff - height) * found.normal
+        sign = self.cells.surface.side_sign
+        found = feet_of(self.cells.surface, points)
+        target = found.points + sign * self.task.standoff * found.normals
         away = np.linalg.norm(points[:, None] - self.targets.points, axis=2)
         near = np.where(cell < 0, np.argmin(away, axis=1), cell)
-        slides = (found.inside & (cell < 0))[:, None]
+        slides = (found.on_patch & (cell < 0))[:, None]
         return (
             np.where(slides, target, self.targets.points[near]),
-            np.where(slides, -sign * found.normal, self.targets.approaches[near]),
-            found.inside | (cell >= 0),
+            np.where(slides, -sign * found.normals, self.targets.approaches[near]),
+            found.on_patch | (cell >= 0),
         )
 
     def _stepped(
