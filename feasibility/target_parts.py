@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from surfaces import Surface, SurfaceParts
 
 MOST = 8192
 
 
+# Search and replay may ask for the same; surfaces are values, compared by identity.
+@lru_cache(maxsize=4)
 def target_parts(
     surface: Surface, standoff: float, flat: float, straight: float, most: int = MOST
 ) -> SurfaceParts:
@@ -16,7 +20,7 @@ def target_parts(
     n, within r_f + d r_n.
 
     Args:
-        surface: s is its `side_sign`.
+        surface: that of the cells; s is its `side_sign`.
         standoff: d, m.
         flat: m > 0, the largest radius of target points on the finest parts.
         straight: > 0, the largest radius of directions.

@@ -10,6 +10,7 @@ from typing import ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError
 from surfaces.parts import PartModels, SurfaceParts, around
 
 Array = NDArray[np.float64]
@@ -126,7 +127,12 @@ def grown(roots: Pieces, flat: float, straight: float, most: int) -> SurfacePart
         flat: m, the largest r_f wanted.
         straight: the largest r_n wanted.
         most: how many parts may be made.
+
+    Raises:
+        ArgumentError: flat or straight is not above 0.
     """
+    if not (flat > 0.0 and straight > 0.0):
+        raise ArgumentError(f"flat and straight must be above 0, got {flat!r} and {straight!r}")
     limits = np.array([flat, straight])
     width = roots.sides.max(axis=0)
     found = roots.models().guarded()

@@ -102,6 +102,10 @@ class Surface(Protected, ABC):
             flat: m > 0, the largest r_f of a finest part; see `SurfaceParts`.
             straight: > 0, the largest r_n.
             most: how many parts may be made in all; never fewer than the surface begins with.
+
+        Raises:
+            ArgumentError: flat or straight is not above 0.
+            SurfaceError: no bounds are known for this kind; all those of `surfaces` have them.
         """
 
     def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:

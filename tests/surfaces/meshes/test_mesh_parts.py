@@ -38,7 +38,7 @@ MESHES = {
     "dome": mesh(plain(mesh_patches.dome(20, 25)), side="inside"),
     "horn": mesh(plain(mesh_patches.horn(24, 20)), **POSE),
     "box": mesh(box(), **POSE),
-    "box of cells": mesh(box(), **POSE).cells(count=24).surface,
+    "box of cells": mesh(box(), **POSE).cells(count=8).surface,
     "rough": mesh(rough(), **POSE),
     "rough cells": mesh(rough(), **POSE).cells(count=12).surface,
 }
@@ -49,7 +49,7 @@ def surface(request):
     return MESHES[request.param]
 
 
-def places(surface, count=4000, seed=4):
+def places(surface, count=2000, seed=4):
     """Faces (k,) and weights (k, 3): inside, on edges and corners, and on strips along creases."""
     rng = np.random.default_rng(seed)
     face = rng.integers(len(surface.mesh.faces), size=count)

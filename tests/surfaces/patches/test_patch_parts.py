@@ -36,7 +36,7 @@ def patch(request):
     return PATCHES[request.param]
 
 
-def walked(patch, parts, count=20_000):
+def walked(patch, parts, count=10_000):
     """A walk of places all over the patch, from the root."""
     u, v = spread(patch, count)
     _, x = at_parameters(patch, u, v)
@@ -81,7 +81,7 @@ def test_the_tree_is_one(patch):
 
 
 def test_radii_fall_by_four_where_sides_are_halved(patch):
-    coarse, fine = (patch.parts(flat, 1e9, 200_000) for flat in (4e-3, 1e-3))
+    coarse, fine = (patch.parts(flat, 1e9, 30_000) for flat in (4e-3, 1e-3))
     if patch.kind != "plane":
         assert len(fine) < 7 * len(coarse)
 

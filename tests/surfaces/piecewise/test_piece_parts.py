@@ -55,7 +55,7 @@ def test_closest_points_lie_in_the_model_of_some_finest_part():
     surface = JOINED["can"]
     parts = surface.parts(2e-3, 0.05, 2000)
     rng = np.random.default_rng(4)
-    direction = rng.normal(size=(300, 3))
+    direction = rng.normal(size=(100, 3))
     found = surface.nearest(surface.position + direction)
     finest = np.flatnonzero(parts.children[:, 0] < 0)
     for place, normal in zip(found.places, found.normals, strict=True):
