@@ -7,20 +7,25 @@ checked cut by cut, and leaf by leaf. Nothing is believed of where they come fro
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError, CoverableError
-from feasibility.certification import MotionFault, replay_over_surface, verify_proof
+from feasibility.certification import (
+    MotionFault,
+    replay_along_curves,
+    replay_over_surface,
+    verify_proof,
+)
 from feasibility.cut_tree import CutTree
 from feasibility.problem import Problem
 from feasibility.results import Result
 from feasibility.search import Search
 from feasibility.task import Task
-from feasibility.verdict import Answer, Certificate, Evidence, Verdict
+from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
@@ -151,6 +156,19 @@ def _of_motion(claim: Literal["motion", "witness"], problem: Problem, q: Any) ->
     )
 
 
+def _of_witness(problem: Problem, walk: Walk) -> Verification:
+    """A stored motion over the surface, or failing that along the curves that it was found on."""
+    found = _of_motion("witness", problem, walk.q)
+    if found.holds:
+        return found
+    robot, cells, task = problem.robot, problem.cells, problem.task
+    every = np.ones(len(cells), dtype=bool)
+    along = replay_along_curves(robot, cells, task, walk, every)
+    if not along.accepted:
+        return found
+    return replace(found, faults=(), certificate=along.certificate, reached=every)
+
+
 def _of_verdict(
     verdict: Verdict, search: Search | None, tick: Callable[[], object] | None
 ) -> Verification:
@@ -160,7 +178,7 @@ def _of_verdict(
     if verdict.answer is Answer.FEASIBLE and len(cells) == 0:
         return _of_motion("witness", problem, np.empty((0, robot.n)))
     if verdict.answer is Answer.FEASIBLE and verdict.witness is not None:
-        return _of_motion("witness", problem, np.asarray(verdict.witness.q))
+        return _of_witness(problem, verdict.witness)
     if verdict.answer is Answer.FEASIBLE and verdict.tree is not None and search is not None:
         from feasibility.paper import replay_stored
 

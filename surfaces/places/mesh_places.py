@@ -28,6 +28,9 @@ from surfaces.places.places import (
     second_derivative_of_unit,
 )
 
+GRID = np.linspace(0.0, 1.0, 9)  # places on an edge that are tried, in so many rounds
+ROUNDS = 8
+
 
 @dataclass(frozen=True, eq=False)
 class MeshPlaces(OffsetSurface):
@@ -93,7 +96,11 @@ class MeshPlaces(OffsetSurface):
         ends = self._on(start), self._on(end)
         eye = np.eye(3)
         along = [self._on(Places(start.chart, eye[c][:, 1:])) for c in (corner, last)]
-        t = np.where(count >= 2, _crossing(*ends, *along), 0.0)[:, None]
+        t = np.where(count >= 2, _crossing(*ends, *along), 0.0)
+        creased = np.asarray(self.surface.on_crease.any(axis=1))
+        some = np.flatnonzero((count >= 2) & (creased[start.chart] | creased[end.chart]))
+        t[some] = self._shortest(start.of(some), end.of(some), corner[some], last[some], t[some])
+        t = t[:, None]
         before = Places(start.chart, ((1.0 - t) * eye[corner] + t * eye[last])[:, 1:])
         after = Places(end.chart, ((1.0 - t) * eye[mates[0]] + t * eye[mates[1]])[:, 1:])
         placed = [self.at(places) for places in (start, before, after, end)]
@@ -113,6 +120,28 @@ class MeshPlaces(OffsetSurface):
             np.stack([normal for _, normal in placed], axis=1),
             np.stack(bends, axis=1),
         )
+
+    def _shortest(self, start: Places, end: Places, corner: Ints, last: Ints, t: Array) -> Array:
+        """(k,) 0..1, where on the edge from `corner` to `last` the way from T to T is shortest.
+
+        On a crease's strip the straight line on the mesh may be a long way round. Looked for on
+        ever finer grids, the first of them over the whole edge with `t` in it.
+        """
+        eye = np.eye(3)
+        low, high = np.zeros_like(t), np.ones_like(t)
+        (a, _), (b, _) = self.at(start), self.at(end)
+        best = t
+        for _ in range(ROUNDS):
+            tried = np.concatenate([low + GRID[:, None] * (high - low), best[None]])
+            x = (1.0 - tried)[..., None] * eye[corner] + tried[..., None] * eye[last]
+            chart = np.tile(start.chart, len(tried))
+            over, _ = self.at(Places(chart, x.reshape(-1, 3)[:, 1:]))
+            over = over.reshape(*tried.shape, 3)
+            way = np.linalg.norm(over - a, axis=2) + np.linalg.norm(over - b, axis=2)
+            best = tried[np.argmin(way, axis=0), np.arange(len(t))]
+            width = 1.5 * GRID[1] * (high - low)
+            low, high = np.maximum(best - width, 0.0), np.minimum(best + width, 1.0)
+        return np.asarray(best)
 
     def _on(self, places: Places) -> Array:
         """(k, 3) m, points of the mesh itself; there the weights are straight, and on a crease's
