@@ -65,6 +65,8 @@ class Boxes(NamedTuple):
     """(STACK, m)"""
     part: NDArray[np.int64]
     """(STACK,) index into the `Places`."""
+    weight: NDArray[np.float64]
+    """(STACK,) share of the whole: halves of a box have half of its share each."""
     counts: NDArray[np.int64]
     """(2,) boxes on the stack; boxes examined so far."""
 
@@ -123,6 +125,7 @@ def box_of(low: NDArray[np.float64], high: NDArray[np.float64], parameters: int 
         np.empty((STACK, m)),
         np.empty((STACK, m)),
         np.zeros(STACK, dtype=np.int64),
+        np.ones(STACK),
         np.array([1, 0]),
     )
     boxes.low[0], boxes.high[0] = -1.0, 1.0

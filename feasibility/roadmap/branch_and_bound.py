@@ -98,17 +98,18 @@ def _split(arrays, places, part, by_point, space, low, high):  # type: ignore[no
 
 
 @kernel
-def _push(boxes, low, high, part):  # type: ignore[no-untyped-def]
+def _push(boxes, low, high, part, weight):  # type: ignore[no-untyped-def]
     """Put a box on the stack."""
     top = boxes.counts[0]
     put(boxes.low[top], low)
     put(boxes.high[top], high)
     boxes.part[top] = part
+    boxes.weight[top] = weight
     boxes.counts[0] += 1
 
 
 @kernel
-def _push_children(places, boxes, part, n, low, high):  # type: ignore[no-untyped-def]
+def _push_children(places, boxes, part, weight, n, low, high):  # type: ignore[no-untyped-def]
     """Hand a box to the children of its part (low and high are lost)."""
     axis = places.axis[part]
     for side in range(2):
@@ -116,14 +117,14 @@ def _push_children(places, boxes, part, n, low, high):  # type: ignore[no-untype
         if axis < 0:
             for i in range(n, low.shape[0]):
                 low[i], high[i] = -1.0, 1.0
-            _push(boxes, low, high, child)
+            _push(boxes, low, high, child, 0.5 * weight)
             continue
         least, most = low[n + axis], high[n + axis]
         middle = 1.0 if side == 0 else -1.0
         low[n + axis] = max(2.0 * least + middle, -1.0)
         high[n + axis] = min(2.0 * most + middle, 1.0)
         if low[n + axis] <= high[n + axis]:
-            _push(boxes, low, high, child)
+            _push(boxes, low, high, child, 0.5 * weight)
         low[n + axis], high[n + axis] = least, most
 
 
@@ -154,7 +155,7 @@ def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space
         top = boxes.counts[0]
         put(low, boxes.low[top])
         put(high, boxes.high[top])
-        part = boxes.part[top]
+        part, weight = boxes.part[top], boxes.weight[top]
         code, by_point = shrink(arrays, work, places, part, slabs, directions, space, low, high)
         if code == 1:
             continue
@@ -167,13 +168,13 @@ def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space
                 found[j] = 0.5 * (low[j] + high[j])
             return 3
         if worst == m:
-            _push_children(places, boxes, part, n, low, high)
+            _push_children(places, boxes, part, weight, n, low, high)
             continue
         least, middle = low[worst], 0.5 * (low[worst] + high[worst])
         low[worst] = middle
-        _push(boxes, low, high, part)
+        _push(boxes, low, high, part, 0.5 * weight)
         low[worst], high[worst] = least, middle
-        _push(boxes, low, high, part)
+        _push(boxes, low, high, part, 0.5 * weight)
     return 0
 
 

@@ -14,7 +14,8 @@ from feasibility.roadmap.branch_and_bound import Ruling, examine
 from feasibility.roadmap.cuts.regions import Region
 
 BATCH = 4000  # boxes between two ticks
-TURNS = (500, 1500, 6000, 25_000, 100_000, 400_000)  # boxes of a statement in its turns
+LEAST = 500  # boxes of a statement before it is compared with others
+MORE = 0.5  # [1] of its boxes so far that a statement is given at a time
 
 
 @dataclass(eq=False)
@@ -29,20 +30,42 @@ class Counted:
     """Called between batches; may raise."""
     spent: int = 0
 
-    def examine(self, statement: Statement, most: int) -> Ruling:
-        """Go on with a statement until so many boxes were spent on it, or none are left."""
+    def examine(self, statement: Statement, most: int) -> None:
+        """Go on with a statement for so many boxes, or until it is settled."""
         boxes = statement.boxes
-        while statement.ruling is Ruling.OPEN and boxes.counts[1] < most and self.left > 0:
+        while statement.ruling is Ruling.OPEN and most > 0 and self.left > 0:
             before = int(boxes.counts[1])
-            batch = min(most - before, self.left, BATCH)
-            statement.ruling, q = examine(
+            batch = min(most, self.left, BATCH)
+            statement.ruling, statement.found = examine(
                 self.arrays, self.work, statement.places, statement.region.slabs, boxes, batch
             )
-            statement.found = q
-            self.spent += int(boxes.counts[1]) - before
-            self.left -= int(boxes.counts[1]) - before
+            used = int(boxes.counts[1]) - before
+            self.spent += used
+            self.left -= used
+            most -= used
             self.tick()
-        return statement.ruling
+
+    def settle_one(self, statements: list[Statement], most: int) -> Statement | None:
+        """Go on until one of some statements is newly settled, always with the likeliest one.
+
+        That is the one which, after a first look at each, has fewest boxes left to examine.
+
+        Args:
+            statements: settled ones are left alone.
+            most: boxes to spend, or a little more.
+
+        Returns:
+            The one that is settled now; None where the boxes are spent, or all were settled.
+        """
+        end = self.spent + most
+        open_ones = [s for s in statements if s.ruling is Ruling.OPEN]
+        while open_ones and self.left > 0 and self.spent < end:
+            new = [s for s in open_ones if s.boxes.counts[1] < LEAST]
+            best = new[0] if new else min(open_ones, key=lambda s: s.boxes_left)
+            self.examine(best, max(LEAST, int(MORE * best.boxes.counts[1])))
+            if best.ruling is not Ruling.OPEN:
+                return best
+        return None
 
 
 @dataclass(eq=False)
@@ -63,3 +86,10 @@ class Statement:
         self.boxes = self.region.boxes(self.parameters)
         if self.region.empty:
             self.boxes.counts[0] = 0
+
+    @property
+    def boxes_left(self) -> float:
+        """An estimate of the boxes still to be examined, from the share that is done."""
+        count, examined = self.boxes.counts
+        left = float(self.boxes.weight[:count].sum())
+        return float(examined) * left / max(1.0 - left, 1e-9)

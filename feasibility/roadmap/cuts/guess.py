@@ -1,8 +1,8 @@
 """The guess of a tree: cuts between components, proved as they are found, down to leaves.
 
 At a region: where all components inside it miss a common cell, there is a leaf. Otherwise the gaps
-between components are tried as cuts, each by a few Newton tries first, and then by branch and bound
-in turns. The leaves come last, all of them in turns.
+between components are tried as cuts, each by a few Newton tries first, and then by branch and
+bound. The leaves come last, all of them in turns.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.cuts.counting import TURNS, Counted, Statement
+from feasibility.roadmap.cuts.counting import Counted, Statement
 from feasibility.roadmap.cuts.findings import Findings, ProvedCut
 from feasibility.roadmap.cuts.gaps import Component, gaps
 from feasibility.roadmap.cuts.leaves import GuessedLeaf, guessed_leaf, prove_leaves
@@ -61,13 +61,17 @@ class Guessing:
     opened: dict[int, float]
     blocked: list[Blocked] = field(default_factory=list)
     leaves: list[GuessedLeaf] = field(default_factory=list)
+    boxes_left: float = np.inf
+    """An estimate of what the proof still needs, where only boxes are missing."""
 
     def tree(self, region: Region, components: list[Component]) -> Cut | Leaf | None:
         """The tree of a region, proved; None where none was found."""
         guess = self._node(region, components, DEEPEST)
-        if guess is None or not prove_leaves(self.findings, self.counted, self.leaves):
+        if guess is None:
             return None
-        return _proved(guess)
+        proved = prove_leaves(self.findings, self.counted, self.leaves)
+        self.boxes_left = sum(leaf.boxes_left for leaf in self.leaves)
+        return _proved(guess) if proved else None
 
     def _node(
         self, region: Region, components: list[Component], depth: int
@@ -139,7 +143,7 @@ def first_proved(
 ) -> Line | None:
     """The first of some cuts on which the tool is proved to be nowhere.
 
-    Those without a known point of the motion set are proved in turns.
+    Branch and bound goes on with the likeliest of those without a known point of the motion set.
 
     Args:
         findings, counted: what is known, and may be spent.
@@ -151,16 +155,16 @@ def first_proved(
             statements.append(((weights, value), findings.statement(on)))
         if len(statements) == CANDIDATES:
             break
-    for most in TURNS:
-        for line, statement in statements:
-            was = statement.ruling
-            if was in (Ruling.OPEN, Ruling.PROVED):
-                ruling = counted.examine(statement, most)
-                if ruling is Ruling.PROVED:
-                    return line
-                if ruling is Ruling.REACHED:
-                    findings.keep(statement.found[None])
-    return None
+    while True:
+        proved = (line for line, s in statements if s.ruling is Ruling.PROVED)
+        line = next(proved, None)
+        if line is not None:
+            return line
+        settled = counted.settle_one([s for _, s in statements], counted.left)
+        if settled is None:
+            return None
+        if settled.ruling is Ruling.REACHED:
+            findings.keep(settled.found[None])
 
 
 def _proved(guess: _Guess | GuessedLeaf) -> Cut | Leaf:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.cuts.counting import TURNS, Counted, Statement
+from feasibility.roadmap.cuts.counting import Counted, Statement
 from feasibility.roadmap.cuts.findings import Findings, ProvedLeaf
 from feasibility.roadmap.cuts.regions import Region
 
-CELLS = 4  # of a leaf that are examined in turns
+CELLS = 4  # of a leaf that are examined
+TURNS = (2000, 4000, 16_000, 64_000, 256_000, 1_000_000)  # boxes of one leaf in its turns
 
 
 @dataclass(eq=False)
@@ -29,6 +30,12 @@ class GuessedLeaf:
     def open(self) -> bool:
         """Can it still be proved?"""
         return any(s.ruling is Ruling.OPEN for s in self.statements.values())
+
+    @property
+    def boxes_left(self) -> float:
+        """An estimate of the boxes that its proof still needs; inf where it has none."""
+        left = (s.boxes_left for s in self.statements.values() if s.ruling is Ruling.OPEN)
+        return min(left, default=np.inf) if self.cell is None else 0.0
 
 
 def guessed_leaf(findings: Findings, region: Region, cover: NDArray[np.bool_]) -> GuessedLeaf:
@@ -47,28 +54,32 @@ def guessed_leaf(findings: Findings, region: Region, cover: NDArray[np.bool_]) -
 def prove_leaves(findings: Findings, counted: Counted, leaves: list[GuessedLeaf]) -> bool:
     """Prove one cell of each leaf, in turns; False when one cannot be, or the budget is spent."""
     for most in TURNS:
-        for leaf in leaves:
-            for cell, statement in leaf.statements.items():
-                if leaf.cell is None and statement.ruling is Ruling.OPEN:
-                    _examine(findings, counted, leaf, cell, most)
+        left = [leaf for leaf in leaves if leaf.cell is None]
+        for leaf in left:
+            _go_on(findings, counted, leaf, most)
             if leaf.cell is None and not leaf.open:
                 return False
-        if all(leaf.cell is not None for leaf in leaves):
+        if not left:
             return True
     return False
 
 
-def _examine(findings: Findings, counted: Counted, leaf: GuessedLeaf, cell: int, most: int) -> None:
-    """Go on with the proof of one cell; a configuration that refutes it is a seed."""
-    statement = leaf.statements[cell]
-    ruling = counted.examine(statement, most)
-    if ruling is Ruling.PROVED:
-        leaf.cell = cell
-        findings.leaves.append(ProvedLeaf(leaf.region, cell))
-    elif ruling is Ruling.REACHED:
-        findings.keep(statement.found[None], cell)
-    elif ruling is Ruling.UNKNOWN and np.isfinite(statement.found).all():
-        findings.seeds.append((cell, statement.found))
+def _go_on(findings: Findings, counted: Counted, leaf: GuessedLeaf, most: int) -> None:
+    """Go on with the cells of one leaf; a configuration that refutes one is a seed."""
+    statements, end = list(leaf.statements.values()), counted.spent + most
+    while True:
+        settled = counted.settle_one(statements, end - counted.spent)
+        if settled is None:
+            return
+        cell = next(cell for cell, s in leaf.statements.items() if s is settled)
+        if settled.ruling is Ruling.PROVED:
+            leaf.cell = cell
+            findings.leaves.append(ProvedLeaf(leaf.region, cell))
+            return
+        if settled.ruling is Ruling.REACHED:
+            findings.keep(settled.found[None], cell)
+        elif np.isfinite(settled.found).all():
+            findings.seeds.append((cell, settled.found))
 
 
 def _furthest(points: NDArray[np.float64], cover: NDArray[np.bool_]) -> list[int]:

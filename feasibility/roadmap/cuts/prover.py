@@ -39,6 +39,9 @@ class Attempt:
     one where it is not covered. Joints of more than a turn may be at another winding."""
     blocked: tuple[Blocked, ...]
     """What kept it, where there is no proof: the gaps of the region that stayed open."""
+    boxes_left: float
+    """An estimate of the boxes that the proof still needs, where its cuts are found and none of its
+    leaves is refuted; inf where that is not so, 0 where there is a proof."""
 
 
 @dataclass(eq=False)
@@ -72,16 +75,18 @@ class Prover:
         limits = limits_of(self.arrays, self.places)
         self.findings.seeds.clear()
         blocked: list[Blocked] = []
+        boxes_left = np.inf
         if limits.over_one_turn().is_finite:
             self.findings.look_around(limits)
             for opened, joints in self._plans(counted, limits, components):
                 guess = Guessing(self.findings, counted, joints, opened)
                 root = self._root(guess, limits, components)
                 if root is not None:
-                    return Attempt(CutTree(root, tuple(opened.items())), counted.spent, (), ())
+                    return Attempt(CutTree(root, tuple(opened.items())), counted.spent, (), (), 0.0)
                 blocked += guess.blocked
+                boxes_left = min(boxes_left, guess.boxes_left)
         seeds = tuple(self.findings.seeds[:MOST_SEEDS])
-        return Attempt(None, counted.spent, seeds, tuple(blocked))
+        return Attempt(None, counted.spent, seeds, tuple(blocked), float(boxes_left))
 
     def _root(
         self, guess: Guessing, limits: Region, components: list[Component]
