@@ -41,7 +41,8 @@ def sheet(count=25):
     faces = np.concatenate(
         [np.column_stack([corner, right, right + count]), np.column_stack([corner, up + 1, up])]
     )
-    points = [*np.stack([x, y, z], axis=-1).reshape(-1, 3), 0.45, 0.05, 0.25]
+    place = np.array([0.45, 0.05, 0.25])
+    points = np.stack([x, y, z], axis=-1).reshape(-1, 3) + place
     return mesh(TriangleMesh(points, faces))
 
 
