@@ -11,6 +11,8 @@ from feasibility.roadmap.graph import COMPONENTS, EDGES, NODES, WAYPOINTS, Roadm
 def components_of(roadmap: Roadmap) -> list[Component]:
     """The components of a roadmap, the largest first: nodes and waypoints, and covered cells."""
     nodes, edges, rows, slots = roadmap.counters[[NODES, EDGES, WAYPOINTS, COMPONENTS]]
+    if nodes == 0:
+        return []
     root = roadmap.parent[:slots].copy()
     while (root[root] != root).any():
         root = root[root]

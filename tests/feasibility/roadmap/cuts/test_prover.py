@@ -9,9 +9,11 @@ from oracle_build import built
 from proving import nodes, nothing, prove, root_region, ruling, statement_of
 
 from feasibility.cut_tree import Cut, Leaf
+from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.branch_and_bound import Ruling, branch_and_bound
 from feasibility.roadmap.cuts import components_of
 from feasibility.roadmap.cuts.samples import projected, random_targets
+from feasibility.roadmap.exploration import Exploration
 from robots import load_robot
 
 ATTACKS = 300  # Newton starts on each statement
@@ -128,3 +130,9 @@ def test_a_budget_is_kept_and_ticks_may_end_an_attempt():
 def test_kernels_are_compiled_once(proved):
     assert proved
     assert len(branch_and_bound.signatures) == 1
+
+
+def test_a_roadmap_without_nodes_has_no_components():
+    robot, cells, task = built(stored("puma560", feasible=False)[12], load_robot("puma560"))
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
+    assert components_of(exploration.roadmap) == []
