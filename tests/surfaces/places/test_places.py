@@ -166,12 +166,12 @@ def bounded(offset, places, bends):
     return known, sag(point), sag(normal)
 
 
-@pytest.mark.parametrize("height", [0.0, 0.03, -0.05])
+@pytest.mark.parametrize("height", [0.0, -0.05])
 def test_straight_paths_bend_no_more_than_is_said(named, height):
     """Points and normals at dense samples of straight lines in the parameters."""
     name, surface = named
     rng = np.random.default_rng(2)
-    start, end = random_places(surface, 500, rng)
+    start, end = random_places(surface, 300, rng)
     offset = offset_surface(surface, height)
     if surface.kind == "mesh":
         bends = offset._bends(start.chart, start.x, end.x)
@@ -197,7 +197,7 @@ def test_straight_paths_bend_no_more_than_is_said(named, height):
         assert np.median(bends[some, 0] / points[some]) < (5e3 if name == "weighted" else 20.0)
 
 
-@pytest.mark.parametrize("height", [0.0, 0.03, -0.05])
+@pytest.mark.parametrize("height", [0.0, -0.05])
 def test_paths_begin_and_end_where_they_should(named, height):
     _, surface = named
     offset = offset_surface(surface, height)
