@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from surfaces.meshes import MeshSurface
 from surfaces.patches import Patch
-from surfaces.piecewise import Piecewise
-from surfaces.places.mesh_places import MeshPlaces
 from surfaces.places.patch_places import PatchPlaces
-from surfaces.places.piece_places import PiecePlaces
 from surfaces.places.places import OffsetSurface
 from surfaces.surface import Surface, SurfaceError
 
@@ -29,6 +25,12 @@ def offset_surface(surface: Surface, height: float) -> OffsetSurface:
     """
     if isinstance(surface, Patch):
         return PatchPlaces(height, surface)
+    # Loaded where they are needed: most questions are about one patch.
+    from surfaces.meshes import MeshSurface
+    from surfaces.piecewise import Piecewise
+    from surfaces.places.mesh_places import MeshPlaces
+    from surfaces.places.piece_places import PiecePlaces
+
     if isinstance(surface, Piecewise):
         return PiecePlaces(height, surface)
     if isinstance(surface, MeshSurface):
