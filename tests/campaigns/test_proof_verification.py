@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from known_points import known, lost
+from known_points import confirmed, known, lost
 from proof_cases import stored, stored_case
 
 from feasibility.certification import verify_proof
@@ -13,6 +13,13 @@ def test_no_box_around_a_known_place_is_lost(seed):
     rng = np.random.default_rng(seed)
     for _ in range(100):
         assert not lost(known(rng)).any()
+
+
+@pytest.mark.parametrize("seed", range(200, 210))
+def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(100):
+        assert not confirmed(rng, known(rng, 1), 5000)
 
 
 @pytest.mark.parametrize("index", range(len(stored())))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ from random_arms import random_arm
 from scipy.spatial.transform import Rotation
 
 from feasibility.certification.box_cutting import smaller
-from feasibility.certification.empty_region import Emptiness
+from feasibility.certification.empty_region import Claim, Emptiness
 from feasibility.certification.linear_models import Allowed, Arm, Boxes, target_parts
 from feasibility.certification.region import Region
 from robots import Kinematics
@@ -25,6 +26,7 @@ PATCHES = (
     cone(0.4, 0.5, (0, 300), (-0.2, 0.3), side="outside"),
     torus(0.5, 0.2, (0, 360), (0, 360), side="outside"),
 )
+FAR = 8.0  # [rad], [m] that regions may pass the limits by
 EXACT = 0.3  # share of deviations, tilts and box faces that are as large as they may be
 
 
@@ -71,7 +73,7 @@ def known(rng, boxes=50):
     )
     chord = 2.0 * np.sin(angle / 2.0)
     parts = target_parts(patch.parts(0.3 * tolerance, 0.3 * chord, 600), patch.side_sign, standoff)
-    arm = Arm(robot, robot.lower, robot.upper)
+    arm = Arm(robot, robot.lower - FAR, robot.upper + FAR)
     allowed = Allowed(tolerance, chord, 0.5)
     emptiness = Emptiness(arm, parts, lambda cell: 0, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
@@ -152,3 +154,29 @@ def within(parts, part, place):
 def holds(low, high, place):
     """Whether a box holds the place."""
     return ((place >= low - 1e-15) & (place <= high + 1e-15)).all()
+
+
+class NoRefutation:
+    """A search for refutations that finds none, so that the bounds alone have to refuse."""
+
+    def find(self, *_):
+        """Nothing."""
+
+
+def confirmed(rng, case, most):
+    """Whether some region that holds the known place is said to be empty, of three random ones.
+
+    Joints that turn may be some turns away from it: the tool is at the same place there.
+    """
+    q, arm = case.places[0][:-2], case.emptiness.arm
+    for _ in range(3):
+        size = np.exp(rng.uniform(np.log(1e-6), np.log(8.0), (2, arm.n)))
+        size[:, rng.random(arm.n) < 0.2] = 0.0
+        turns = np.where(arm.prismatic, 0, 2.0 * np.pi * rng.integers(-1, 2, arm.n))
+        region = replace(case.region, low=q - size[0], high=q + size[1])
+        if len(region.weights) == 0:
+            region = replace(region, low=region.low + turns, high=region.high + turns)
+        claims = [Claim("a region", region, None)]
+        if case.emptiness.test(claims, NoRefutation(), most).failed is None:
+            return True
+    return False

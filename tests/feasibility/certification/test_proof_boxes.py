@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from known_points import known, lost
+from known_points import confirmed, known, lost
 from random_arms import random_arm
 
 from feasibility.certification import linear_models
@@ -28,6 +28,13 @@ def test_with_smaller_remainders_some_are_lost(monkeypatch):
     monkeypatch.setattr(linear_models, "lever_bounds", halved)
     rng = np.random.default_rng(0)
     assert sum(lost(known(rng)).sum() for _ in range(20)) > 0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
+    rng = np.random.default_rng(seed)
+    for _ in range(15):
+        assert not confirmed(rng, known(rng, 1), 600)
 
 
 @pytest.mark.parametrize("seed", range(25))

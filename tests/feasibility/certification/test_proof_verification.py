@@ -1,6 +1,9 @@
 """The verifier of cut trees: true proofs are accepted, damaged ones refused with the reason."""
 
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from proof_cases import (
     strip,
 )
 
+import feasibility
 from feasibility import Task
 from feasibility.certification import verify_proof
 from feasibility.cut_tree import Cut, CutTree, Leaf
@@ -328,3 +332,31 @@ def test_surfaces_whose_bounds_miss_them_prove_nothing(tmp_path):
     assert verify_on(*case, shrunk).accepted
     shifted = replace(shrunk, centre=shrunk.centre + 1e-3)
     assert "the surface's bounds do not hold" in verify_on(*case, shifted).refusal
+
+
+def test_the_verifier_shares_no_code_with_the_search():
+    """Neither the paper's nor the complete one, nor their compiled kinematics."""
+    shown = subprocess.run(
+        [sys.executable, "-c", LOADING], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    loaded = set(shown.stdout.split())
+    assert "feasibility.certification.proof_verification" in loaded
+    search = ("feasibility.roadmap", "feasibility.paper", "feasibility.search", "robots.chain")
+    assert not [name for name in loaded if f"{name}.".startswith(tuple(f"{s}." for s in search))]
+
+
+ROOT = Path(feasibility.__file__).parents[1]
+LOADING = """
+import sys
+import numpy as np
+import feasibility
+from feasibility import Task
+from feasibility.certification import verify_proof
+from feasibility.cut_tree import CutTree, Leaf
+from robots import load_robot
+from surfaces import plane
+cells = plane((5.0, 6.0), (0.0, 1.0)).cells(1, 2)
+check = verify_proof(load_robot("puma560"), cells, Task(0.0, 20.0), CutTree(Leaf(0)))
+assert check.accepted
+print(*sys.modules)
+"""
