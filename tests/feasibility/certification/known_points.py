@@ -99,8 +99,8 @@ def boxes_around(rng, robot, q, parts, part, x, count):
         high.append(np.minimum(place + above, ends[1]))
         places.append(place)
         which.append(part)
-    zeros = np.zeros(count, dtype=int)
-    return Boxes(np.array(low), np.array(high), np.array(which), zeros), np.array(places)
+    numbers = np.arange(count)
+    return Boxes(np.array(low), np.array(high), np.array(which), numbers), np.array(places)
 
 
 def child_of(parts, part, x):
@@ -126,19 +126,17 @@ def region_around(rng, robot, q):
 
 def lost(case):
     """(m,) boxes that the verifier drops, or contracts or cuts so that the place is outside."""
-    missed = np.zeros(len(case.boxes), dtype=bool)
+    left, models, _ = case.emptiness.examine(case.boxes, case.region)
     parts = case.emptiness.parts
-    for k in range(len(case.boxes)):
-        left, models, _ = case.emptiness.examine(case.boxes[np.array([k])], case.region)
-        if not len(left):
-            missed[k] = True
-            continue
-        made = smaller(left, models, parts, case.emptiness.allowed.length)
-        at = dict(within(parts, int(case.boxes.part[k]), case.places[k]))
-        missed[k] = not any(
-            part in at and holds(made.low[i], made.high[i], at[part])
-            for i, part in enumerate(made.part.tolist())
-        )
+    made = smaller(left, models, parts, case.emptiness.allowed.length)
+    missed = np.ones(len(case.boxes), dtype=bool)
+    at = [
+        dict(within(parts, part, place))
+        for part, place in zip(case.boxes.part.tolist(), case.places, strict=True)
+    ]
+    for i, (box, part) in enumerate(zip(made.claim.tolist(), made.part.tolist(), strict=True)):
+        if part in at[box] and holds(made.low[i], made.high[i], at[box][part]):
+            missed[box] = False
     return missed
 
 

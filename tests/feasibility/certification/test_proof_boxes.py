@@ -11,11 +11,11 @@ from feasibility.certification.linear_models import derivatives
 from robots import Kinematics
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(4))
 def test_no_box_around_a_known_place_is_lost(seed):
     rng = np.random.default_rng(seed)
-    for _ in range(12):
-        assert not lost(known(rng)).any()
+    for boxes in (1, 40, 150, 150, 150, 150, 150, 150):
+        assert not lost(known(rng, boxes)).any()
 
 
 def test_with_smaller_remainders_some_are_lost(monkeypatch):
@@ -30,10 +30,10 @@ def test_with_smaller_remainders_some_are_lost(monkeypatch):
     assert sum(lost(known(rng)).sum() for _ in range(20)) > 0
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_no_region_around_a_known_place_is_said_to_be_empty(seed):
     rng = np.random.default_rng(seed)
-    for _ in range(15):
+    for _ in range(10):
         assert not confirmed(rng, known(rng, 1), 600)
 
 
