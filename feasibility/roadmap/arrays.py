@@ -67,6 +67,10 @@ class SearchArrays(NamedTuple):
     """1/m, the largest curvature of the target surface next to the cells' centres."""
     near: float
     """m, how near its target the tool point is at a waypoint; see NEWTON and NEWTON_CONE."""
+    off_target_cost: float
+    """[1], times the curvature: what a tool point off its target costs of the cone chord for each
+    metre. NEAR_COST where the cone is to hold at its closest point on the surface too, 0 where only
+    at its target, which is all that the task asks."""
     scale: float
     """m, the length that makes metres comparable to radians (the arm's reach)."""
 
@@ -101,6 +105,7 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
         inner_cone_chord=float(cone_chord - ordinary - NEAR_COST * curves.centre_curvature * near),
         curvature=curves.centre_curvature,
         near=float(near),
+        off_target_cost=NEAR_COST,
         # A gantry may have no links: any length will do then.
         scale=float(np.linalg.norm(robot.chain.translations, axis=1).sum()) or 1.0,
     )
@@ -124,9 +129,9 @@ class Work(NamedTuple):
     axis_rows: NDArray[np.float64]
     """(3, n)"""
     rows: NDArray[np.float64]
-    """(4, n) constraint rows of the step."""
+    """(5, n) constraint rows of the step."""
     rhs: NDArray[np.float64]
-    """(4,)"""
+    """(5,)"""
     secondary_step: NDArray[np.float64]
     """(n,) the step that the secondary objective asks for, to be taken in the free directions."""
     step: NDArray[np.float64]
@@ -135,6 +140,8 @@ class Work(NamedTuple):
     """(n,) joints that the step holds at a limit."""
     trial: NDArray[np.float64]
     """(n,)"""
+    kept: NDArray[np.float64]
+    """(n,) the best configuration of a projection off the target."""
     target: NDArray[np.float64]
     """(2, 3) target point and approach direction."""
     derivative_bound: NDArray[np.float64]
@@ -160,12 +167,13 @@ def work_for(n: int) -> Work:
         error=np.zeros((2, 2)),
         point_rows=np.zeros((3, n)),
         axis_rows=np.zeros((3, n)),
-        rows=np.zeros((4, n)),
-        rhs=np.zeros(4),
+        rows=np.zeros((5, n)),
+        rhs=np.zeros(5),
         secondary_step=np.zeros(n),
         step=np.zeros(n),
         held=np.zeros(n, dtype=np.bool_),
         trial=np.zeros(n),
+        kept=np.zeros(n),
         target=np.zeros((2, 3)),
         derivative_bound=np.zeros(5),
         allowance=np.zeros(2),
@@ -186,6 +194,17 @@ def place(arrays, work, slot, q):  # type: ignore[no-untyped-def]
         chord += (work.axis[slot, k] - work.target[1, k]) ** 2
     work.error[slot, 0] = np.sqrt(distance)
     work.error[slot, 1] = np.sqrt(chord)
+
+
+@kernel
+def cone_used(arrays, work, slot):  # type: ignore[no-untyped-def]
+    """The part of the cone chord that a slot uses.
+
+    That is |a - b|, and what a tool point off its target costs, because the surface's normal next
+    to it is another (see NEAR_COST; the first `near` of it is taken off `Work.allowance`).
+    """
+    off = max(work.error[slot, 0] - arrays.near, 0.0)
+    return work.error[slot, 1] + arrays.off_target_cost * work.derivative_bound[2] * off
 
 
 @kernel

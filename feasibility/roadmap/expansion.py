@@ -29,7 +29,7 @@ from feasibility.roadmap.graph import (
     root_of,
     unite,
 )
-from feasibility.roadmap.projection import PROJECTION_STEPS, project_onto_cell
+from feasibility.roadmap.projection import PROJECTION_STEPS, project_near_cell
 from feasibility.roadmap.self_motion import SETTLE_STEPS, connect, settle
 from feasibility.roadmap.tracking import track
 
@@ -186,7 +186,7 @@ def seed_cell(
         if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
             break
         q = guess.copy()
-        if not project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
+        if not project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
         found += 1
         settle(arrays, work, target, approach, q, SETTLE_STEPS)
@@ -234,7 +234,7 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
             if k == 0:
                 # Head for a random configuration of the manifold.
                 put(goal, guesses[g])
-                if not project_onto_cell(arrays, work, cell, goal, AIM_STEPS):
+                if not project_near_cell(arrays, work, cell, goal, AIM_STEPS):
                     break
             node = _nearest_rival(roadmap, cell, goal, NOBODY, tried, NONE)
             if node < 0:

@@ -9,13 +9,30 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
-from feasibility.roadmap.arrays import CONE, LIMIT, NEXT, SINGULAR, look_at, place
+from feasibility.compiled import kernel, put
+from feasibility.roadmap.arrays import (
+    CONE,
+    LIMIT,
+    NEXT,
+    SINGULAR,
+    cone_used,
+    look_at,
+    place,
+)
 from robots import jacobians
 
 COMFORT = 0.7  # [1] share of the cone chord that a step keeps to where it can
 LARGEST_STEP = 0.35  # [rad] or [m], largest change of one joint in one Newton step
-POINT, POINT_AND_CONE = np.int64(3), np.int64(4)  # rows of a step
+# Rows of a step: the tool point; and the cone; and, where that is narrow, both tilts.
+POINT, POINT_AND_CONE, POINT_AND_TILTS = np.int64(3), np.int64(4), np.int64(5)
+NARROW = 0.06  # [1] a cone chord below which a step across the cone's row would leave the cone
+HALF = 0.5  # [1] of a narrow cone's chord: where both tilts are led
+DAMPING = 1e-9  # [1] of the rows' squares: at a singularity the step stays finite
+OFF_TARGET = 0.9  # [1] of the tolerance, how far a tool point may be off where it cannot be nearer
+OFF_TARGET_SLACK = 1e-3  # [1] share of the cone chord that it then keeps free
+OFF_TARGET_GAIN = 1e-4  # [1] a step that brings it nearer by a smaller share is the last
+OFF_TARGET_STEPS = np.int64(40)
+CONE_WEIGHT = 10.0  # [1] of the cone's row beside those of the tool point
 PROJECTION_SLACK = 1e-6  # [1] share of the cone chord that the projection of a guess keeps free
 PROJECTION_STEPS = np.int64(60)
 
@@ -46,15 +63,16 @@ def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def least_step(arrays, work, q, m):  # type: ignore[no-untyped-def]
+def least_step(arrays, work, q, m, damping):  # type: ignore[no-untyped-def]
     """The step nearest to `work.secondary_step` with rows @ step = rhs, inside the limits.
 
     Only the first m rows count. Joints that would pass a limit are held at it, the furthest first,
-    and the others take over. Returns False when too few joints are left.
+    and the others take over. Returns False when too few joints are left. With a larger `damping`
+    (a share of the rows' squares) the step is shorter, and the rows hold as nearly as they can.
     """
     n = q.shape[0]
-    a = np.empty((4, 4))
-    y = np.empty(4)
+    a = np.empty((5, 5))
+    y = np.empty(5)
     for j in range(n):
         work.held[j] = False
         work.step[j] = 0.0
@@ -74,7 +92,7 @@ def least_step(arrays, work, q, m):  # type: ignore[no-untyped-def]
         if not trace > 1e-14:
             return False
         for i in range(m):
-            a[i, i] += 1e-9 * trace  # damping: at a singularity the step stays finite
+            a[i, i] += damping * trace
         if not cholesky_solve(a, y, m):
             return False
         worst, furthest = -1, 1e-14
@@ -134,6 +152,83 @@ def linearise(arrays, work, slot, chord_goal):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def tilts(work, goal):  # type: ignore[no-untyped-def]
+    """Replace the cone row by two: the tilts of the axis along two directions across the target's.
+
+    A step across the row of |a - b| leaves a narrow cone; these two rows hold the axis in both
+    directions. They lead the chord to `goal`, or hold it where it is smaller. Needs `linearise`.
+    """
+    bx, by, bz = work.target[1, 0], work.target[1, 1], work.target[1, 2]
+    # Two unit vectors across b: b x e for the axis e that is furthest from b, and b x that.
+    tx, ty, tz = 0.0, bz, -by
+    if abs(bx) > 0.6:
+        tx, ty, tz = -bz, 0.0, bx
+    length = np.sqrt(tx * tx + ty * ty + tz * tz)
+    tx, ty, tz = tx / length, ty / length, tz / length
+    sx, sy, sz = by * tz - bz * ty, bz * tx - bx * tz, bx * ty - by * tx
+    chord = work.error[1, 1]
+    back = 1.0 - goal / chord if chord > goal else 0.0
+    ax, ay, az = work.axis[1, 0] - bx, work.axis[1, 1] - by, work.axis[1, 2] - bz
+    work.rhs[3] = -back * (tx * ax + ty * ay + tz * az)
+    work.rhs[4] = -back * (sx * ax + sy * ay + sz * az)
+    for j in range(work.step.shape[0]):
+        rx, ry, rz = work.axis_rows[0, j], work.axis_rows[1, j], work.axis_rows[2, j]
+        work.rows[3, j] = tx * rx + ty * ry + tz * rz
+        work.rows[4, j] = sx * rx + sy * ry + sz * rz
+
+
+@kernel
+def cone_step(arrays, work, q, goal, narrow, damping):  # type: ignore[no-untyped-def]
+    """`least_step` with the cone: by both tilts where it is narrow, as long as joints suffice."""
+    if narrow:
+        kept = work.rhs[3]
+        tilts(work, goal)
+        if least_step(arrays, work, q, POINT_AND_TILTS, damping):
+            free = 0
+            for j in range(q.shape[0]):
+                if not work.held[j]:
+                    free += 1
+            if free >= POINT_AND_TILTS:
+                return True
+        chord = work.error[1, 1]
+        if not chord > 1e-12:
+            return False
+        work.rhs[3] = kept
+        for j in range(q.shape[0]):
+            total = 0.0
+            for k in range(3):
+                total += (work.axis[1, k] - work.target[1, k]) * work.axis_rows[k, j]
+            work.rows[3, j] = total / chord
+    return least_step(arrays, work, q, POINT_AND_CONE, damping)
+
+
+@kernel
+def predicted_chord(work):  # type: ignore[no-untyped-def]
+    """|a - b| after `work.step`, to first order."""
+    square = 0.0
+    for k in range(3):
+        change = work.axis[1, k] - work.target[1, k]
+        for j in range(work.step.shape[0]):
+            change += work.axis_rows[k, j] * work.step[j]
+        square += change * change
+    return np.sqrt(square)
+
+
+@kernel
+def move(arrays, work, q):  # type: ignore[no-untyped-def]
+    """Take `work.step` from q (in place), shortened if it is long, and evaluate the arm there."""
+    largest = 0.0
+    n = q.shape[0]
+    for j in range(n):
+        largest = max(largest, abs(work.step[j]))
+    shrink = 1.0 if largest <= LARGEST_STEP else LARGEST_STEP / largest
+    for j in range(n):
+        q[j] = min(max(q[j] + shrink * work.step[j], arrays.lower[j]), arrays.upper[j])
+        work.secondary_step[j] = 0.0
+    place(arrays, work, NEXT, q)
+
+
+@kernel
 def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-def]
     """Project q (in place) onto the constraints over `work.target`; slot 1 holds the result.
 
@@ -143,57 +238,104 @@ def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-de
     the errors. Returns True when the tool point is within `arrays.near` of its target, and the axis
     inside the cone.
     """
-    n = q.shape[0]
     inner = work.allowance[1]
     hard = inner * (1.0 - slack)
+    narrow = inner < NARROW
     last = np.inf
     for it in range(most):
         if it > 0 and work.error[1, 0] <= arrays.near and work.error[1, 1] <= inner:
             return True
         chord = work.error[1, 1]
         goal = hard
-        if it == 0:
+        if narrow:
+            goal = HALF * hard
+        elif it == 0:
             # Lead the axis inwards by a part of what the target's motion costs anyway.
             inwards = max(0.5 * (chord - before), 150.0 * slack * before)
             goal = min(hard, max(COMFORT * arrays.cone_chord, before - inwards))
-        norm = linearise(arrays, work, NEXT, goal)
-        usable = norm > 1e-9
+        usable = linearise(arrays, work, NEXT, goal) > 1e-9 or narrow
         work.stop_reason[1] = -1
         cone = chord > goal and usable
-        done = least_step(arrays, work, q, POINT_AND_CONE if cone else POINT)
-        if done and not cone and usable and chord > 0.3 * goal:
-            # Would the step leave the cone? Then repeat it along the boundary of the cone.
-            predicted = 0.0
-            for k in range(3):
-                change = work.axis[1, k] - work.target[1, k]
-                for j in range(n):
-                    change += work.axis_rows[k, j] * work.step[j]
-                predicted += change * change
-            if np.sqrt(predicted) > goal:
-                cone = True
-                done = least_step(arrays, work, q, POINT_AND_CONE)
-        if not done and cone and goal < hard:
+        if cone:
+            done = cone_step(arrays, work, q, goal, narrow, DAMPING)
+        else:
+            done = least_step(arrays, work, q, POINT, DAMPING)
+        # Would the step leave the cone? Then repeat it along the boundary of the cone.
+        near = narrow or chord > 0.3 * goal
+        if done and not cone and usable and near and predicted_chord(work) > goal:
+            cone = True
+            done = cone_step(arrays, work, q, goal, narrow, DAMPING)
+        if not done and cone and goal < hard and chord > 1e-12:
+            if narrow:
+                linearise(arrays, work, NEXT, hard)
             work.rhs[3] = hard - chord
-            done = least_step(arrays, work, q, POINT_AND_CONE)
+            done = least_step(arrays, work, q, POINT_AND_CONE, DAMPING)
         if not done:
             work.stop_reason[0] = (
                 LIMIT if work.stop_reason[1] >= 0 else (CONE if cone else SINGULAR)
             )
             return False
-        largest = 0.0
-        for j in range(n):
-            largest = max(largest, abs(work.step[j]))
-        shrink = 1.0 if largest <= LARGEST_STEP else LARGEST_STEP / largest
-        for j in range(n):
-            q[j] = min(max(q[j] + shrink * work.step[j], arrays.lower[j]), arrays.upper[j])
-            work.secondary_step[j] = 0.0
-        place(arrays, work, NEXT, q)
+        move(arrays, work, q)
         error = work.error[1, 0] / arrays.scale + max(work.error[1, 1] - inner, 0.0)
         work.stop_reason[0] = LIMIT if work.stop_reason[1] >= 0 else (CONE if cone else SINGULAR)
         if not error < np.inf or (it > 2 and error > 2.0 * last and most < 20):
             return False
         last = error
     return work.error[1, 0] <= arrays.near and work.error[1, 1] <= inner
+
+
+@kernel
+def project_off_target(arrays, work, q, most):  # type: ignore[no-untyped-def]
+    """Bring the tool point as near to `work.target` as limits and cone allow, from q (in place).
+
+    For targets that the tool point cannot reach exactly, but within the tolerance. A damped
+    (Levenberg-Marquardt) iteration on the distance, with the cone as a row of large weight. Slot 1
+    holds the placement of q, before and after. Returns True when tool point and axis are inside
+    what tolerance and cone leave, see `cone_used`.
+    """
+    n = q.shape[0]
+    inner = work.allowance[1]
+    goal = (1.0 - OFF_TARGET_SLACK) * inner
+    damping = 1e-4
+    best = np.inf
+    for it in range(most):
+        excess = max(cone_used(arrays, work, NEXT) - goal, 0.0)
+        merit = work.error[1, 0] + arrays.scale * CONE_WEIGHT * excess
+        if merit < best:
+            if it > 0 and best - merit < OFF_TARGET_GAIN * best and excess <= 0.0:
+                break
+            best = merit
+            put(work.kept, q)
+            damping = max(0.1 * damping, 1e-9)
+        else:
+            # Back to the best configuration, and a shorter step.
+            put(q, work.kept)
+            place(arrays, work, NEXT, q)
+            damping = 10.0 * damping
+            if not damping < 10.0:
+                break
+        if work.error[1, 0] <= arrays.near and work.error[1, 1] <= goal:
+            return True
+        off = max(work.error[1, 0] - arrays.near, 0.0)
+        chord_goal = max(goal - arrays.off_target_cost * work.derivative_bound[2] * off, 0.5 * goal)
+        usable = linearise(arrays, work, NEXT, chord_goal) > 1e-9
+        for j in range(n):
+            work.secondary_step[j] = 0.0
+        rows = POINT
+        if usable and work.error[1, 1] > 0.98 * chord_goal:
+            rows = POINT_AND_CONE
+            work.rhs[3] *= CONE_WEIGHT
+            for j in range(n):
+                work.rows[3, j] *= CONE_WEIGHT
+        if not least_step(arrays, work, q, rows, damping):
+            break
+        move(arrays, work, q)
+    put(q, work.kept)
+    place(arrays, work, NEXT, q)
+    return (
+        work.error[1, 0] <= OFF_TARGET * work.allowance[0]
+        and cone_used(arrays, work, NEXT) <= inner
+    )
 
 
 @kernel
@@ -204,3 +346,11 @@ def project_onto_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-d
     for j in range(q.shape[0]):
         work.secondary_step[j] = 0.0
     return project(arrays, work, q, PROJECTION_SLACK, np.inf, most)
+
+
+@kernel
+def project_near_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
+    """`project_onto_cell`, or failing that, to a place within the tolerance of the cell's centre."""
+    if project_onto_cell(arrays, work, cell, q, most):
+        return True
+    return project_off_target(arrays, work, q, OFF_TARGET_STEPS)

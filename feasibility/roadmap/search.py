@@ -93,6 +93,7 @@ def _unreached(exploration: Exploration) -> None:
             exploration.rule(cell, boxes, MORE_BOXES)
     if Ruling.PROVED in exploration.rulings.values():
         return
+    _at_the_target(exploration)
     # One proof is enough for the verdict: examine the furthest of the remaining cells deeper.
     left = [
         c
@@ -102,6 +103,27 @@ def _unreached(exploration: Exploration) -> None:
     for cell in sorted(left, key=lambda c: -distance[c])[:DEEP_CELLS]:
         if exploration.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
             return
+
+
+def _at_the_target(exploration: Exploration) -> None:
+    """Look again for cells that are still open, with the cone at the target only.
+
+    Up to here the cone had to hold at the tool point's own closest point on the surface too. Where
+    the tool point is off its target by much of the tolerance, that may leave nothing of the cone.
+    """
+    left = [
+        cell
+        for cell, ruling in exploration.rulings.items()
+        if ruling is not Ruling.PROVED and not exploration.reached[cell]
+    ]
+    if not left:
+        return
+    exploration.arrays = exploration.arrays._replace(off_target_cost=0.0)
+    for cell in left:
+        if not exploration.reached[cell]:
+            exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
+        if not exploration.reached[cell]:
+            exploration.rule(cell, root_box(exploration.arrays), MORE_BOXES)
 
 
 def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:

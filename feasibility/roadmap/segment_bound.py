@@ -24,8 +24,8 @@ at most kappa |p - T|, kappa the largest curvature of the target surface:
 
     |a - n|(s)  <= peak of both ends with M = Da + Tb + kappa (D + Tp)
 
-(`Work.allowance` is already less by what this adds at the ends.) Limits are convex: the ends
-decide.
+(`Work.allowance` is already less by what this adds at the ends for tool points within `near` of
+their targets, and `cone_used` adds what it costs further off.) Limits are convex: the ends decide.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.compiled import kernel
+from feasibility.roadmap.arrays import HERE, NEXT, cone_used
 
 
 @kernel
@@ -102,5 +103,7 @@ def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     approach = longer * longer * work.derivative_bound[1]
     position = peak(work.error[0, 0], work.error[1, 0], total + target)
     normal = work.derivative_bound[2] * (total + target)
-    cone = peak(work.error[0, 1], work.error[1, 1], total_axis + approach + normal)
+    cone = peak(
+        cone_used(arrays, work, HERE), cone_used(arrays, work, NEXT), total_axis + approach + normal
+    )
     return position / work.allowance[0], cone / work.allowance[1]

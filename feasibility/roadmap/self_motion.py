@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.compiled import kernel
+from feasibility.compiled import kernel, put
 from feasibility.roadmap.arrays import (
     HERE,
     NEXT,
@@ -22,11 +22,18 @@ from feasibility.roadmap.arrays import (
     look_at,
     place,
 )
-from feasibility.roadmap.projection import PROJECTION_STEPS, linearise, project, project_onto_cell
+from feasibility.roadmap.projection import (
+    PROJECTION_STEPS,
+    linearise,
+    project,
+    project_off_target,
+    project_onto_cell,
+)
 from feasibility.roadmap.segment_bound import segment_holds
 
 CONE_SLACK = 1e-3  # [1] share of the cone chord kept free by a full step; less by a shorter one
 NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
+OFF_TARGET_STEPS = np.int64(15)  # of one step with the tool point off its target
 SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
@@ -94,6 +101,7 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
         left += (goal[j] - q[j]) ** 2
     left = np.sqrt(left)
     allowed = 1.5 * left + 0.1
+    off_target = work.error[HERE, 0] > arrays.near
     for _ in range(most):
         if left <= size:
             for j in range(n):
@@ -115,7 +123,13 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
         position, cone = np.inf, np.inf
         remaining, moved = np.inf, 0.0
         slack = 0.25 * CONE_SLACK * min(1.0, size / 0.1)
-        if project(arrays, work, work.trial, slack, np.inf, NEWTON_STEPS):
+        good = project(arrays, work, work.trial, slack, np.inf, NEWTON_STEPS)
+        if not good and off_target:
+            for j in range(n):
+                work.trial[j] = q[j] + (goal[j] - q[j]) * min(1.0, size / max(left, 1e-12))
+            place(arrays, work, NEXT, work.trial)
+            good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
+        if good:
             position, cone = segment_holds(arrays, work, q, work.trial)
             remaining = 0.0
             for j in range(n):
@@ -149,6 +163,7 @@ def settle(arrays, work, target, approach, q, most):  # type: ignore[no-untyped-
     n = q.shape[0]
     look_at(arrays, work, target, approach)
     place(arrays, work, HERE, q)
+    off_target = work.error[HERE, 0] > arrays.near
     size = 0.3
     for _ in range(most):
         copy_slot(work)
@@ -157,6 +172,10 @@ def settle(arrays, work, target, approach, q, most):  # type: ignore[no-untyped-
         for j in range(n):
             work.trial[j] = q[j]
         good = project(arrays, work, work.trial, CONE_SLACK, np.inf, NEWTON_STEPS)
+        if not good and off_target:
+            put(work.trial, q)
+            place(arrays, work, NEXT, work.trial)
+            good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
         if good:
             position, cone = segment_holds(arrays, work, q, work.trial)
             good = position <= 1.0 and cone <= 1.0

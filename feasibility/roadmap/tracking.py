@@ -6,7 +6,8 @@ depends on the kind of surface.
 The arm follows: a predictor step, Newton on the tool point, and the free directions used to stay
 away from limits and from the boundary of the cone, or to head for a goal configuration. A step is
 kept only when `feasibility.roadmap.segment_bound` shows that the straight joint segment obeys every
-constraint between its ends too; otherwise it is shortened. (Step 6 of the complete search.)
+constraint between its ends too; otherwise it is shortened. Where no step is short enough, the tool
+point may leave its target, within the tolerance. (Step 6 of the complete search.)
 """
 
 from __future__ import annotations
@@ -29,13 +30,15 @@ from feasibility.roadmap.arrays import (
     copy_slot,
     place,
 )
-from feasibility.roadmap.projection import linearise, project
+from feasibility.roadmap.projection import linearise, project, project_off_target
 from feasibility.roadmap.segment_bound import segment_holds
 from feasibility.roadmap.self_motion import CONE_SLACK, margin_objective
 
 SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step ends the motion
+OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool point off its target
 MOST_STEPS = 400  # accepted steps of one motion
 NEWTON_STEPS = np.int64(8)  # of one step
+OFF_TARGET_STEPS = np.int64(15)  # of one step off the target
 
 
 @kernel
@@ -74,6 +77,7 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
         work.stop_reason[0] = SINGULAR if allowance[0] > 0.0 and allowance[1] > 0.0 else FOLD
         return STOPPED
     t, dt, written = 0.0, 1.0, 0
+    off_target = work.error[HERE, 0] > arrays.near
     for _ in range(MOST_STEPS):
         dt = min(dt, 1.0 - t)
         if 1.0 - t - dt < 0.1 * dt:
@@ -93,7 +97,12 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
             margin_objective(arrays, work, q, 2.0 * size * dt)
         put(work.trial, q)
         position, cone = np.inf, np.inf
-        if project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS):
+        good = project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS)
+        if not good and off_target:
+            put(work.trial, q)
+            copy_slot(work)
+            good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
+        if good:
             # Slot 0's errors are against the previous target: stored when that step was accepted.
             position, cone = segment_holds(arrays, work, q, work.trial)
         if position <= 1.0 and cone <= 1.0:
@@ -116,6 +125,8 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
                 work.stop_reason[0] = CONE
             dt *= factor
             if dt < SMALLEST_STEP:
-                return STOPPED
+                if off_target:
+                    return STOPPED
+                off_target, dt = True, OFF_TARGET_STEP
     work.stop_reason[0] = LONG
     return STOPPED
