@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.curve_matching import match_to_curves
+from feasibility.certification.curve_matching import CurveMatch, match_to_curves
 from feasibility.certification.kinematic_bounds import peaks, placements, second_derivatives
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.cone import angle_of
@@ -81,6 +81,29 @@ def _marks_are_right(
     return bool(visited[needed].all() and right.all())
 
 
+def _largest_tilt(
+    matched: CurveMatch,
+    derivative_bound: NDArray[np.float64],
+    axis_bound: NDArray[np.float64],
+    beside: bool,
+) -> float:
+    """The largest |a - b| along a walk.
+
+    The task asks for the cone at the tool point's target. With `beside` it is to hold at the tool
+    point's closest point on the surface too, where the normal may be another: the more cautious
+    figure, which is taken where it is inside the cone.
+    """
+    share = 1.0 if beside else 0.0
+    error, chord, curvature = matched.error, matched.chord, share * matched.derivative_bounds[:, 2]
+    with np.errstate(invalid="ignore", over="ignore"):  # a fold: inf * 0 is NaN, and refused
+        bound = axis_bound + curvature * derivative_bound
+        before = chord[:-1] + curvature * error[:-1]
+        after = chord[1:] + curvature * error[1:]
+    tilted = peaks(before, after, bound) + matched.deviations[:, 1]
+    alone = chord + share * matched.centre_curvature * error if len(chord) == 1 else chord
+    return float(np.max(tilted, initial=np.max(alone, initial=0.0)))
+
+
 def replay_along_curves(
     robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
 ) -> Replay:
@@ -102,23 +125,18 @@ def replay_along_curves(
         second_derivatives(steps, robot.prismatic, poses.sines, 1.0)
         + matched.derivative_bounds[:, 1]
     )
-    error, chord, curvature = matched.error, matched.chord, matched.derivative_bounds[:, 2]
-    with np.errstate(invalid="ignore", over="ignore"):  # a fold: inf * 0 is NaN, and refused
-        axis_bound = axis_bound + curvature * derivative_bound
-        # The cone is to hold at the tool point's closest point on the surface, where the normal
-        # differs from the one at its target.
-        before = chord[:-1] + curvature * error[:-1]
-        after = chord[1:] + curvature * error[1:]
-    deviated = peaks(error[:-1], error[1:], derivative_bound) + matched.deviations[:, 0]
-    tilted = peaks(before, after, axis_bound) + matched.deviations[:, 1]
-    position = np.max(deviated, initial=np.max(error, initial=0.0))
-    at_waypoints = chord + matched.centre_curvature * error if len(chord) == 1 else chord
-    worst = np.max(tilted, initial=np.max(at_waypoints, initial=0.0))
+    deviated = peaks(matched.error[:-1], matched.error[1:], derivative_bound)
+    position = np.max(
+        deviated + matched.deviations[:, 0], initial=np.max(matched.error, initial=0.0)
+    )
+    worst = _largest_tilt(matched, derivative_bound, axis_bound, beside=True)
+    if not worst <= cone_chord + CLOSE_TO_ZERO:
+        worst = _largest_tilt(matched, derivative_bound, axis_bound, beside=False)
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
         waypoints=len(walk.q),
         max_position_error=float(position),
-        max_angle=angle_of(float(worst)),
+        max_angle=angle_of(worst),
         min_limit_margin=margin,
     )
 

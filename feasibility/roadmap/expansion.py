@@ -29,7 +29,8 @@ from feasibility.roadmap.graph import (
     root_of,
     unite,
 )
-from feasibility.roadmap.projection import PROJECTION_STEPS, project_near_cell
+from feasibility.roadmap.off_target import project_near_cell
+from feasibility.roadmap.projection import PROJECTION_STEPS
 from feasibility.roadmap.self_motion import SETTLE_STEPS, connect, settle
 from feasibility.roadmap.tracking import track
 

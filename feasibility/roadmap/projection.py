@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel, put
+from feasibility.compiled import kernel
 from feasibility.roadmap.arrays import (
     CONE,
     LIMIT,
     NEXT,
     SINGULAR,
-    cone_used,
     look_at,
     place,
 )
@@ -28,11 +27,6 @@ POINT, POINT_AND_CONE, POINT_AND_TILTS = np.int64(3), np.int64(4), np.int64(5)
 NARROW = 0.06  # [1] a cone chord below which a step across the cone's row would leave the cone
 HALF = 0.5  # [1] of a narrow cone's chord: where both tilts are led
 DAMPING = 1e-9  # [1] of the rows' squares: at a singularity the step stays finite
-OFF_TARGET = 0.9  # [1] of the tolerance, how far a tool point may be off where it cannot be nearer
-OFF_TARGET_SLACK = 1e-3  # [1] share of the cone chord that it then keeps free
-OFF_TARGET_GAIN = 1e-4  # [1] a step that brings it nearer by a smaller share is the last
-OFF_TARGET_STEPS = np.int64(40)
-CONE_WEIGHT = 10.0  # [1] of the cone's row beside those of the tool point
 PROJECTION_SLACK = 1e-6  # [1] share of the cone chord that the projection of a guess keeps free
 PROJECTION_STEPS = np.int64(60)
 
@@ -285,60 +279,6 @@ def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-de
 
 
 @kernel
-def project_off_target(arrays, work, q, most):  # type: ignore[no-untyped-def]
-    """Bring the tool point as near to `work.target` as limits and cone allow, from q (in place).
-
-    For targets that the tool point cannot reach exactly, but within the tolerance. A damped
-    (Levenberg-Marquardt) iteration on the distance, with the cone as a row of large weight. Slot 1
-    holds the placement of q, before and after. Returns True when tool point and axis are inside
-    what tolerance and cone leave, see `cone_used`.
-    """
-    n = q.shape[0]
-    inner = work.allowance[1]
-    goal = (1.0 - OFF_TARGET_SLACK) * inner
-    damping = 1e-4
-    best = np.inf
-    for it in range(most):
-        excess = max(cone_used(arrays, work, NEXT) - goal, 0.0)
-        merit = work.error[1, 0] + arrays.scale * CONE_WEIGHT * excess
-        if merit < best:
-            if it > 0 and best - merit < OFF_TARGET_GAIN * best and excess <= 0.0:
-                break
-            best = merit
-            put(work.kept, q)
-            damping = max(0.1 * damping, 1e-9)
-        else:
-            # Back to the best configuration, and a shorter step.
-            put(q, work.kept)
-            place(arrays, work, NEXT, q)
-            damping = 10.0 * damping
-            if not damping < 10.0:
-                break
-        if work.error[1, 0] <= arrays.near and work.error[1, 1] <= goal:
-            return True
-        off = max(work.error[1, 0] - arrays.near, 0.0)
-        chord_goal = max(goal - arrays.off_target_cost * work.derivative_bound[2] * off, 0.5 * goal)
-        usable = linearise(arrays, work, NEXT, chord_goal) > 1e-9
-        for j in range(n):
-            work.secondary_step[j] = 0.0
-        rows = POINT
-        if usable and work.error[1, 1] > 0.98 * chord_goal:
-            rows = POINT_AND_CONE
-            work.rhs[3] *= CONE_WEIGHT
-            for j in range(n):
-                work.rows[3, j] *= CONE_WEIGHT
-        if not least_step(arrays, work, q, rows, damping):
-            break
-        move(arrays, work, q)
-    put(q, work.kept)
-    place(arrays, work, NEXT, q)
-    return (
-        work.error[1, 0] <= OFF_TARGET * work.allowance[0]
-        and cone_used(arrays, work, NEXT) <= inner
-    )
-
-
-@kernel
 def project_onto_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
     """Project a guess q (in place) onto the constraints over a cell's centre; True on success."""
     look_at(arrays, work, arrays.points[cell], arrays.approaches[cell])
@@ -346,11 +286,3 @@ def project_onto_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-d
     for j in range(q.shape[0]):
         work.secondary_step[j] = 0.0
     return project(arrays, work, q, PROJECTION_SLACK, np.inf, most)
-
-
-@kernel
-def project_near_cell(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
-    """`project_onto_cell`, or failing that, to a place within the tolerance of the cell's centre."""
-    if project_onto_cell(arrays, work, cell, q, most):
-        return True
-    return project_off_target(arrays, work, q, OFF_TARGET_STEPS)

@@ -22,11 +22,11 @@ from feasibility.roadmap.arrays import (
     look_at,
     place,
 )
+from feasibility.roadmap.off_target import project_off_target
 from feasibility.roadmap.projection import (
     PROJECTION_STEPS,
     linearise,
     project,
-    project_off_target,
     project_onto_cell,
 )
 from feasibility.roadmap.segment_bound import segment_holds

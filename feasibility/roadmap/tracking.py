@@ -30,7 +30,8 @@ from feasibility.roadmap.arrays import (
     copy_slot,
     place,
 )
-from feasibility.roadmap.projection import linearise, project, project_off_target
+from feasibility.roadmap.off_target import project_off_target
+from feasibility.roadmap.projection import linearise, project
 from feasibility.roadmap.segment_bound import segment_holds
 from feasibility.roadmap.self_motion import CONE_SLACK, margin_objective
 
