@@ -46,6 +46,14 @@ class Unrolled(NamedTuple):
     """How much of x and y is once around, inf where the surface does not close."""
 
 
+class Finer(NamedTuple):
+    """The same surface in finer cells, with the old centres among the new ones."""
+
+    cells: Cells
+    same: NDArray[np.int64]
+    """(N,) the finer cell with the same centre as each of the N cells."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Cells(Protected, ABC):
     """N cells of one surface, numbered from 0. Cells are values; they pickle."""
@@ -73,6 +81,13 @@ class Cells(Protected, ABC):
     @abstractmethod
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
+
+    def finer(self, ways: int = 3) -> Finer | None:
+        """Every cell cut into `ways` x `ways` ones, an odd number; None where there is no such cut.
+
+        Cells of a mesh have no such cut: their borders are not at fixed shares of anything.
+        """
+        return None
 
     @property
     def middle(self) -> int:

@@ -9,21 +9,25 @@ import numpy as np
 from coverable_errors import Checks
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
-from feasibility.cut_tree import CutTree, Leaf
-from feasibility.cut_words import sentence
 from feasibility.found import Found
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.arrays import arrays_of
-from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.graph_g import graph_of
+from feasibility.roadmap.outcome import (
+    exhausted_words,
+    proof_of,
+    proved_words,
+    unfinished_words,
+)
+from feasibility.roadmap.proving import Proving
+from feasibility.roadmap.refinement import refine
 from feasibility.roadmap.search import close, explore
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
-from feasibility.target_curves import blocked_curves
 from feasibility.verdict import Replay, Walk
 
 
@@ -49,18 +53,21 @@ def complete_search(
     clock.start()
     arrays = arrays_of(problem.robot, problem.cells, problem.searched)
     exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock)
+    proving = Proving(exploration, problem.task)
     in_time, known = True, None
     try:
         if seeds is not None:
             known = seeds if _replayed(problem, seeds).accepted else None
             _plant(exploration, seeds)
         if known is None:
-            explore(exploration)
+            explore(exploration, proving)
+            if exploration.open and proving.tree is None:
+                exploration.finer = refine(exploration, problem.searched)
         close(exploration)
     except OutOfTime:
         in_time = False
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
-    return _found(problem, exploration, in_time, known)
+    return _found(problem, exploration, proving, in_time, known)
 
 
 def _check_seeds(problem: Problem, seeds: Walk) -> None:
@@ -89,14 +96,17 @@ def _plant(exploration: Exploration, seeds: Walk) -> None:
 
 
 def _found(
-    problem: Problem, exploration: Exploration, in_time: bool, known: Walk | None = None
+    problem: Problem,
+    exploration: Exploration,
+    proving: Proving,
+    in_time: bool,
+    known: Walk | None = None,
 ) -> Found:
     """The best component, and the sentences about it; `known` is a motion that covers all cells."""
     total = len(problem.cells)
     complete = exploration.complete and total > 0
     walk = covering_walk(exploration.roadmap, exploration.best) if complete else known
-    covered = int(exploration.covered.sum())
-    proof = None if walk is not None else _proof(exploration)
+    proof = None if walk is not None else proof_of(exploration, proving)
     nodes, motions = (int(count) for count in exploration.roadmap.counters[:2])
     return Found(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),
@@ -110,7 +120,7 @@ def _found(
             "fk": int(exploration.work.counts[0]),
             "nodes": nodes,
             "motions": motions,
-            "boxes": exploration.boxes,
+            "boxes": exploration.boxes + proving.boxes,
             "rounds": exploration.rounds,
         },
         motion=walk,
@@ -120,11 +130,9 @@ def _found(
         refused="A motion over every cell was found, but the independent replay refuses it: "
         "{refusal}.",
         proof=proof,
-        proved="" if proof is None else _proved(problem, exploration, proof),
-        unfinished="" if walk is not None else _unfinished(problem, exploration, in_time),
-        exhausted=f"The search ended without a covering motion {problem.within}: "
-        f"{_shortfall(exploration)}; the best covers {covered} of {total} cells ({nodes} nodes, "
-        f"{exploration.rounds} rounds, seed {exploration.seed}).",
+        proved="" if proof is None else proved_words(problem, proving, proof),
+        unfinished="" if walk is not None else unfinished_words(problem, proving, in_time),
+        exhausted=exhausted_words(problem, exploration, proving),
         make_graph=lambda: graph_of(exploration),
         make_causes=lambda: causes_of(exploration, proof),
     )
@@ -134,44 +142,3 @@ def _replayed(problem: Problem, walk: Walk) -> Replay:
     """Replay the walk: it must visit every cell, whatever the search recorded as covered."""
     needed = np.ones(len(problem.cells), dtype=bool)
     return replay(problem.robot, problem.cells, problem.task, walk, needed)
-
-
-def _proof(exploration: Exploration) -> CutTree | None:
-    """The first cell that is proved uncoverable, as a proof; None where none is."""
-    rulings = exploration.rulings.items()
-    cell = next((cell for cell, ruling in rulings if ruling is Ruling.PROVED), None)
-    return None if cell is None else CutTree(Leaf(cell))
-
-
-def _proved(problem: Problem, exploration: Exploration, proof: CutTree) -> str:
-    """The sentence about a proof: which cells are out of the question, or which cuts part them."""
-    if proof.kind == "cut":
-        return (
-            f"No single motion covers every cell {problem.within}, which is proved: "
-            f"{sentence(proof, problem.robot, problem.cells)} ({exploration.boxes} boxes); the "
-            f"best single motion covers {int(exploration.covered.sum())} of {len(problem.cells)}."
-        )
-    proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
-    return (
-        f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {problem.within} "
-        f"(reach bound and branch and bound, {exploration.boxes} boxes); the best single motion "
-        f"covers {int(exploration.covered.sum())} of {len(problem.cells)}."
-    )
-
-
-def _unfinished(problem: Problem, exploration: Exploration, in_time: bool) -> str:
-    """Why the search was incomplete; empty where it was not."""
-    if not in_time:
-        return (
-            f"The time limit ran out; the best single motion so far covers "
-            f"{int(exploration.covered.sum())} of {len(problem.cells)} cells."
-        )
-    return blocked_curves(problem.cells, problem.task)
-
-
-def _shortfall(exploration: Exploration) -> str:
-    """Why the search ended without a covering motion."""
-    missed = int((~exploration.reached).sum())
-    if missed:
-        return f"{missed} cell{'s were' if missed > 1 else ' was'} never reached, without a proof"
-    return "every cell is reached, but by no single component"

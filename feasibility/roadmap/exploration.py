@@ -52,6 +52,8 @@ class Exploration:
     """Outcomes of branch and bound, by cell."""
     boxes: int = 0
     rounds: int = 0
+    finer: bool = False
+    """Was the surface searched in finer cells too?"""
     tried: dict[tuple[int, int], int] = field(default_factory=dict)
     """How often a bridge between two nodes was tried."""
     pairs: NDArray[np.int64] = field(init=False)
@@ -94,6 +96,11 @@ class Exploration:
         return self.roadmap.cover[self.best].astype(bool)
 
     @property
+    def n_covered(self) -> int:
+        """How many cells the best component covers."""
+        return int(self.roadmap.size[self.best])
+
+    @property
     def complete(self) -> bool:
         """Does the best component cover every cell?"""
         return int(self.roadmap.size[self.best]) == len(self.cells)
@@ -102,6 +109,16 @@ class Exploration:
     def reached(self) -> NDArray[np.bool_]:
         """(N,) cells that some component covers."""
         return self.roadmap.first_node >= 0
+
+    @property
+    def proved(self) -> bool:
+        """Is a cell proved uncoverable?"""
+        return Ruling.PROVED in self.rulings.values()
+
+    @property
+    def open(self) -> bool:
+        """Does no component cover every cell, and is no cell proved uncoverable?"""
+        return not self.complete and not self.proved
 
     @property
     def n_edges(self) -> int:
@@ -113,6 +130,10 @@ class Exploration:
         slots = np.arange(self.roadmap.counters[COMPONENTS])
         roots = slots[self.roadmap.parent[slots] == slots]
         return [int(r) for r in roots[np.argsort(-self.roadmap.size[roots], kind="stable")]]
+
+    def sizes(self, most: int | None = None) -> tuple[int, ...]:
+        """How many cells the components cover, the largest ones first."""
+        return tuple(int(self.roadmap.size[r]) for r in self.roots()[:most])
 
     def covers(self, component: int) -> NDArray[np.bool_]:
         """(N,) cells of a component."""

@@ -24,6 +24,7 @@ from feasibility.roadmap.boxes import Boxes
 from feasibility.roadmap.branch_and_bound import Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import NODES, root_of
+from feasibility.roadmap.proving import Proving
 from feasibility.roadmap.self_motion import margin_shares
 
 PIVOT_SEEDS = 8
@@ -40,8 +41,12 @@ MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid
 NEWTON_STARTS = 25
 
 
-def explore(exploration: Exploration) -> None:
+def explore(exploration: Exploration, proving: Proving | None = None) -> None:
     """Run the search to its end; the exploration holds the result.
+
+    Args:
+        exploration: the search.
+        proving: tries to prove between rounds that no motion covers every cell; then they end.
 
     Raises:
         OutOfTime: the deadline passed; the exploration holds what was found until then.
@@ -49,7 +54,7 @@ def explore(exploration: Exploration) -> None:
     if len(exploration.cells) == 0 or seed_middle(exploration):
         return
     _unreached(exploration)
-    _rounds(exploration)
+    _rounds(exploration, proving)
 
 
 def seed_middle(exploration: Exploration) -> bool:
@@ -91,7 +96,7 @@ def _unreached(exploration: Exploration) -> None:
     for cell, boxes in open_boxes.items():
         if not exploration.reached[cell]:
             exploration.rule(cell, boxes, MORE_BOXES)
-    if Ruling.PROVED in exploration.rulings.values():
+    if exploration.proved:
         return
     _at_the_target(exploration)
     # One proof is enough for the verdict: examine the furthest of the remaining cells deeper.
@@ -132,26 +137,24 @@ def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]
 
 
-def _rounds(exploration: Exploration) -> None:
+def _rounds(exploration: Exploration, proving: Proving | None) -> None:
     """Step 3: rounds of seeding and exploring, until some in a row have gained nothing."""
     dry = 0
-    enough = SETTLED_ROUNDS if Ruling.PROVED in exploration.rulings.values() else DRY_ROUNDS
+    enough = SETTLED_ROUNDS if exploration.proved else DRY_ROUNDS
     for _ in range(MOST_ROUNDS):
         roots = exploration.roots()
         if not roots or exploration.covered[exploration.reached].all():
             return  # the best component covers every cell that any component covers
-        before = _largest_sizes(exploration)
+        before = exploration.sizes(TOP)
         _round(exploration, roots[:TOP])
         exploration.rounds += 1
-        dry = dry + 1 if _largest_sizes(exploration) == before else 0
+        dry = dry + 1 if exploration.sizes(TOP) == before else 0
         if exploration.complete or dry >= enough:
             return
-
-
-def _largest_sizes(exploration: Exploration) -> tuple[int, ...]:
-    """Sizes of the largest components; a round that changes none has gained nothing."""
-    roots = exploration.roots()[:TOP]
-    return tuple(int(exploration.roadmap.size[r]) for r in roots)
+        if proving is not None and not exploration.proved and proving.after(dry):
+            if proving.tree is not None:
+                return
+            dry = 0
 
 
 def _round(exploration: Exploration, top: list[int]) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfaces.adjacency import Neighbours, grid_neighbours
 from surfaces.arguments import Checks
 from surfaces.cell_curves import CellCurves
-from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.cells import Cells, Finer, Triangles, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.patches.patch import ClosedFormPatch, Patch
 from surfaces.surface import SurfaceError, max_principal_curvature
@@ -60,6 +60,13 @@ class GridCells(Cells):
             u=u,
             v=v,
         )
+
+    def finer(self, ways: int = 3) -> Finer:
+        """See `Cells.finer`."""
+        nu, nv = self.shape
+        i, j = np.divmod(np.arange(len(self)), nv)
+        same = (ways * i + ways // 2) * (ways * nv) + ways * j + ways // 2
+        return Finer(GridCells.cut(self.surface, ways * nu, ways * nv), same)
 
     @cached_property
     def neighbours(self) -> Neighbours:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
-from surfaces.cells import Cells, Triangles, Unrolled
+from surfaces.cells import Cells, Finer, Triangles, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.patches import GridCells
 from surfaces.piecewise.across_seams import SMOOTH, curves_across
@@ -52,6 +52,13 @@ class PieceCells(Cells):
             shape=(len(areas),),
             counts=checked,
         )
+
+    def finer(self, ways: int = 3) -> Finer:
+        """See `Cells.finer`."""
+        cells = PieceCells.cut(self.surface, [(ways * nu, ways * nv) for nu, nv in self.counts])
+        starts = np.repeat(cells.first[:-1], np.diff(self.first))
+        same = np.concatenate([grid.finer(ways).same for grid in self.grids])
+        return Finer(cells, starts + same)
 
     @cached_property
     def grids(self) -> tuple[GridCells, ...]:

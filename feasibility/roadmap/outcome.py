@@ -1,0 +1,101 @@
+"""What a search that found no covering motion may say: proof, left untried, or exhausted."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from feasibility.cut_tree import CutTree, Leaf
+from feasibility.cut_words import sentence
+from feasibility.problem import Problem
+from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.cuts import Blocked
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.proving import Proving
+from feasibility.target_curves import blocked_curves
+from robots import Robot
+
+
+def proof_of(exploration: Exploration, proving: Proving) -> CutTree | None:
+    """The first cell that is proved uncoverable, or the cut tree; None where there is neither."""
+    rulings = exploration.rulings.items()
+    cell = next((cell for cell, ruling in rulings if ruling is Ruling.PROVED), None)
+    return proving.tree if cell is None else CutTree(Leaf(cell))
+
+
+def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
+    """What is proved: which cells cannot be covered, or which cuts part them."""
+    exploration = proving.exploration
+    best = f"the best single motion covers {exploration.n_covered} of {len(problem.cells)}"
+    if proof.kind == "cut":
+        return (
+            f"No single motion covers every cell {problem.within}, which is proved: "
+            f"{sentence(proof, problem.robot, problem.cells)} ({proving.boxes} boxes); {best}."
+        )
+    proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
+    return (
+        f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {problem.within} "
+        f"(reach bound and branch and bound, {exploration.boxes} boxes); {best}."
+    )
+
+
+def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
+    """What is known to be left untried; empty where nothing is."""
+    exploration, total = proving.exploration, len(problem.cells)
+    if not in_time:
+        return (
+            f"The time limit ran out; the best single motion so far covers "
+            f"{exploration.n_covered} of {total} cells."
+        )
+    blocked = blocked_curves(problem.cells, problem.task)
+    if blocked:
+        return blocked
+    missed = np.flatnonzero(~exploration.reached)
+    if len(missed):
+        named = ", ".join(str(list(problem.cells.unravel(int(cell)))) for cell in missed[:3])
+        more = ", ..." if len(missed) > 3 else ""
+        return (
+            f"{len(missed)} cell{'s were' if len(missed) > 1 else ' was'} neither reached nor "
+            f"proved uncoverable {problem.within} ({named}{more}); the best motion covers "
+            f"{exploration.n_covered} of {total}."
+        )
+    kept = [gap for gap in proving.blocked if gap.points > 0]
+    if kept and not any(gap.points == 0 for gap in proving.blocked):
+        where = _between(problem.robot, max(kept, key=lambda gap: gap.high - gap.low))
+        return (
+            f"Every cell is reached, but by no single motion that was found (the best covers "
+            f"{exploration.n_covered} of {total}); nor is there a proof, because the arm has "
+            f"configurations on the surface between the parts, such as with {where}. A motion "
+            "through them may have been missed; another seed or finer cells may find it."
+        )
+    return ""
+
+
+def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving) -> str:
+    """What was tried in vain."""
+    tried = [f"{exploration.rounds} rounds"]
+    if exploration.finer:
+        tried.append("cells cut 3 x 3")
+    if proving.attempts:
+        tried.append(f"{proving.attempts} attempts at a proof, {proving.boxes} boxes")
+    nodes = int(exploration.roadmap.counters[0])
+    return (
+        f"The search ended without a covering motion {problem.within}: every cell is reached, but "
+        f"by no single component; the best covers {exploration.n_covered} of "
+        f"{len(problem.cells)} cells ({nodes} nodes, {', '.join(tried)}, seed {exploration.seed})."
+    )
+
+
+def _between(robot: Robot, gap: Blocked) -> str:
+    """The interval of a gap in words."""
+    joints = np.flatnonzero(gap.weights)
+    slides = bool(robot.prismatic[joints[0]])
+    low, high = (value * 1e3 if slides else math.degrees(value) for value in (gap.low, gap.high))
+    names = " + ".join(
+        robot.joint_names[j]
+        if gap.weights[j] == 1.0
+        else f"{gap.weights[j]:.3g} {robot.joint_names[j]}"
+        for j in joints
+    )
+    return f"{names} between {low:.1f} and {high:.1f} {'mm' if slides else 'deg'}"

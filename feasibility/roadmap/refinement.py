@@ -1,0 +1,178 @@
+"""Motions over the surface that follow no curve between cell centres.
+
+The search moves along the curves between neighbouring centres. Where that joins two components by
+no motion, there may still be one over the patch beside these curves. So the surface is cut into
+finer cells, whose centres are waypoints only: the components found are put there, spread over the
+finer curves, and where they meet, or reach a cell that they had missed, the motion becomes an edge
+of the roadmap itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.roadmap.arrays import arrays_of
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.graph import (
+    COMPONENTS,
+    EDGES,
+    NODES,
+    WAYPOINTS,
+    Roadmap,
+    add_edge,
+    add_node,
+    grown,
+    root_of,
+    unite,
+)
+from feasibility.roadmap.search import improve
+from feasibility.roadmap.walk import edge_motion
+from feasibility.task import Task
+
+WAYS = 3  # each cell is cut into so many by so many
+MOST_CELLS = 20_000  # finer cells; above that the surface is cut finely enough
+DRY_ROUNDS = 4  # rounds without gain over the finer cells, after which they are given up
+TOP = 5  # components that a round works on
+
+
+def refine(exploration: Exploration, task: Task) -> bool:
+    """Search over finer cells, and take over the motions found; True when they were searched.
+
+    Args:
+        exploration: a search that found no covering motion; its roadmap grows here.
+        task: the task that it keeps to.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    finer = exploration.cells.finer(WAYS)
+    if finer is None or len(finer.cells) > MOST_CELLS:
+        return False
+    exploration.tick("cutting the surface more finely")
+    finer.cells.curves  # noqa: B018 - part of the cells, made once
+    arrays = arrays_of(exploration.robot, finer.cells, task)
+    arrays = arrays._replace(off_target_cost=exploration.arrays.off_target_cost)
+    fine = Exploration(exploration.robot, finer.cells, arrays, exploration.seed, exploration.clock)
+    origin = _put_there(exploration, fine, finer.same)
+    dry = 0
+    try:
+        fine.spread()
+        while True:
+            gained = _take_over(exploration, fine, finer.same, origin)
+            dry = 0 if gained else dry + 1
+            if exploration.complete or dry > DRY_ROUNDS:
+                break
+            fine.rounds += 1
+            improve(fine, fine.roots()[:TOP])
+    finally:
+        exploration.work.counts[0] += fine.work.counts[0]
+    exploration.spread()
+    return True
+
+
+def _put_there(
+    exploration: Exploration, fine: Exploration, same: NDArray[np.int64]
+) -> dict[int, int]:
+    """Put every node over its finer cell, a component a slot; returns old nodes by new ones."""
+    old = exploration.roadmap
+    slots = {root: slot for slot, root in enumerate(exploration.roots())}
+    fine.roadmap.counters[COMPONENTS] = 0
+    origin = {}
+    for node in range(old.counters[NODES]):
+        slot = slots[int(root_of(old, old.component[node]))]
+        while slot >= len(fine.roadmap.parent) - 2:
+            fine.roadmap.counters[COMPONENTS] = len(fine.roadmap.parent) - 2
+            fine.roadmap = grown(fine.roadmap)
+        fine.roadmap = grown(fine.roadmap)
+        cell = int(same[old.cell[node]])
+        new = add_node(fine.arrays, fine.work, fine.roadmap, cell, old.q[node], slot)
+        origin[int(new)] = node
+    fine.roadmap.counters[COMPONENTS] = len(slots)
+    return origin
+
+
+def _take_over(
+    exploration: Exploration,
+    fine: Exploration,
+    same: NDArray[np.int64],
+    origin: dict[int, int],
+) -> bool:
+    """Take motions between components, and to cells that they miss, as edges; True for any."""
+    routes = _Routes(fine.roadmap, origin)
+    gained = False
+    for edge in range(fine.roadmap.counters[EDGES]):
+        a, b = (int(node) for node in fine.roadmap.ends[edge])
+        if a not in routes.source or b not in routes.source:
+            continue
+        x, y = origin[routes.source[a]], origin[routes.source[b]]
+        if _root(exploration, x) != _root(exploration, y):
+            back = routes.to(b)[::-1]
+            motion = np.vstack([routes.to(a), edge_motion(fine.roadmap, edge)[1:], back[1:]])
+            _add_motion(exploration, x, y, motion)
+            gained = True
+    cell_of = np.full(len(fine.cells), -1)
+    cell_of[same] = np.arange(len(same))
+    for node in sorted(routes.source):
+        cell = int(cell_of[fine.roadmap.cell[node]])
+        x = origin[routes.source[node]]
+        own = _root(exploration, x)
+        if cell >= 0 and not exploration.roadmap.cover[own, cell]:
+            motion = routes.to(node)
+            roadmap = exploration.reserve(0)
+            y = add_node(exploration.arrays, exploration.work, roadmap, cell, motion[-1], own)
+            origin[node] = int(y)
+            _add_motion(exploration, x, int(y), motion)
+            gained = True
+    return gained
+
+
+def _root(exploration: Exploration, node: int) -> int:
+    """The component of a node."""
+    return int(root_of(exploration.roadmap, exploration.roadmap.component[node]))
+
+
+def _add_motion(exploration: Exploration, x: int, y: int, motion: NDArray[np.float64]) -> None:
+    """Add an edge with the waypoints of a motion (k, n) from node x to node y."""
+    roadmap = exploration.reserve(len(motion))
+    first = roadmap.counters[WAYPOINTS]
+    roadmap.waypoints[first : first + len(motion) - 1] = motion[1:]
+    add_edge(roadmap, x, y, len(motion) - 1)
+    unite(roadmap, roadmap.component[x], roadmap.component[y])
+
+
+class _Routes:
+    """Shortest motions, in edges, from the nodes that stand for old ones to the others."""
+
+    def __init__(self, roadmap: Roadmap, origin: dict[int, int]) -> None:
+        self._roadmap = roadmap
+        self.source = {node: node for node in origin}
+        """Of each node that a motion leads to: where it begins."""
+        self._came: dict[int, tuple[int, int]] = {}
+        count = roadmap.counters[EDGES]
+        at: dict[int, list[tuple[int, int]]] = {}
+        for edge, (a, b) in enumerate(roadmap.ends[:count].tolist()):
+            at.setdefault(a, []).append((b, edge))
+            at.setdefault(b, []).append((a, edge))
+        queue = deque(sorted(origin))
+        while queue:
+            node = queue.popleft()
+            for other, edge in at.get(node, ()):
+                if other not in self.source:
+                    self.source[other] = self.source[node]
+                    self._came[other] = (node, edge)
+                    queue.append(other)
+
+    def to(self, node: int) -> NDArray[np.float64]:
+        """(k, n) waypoints from the source of a node to it, both included."""
+        parts = [self._roadmap.q[node][None]]
+        while node in self._came:
+            before, edge = self._came[node]
+            motion = edge_motion(self._roadmap, edge)
+            if int(self._roadmap.ends[edge, 0]) != before:
+                motion = motion[::-1]
+            parts.append(motion[:-1])
+            node = before
+        return np.vstack(parts[::-1])
