@@ -1,6 +1,7 @@
 from .adjacency import components as components
 from .arguments import check_pose as check_pose
 from .cells import Cells as Cells
+from .cells import Finer as Finer
 from .cells import Triangles as Triangles
 from .meshes import MeshSurface as MeshSurface
 from .meshes import cut_box as cut_box

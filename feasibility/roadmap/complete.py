@@ -61,8 +61,8 @@ def complete_search(
             _plant(exploration, seeds)
         if known is None:
             explore(exploration, proving)
-            if exploration.open and proving.tree is None:
-                exploration.finer = refine(exploration, problem.searched)
+            if exploration.apart and proving.tree is None:
+                exploration.finest = refine(exploration, problem.searched)
         close(exploration)
     except OutOfTime:
         in_time = False

@@ -52,8 +52,8 @@ class Exploration:
     """Outcomes of branch and bound, by cell."""
     boxes: int = 0
     rounds: int = 0
-    finer: bool = False
-    """Was the surface searched in finer cells too?"""
+    finest: int = 1
+    """Into how many by how many each cell was cut for a search in finer cells."""
     tried: dict[tuple[int, int], int] = field(default_factory=dict)
     """How often a bridge between two nodes was tried."""
     pairs: NDArray[np.int64] = field(init=False)
@@ -116,9 +116,9 @@ class Exploration:
         return Ruling.PROVED in self.rulings.values()
 
     @property
-    def open(self) -> bool:
-        """Does no component cover every cell, and is no cell proved uncoverable?"""
-        return not self.complete and not self.proved
+    def apart(self) -> bool:
+        """Is every cell covered, but by no single component?"""
+        return not self.complete and bool(self.reached.all())
 
     @property
     def n_edges(self) -> int:
@@ -210,11 +210,11 @@ class Exploration:
             self.roadmap = grown(self.roadmap)
         self.spread()
 
-    def bridge(self, one: int, other: int) -> None:
+    def bridge(self, one: int, other: int, most: int = BRIDGES) -> None:
         """Try to bridge two components between cell centres, the nearest nodes first."""
         tries = 0
         nodes = nearest_pairs(self.roadmap, self.cells.pairs, one, other)
-        for x, y in nodes[: 2 * BRIDGES * (1 + self.rounds)].tolist():
+        for x, y in nodes[: 2 * most * (1 + self.rounds)].tolist():
             if self.tried.get((x, y), 0) > self.rounds // 4:
                 continue
             self.tried[x, y] = self.tried.get((x, y), 0) + 1
@@ -224,7 +224,7 @@ class Exploration:
                 self.spread()
                 return
             tries += 1
-            if tries == BRIDGES:
+            if tries == most:
                 return
 
     def curve(self, cell: int, other: int) -> int:

@@ -75,8 +75,8 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
 def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving) -> str:
     """What was tried in vain."""
     tried = [f"{exploration.rounds} rounds"]
-    if exploration.finer:
-        tried.append("cells cut 3 x 3")
+    if exploration.finest > 1:
+        tried.append(f"cells cut {exploration.finest} x {exploration.finest}")
     if proving.attempts:
         tried.append(f"{proving.attempts} attempts at a proof, {proving.boxes} boxes")
     nodes = int(exploration.roadmap.counters[0])

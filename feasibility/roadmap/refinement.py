@@ -10,6 +10,7 @@ of the roadmap itself.
 from __future__ import annotations
 
 from collections import deque
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,46 +32,70 @@ from feasibility.roadmap.graph import (
 from feasibility.roadmap.search import improve
 from feasibility.roadmap.walk import edge_motion
 from feasibility.task import Task
+from surfaces import Finer
 
-WAYS = 3  # each cell is cut into so many by so many
-MOST_CELLS = 20_000  # finer cells; above that the surface is cut finely enough
-DRY_ROUNDS = 4  # rounds without gain over the finer cells, after which they are given up
-TOP = 5  # components that a round works on
+LEVELS = (3, 9, 27)  # each cell is cut into so many by so many, until a motion is found
+MOST_CELLS = 8_000  # finer cells; more are not tried
+BRIDGES = 24  # pairs of nodes that a round tries to bridge for each two components
+BRIDGING_ROUNDS, ROUNDS = 4, 2  # without gain: of bridges alone, and of self-motions too
+TOP = 4  # components that a round works on
 
 
-def refine(exploration: Exploration, task: Task) -> bool:
-    """Search over finer cells, and take over the motions found; True when they were searched.
+def refine(exploration: Exploration, task: Task) -> int:
+    """Search over finer and finer cells, and take over the motions found.
 
     Args:
         exploration: a search that found no covering motion; its roadmap grows here.
         task: the task that it keeps to.
 
+    Returns:
+        How finely the cells were cut in the end; 1 where they were not.
+
     Raises:
         OutOfTime: the deadline passed.
     """
-    finer = exploration.cells.finer(WAYS)
-    if finer is None or len(finer.cells) > MOST_CELLS:
-        return False
+    finest = 1
+    for ways in LEVELS:
+        finer = exploration.cells.finer(ways)
+        if finer is None or len(finer.cells) > MOST_CELLS or not exploration.apart:
+            break
+        _search_over(exploration, task, finer)
+        finest = ways
+    return finest
+
+
+def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
+    """`refine` over one set of finer cells."""
     exploration.tick("cutting the surface more finely")
     finer.cells.curves  # noqa: B018 - part of the cells, made once
     arrays = arrays_of(exploration.robot, finer.cells, task)
     arrays = arrays._replace(off_target_cost=exploration.arrays.off_target_cost)
     fine = Exploration(exploration.robot, finer.cells, arrays, exploration.seed, exploration.clock)
     origin = _put_there(exploration, fine, finer.same)
-    dry = 0
     try:
         fine.spread()
-        while True:
+        dry = 0
+        while exploration.apart and dry <= BRIDGING_ROUNDS + ROUNDS:
             gained = _take_over(exploration, fine, finer.same, origin)
             dry = 0 if gained else dry + 1
-            if exploration.complete or dry > DRY_ROUNDS:
-                break
             fine.rounds += 1
-            improve(fine, fine.roots()[:TOP])
+            if dry > BRIDGING_ROUNDS:
+                improve(fine, fine.roots()[:TOP])
+            else:
+                _bridge(fine)
     finally:
         exploration.work.counts[0] += fine.work.counts[0]
     exploration.spread()
-    return True
+
+
+def _bridge(fine: Exploration) -> None:
+    """Try to bridge each two of the largest components."""
+    top = fine.roots()[:TOP]
+    for a, b in combinations(top, 2):
+        one, other = (int(root_of(fine.roadmap, root)) for root in (a, b))
+        if one != other:
+            fine.tick("bridging components in finer cells")
+            fine.bridge(one, other, BRIDGES)
 
 
 def _put_there(
@@ -79,18 +104,16 @@ def _put_there(
     """Put every node over its finer cell, a component a slot; returns old nodes by new ones."""
     old = exploration.roadmap
     slots = {root: slot for slot, root in enumerate(exploration.roots())}
-    fine.roadmap.counters[COMPONENTS] = 0
+    fine.roadmap.counters[COMPONENTS] = len(slots)
+    while len(fine.roadmap.parent) < len(slots) + 2:
+        fine.roadmap = grown(fine.roadmap)
     origin = {}
     for node in range(old.counters[NODES]):
-        slot = slots[int(root_of(old, old.component[node]))]
-        while slot >= len(fine.roadmap.parent) - 2:
-            fine.roadmap.counters[COMPONENTS] = len(fine.roadmap.parent) - 2
-            fine.roadmap = grown(fine.roadmap)
         fine.roadmap = grown(fine.roadmap)
+        slot = slots[int(root_of(old, old.component[node]))]
         cell = int(same[old.cell[node]])
         new = add_node(fine.arrays, fine.work, fine.roadmap, cell, old.q[node], slot)
         origin[int(new)] = node
-    fine.roadmap.counters[COMPONENTS] = len(slots)
     return origin
 
 
