@@ -38,11 +38,12 @@ feasibility: clock compiled cone cut_tree cut_words found notices problem read_o
 feasibility.certification
 feasibility.paper
 feasibility.cases
-feasibility.roadmap: arrays box_bounds box_contraction boxes branch_and_bound graph projection segment_bound self_motion
+feasibility.roadmap: arrays graph off_target projection segment_bound self_motion
+feasibility.roadmap.branch_and_bound
 feasibility.roadmap.cuts
-feasibility.roadmap: bridging expansion exploration search tracking
+feasibility.roadmap: bridging expansion exploration proving search tracking
 feasibility.roadmap.causes
-feasibility.roadmap: complete graph_g walk warmup
+feasibility.roadmap: complete graph_g outcome refinement walk warmup
 feasibility: checking
 feasibility.paths
 feasibility.timing

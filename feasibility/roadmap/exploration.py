@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from feasibility.clock import Clock
 from feasibility.roadmap.arrays import SearchArrays, Work, work_for
-from feasibility.roadmap.boxes import Boxes
-from feasibility.roadmap.branch_and_bound import Ruling, rule
+from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
 from feasibility.roadmap.expansion import close_pairs, explore_self_motions, seed_cell, spread_out
 from feasibility.roadmap.graph import (

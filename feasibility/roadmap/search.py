@@ -20,8 +20,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.boxes import Boxes
-from feasibility.roadmap.branch_and_bound import Ruling, root_box
+from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import NODES, root_of
 from feasibility.roadmap.proving import Proving

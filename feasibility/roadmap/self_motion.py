@@ -80,6 +80,23 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ignore[no-untyped-def]
+    """Put a share of the way from q to the goal, projected, into `work.trial`; True on success."""
+    copy_slot(work)
+    for j in range(q.shape[0]):
+        work.trial[j] = q[j]
+        work.secondary_step[j] = share * (goal[j] - q[j])
+    if project(arrays, work, work.trial, slack, np.inf, NEWTON_STEPS):
+        return True
+    if not off_target:
+        return False
+    for j in range(q.shape[0]):
+        work.trial[j] = q[j] + share * (goal[j] - q[j])
+    place(arrays, work, NEXT, work.trial)
+    return project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
+
+
+@kernel
 def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
     """Self-motion over one target from q (in place) towards the configuration `goal`.
 
@@ -116,20 +133,11 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
                     waypoints[first + written, j] = q[j]
                 return written + 1, True
             size = 0.5 * left
-        copy_slot(work)
-        for j in range(n):
-            work.trial[j] = q[j]
-            work.secondary_step[j] = (goal[j] - q[j]) * min(1.0, size / max(left, 1e-12))
         position, cone = np.inf, np.inf
         remaining, moved = np.inf, 0.0
         slack = 0.25 * CONE_SLACK * min(1.0, size / 0.1)
-        good = project(arrays, work, work.trial, slack, np.inf, NEWTON_STEPS)
-        if not good and off_target:
-            for j in range(n):
-                work.trial[j] = q[j] + (goal[j] - q[j]) * min(1.0, size / max(left, 1e-12))
-            place(arrays, work, NEXT, work.trial)
-            good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
-        if good:
+        share = min(1.0, size / max(left, 1e-12))
+        if _step_towards(arrays, work, q, goal, share, slack, off_target):
             position, cone = segment_holds(arrays, work, q, work.trial)
             remaining = 0.0
             for j in range(n):

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.arrays import SearchArrays, Work
-from feasibility.roadmap.boxes import Boxes, Places
-from feasibility.roadmap.branch_and_bound import Ruling, examine
+from feasibility.roadmap.branch_and_bound import Boxes, Places, Ruling, examine
 from feasibility.roadmap.cuts.regions import Region
 
 BATCH = 4000  # boxes between two ticks

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.arrays import SearchArrays, Work, work_for
-from feasibility.roadmap.boxes import Places, place_at_rest
+from feasibility.roadmap.branch_and_bound import Places, place_at_rest
 from feasibility.roadmap.cuts.counting import Statement
 from feasibility.roadmap.cuts.regions import Region, folded
 from feasibility.roadmap.cuts.samples import projected, random_targets

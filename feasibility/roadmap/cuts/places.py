@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.roadmap.boxes import Places
+from feasibility.roadmap.branch_and_bound import Places
 from feasibility.target_parts import target_parts
 from feasibility.task import Task
 from surfaces import Surface

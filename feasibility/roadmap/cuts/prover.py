@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.roadmap.arrays import SearchArrays
-from feasibility.roadmap.boxes import Places
+from feasibility.roadmap.branch_and_bound import Places
 from feasibility.roadmap.cuts.counting import Counted
 from feasibility.roadmap.cuts.findings import Findings
 from feasibility.roadmap.cuts.gaps import Component

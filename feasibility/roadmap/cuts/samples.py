@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
 from feasibility.roadmap.arrays import NEXT, SearchArrays, Work, look_at, place
-from feasibility.roadmap.boxes import Places
+from feasibility.roadmap.branch_and_bound import Places
 from feasibility.roadmap.cuts.regions import Region
 from feasibility.roadmap.projection import PROJECTION_SLACK, project
 

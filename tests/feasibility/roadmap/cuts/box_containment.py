@@ -9,10 +9,10 @@ from random_arms import rail_arm, random_arm, random_configuration, tilted, tool
 
 from feasibility import Task
 from feasibility.roadmap.arrays import arrays_of, work_for
-from feasibility.roadmap.box_bounds import static_levers
-from feasibility.roadmap.box_contraction import shrink
-from feasibility.roadmap.boxes import Slabs, box_work
-from feasibility.roadmap.branch_and_bound import DIRECTIONS
+from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
+from feasibility.roadmap.branch_and_bound.box_contraction import shrink
+from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
+from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
 from feasibility.roadmap.cuts.places import places_on
 from robots import load_robot
 from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus

@@ -8,7 +8,7 @@ import numpy as np
 
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.arrays import arrays_of
-from feasibility.roadmap.boxes import place_at_rest
+from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
 from feasibility.roadmap.cuts import Prover, components_of, places_on
 from feasibility.roadmap.cuts.counting import Counted, Statement
 from feasibility.roadmap.cuts.regions import limits_of, turn_from

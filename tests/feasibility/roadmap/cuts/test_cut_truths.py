@@ -8,7 +8,7 @@ from random_arms import robot_of
 
 from feasibility import Task
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.branch_and_bound.branching import Ruling
 from feasibility.roadmap.cuts.counting import Statement
 from feasibility.roadmap.cuts.regions import limits_of
 from surfaces import cylinder, plane

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from feasibility.compiled import kernel, put
 from feasibility.roadmap.arrays import SearchArrays, Work
-from feasibility.roadmap.box_bounds import static_levers
-from feasibility.roadmap.box_contraction import shrink
-from feasibility.roadmap.boxes import (
+from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
+from feasibility.roadmap.branch_and_bound.box_contraction import shrink
+from feasibility.roadmap.branch_and_bound.boxes import (
     Boxes,
     Places,
     Slabs,

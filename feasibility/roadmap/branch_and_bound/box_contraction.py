@@ -28,7 +28,7 @@ import numpy as np
 
 from feasibility.compiled import inlined, kernel
 from feasibility.roadmap.arrays import NEXT, place
-from feasibility.roadmap.box_bounds import contract, contract_to_ball, reach_of_box
+from feasibility.roadmap.branch_and_bound.box_bounds import contract, contract_to_ball, reach_of_box
 from robots import jacobians
 
 ROUNDING = 1e-10  # [m], [1], [rad]: more than the error of double arithmetic in a cut

@@ -1,0 +1,10 @@
+from .boxes import Slabs as Slabs
+from .boxes import place_at_rest as place_at_rest
+from .branching import Boxes as Boxes
+from .branching import Places as Places
+from .branching import Ruling as Ruling
+from .branching import box_of as box_of
+from .branching import examine as examine
+from .branching import no_slabs as no_slabs
+from .branching import root_box as root_box
+from .branching import rule as rule
