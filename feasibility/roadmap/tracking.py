@@ -53,6 +53,24 @@ def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
+    """Project q, with its secondary step, onto the target ahead; `work.trial` is the result.
+
+    Returns what `segment_holds` does, inf where the projection failed.
+    """
+    put(work.trial, q)
+    good = project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS)
+    if not good and off_target:
+        put(work.trial, q)
+        copy_slot(work)
+        good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
+    if not good:
+        return np.inf, np.inf
+    # Slot 0's errors are against the previous target: stored when that step was accepted.
+    return segment_holds(arrays, work, q, work.trial)
+
+
+@kernel
 def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):  # type: ignore[no-untyped-def]
     """Follow a curve from `begin` to `end`, from q (in place).
 
@@ -96,16 +114,7 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
         else:
             linearise(arrays, work, NEXT, arrays.cone_chord)
             margin_objective(arrays, work, q, 2.0 * size * dt)
-        put(work.trial, q)
-        position, cone = np.inf, np.inf
-        good = project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS)
-        if not good and off_target:
-            put(work.trial, q)
-            copy_slot(work)
-            good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
-        if good:
-            # Slot 0's errors are against the previous target: stored when that step was accepted.
-            position, cone = segment_holds(arrays, work, q, work.trial)
+        position, cone = _step_from(arrays, work, q, dt, off_target)
         if position <= 1.0 and cone <= 1.0:
             if first + written >= waypoints.shape[0]:
                 return OVERFLOW
@@ -118,16 +127,16 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
                 return written
             accept(work)
             dt *= min(2.0, 0.85 / np.sqrt(max(position, 0.1)))
+            continue
+        if 1.0 < position < np.inf:
+            dt *= max(0.2, min(0.7, 0.85 / np.sqrt(position)))
         else:
-            factor = 0.5
-            if 1.0 < position < np.inf:
-                factor = max(0.2, min(0.7, 0.85 / np.sqrt(position)))
-            elif position < np.inf:
+            dt *= 0.5
+            if position < np.inf:
                 work.stop_reason[0] = CONE
-            dt *= factor
-            if dt < SMALLEST_STEP:
-                if off_target:
-                    return STOPPED
-                off_target, dt = True, OFF_TARGET_STEP
+        if dt < SMALLEST_STEP:
+            if off_target:
+                return STOPPED
+            off_target, dt = True, OFF_TARGET_STEP
     work.stop_reason[0] = LONG
     return STOPPED
