@@ -20,7 +20,6 @@ from feasibility.roadmap.projection import (
     project_onto_cell,
 )
 
-OFF_TARGET = 0.9  # [1] of the tolerance, how far the tool point may be off
 SLACK = 1e-3  # [1] share of the cone chord that is kept free
 GAIN = 1e-4  # [1] a step that brings the tool point nearer by a smaller share is the last
 STEPS = np.int64(40)  # from a guess
@@ -76,10 +75,7 @@ def project_off_target(arrays, work, q, most):  # type: ignore[no-untyped-def]
         move(arrays, work, q)
     put(q, work.kept)
     place(arrays, work, NEXT, q)
-    return (
-        work.error[1, 0] <= OFF_TARGET * work.allowance[0]
-        and cone_used(arrays, work, NEXT) <= inner
-    )
+    return work.error[1, 0] <= work.allowance[0] and cone_used(arrays, work, NEXT) <= inner
 
 
 @kernel
