@@ -200,7 +200,7 @@ def _exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
     if len(tilted):
         worst = tilted[np.argmax(np.nan_to_num(wrong.chord[tilted], nan=np.inf))]
         text = (
-            f"the tool axis tilts {np.degrees(angle_of(float(wrong.chord[worst]))):.4f} deg, "
+            f"the tool axis tilts {np.degrees(angle_of(float(wrong.chord[worst]))):.6g} deg, "
             f"{task.cone_deg:g} deg are allowed" + _others(len(tilted) - 1, noun)
         )
         faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))

@@ -32,12 +32,12 @@ LEFT_ASIDE = ("cell", "time", "t", "tool_speed", "time_from_start", "index", "ro
 DERIVED = ("_velocity", "_acceleration", "_effort")
 SLACK = 1e-6  # rad or m, beyond limits, of values that are taken for another unit
 UNITS = (
-    ("revolute", math.radians(1.0), 1.0, "degrees", "rad",
+    ("revolute", math.radians(1.0), 4.0 * math.pi, "degrees", "rad",
      "give radians, or call the columns {joint}_deg and so on"),
     ("prismatic", 1e-3, 0.5, "millimetres", "m", "give metres"),
 )  # fmt: skip
 """Kinds of joints: what a unit that people confuse is worth, how far (rad, m) beyond its limits a
-value is no small mistake, the names of both units, and the remedy."""
+value is no wrong turn, the names of both units, and the remedy."""
 DELIMITERS = (",", ";", "\t")
 
 
@@ -186,4 +186,16 @@ def _checked(q: NDArray[np.float64], robot: Robot, name: str, notes: tuple[str, 
                 f"{limits}, and all values would fit as {taken}; {remedy.format(joint=joint)}",
                 name,
             )
-    return Motion(q, notes)
+    return Motion(q, (*notes, *_turns(q, robot)))
+
+
+def _turns(q: NDArray[np.float64], robot: Robot) -> list[str]:
+    """Says so where a joint seems to be wrapped at half a turn: it goes all the way round."""
+    jumps = (np.abs(np.diff(q, axis=0)) > math.pi) & ~robot.prismatic
+    if not jumps.any():
+        return []
+    row, joint = np.argwhere(jumps)[0]
+    return [
+        f"{robot.joint_names[joint]} moves by more than half a turn from row {row + 1} to "
+        f"{row + 2}; values must be unwrapped"
+    ]

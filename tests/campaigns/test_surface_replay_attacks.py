@@ -7,12 +7,12 @@ tests/feasibility/certification/test_replay_attacks.py.
 from __future__ import annotations
 
 import pytest
-from replay_attacks import SMOOTH, attacked
+from replay_attacks import SURFACES, attacked
 
 SEEDS = 200
 
 
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("name", SURFACES)
 def test_what_is_accepted_holds(name):
     """Not one accepted motion that leaves tolerance or cone; few refused that keep well inside."""
     outcomes = [attacked(name, seed) for seed in range(SEEDS)]

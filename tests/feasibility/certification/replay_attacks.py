@@ -2,7 +2,8 @@
 
 Rows of a raster are taken out, moved, tilted and joined in other ways, and the tolerance is chosen
 near to what dense samples show, just above or just below. The samples know nothing of places and
-paths: they compare the tool with the surface's closest points.
+paths: they compare the tool with the surface's closest points; on a mesh with those of a reader
+that shares nothing with `surfaces`.
 """
 
 from __future__ import annotations
@@ -12,11 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 from rasters import raster
+from test_mesh_witness import Reader
 
 from feasibility.certification import replay_over_surface
 from robots import Kinematics
 
-SMOOTH = ("plane", "ball", "pipe", "ring", "spline")
+SURFACES = ("plane", "ball", "pipe", "ring", "spline", "mesh")
 DENSE = 60  # samples a segment
 ROWS = 24
 BESIDE = 1.0  # rad/m: how much the normal may turn between them, for each metre off
@@ -69,10 +71,13 @@ def sampled(made, q):
     between = (q[:-1, None] + t * np.diff(q, axis=0)[:, None]).reshape(-1, q.shape[1])
     points, axes = Kinematics(made.robot).tools(np.vstack([between, q[-1:]]))
     surface, task = made.cells.surface, made.task
-    found = surface.closest(points)
-    u, v = np.clip(found.u, *surface.u_range), np.clip(found.v, *surface.v_range)
-    normal = surface.normal(u, v)
-    place = surface.point(u, v)
+    if surface.kind == "mesh":
+        reader = Reader(surface.mesh.vertices, surface.mesh.faces)
+        place, normal = reader.closest_points(points, surface.side_sign * task.standoff)
+    else:
+        found = surface.closest(points)
+        u, v = np.clip(found.u, *surface.u_range), np.clip(found.v, *surface.v_range)
+        place, normal = surface.point(u, v), surface.normal(u, v)
     off = np.linalg.norm(points - place - surface.side_sign * task.standoff * normal, axis=1)
     chord = np.linalg.norm(axes + surface.side_sign * normal, axis=1)
     steps = np.linalg.norm(np.diff(place, axis=0), axis=1)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from replay_attacks import SMOOTH, attacked
+from replay_attacks import SURFACES, attacked
 
 
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("name", SURFACES[:-1])  # the mesh's reader takes its time
 def test_what_is_accepted_holds(name):
     outcomes = [attacked(name, seed) for seed in range(1000, 1008)]
     for one in outcomes:

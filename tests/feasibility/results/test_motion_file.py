@@ -62,6 +62,15 @@ def test_small_things_that_files_have(read):
     assert np.array_equal(read(text_of().replace(",", " , ") + "\n\n").q, ROWS)
 
 
+def test_wrapped_values_are_noted(read):
+    rows = np.vstack([ROWS, ROWS[-1:]])
+    rows[2, 5] -= 2 * np.pi
+    found = read(text_of(rows=rows))
+    assert found.notes == (
+        "joint6 moves by more than half a turn from row 2 to 3; values must be unwrapped",
+    )
+
+
 FAULTS = {
     "empty": ("", "is empty"),
     "no rows": (",".join(NAMES), "has no rows"),
