@@ -1,3 +1,4 @@
+from .division import Apart as Apart
 from .division import Division as Division
 from .division import Plan as Plan
 from .division import SubPatch as SubPatch

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
@@ -70,6 +71,16 @@ class Plan:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Apart:
+    """Two cells that no single motion covers."""
+
+    cell: int
+    other: int
+    proof: CutTree
+    """Its leaves are these two cells."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class Division(ReadOnlyArrays):
     """A surface divided into the fewest patches; see `feasibility.division.divide`."""
 
@@ -91,6 +102,14 @@ class Division(ReadOnlyArrays):
     known: a time limit struck, or no motion can be certified over a part of the surface."""
     message: str
     """What was found, and on what it rests."""
+    at_least: int = 0
+    """Motions that it takes at least to cover the cells of the patches, proved: no matter what the
+    search found."""
+    proof: CutTree | None = None
+    """No single motion covers the cells of the patches; None where that is not proved."""
+    apart: tuple[Apart, ...] = ()
+    """Where more than two motions are proved to be needed: the pairs among `at_least` cells, of
+    which a motion covers one at most."""
     timing: Mapping[str, float] = field(default_factory=dict)
     """Seconds: load_s, search_s, divide_s, total_s."""
     statistics: Mapping[str, Any] = field(default_factory=dict)
@@ -109,7 +128,12 @@ class Division(ReadOnlyArrays):
     @property
     def optimal(self) -> bool:
         """Fewest of all that the search can find: it ended, and the optimum is proved."""
-        return self.ended and self.fewest.optimal
+        return (self.ended and self.fewest.optimal) or self.proved_fewest
+
+    @property
+    def proved_fewest(self) -> bool:
+        """Is it proved that no fewer motions will do, whatever the search found?"""
+        return 0 < len(self.patches) <= self.at_least
 
     @property
     def decided(self) -> bool:

@@ -11,6 +11,7 @@ from coverable_errors import ArgumentError
 from feasibility.clock import Clock, OutOfTime
 from feasibility.division.division import Division, Plan
 from feasibility.division.plans import collect_components, plans
+from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
 from feasibility.roadmap import (
     Exploration,
@@ -74,7 +75,7 @@ def divide(
     with compiling_notice():
         warm_up()
     began = time.monotonic()
-    exploration, ended = _searched(robot, cells, task, search, progress)
+    exploration, apart, ended = _searched(robot, cells, task, search, progress)
     searched = time.monotonic()
     folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
     blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
@@ -82,6 +83,7 @@ def divide(
     fewest, connected = (nothing, nothing) if blocked else plans(exploration, task)
     missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
     causes = _causes(exploration, missing, ended)
+    total = len(cells) - len(missing), len(cells)
     return Division(
         robot=robot,
         cells=cells,
@@ -92,7 +94,10 @@ def divide(
         left_out=causes,
         unsettled=np.setdiff1d(missing, [cause.cell for cause in causes]),
         ended=ended and not blocked and not folded,
-        message=blocked or _message(fewest, connected, len(missing), len(cells), ended, folded),
+        message=blocked or _message(fewest, connected, apart.number, total, ended, folded),
+        at_least=min(apart.number, len(fewest.patches)),
+        proof=apart.proof if fewest.patches else None,
+        apart=apart.apart if fewest.patches else (),
         timing={
             "load_s": began - called,
             "search_s": searched - began,
@@ -116,19 +121,21 @@ def _statistics(exploration: Exploration) -> dict[str, int]:
 
 def _searched(
     robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
-) -> tuple[Exploration, bool]:
-    """The search with all components that it found, and whether it ran to its end."""
+) -> tuple[Exploration, ProvedBound, bool]:
+    """The search with all components that it found, a bound, and whether it ran to its end."""
     clock = Clock(search.time_limit, progress).start()
     arrays = arrays_of(robot, cells, task)
     exploration = Exploration(robot, cells, arrays, search.seed, clock)
-    ended = True
+    ended, apart = True, ProvedBound(min(1, len(cells)))
     try:
         explore(exploration)
         collect_components(exploration)
+        if not _no_motion(arrays):
+            apart = prove_apart(exploration, task)
     except OutOfTime:
         ended = False
     exploration.clock = Clock()
-    return exploration, ended
+    return exploration, apart, ended
 
 
 def _causes(exploration: Exploration, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
@@ -152,7 +159,7 @@ def _no_motion(arrays: SearchArrays) -> bool:
 
 
 def _message(
-    fewest: Plan, connected: Plan, left_out: int, total: int, ended: bool, folded: bool
+    fewest: Plan, connected: Plan, at_least: int, total: tuple[int, int], ended: bool, folded: bool
 ) -> str:
     """One or two sentences: what was found, and on what it rests."""
     refused = [p.refusal for p in (*fewest.patches, *connected.patches) if not p.accepted]
@@ -161,9 +168,8 @@ def _message(
             f"{len(refused)} patch{'es have' if len(refused) > 1 else ' has'} a walk that the "
             f"independent replay refuses: {refused[0]}."
         )
-    covered = total - left_out
     number = len(fewest.patches)
-    if total == 0:
+    if total[1] == 0:
         return "There are no cells to cover."
     if number == 0:
         return (
@@ -172,11 +178,10 @@ def _message(
             else "The time limit ran out before any cell was covered."
         )
     what = f"{number} continuous motion{'s' if number > 1 else ''}"
-    proof = (
-        "" if number == 1 else "; no fewer of the components found would do"
-        if fewest.optimal else f"; at least {fewest.bound} of the components found are needed"
-    )  # fmt: skip
-    sentence = f"{what} cover{'' if number > 1 else 's'} {covered} of {total} cells{proof}."
+    proof = f"; at least {at_least}, proved" if min(number, at_least) > 1 else ""
+    if fewest.bound > max(at_least, 1):
+        proof += f"; at least {fewest.bound} among the motions found"
+    sentence = f"{what} cover{'' if number > 1 else 's'} {total[0]} of {total[1]} cells{proof}."
     if connected is not fewest:
         most = len(connected.patches)
         least = "" if connected.optimal else f" (at least {connected.bound})"

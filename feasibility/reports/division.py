@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from feasibility.division import Division, Plan, Reconfiguration, SubPatch
+from feasibility.cut_words import lines as proof_lines
+from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatch
 from feasibility.reports.parts import (
     causes_json,
     certificate_json,
@@ -18,6 +19,7 @@ from feasibility.reports.parts import (
     seconds_text,
     summary,
 )
+from feasibility.reports.proof import proof_json
 from feasibility.reports.verdict import causes_listed
 from feasibility.results import plain
 from feasibility.version import version
@@ -54,6 +56,11 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         "covered": division.n_covered,
         "ended": division.ended,
         **_plan_json(fewest, division),
+        "proved_at_least": division.at_least,
+        "proof": None
+        if division.proof is None
+        else proof_json(division.proof, division.robot, cells),
+        "apart": [_apart_json(apart, division) for apart in division.apart],
         "connected": None if connected is fewest else _plan_json(connected, division),
         "left_out": causes_json(division.left_out, cells),
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
@@ -62,6 +69,15 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         "robot": division.robot.name,
         "seed": int(division.seed),
         "version": version(),
+    }
+
+
+def _apart_json(apart: Apart, division: Division) -> dict[str, Any]:
+    """Two cells that no motion covers both of, and why."""
+    cells = division.cells
+    return {
+        "cells": [list(cells.unravel(apart.cell)), list(cells.unravel(apart.other))],
+        "proof": proof_json(apart.proof, division.robot, cells),
     }
 
 
@@ -125,6 +141,12 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     if division.connected is not division.fewest:
         lines += ["", "With patches that are each connected on the surface:"]
         lines += _steps(division.connected, division)
+    if division.proof is not None:
+        lines += ["", "Why one motion is not enough:"]
+        said = proof_lines(division.proof, division.robot, division.cells)
+        lines += [filled(_indented(line), line.strip()) for line in said]
+    if division.apart:
+        lines += ["", filled("", _never_together(division))]
     if division.left_out:
         lines += ["", "Left out:", *causes_listed(division.left_out, division.cells)]
     if len(division.unsettled):
@@ -133,9 +155,27 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
     return "\n".join(lines)
 
 
+def _indented(line: str) -> str:
+    """The blanks before a line of a proof."""
+    return "  " + " " * (len(line) - len(line.lstrip()))
+
+
+def _never_together(division: Division) -> str:
+    """Cells of which a motion covers one at most."""
+    cells = sorted({cell for apart in division.apart for cell in (apart.cell, apart.other)})
+    named = ", ".join(str(list(division.cells.unravel(cell))) for cell in cells)
+    return (
+        f"Of the cells {named} no two can be covered by one motion, proved pair by pair "
+        "(--json has the proofs)."
+    )
+
+
 def _motions(division: Division) -> str:
     """How many motions, and whether fewer are known to be impossible."""
-    motions = counted(len(division.patches), "motion")
+    number = len(division.patches)
+    motions = counted(number, "motion")
+    if number > 1 and division.proved_fewest:
+        return f"{motions} (no fewer will do, proved)"
     proved = division.optimal or not division.patches
     return motions if proved else f"{motions} (the fewest found)"
 

@@ -8,6 +8,7 @@ from cut_verdicts import ONE_CUT, TWO_CUTS, cut_verdict, explored
 from fabricated import DOME, verdict_on
 
 from feasibility.cut_tree import CutTree, Leaf
+from feasibility.cut_words import sentence
 from feasibility.roadmap.graph import NODES
 from feasibility.viewer import plot_sides, view
 from feasibility.viewer.cut_sides import ABOVE, BELOW, BOTH, COLOURS, sides_of
@@ -50,7 +51,8 @@ def test_the_view_has_both_sides_with_a_legend() -> None:
     page = view(verdict, "apart").html()
     for name in (*sides.names, sides.lost_name):
         assert name in page
-    assert "nowhere on the surface can joint1 be 56.4 deg" in page
+    assert verdict.proof is not None
+    assert sentence(verdict.proof, verdict.robot, verdict.cells) in page
 
 
 @pytest.mark.parametrize("number", [ONE_CUT, TWO_CUTS])

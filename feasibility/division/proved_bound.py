@@ -1,0 +1,157 @@
+"""How many motions it takes at least, proved: whatever the search found or did not find.
+
+Where a cut tree shows that no motion covers all of some cells, two at least are needed. Where no
+two of k cells can be covered by one motion, each pair by a cut tree of its own, k are: a motion
+covers one of them at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.cut_tree import CutTree
+from feasibility.division.division import Apart
+from feasibility.roadmap import Exploration
+from feasibility.roadmap.cuts import Prover, components_of, places_on
+from feasibility.task import Task
+
+ATTEMPTS = 4  # at a proof, each with the configurations that refuted the one before
+BOXES = 60_000  # of an attempt
+ALL_BOXES = 600_000
+MOST_REFUTED = 8  # pairs of cells that one motion may cover after all
+MOST_GROUPS = 60  # of cells that the same components cover
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ProvedBound:
+    """A number of motions that no division goes below."""
+
+    number: int
+    """Motions; 0 for no cells, 1 where nothing is proved."""
+    proof: CutTree | None = None
+    """No single motion covers all cells that some motion covers; None where that is not proved."""
+    apart: tuple[Apart, ...] = ()
+    """The pairs among `number` cells of which a motion covers one at most; empty where `proof` is
+    enough."""
+    boxes: int = 0
+    """Examined for it."""
+
+
+def prove_apart(exploration: Exploration, task: Task) -> ProvedBound:
+    """Prove how many motions it takes to cover the cells that are reached.
+
+    Configurations that refute a guess become seeds, so the exploration may know more afterwards.
+
+    Args:
+        exploration: a finished search.
+        task: the task.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    reached = exploration.reached
+    if not reached.any() or exploration.covered[reached].all():
+        return ProvedBound(int(reached.any()))
+    rng = np.random.default_rng(exploration.seed)
+    prover = Prover(exploration.arrays, places_on(exploration.cells.surface, task), rng)
+    proofs = _Proofs(exploration, prover)
+    whole = proofs.tree(None)
+    if whole is None:
+        return ProvedBound(1, boxes=proofs.boxes)
+    apart: dict[tuple[int, int], CutTree] = {}
+    refuted: set[tuple[int, int]] = set()
+    while len(refuted) <= MOST_REFUTED and proofs.boxes < ALL_BOXES:
+        cells = _never_together(exploration, refuted)
+        if len(cells) < 3:
+            break
+        pairs = [(a, b) for a in cells for b in cells if a < b]
+        failed = next((p for p in pairs if p not in apart and not proofs.put(apart, p)), None)
+        if failed is None:
+            trees = tuple(Apart(a, b, apart[a, b]) for a, b in pairs)
+            return ProvedBound(len(cells), whole, trees, proofs.boxes)
+        refuted.add(failed)
+    return ProvedBound(2, whole, boxes=proofs.boxes)
+
+
+@dataclass(eq=False)
+class _Proofs:
+    """Cut trees about some of the cells, and what they cost."""
+
+    exploration: Exploration
+    prover: Prover
+    boxes: int = field(default=0)
+
+    def put(self, apart: dict[tuple[int, int], CutTree], pair: tuple[int, int]) -> bool:
+        """Prove that no motion covers both cells; False where that fails."""
+        tree = self.tree(pair)
+        if tree is not None:
+            apart[pair] = tree
+        return tree is not None
+
+    def tree(self, cells: tuple[int, ...] | None) -> CutTree | None:
+        """A proof that no motion covers all of some cells, or all that are reached; or None."""
+        exploration = self.exploration
+        for _ in range(ATTEMPTS):
+            wanted = exploration.reached.copy()
+            if cells is not None:
+                wanted[:] = False
+                wanted[list(cells)] = True
+            # The other cells do not count: every component is taken to cover them.
+            known = [
+                c._replace(cover=c.cover | ~wanted) for c in components_of(exploration.roadmap)
+            ]
+            if any(component.cover.all() for component in known):
+                return None
+            attempt = self.prover.attempt(known, BOXES, self._tick)
+            self.boxes += attempt.boxes
+            if attempt.tree is not None or not attempt.seeds:
+                return attempt.tree
+            for cell, q in attempt.seeds:
+                exploration.add_seeds(cell, q[None])
+        return None
+
+    def _tick(self) -> None:
+        """Report progress, and stop when the time is up."""
+        self.exploration.tick("proving how many motions it takes")
+
+
+def _never_together(exploration: Exploration, refuted: set[tuple[int, int]]) -> list[int]:
+    """As many cells as can be of which no component found covers two, sorted.
+
+    Args:
+        exploration: the search.
+        refuted: pairs (a, b), a < b, that are not to be among them.
+    """
+    import networkx as nx
+
+    roots = exploration.roots()
+    covers = exploration.roadmap.cover[roots].astype(bool)
+    reached = np.flatnonzero(exploration.reached)
+    kinds, group = np.unique(covers[:, reached], axis=1, return_inverse=True)
+    group = group.reshape(-1)
+    cells = [_innermost(exploration, reached, group == k) for k in range(kinds.shape[1])]
+    # Cells that few components cover go together with few others.
+    order = np.argsort(kinds.sum(axis=0), kind="stable")[:MOST_GROUPS].tolist()
+    graph = nx.Graph()
+    graph.add_nodes_from(cells[k] for k in order)
+    for i, k in enumerate(order):
+        for other in order[:i]:
+            a, b = sorted((cells[k], cells[other]))
+            if not (kinds[:, k] & kinds[:, other]).any() and (a, b) not in refuted:
+                graph.add_edge(a, b)
+    clique, _ = nx.max_weight_clique(graph, weight=None)
+    return sorted(clique)
+
+
+def _innermost(
+    exploration: Exploration, reached: NDArray[np.int64], mine: NDArray[np.bool_]
+) -> int:
+    """Of some of the reached cells the one that is furthest from all others."""
+    points = exploration.arrays.points[reached]
+    if mine.all():
+        return int(reached[0])
+    away = np.linalg.norm(points[mine, None] - points[None, ~mine], axis=2).min(axis=1)
+    return int(reached[mine][away.argmax()])
