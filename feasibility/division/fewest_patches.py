@@ -98,14 +98,20 @@ def divide(
         at_least=min(apart.number, len(fewest.patches)),
         proof=apart.proof if fewest.patches else None,
         apart=apart.apart if fewest.patches else (),
-        timing={
-            "load_s": began - called,
-            "search_s": searched - began,
-            "divide_s": time.monotonic() - searched,
-            "total_s": time.monotonic() - called,
-        },
+        timing=_timing(called, began, searched),
         statistics=_statistics(exploration),
     )
+
+
+def _timing(called: float, began: float, searched: float) -> dict[str, float]:
+    """Seconds by phase."""
+    now = time.monotonic()
+    return {
+        "load_s": began - called,
+        "search_s": searched - began,
+        "divide_s": now - searched,
+        "total_s": now - called,
+    }
 
 
 def _statistics(exploration: Exploration) -> dict[str, int]:
