@@ -26,6 +26,7 @@ from random_cases import HERE, _round, draw_surface, puma_first, tightened, writ
 
 FINE = Resolution(rows=12.0, turn_deg=2.0)
 COARSE = Resolution(samples=1500)
+JOBS = ((33, 79), (133, 21))  # seed, cases wanted
 SAMPLES = 24  # between nodes of the oracle's graph, when a motion is measured
 MOST_JUMP = 0.12  # [rad] of a joint between samples
 TIGHT_CONE, TIGHT_LIMITS_DEG = 0.985, -0.2
@@ -99,10 +100,10 @@ def search(rng: np.random.Generator) -> Between | None:
     return None if on_net.feasible else Between(problem, on_net.covered, *room)
 
 
-def collect(wanted: int, seed: int, path: Path) -> int:
-    """Draw until there are enough, and write them; returns how many were drawn."""
-    rng, kept, drawn = np.random.default_rng(seed), list[dict[str, Any]](), 0
-    while len(kept) < wanted:
+def collect(wanted: int, seed: int, path: Path, kept: list[dict[str, Any]]) -> int:
+    """Add cases until so many are new, writing all; returns how many were drawn."""
+    rng, drawn, most = np.random.default_rng(seed), 0, len(kept) + wanted
+    while len(kept) < most:
         found, drawn = search(rng), drawn + 1
         if found is not None:
             rest = found._asdict()
@@ -123,12 +124,11 @@ def read_between(path: Path = HERE / "between_curves.json") -> list[Between]:
 def main() -> None:
     """Draw and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--wanted", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=33)
     parser.add_argument("--out", type=Path, default=HERE / "between_curves.json")
-    asked = parser.parse_args()
-    drawn = collect(asked.wanted, asked.seed, asked.out)
-    sys.stderr.write(f"{asked.wanted} of {drawn} drawn\n")
+    out, kept = parser.parse_args().out, list[dict[str, Any]]()
+    for seed, wanted in JOBS:
+        drawn = collect(wanted, seed, out, kept)
+        sys.stderr.write(f"{wanted} of {drawn} drawn\n")
 
 
 if __name__ == "__main__":
