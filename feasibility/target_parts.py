@@ -29,6 +29,14 @@ def target_parts(
     Returns:
         The same parts as `Surface.parts` has, with targets (m) in the place of points and approach
         directions in that of normals.
+
+    Example:
+        >>> from surfaces import sphere
+        >>> dome = sphere(1.0, polar_deg=(10, 90), azimuth_deg=(0, 90))
+        >>> parts = target_parts(dome, standoff=0.005, flat=1e-3, straight=0.1)
+        >>> finest = parts.children[:, 0] < 0
+        >>> float(parts.radius[finest, 0].max()) <= 1e-3
+        True
     """
     bent = min(straight, flat / (2.0 * standoff)) if standoff > 0.0 else straight
     parts = surface.parts(flat - standoff * bent, bent, most)

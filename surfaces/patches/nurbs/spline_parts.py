@@ -32,9 +32,9 @@ from surfaces.patches.nurbs.bernstein import (
     product,
     span_matrix,
 )
+from surfaces.patches.nurbs.span_pieces import Pieces, pieces_of
 
 Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _QUARTERED = 128  # coefficients of N, with more a box is not cut at its middle
 _BLOCK = 300_000  # numbers held at a time, about
@@ -133,80 +133,10 @@ def spline_models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, 
     return points._replace(centre=points.centre + nets.origin), normals
 
 
-class _Pieces(NamedTuple):
-    """What of the boxes lies in single spans, box by box."""
-
-    starts: Ints
-    """(k,) where each box's pieces begin."""
-    box: Ints
-    """(j,) the box of each piece."""
-    span: Ints
-    """(j,)"""
-    low: Array
-    """(j, 2) share of the span."""
-    high: Array
-    """(j, 2)"""
-    middle: Array
-    """(j, 2) of the piece, in -1..1 of the box."""
-    half: Array
-    """(j, 2)"""
-
-    def affine(self, values: Array, m: int = 2, n: int = 2) -> Array:
-        """(j, m, n, d) nets over the pieces of affine functions of x, (k, 3, d): 1, x_1, x_2."""
-        own = values[self.box]
-        middle, by_x, by_y = own[:, 0], own[:, 1], own[:, 2]
-        middle = middle + self.middle[:, :1] * by_x + self.middle[:, 1:] * by_y
-        x = (self.half[:, :1] * abscissae(m))[..., None] * by_x[:, None]
-        y = (self.half[:, 1:] * abscissae(n))[..., None] * by_y[:, None]
-        return np.asarray((middle[:, None] + x)[:, :, None] + y[:, None])
-
-
-def _pieces(breaks: tuple[Array, Array], low: Array, high: Array, quartered: bool) -> _Pieces:
-    """Cut boxes at the knots, and in the middle."""
-    if quartered:
-        centre = (low + high) / 2.0
-        ends = np.stack([low, centre, high])
-        corners = [(i, j) for i in (0, 1) for j in (0, 1)]
-        begin = np.stack([ends[list(c), :, [0, 1]].T for c in corners], axis=1).reshape(-1, 2)
-        stop = np.stack([ends[[i + 1, j + 1], :, [0, 1]].T for i, j in corners], axis=1)
-        stop = stop.reshape(-1, 2)
-    else:
-        begin, stop = low, high
-    first, count = np.empty((2, len(begin)), np.int64), np.empty((2, len(begin)), np.int64)
-    for axis, line in enumerate(breaks):
-        spans = len(line) - 1
-        first[axis] = np.clip(np.searchsorted(line, begin[:, axis], "right") - 1, 0, spans - 1)
-        last = np.clip(np.searchsorted(line, stop[:, axis], "left") - 1, 0, spans - 1)
-        count[axis] = np.maximum(last - first[axis], 0) + 1
-    total = count[0] * count[1]
-    owner = np.repeat(np.arange(len(begin)), total)
-    within = np.arange(len(owner)) - np.repeat(np.cumsum(total) - total, total)
-    along = np.stack(np.divmod(within, count[1][owner])) + first[:, owner]
-    box = owner // (4 if quartered else 1)
-    shares, places = [], []
-    for axis, line in enumerate(breaks):
-        a, b = line[along[axis]], line[along[axis] + 1]
-        ends = np.clip(np.stack([begin[owner, axis], stop[owner, axis]]), a, b)
-        shares.append(np.clip((ends - a) / (b - a), 0.0, 1.0))
-        middle, width = (low[box, axis] + high[box, axis]) / 2.0, high[box, axis] - low[box, axis]
-        places.append(2.0 * (ends - middle) / width)
-    (low_u, high_u), (low_v, high_v) = shares
-    (x0, x1), (y0, y1) = places
-    return _Pieces(
-        starts=np.searchsorted(box, np.arange(len(low))),
-        box=box,
-        span=along[0] * (len(breaks[1]) - 1) + along[1],
-        low=np.stack([low_u, low_v], 1),
-        high=np.stack([high_u, high_v], 1),
-        middle=np.stack([x0 + x1, y0 + y1], 1) / 2.0,
-        half=np.stack([x1 - x0, y1 - y0], 1) / 2.0,
-    )
-
-
 def _models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
     """Of boxes that are few enough to be held at a time."""
     quartered = nets.normals[0].size <= 3 * _QUARTERED
-    pieces = _pieces(nets.breaks, low, high, quartered)
+    pieces = pieces_of(nets.breaks, low, high, quartered)
 
     def cut(net: Array) -> Array:
         by_u, by_v = (
@@ -222,7 +152,7 @@ def _models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, SpaceM
     return points_model, _unit_normals(pieces, cut(nets.normals), nets.rounding)
 
 
-def _unit_normals(pieces: _Pieces, net: Array, rounding: Array) -> SpaceModel:
+def _unit_normals(pieces: Pieces, net: Array, rounding: Array) -> SpaceModel:
     """From the nets (j, m, n, 3) of N of each piece, and what is wrong with those of spans.
 
     N is divided by an affine function first, that is nearly its length: the direction is the same,
@@ -246,7 +176,7 @@ def _unit_normals(pieces: _Pieces, net: Array, rounding: Array) -> SpaceModel:
 class _Fit(NamedTuple):
     """An affine model of each box, and the coefficients of what it leaves of the pieces."""
 
-    pieces: _Pieces
+    pieces: Pieces
     centre: Array
     """(k, 3)"""
     slopes: Array
@@ -255,7 +185,7 @@ class _Fit(NamedTuple):
     """(j, m, n, 3)"""
 
     @staticmethod
-    def of(pieces: _Pieces, net: Array, weights: Array | None) -> _Fit:
+    def of(pieces: Pieces, net: Array, weights: Array | None) -> _Fit:
         """Least squares over the coefficients, the middle moved between the extremes.
 
         Args:
@@ -310,7 +240,7 @@ def _lengths(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("...d,...d->...", vectors, vectors)))
 
 
-def _least_squares(pieces: _Pieces, values: Array) -> Array:
+def _least_squares(pieces: Pieces, values: Array) -> Array:
     """(k, 3, 3) for each box the affine function, 1, x_1, x_2, nearest to values (j, m, n, 3)."""
     (_, m, n, _), starts = values.shape, pieces.starts
     x, y = abscissae(m), abscissae(n)
