@@ -42,6 +42,7 @@ from surfaces import Cells, SurfaceError, SurfaceParts
 
 MOST_BOXES = 2_000_000
 FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may be off by
+TYPICAL = 0.2  # of the longest lever: what a difference of axes is weighed by; found by trying
 NARROWEST = 1e-6  # a chord that parts of the surface are made for, at least
 ANY_AXIS = 4.0  # a chord that two unit vectors never have
 
@@ -111,7 +112,7 @@ def verify_on(
     if fault:
         return ProofCheck(fault, 0)
     arm = Arm(robot, limits.low, limits.high)
-    length = max(0.5 * float(arm.caps.max()), 1e-3)
+    length = max(TYPICAL * float(arm.caps.max()), 1e-3)
     allowed = Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length)
     targets = task.targets(cells)
 
