@@ -97,6 +97,27 @@ class CutTree:
             node = node.above if above else node.below
         return tuple(found)
 
+    def opened_by(self, walk: NDArray[np.float64]) -> Cut | Leaf | tuple[int, float]:
+        """What a motion (m, n) of a changed case shows to hold no more.
+
+        Straight lines between its rows.
+
+        Returns:
+            The first cut that it crosses, or the (joint, t) of `opened` that it passes; a leaf
+            where it crosses none: its region holds the whole motion.
+        """
+        for joint, value in self.opened:
+            turns = np.floor((walk[:, joint] - value) / (2.0 * np.pi))
+            if turns.min() < turns.max():
+                return joint, value
+        node, q = self.root, self.folded(walk)
+        while isinstance(node, Cut):
+            above = q @ np.asarray(node.weights) > node.value
+            if above.any() and not above.all():
+                return node
+            node = node.above if above.all() else node.below
+        return node
+
     def parting(self, q: NDArray[np.float64], other: NDArray[np.float64]) -> Cut | None:
         """The cut between two configurations (n,) that no motion joins; None in one region."""
         for (cut, above), (_, beyond) in zip(self.way(q), self.way(other), strict=False):

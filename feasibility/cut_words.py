@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
@@ -94,6 +95,23 @@ def lines(tree: CutTree, robot: Robot, cells: Cells) -> list[str]:
         text = f"{head}{text}" if head else f"{text[0].upper()}{text[1:]}"
         made.append(f"{INDENT * depth}{text}.")
     return made
+
+
+def what_opens(tree: CutTree, walk: NDArray[np.float64], robot: Robot, cells: Cells) -> str:
+    """What a covering motion (m, n) of a changed case does that the tree rules out in this one."""
+    found = tree.opened_by(walk)
+    if isinstance(found, Cut):
+        return f"the motion then crosses {place_of(found, robot)}, as none can now"
+    if isinstance(found, tuple):
+        joint, value = found
+        name = robot.joint_names[joint]
+        return f"{name} then passes {joint_value(robot, joint, value)}, as in no motion now"
+    text = f"cell {_cell(found, cells)} can then be covered"
+    way = tree.way(walk[0])
+    if way:
+        cut, above = way[-1]
+        text += f" {'above' if above else 'below'} {place_of(cut, robot)}, as it cannot now"
+    return text
 
 
 def _of_many(tree: CutTree, robot: Robot, cells: Cells) -> str:

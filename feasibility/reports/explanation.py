@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from feasibility.cut_words import what_opens
 from feasibility.reports.parts import filled
 from feasibility.sensitivity import Dropped, Explanation, Finding, Kind, Quantity, Threshold
 from feasibility.verdict import Answer, Evidence, Verdict
@@ -32,7 +33,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
     if not verdict.feasible:
         helps.sort(key=_effort)
     lines += [""] if helps or others else []
-    lines += [filled("  - ", sentence(threshold, verdict.feasible)) for threshold in helps]
+    lines += [filled("  - ", sentence(threshold, verdict)) for threshold in helps]
     if not helps and others:
         lines.append(filled("  ", "No single change that was tried was found to make it feasible."))
     if others:
@@ -41,7 +42,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         if ruled_out:
             lines.append(filled("  - ", f"proved: {'; '.join(ruled_out)}."))
         for threshold in (t for t in others if not t.ruled_out):
-            lines.append(filled("  - ", sentence(threshold, verdict.feasible)))
+            lines.append(filled("  - ", sentence(threshold, verdict)))
     if any(t.feasible is not None and t.feasible.unaided is False for t in helps):
         lines += ["", filled("  ", f"{SEEDED} {_from_nearby(verdict)}")]
     if explanation.dropped is not None:
@@ -53,8 +54,8 @@ def as_text(explanation: Explanation, case_name: str) -> str:
 
 def helpful(explanation: Explanation) -> list[str]:
     """The thresholds at which a feasible value was found, a sentence each."""
-    feasible = explanation.verdict.feasible
-    return [sentence(t, feasible) for t in explanation.thresholds if t.feasible is not None]
+    verdict = explanation.verdict
+    return [sentence(t, verdict) for t in explanation.thresholds if t.feasible is not None]
 
 
 def _seeded(alone: Verdict) -> str:
@@ -106,13 +107,14 @@ def _effort(threshold: Threshold) -> float:
     return abs(found.value - quantity.given) / span if found is not None and span > 0.0 else 1.0
 
 
-def sentence(threshold: Threshold, tightened: bool) -> str:
+def sentence(threshold: Threshold, verdict: Verdict) -> str:
     """One threshold as a sentence.
 
     Args:
         threshold: what was found.
-        tightened: the case is feasible, and this is a margin.
+        verdict: of the case as given; where it is feasible the threshold is a margin.
     """
+    tightened = verdict.feasible
     quantity, found = threshold.quantity, threshold.feasible
     if found is None:
         return _helpless(threshold)
@@ -126,7 +128,17 @@ def sentence(threshold: Threshold, tightened: bool) -> str:
         text += f"; {_against(quantity, threshold.other)}"
     elif tightened and found.value == quantity.end:
         text += ", the furthest value tried"
+    opens = what_it_opens(threshold, verdict)
+    text += f"; {opens}" if opens else ""
     return text + ("." if found.unaided is not False else f" {SEEDED}.")
+
+
+def what_it_opens(threshold: Threshold, verdict: Verdict) -> str:
+    """How the motion of a changed case gets past the proof of this one; empty without cuts."""
+    found, proof = threshold.feasible, verdict.proof
+    if found is None or found.witness is None or proof is None or proof.kind != "cut":
+        return ""
+    return what_opens(proof, found.witness.q, verdict.robot, verdict.cells)
 
 
 def _margin(quantity: Quantity, value: str, now: str) -> str:
@@ -212,7 +224,7 @@ def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
         "evidence": str(verdict.evidence),
         "cells": len(verdict.cells),
         "covered": verdict.n_covered,
-        "thresholds": [_threshold(t, verdict.feasible) for t in explanation.thresholds],
+        "thresholds": [_threshold(t, verdict) for t in explanation.thresholds],
         "not_looked_at": list(explanation.left_out),
         "dropped": dropped
         and {
@@ -229,7 +241,7 @@ def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
     }
 
 
-def _threshold(threshold: Threshold, tightened: bool) -> dict[str, Any]:
+def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:
     """One threshold as an object; keys say the unit."""
     quantity, span = threshold.quantity, threshold.span
     found = _number(quantity, "given", quantity.given)
@@ -248,7 +260,8 @@ def _threshold(threshold: Threshold, tightened: bool) -> dict[str, Any]:
             "other": _finding(quantity, span.other),
         },
         "tried": threshold.tried,
-        "sentence": sentence(threshold, tightened),
+        "opens": what_it_opens(threshold, verdict) or None,
+        "sentence": sentence(threshold, verdict),
     }
 
 
