@@ -7,7 +7,7 @@ import pytest
 from random_arms import rail_arm
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from feasibility.cut_words import lines, nowhere, place_of, sentence
+from feasibility.cut_words import lines, nowhere, place_of, sentence, what_opens
 from robots import load_robot
 from surfaces import plane
 
@@ -108,3 +108,29 @@ def test_opened_joints_are_wound_into_one_turn() -> None:
     folded = THREE.folded(q)
     assert np.degrees(folded[:, 5]) == pytest.approx([530.0, 530.0, 530.0])
     assert (folded[:, :5] == 0.0).all()
+
+
+def walk_of(*rows_deg: dict[int, float]) -> np.ndarray:
+    """(m, 6) rad, each row zero but for some joints."""
+    walk = np.zeros((len(rows_deg), 6))
+    for row, joints in zip(walk, rows_deg, strict=True):
+        for joint, value in joints.items():
+            row[joint] = np.radians(value)
+    return walk
+
+
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (({2: -90}, {2: -80}), "the motion then crosses joint3 = -82 deg, as none can now"),
+        (({2: -90, 4: -1}, {2: -90, 4: 1}), "the motion then crosses joint5 = 0 deg, as none"),
+        (({2: -80, 1: 10}, {2: -80, 1: 15}), "the motion then crosses joint2 = 12.5 deg, as none"),
+        (({5: 170}, {5: 190}), "joint6 then passes 178 deg, as in no motion now"),
+        (({5: 530}, {5: 550}), "joint6 then passes 178 deg, as in no motion now"),
+        (({2: -90, 4: -5}, {2: -85, 4: -5}), "cell [4, 1] can then be covered below joint5 = 0"),
+        (({1: 10},), "cell [0, 0] can then be covered below joint2 = 12.5 deg, as it cannot now"),
+        (({1: 13, 5: 360},), "cell [4, 1] can then be covered above joint2 = 12.5 deg"),
+    ],
+)
+def test_what_a_motion_of_a_changed_case_opens(rows: tuple[dict[int, float]], said: str) -> None:
+    assert what_opens(THREE, walk_of(*rows), PUMA, CELLS).startswith(said)
