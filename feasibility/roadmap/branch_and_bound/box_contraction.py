@@ -31,6 +31,7 @@ from feasibility.roadmap.arrays import NEXT, place
 from feasibility.roadmap.branch_and_bound.box_bounds import contract, contract_to_ball, reach_of_box
 from robots import jacobians
 
+THINNEST = 1e-6  # [rad], [m]: boxes are not halved further
 ROUNDING = 1e-10  # [m], [1], [rad]: more than the error of double arithmetic in a cut
 PASSES = 3  # contractions of a box
 GAIN = 0.3  # [1] of the volume left: contracting again would gain little
@@ -107,6 +108,18 @@ def _contract_second(arrays, work, places, part, near, narrow, directions, space
     return True
 
 
+@inlined
+def _inside_slabs(slabs, q):  # type: ignore[no-untyped-def]
+    """Do the slabs hold a configuration, but for what no box is cut to?"""
+    inside = True
+    for i in range(slabs.weights.shape[0]):
+        at = 0.0
+        for j in range(q.shape[0]):
+            at += slabs.weights[i, j] * q[j]
+        inside &= slabs.low[i] - THINNEST <= at and at <= slabs.high[i] + THINNEST
+    return inside
+
+
 @kernel
 def shrink(arrays, work, places, part, slabs, directions, space, low, high):  # type: ignore[no-untyped-def]
     """Cut one box (in place) to what may still hold a solution.
@@ -126,7 +139,11 @@ def shrink(arrays, work, places, part, slabs, directions, space, low, high):  # 
         distance, chord = work.error[1, 0], work.error[1, 1]
         if not (distance < np.inf and chord < np.inf):
             return 3, by_point
-        if distance + off <= arrays.tolerance and chord + turned <= arrays.cone_chord:
+        if (
+            distance + off <= arrays.tolerance
+            and chord + turned <= arrays.cone_chord
+            and _inside_slabs(slabs, space.q)
+        ):
             return 2, by_point
         first, second, first_axis, second_axis = _first_and_second(
             arrays, work, places, part, space

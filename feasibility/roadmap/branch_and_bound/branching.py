@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from feasibility.compiled import kernel, put
 from feasibility.roadmap.arrays import SearchArrays, Work
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
-from feasibility.roadmap.branch_and_bound.box_contraction import shrink
+from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
     Boxes,
     Places,
@@ -30,7 +30,6 @@ from feasibility.roadmap.branch_and_bound.boxes import (
     place_at_rest,
 )
 
-THINNEST = 1e-6  # [rad], [m]: a box with no wider interval that moves anything is left undecided
 DIRECTIONS = np.array(
     [
         [1.0, 0.0, 0.0],

@@ -74,7 +74,8 @@ class Findings:
 
     def on_cut(self, on: Region) -> bool:
         """Is the tool found on the surface in the region of a cut? It is kept, and a seed."""
-        if not self.newton:
+        slanted = (on.slabs.low == on.slabs.high).any()  # Newton would have to hit it by chance
+        if not self.newton or slanted:
             return False
         targets = random_targets(self.places, CUT_TRIES, self.rng)
         q = projected(self.arrays, self.work, on, targets, ENOUGH, self.rng)

@@ -1,7 +1,9 @@
 """Where a cut may be: the gaps between the components' intervals of each joint.
 
 Components are seen by their intervals; points of the motion set that belong to none of them cut a
-gap into smaller ones. The widest are the likeliest to hold a cut, in their middle.
+gap into smaller ones. The widest are the likeliest to hold a cut, in their middle. Where the
+intervals of every joint overlap, several joints together may still have a gap, along the line
+between the nearest points of two components' convex hulls.
 """
 
 from __future__ import annotations
@@ -13,6 +15,9 @@ from numpy.typing import NDArray
 
 NARROWEST = 1e-3  # [rad], [m]: gaps that are not worth a try
 KEPT = 8  # gaps kept of those between the same two components
+PAIRED = 4  # components whose hulls are compared, each two of them
+HULL_POINTS = 400  # samples of a component that its hull is made of
+STEPS = 200  # towards the nearest points of two hulls
 
 
 class Component(NamedTuple):
@@ -56,6 +61,39 @@ def gaps(
     for joint in joints:
         found += gaps_along(np.eye(samples.shape[1])[joint], components, samples)
     return sorted(found, key=lambda gap: -gap.promise)
+
+
+def slanted_gaps(
+    joints: tuple[int, ...], components: list[Component], samples: NDArray[np.float64]
+) -> list[Gap]:
+    """The gaps along several joints together, the most promising first; as `gaps`."""
+    found: list[Gap] = []
+    for k, one in enumerate(components[:PAIRED]):
+        for other in components[:k]:
+            weights = np.zeros(samples.shape[1])
+            weights[list(joints)] = _between_hulls(one.q[:, joints], other.q[:, joints])
+            if weights.any():
+                found += gaps_along(weights, components, samples)
+    return sorted(found, key=lambda gap: -gap.promise)
+
+
+def _between_hulls(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The unit vector (m,) between the nearest points of two hulls of points (k, m).
+
+    Gilbert's algorithm on their difference: a point of it moves towards the corner that is furthest
+    along the way to the origin. All 0 where they seem to overlap.
+    """
+    one, other = (q[:: 1 + len(q) // HULL_POINTS] for q in (one, other))
+    near = one.mean(axis=0) - other.mean(axis=0)
+    for _ in range(STEPS):
+        corner = one[np.argmin(one @ near)] - other[np.argmax(other @ near)]
+        step = near - corner
+        length = float(step @ step)
+        if length <= 0.0 or near @ step <= 1e-6 * (near @ near):
+            break
+        near = near - min(float(near @ step) / length, 1.0) * step
+    size = float(np.linalg.norm(near))
+    return near / size if size > NARROWEST else np.zeros_like(near)
 
 
 def gaps_along(

@@ -18,7 +18,7 @@ from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.cuts.counting import Counted, Statement
 from feasibility.roadmap.cuts.findings import Findings, ProvedCut
-from feasibility.roadmap.cuts.gaps import Component, gaps
+from feasibility.roadmap.cuts.gaps import Component, Gap, gaps, slanted_gaps
 from feasibility.roadmap.cuts.leaves import GuessedLeaf, guessed_leaf, prove_leaves
 from feasibility.roadmap.cuts.regions import Region
 
@@ -96,22 +96,27 @@ class Guessing:
         known = self._known(region, inside)
         if known is not None:
             return known
-        for _ in range(REFINED):
-            before = len(self.findings.samples)
-            samples = self.findings.samples_in(region, self.opened)
-            found = gaps(self.joints, inside, samples)
-            line = first_proved(
-                self.findings,
-                self.counted,
-                ((gap.weights, gap.middle, region.on(gap.weights, gap.middle)) for gap in found),
-            )
-            if line is not None:
-                self.findings.cuts.append(ProvedCut(region, *line))
-                return line
-            if len(self.findings.samples) == before or self.counted.left <= 0:
-                break  # no point has made the gaps smaller: they would be the same
+        for kind in (gaps, slanted_gaps):
+            for _ in range(REFINED):
+                before = len(self.findings.samples)
+                line = self._through(region, kind(self.joints, inside, self._samples(region)))
+                if line is not None:
+                    self.findings.cuts.append(ProvedCut(region, *line))
+                    return line
+                if len(self.findings.samples) == before or self.counted.left <= 0:
+                    break  # no point has made the gaps smaller: they would be the same
         self._note_blocked(region, inside)
         return None
+
+    def _through(self, region: Region, found: list[Gap]) -> Line | None:
+        """The first proved cut through the middles of some gaps."""
+        candidates = (
+            (gap.weights, gap.middle, region.on(gap.weights, gap.middle)) for gap in found
+        )
+        return first_proved(self.findings, self.counted, candidates)
+
+    def _samples(self, region: Region) -> NDArray[np.float64]:
+        return self.findings.samples_in(region, self.opened)
 
     def _known(self, region: Region, inside: list[Component]) -> Line | None:
         """A cut proved earlier that parts the components here."""
@@ -124,7 +129,7 @@ class Guessing:
 
     def _note_blocked(self, region: Region, inside: list[Component]) -> None:
         """Say which gaps of a region stayed open."""
-        samples = self.findings.samples_in(region, self.opened)
+        samples = self._samples(region)
         seen = set()
         for gap in gaps(self.joints, inside, samples):
             along = samples @ gap.weights

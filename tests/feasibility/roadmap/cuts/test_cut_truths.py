@@ -11,7 +11,7 @@ from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.branching import Ruling
 from feasibility.roadmap.cuts.counting import Statement
 from feasibility.roadmap.cuts.regions import limits_of
-from surfaces import cylinder, plane
+from surfaces import cylinder, piecewise, plane
 
 ANY_AXIS = Task(0.0, 180.0, 1e-3)
 
@@ -131,6 +131,30 @@ def test_slides_without_ends(slide):
         assert isinstance(proving.tree.root, Leaf)
     else:
         assert proving.exploration.complete
+
+
+def test_a_cut_along_two_joints():
+    """A tool on two slides, over two slanted strips side by side: no single slide parts them."""
+    gantry = robot_of(
+        [
+            joint(1, "prismatic", axis=(1, 0, 0), limits=(-1.0, 1.0)),
+            joint(2, "prismatic", axis=(0, 1, 0), limits=(-1.0, 1.0)),
+            joint(3, "fixed", (0, 0, 0.1)),
+        ]
+    )
+    strips = [
+        plane((-0.4, 0.4), (-0.02, 0.02), "outside", (0.0, y, 0.1), (0, 0, 45)) for y in (-0.1, 0.1)
+    ]
+    proving = prove(gantry, piecewise(strips, "outside").cells((5, 1)), ANY_AXIS)
+    tree = proving.tree
+    assert isinstance(tree.root, Cut)
+    assert tree.root.joint is None
+    weights = np.array(tree.root.weights)
+    assert abs(weights @ [1, 1]) < 0.3 < abs(weights @ [1, -1])
+    near = np.sort([weights @ [-0.35, -0.25], weights @ [-0.25, -0.35]])
+    assert near[0] < tree.root.value < near[1]
+    for region, node in nodes(root_region(proving.prover, tree), tree.root):
+        assert ruling(proving.prover, statement_of(proving.prover, region, node)) is Ruling.PROVED
 
 
 def test_several_windings_are_several_places():
