@@ -53,8 +53,10 @@ class Findings:
     """(k, n) points of the motion set, at any winding."""
     cuts: list[ProvedCut] = field(default_factory=list)
     leaves: list[ProvedLeaf] = field(default_factory=list)
-    seeds: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
-    """(cell, configuration) that refuted a guess, in this attempt."""
+    uncovered: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
+    """(cell, configuration) that refuted a leaf, in this attempt."""
+    on_cuts: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
+    """(nearest cell, configuration) that refuted a cut, in this attempt."""
     unfinished: dict[tuple[object, ...], Statement] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -93,10 +95,24 @@ class Findings:
         return len(q) > 0
 
     def keep(self, q: NDArray[np.float64], cell: int = -1) -> None:
-        """Keep points of the motion set (k, n), and the first as a seed of a cell (the nearest)."""
+        """Keep points of the motion set (k, n), the first of which refutes a leaf or a cut.
+
+        Args:
+            q: what is not finite is left out.
+            cell: that of the leaf; -1 for a cut.
+        """
+        q = q[np.isfinite(q).all(axis=1)]
         self.samples = np.vstack([self.samples, q])
-        if len(q):
-            self.seeds.append((self._nearest(q[0]) if cell < 0 else cell, q[0]))
+        for first in q[:1]:
+            if cell < 0:
+                self.on_cuts.append((self._nearest(first), first))
+            else:
+                self.uncovered.append((cell, first))
+
+    def forget_seeds(self) -> None:
+        """Start a new attempt."""
+        self.uncovered.clear()
+        self.on_cuts.clear()
 
     def samples_in(self, region: Region, opened: dict[int, float]) -> NDArray[np.float64]:
         """(k, n) those in a region, with opened joints inside their turn."""

@@ -168,8 +168,8 @@ def first_proved(
         settled = counted.settle_one([s for _, s in statements], counted.left)
         if settled is None:
             return None
-        if settled.ruling is Ruling.REACHED:
-            findings.keep(settled.found[None])
+        if settled.ruling is not Ruling.PROVED:
+            findings.keep(settled.found[None])  # or nearly so, where the ruling is UNKNOWN
 
 
 def _proved(guess: _Guess | GuessedLeaf) -> Cut | Leaf:

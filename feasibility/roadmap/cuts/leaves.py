@@ -76,10 +76,7 @@ def _go_on(findings: Findings, counted: Counted, leaf: GuessedLeaf, most: int) -
             leaf.cell = cell
             findings.leaves.append(ProvedLeaf(leaf.region, cell))
             return
-        if settled.ruling is Ruling.REACHED:
-            findings.keep(settled.found[None], cell)
-        elif np.isfinite(settled.found).all():
-            findings.seeds.append((cell, settled.found))
+        findings.keep(settled.found[None], cell)  # or nearly so, where the ruling is UNKNOWN
 
 
 def _furthest(points: NDArray[np.float64], cover: NDArray[np.bool_]) -> list[int]:

@@ -73,7 +73,7 @@ class Prover:
         """
         counted = Counted(self.arrays, self.findings.work, budget, tick)
         limits = limits_of(self.arrays, self.places)
-        self.findings.seeds.clear()
+        self.findings.forget_seeds()
         blocked: list[Blocked] = []
         boxes_left = np.inf
         if limits.over_one_turn().is_finite:
@@ -85,7 +85,9 @@ class Prover:
                     return Attempt(CutTree(root, tuple(opened.items())), counted.spent, (), (), 0.0)
                 blocked += guess.blocked
                 boxes_left = min(boxes_left, guess.boxes_left)
-        seeds = tuple(self.findings.seeds[:MOST_SEEDS])
+                if self.findings.uncovered:
+                    break  # what is known of the components is wrong
+        seeds = (*self.findings.uncovered, *self.findings.on_cuts)[:MOST_SEEDS]
         return Attempt(None, counted.spent, seeds, tuple(blocked), float(boxes_left))
 
     def _root(
