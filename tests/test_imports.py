@@ -43,7 +43,7 @@ feasibility.roadmap.branch_and_bound
 feasibility.roadmap.cuts
 feasibility.roadmap: bridging expansion exploration proving search tracking
 feasibility.roadmap.causes
-feasibility.roadmap: complete graph_g outcome refinement walk warmup
+feasibility.roadmap: between_rounds complete graph_g outcome refinement walk warmup
 feasibility: checking
 feasibility.paths
 feasibility.timing

@@ -13,6 +13,7 @@ from feasibility.found import Found
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.arrays import arrays_of
+from feasibility.roadmap.between_rounds import between_rounds
 from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.graph_g import graph_of
@@ -23,7 +24,6 @@ from feasibility.roadmap.outcome import (
     unfinished_words,
 )
 from feasibility.roadmap.proving import Proving
-from feasibility.roadmap.refinement import refine
 from feasibility.roadmap.search import close, explore
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
@@ -60,9 +60,7 @@ def complete_search(
             known = seeds if _replayed(problem, seeds).accepted else None
             _plant(exploration, seeds)
         if known is None:
-            explore(exploration, proving)
-            if exploration.apart and proving.tree is None:
-                exploration.finest = refine(exploration, problem.searched)
+            explore(exploration, between_rounds(exploration, proving, problem.searched))
         close(exploration)
     except OutOfTime:
         in_time = False
@@ -106,7 +104,7 @@ def _found(
     total = len(problem.cells)
     complete = exploration.complete and total > 0
     walk = covering_walk(exploration.roadmap, exploration.best) if complete else known
-    proof = None if walk is not None else proof_of(exploration, proving)
+    proof = None if walk is not None else proof_of(exploration)
     nodes, motions = (int(count) for count in exploration.roadmap.counters[:2])
     return Found(
         covered=exploration.covered if walk is None else np.ones(total, dtype=bool),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.clock import Clock
+from feasibility.cut_tree import CutTree
 from feasibility.roadmap.arrays import SearchArrays, Work, work_for
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
@@ -51,6 +52,8 @@ class Exploration:
     """Outcomes of branch and bound, by cell."""
     boxes: int = 0
     rounds: int = 0
+    cut_tree: CutTree | None = None
+    """The proof that no motion covers every cell, once there is one."""
     finest: int = 1
     """Into how many by how many each cell was cut for a search in finer cells."""
     tried: dict[tuple[int, int], int] = field(default_factory=dict)

@@ -17,11 +17,11 @@ from feasibility.target_curves import blocked_curves
 from robots import Robot
 
 
-def proof_of(exploration: Exploration, proving: Proving) -> CutTree | None:
+def proof_of(exploration: Exploration) -> CutTree | None:
     """The first cell that is proved uncoverable, or the cut tree; None where there is neither."""
     rulings = exploration.rulings.items()
     cell = next((cell for cell, ruling in rulings if ruling is Ruling.PROVED), None)
-    return proving.tree if cell is None else CutTree(Leaf(cell))
+    return exploration.cut_tree if cell is None else CutTree(Leaf(cell))
 
 
 def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:

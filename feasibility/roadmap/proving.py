@@ -12,15 +12,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from feasibility.cut_tree import CutTree
 from feasibility.roadmap.cuts import Blocked, Prover, components_of, places_on
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.task import Task
 from surfaces import SurfaceError
 
-FIRST_BOXES = 20_000  # of the first attempts
-MORE_BOXES = 200_000  # of later ones
-FIRST_AFTER, MORE_AFTER = 1, (4, 12)  # rounds without gain after which an attempt is made
+MOST_BOXES = 1_000_000  # of one attempt
 ATTEMPTS = 6  # in a row, as long as each finds seeds that gain something
 
 
@@ -29,29 +26,37 @@ class Proving:
     """Proofs that no single motion covers every cell, from what one search knows."""
 
     exploration: Exploration
+    """Its `cut_tree` is set once there is a proof."""
     task: Task
-    tree: CutTree | None = None
-    """The proof, once there is one."""
     blocked: tuple[Blocked, ...] = ()
     """What kept the last attempt, see `Attempt.blocked`."""
     boxes: int = 0
     attempts: int = 0
     unable: str = ""
     """Why nothing can be proved about this surface; empty where it can."""
+    _left: float = field(default=np.inf, init=False)
+    """Boxes that the last attempt estimated to be missing."""
     _prover: Prover | None = field(default=None, init=False)
 
-    def after(self, dry: int) -> bool:
-        """After so many rounds without gain: try a proof. True when there is one, or a gain."""
-        if dry != FIRST_AFTER and dry not in MORE_AFTER:
-            return False
-        budget = FIRST_BOXES if dry == FIRST_AFTER else MORE_BOXES
+    def attempt(self, budget: int) -> bool:
+        """Try a proof, and again as long as the seeds found gain something.
+
+        Args:
+            budget: boxes that may be examined; up to `MOST_BOXES` if it looks as if they would do.
+
+        Returns:
+            True when there is a proof, or a gain.
+        """
         gained = False
         for _ in range(ATTEMPTS):
             seeded = self._attempt(budget)
             gained |= seeded
-            if self.tree is not None or not seeded or self.exploration.complete:
+            if self.exploration.cut_tree is not None:
+                return True
+            if self.exploration.complete or not (seeded or self._left < MOST_BOXES):
                 break
-        return gained or self.tree is not None
+            budget = max(budget, int(min(2.0 * self._left, MOST_BOXES)) if not seeded else 0)
+        return gained
 
     def _attempt(self, budget: int) -> bool:
         """One attempt; True when its seeds made the search grow."""
@@ -66,7 +71,8 @@ class Proving:
         made = prover.attempt(components_of(exploration.roadmap), budget, tick)
         self.attempts += 1
         self.boxes += made.boxes
-        self.tree, self.blocked = made.tree, made.blocked
+        exploration.cut_tree, self.blocked = made.tree, made.blocked
+        self._left = made.boxes_left
         before = exploration.sizes()
         for cell, q in made.seeds:
             exploration.add_seeds(cell, wound(exploration.arrays, q)[None])

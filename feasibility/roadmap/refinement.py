@@ -34,34 +34,33 @@ from feasibility.roadmap.walk import edge_motion
 from feasibility.task import Task
 from surfaces import Finer
 
-LEVELS = (3, 9, 27)  # each cell is cut into so many by so many, until a motion is found
+# Each cell is cut into so many by so many, until a motion is found: at first, and in the end.
+COARSE, FINE = (3,), (9, 27)
 MOST_CELLS = 8_000  # finer cells; more are not tried
 BRIDGES = 24  # pairs of nodes that a round tries to bridge for each two components
 BRIDGING_ROUNDS, ROUNDS = 4, 2  # without gain: of bridges alone, and of self-motions too
 TOP = 4  # components that a round works on
 
 
-def refine(exploration: Exploration, task: Task) -> int:
-    """Search over finer and finer cells, and take over the motions found.
+def refine(exploration: Exploration, task: Task, levels: tuple[int, ...]) -> bool:
+    """Search over finer and finer cells, and take over the motions found; True when there were any.
 
     Args:
         exploration: a search that found no covering motion; its roadmap grows here.
         task: the task that it keeps to.
-
-    Returns:
-        How finely the cells were cut in the end; 1 where they were not.
+        levels: into how many by how many each cell is cut.
 
     Raises:
         OutOfTime: the deadline passed.
     """
-    finest = 1
-    for ways in LEVELS:
+    before = exploration.sizes()
+    for ways in levels:
         finer = exploration.cells.finer(ways)
         if finer is None or len(finer.cells) > MOST_CELLS or not exploration.apart:
             break
         _search_over(exploration, task, finer)
-        finest = ways
-    return finest
+        exploration.finest = max(exploration.finest, ways)
+    return exploration.sizes() != before
 
 
 def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:

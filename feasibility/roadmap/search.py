@@ -17,16 +17,18 @@ verdict is "exhausted", and its message says what was tried.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import NODES, root_of
-from feasibility.roadmap.proving import Proving
 from feasibility.roadmap.self_motion import margin_shares
 
 PIVOT_SEEDS = 8
+RESTARTS = 6  # cells seeded anew before a search counts as exhausted
 TOP = 5  # components that a round works on
 DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
 SETTLED_ROUNDS = 12  # the same once a proof decides the verdict, and only more cells can be gained
@@ -40,12 +42,16 @@ MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid
 NEWTON_STARTS = 25
 
 
-def explore(exploration: Exploration, proving: Proving | None = None) -> None:
+Between = Callable[[int], bool]
+"""Called after so many rounds without gain, to try something else; True when that gained."""
+
+
+def explore(exploration: Exploration, between: Between | None = None) -> None:
     """Run the search to its end; the exploration holds the result.
 
     Args:
         exploration: the search.
-        proving: tries to prove between rounds that no motion covers every cell; then they end.
+        between: what to try between rounds, see `Between`.
 
     Raises:
         OutOfTime: the deadline passed; the exploration holds what was found until then.
@@ -53,7 +59,7 @@ def explore(exploration: Exploration, proving: Proving | None = None) -> None:
     if len(exploration.cells) == 0 or seed_middle(exploration):
         return
     _unreached(exploration)
-    _rounds(exploration, proving)
+    _rounds(exploration, between)
 
 
 def seed_middle(exploration: Exploration) -> bool:
@@ -136,7 +142,7 @@ def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
     return cells[np.argsort(np.modf(golden * np.arange(len(cells)))[0], kind="stable")]
 
 
-def _rounds(exploration: Exploration, proving: Proving | None) -> None:
+def _rounds(exploration: Exploration, between: Between | None) -> None:
     """Step 3: rounds of seeding and exploring, until some in a row have gained nothing."""
     dry = 0
     enough = SETTLED_ROUNDS if exploration.proved else DRY_ROUNDS
@@ -150,10 +156,10 @@ def _rounds(exploration: Exploration, proving: Proving | None) -> None:
         dry = dry + 1 if exploration.sizes(TOP) == before else 0
         if exploration.complete or dry >= enough:
             return
-        if proving is not None and not exploration.proved and proving.after(dry):
-            if proving.tree is not None:
-                return
+        if between is not None and not exploration.proved and between(dry):
             dry = 0
+        if exploration.complete or exploration.cut_tree is not None:
+            return
 
 
 def _round(exploration: Exploration, top: list[int]) -> None:
@@ -187,6 +193,15 @@ def improve(exploration: Exploration, components: list[int]) -> None:
                 return
             if len(shared):
                 exploration.explore_self_motions(int(rng.choice(shared)))
+
+
+def restart(exploration: Exploration) -> None:
+    """Seed several cells all over the surface anew, as if each were the first."""
+    for cell in evenly(np.arange(len(exploration.cells)))[:RESTARTS].tolist():
+        exploration.tick("starting anew elsewhere")
+        exploration.add_seeds(cell, exploration.guesses(PIVOT_SEEDS))
+        if exploration.complete:
+            return
 
 
 def close(exploration: Exploration) -> None:
