@@ -27,7 +27,8 @@ def between_rounds(exploration: Exploration, proving: Proving, task: Task) -> Be
     """
 
     def proved(budget: int) -> bool:
-        return proving.attempt(budget) or exploration.cut_tree is not None
+        # Where a cell is proved uncoverable already, only more cells can be gained.
+        return not exploration.proved and proving.attempt(budget)
 
     def between(dry: int) -> bool:
         if not exploration.apart:

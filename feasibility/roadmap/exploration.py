@@ -119,8 +119,8 @@ class Exploration:
 
     @property
     def apart(self) -> bool:
-        """Is every cell covered, but by no single component?"""
-        return not self.complete and bool(self.reached.all())
+        """Does the best component miss a cell that another one covers?"""
+        return not bool(self.covered[self.reached].all())
 
     @property
     def n_edges(self) -> int:

@@ -148,7 +148,7 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
     enough = SETTLED_ROUNDS if exploration.proved else DRY_ROUNDS
     for _ in range(MOST_ROUNDS):
         roots = exploration.roots()
-        if not roots or exploration.covered[exploration.reached].all():
+        if not roots or not exploration.apart:
             return  # the best component covers every cell that any component covers
         before = exploration.sizes(TOP)
         _round(exploration, roots[:TOP])
@@ -156,7 +156,7 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
         dry = dry + 1 if exploration.sizes(TOP) == before else 0
         if exploration.complete or dry >= enough:
             return
-        if between is not None and not exploration.proved and between(dry):
+        if between is not None and between(dry):
             dry = 0
         if exploration.complete or exploration.cut_tree is not None:
             return
