@@ -38,7 +38,7 @@ def check(
         progress: called as progress(done, total, text) some times a second: cells covered by the
             best motion so far, all cells, and what is going on. What it raises ends the search.
         seeds: a motion over these cells, or over those of a case nearby, that the complete search
-            begins from: the `witness` of another verdict, say.
+            begins from: the `witness` of another verdict, say. Its marks of cells may be missing.
 
     Returns:
         The verdict. An infeasible surface is a result, not an error. The first call on a machine

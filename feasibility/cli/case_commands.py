@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -20,8 +21,10 @@ from feasibility.cli.console import print_err, print_out
 from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
+    from feasibility.cli.command import OpenCase
     from feasibility.paths import Order
-    from feasibility.verdict import Verdict
+    from feasibility.sensitivity import Explanation
+    from feasibility.verdict import Verdict, Walk
 
 ORDERS = ("rows", "columns", "spiral", "shortest")
 STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
@@ -30,6 +33,7 @@ LATER_STATUSES = """exit status: as of `coverable check`; divide: 0 every cell i
 WHY_COMPLETE = {
     "path": "a path needs 'complete': the greedy search does not visit the cells' centres",
     "divide": "a division needs 'complete': the greedy search keeps one motion only",
+    "seeds": "--seeds needs 'complete': the greedy search has a start, and no seeds",
     "explain": "thresholds need 'complete': a greedy search that fails depends on its start",
 }
 
@@ -46,6 +50,10 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "--witness", metavar="FILE", help="write the covering motion as CSV (feasible only)"
     )
     parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
+    parser.add_argument(
+        "--seeds", metavar="MOTION",
+        help="begin the search from a motion over this surface, or one nearby: CSV as of --witness",
+    )  # fmt: skip
     parser = subcommands.add_parser(
         "show",
         help="look at a result that `check --save` wrote",
@@ -73,12 +81,16 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "report how the joints move from one to the next.",
         epilog=LATER_STATUSES,
     )  # fmt: skip
-    add_command(
+    parser = add_command(
         subcommands, "explain", explain, add_case, add_html,
         help="what would make a case feasible, and the margins of a feasible one",
         description="Find the thresholds at which the verdict changes: cone, joint limits, "
         "standoff, position of the surface, cells to drop.",
         epilog=LATER_STATUSES,
+    )  # fmt: skip
+    parser.add_argument(
+        "--witness", metavar="FOLDER",
+        help="write the covering motion at each threshold as CSV, for `check --seeds` and `verify`",
     )  # fmt: skip
 
 
@@ -118,8 +130,9 @@ def check(args: argparse.Namespace, began: float) -> int:
         from feasibility.checking import check as run
         from feasibility.reports import verdict as report
 
-        case, loaded = opened.case, opened.so_far()
-        verdict = run(*opened.setup, progress=opened.progress)
+        case, seeds = opened.case, _seeds(args, opened)
+        loaded = opened.so_far()
+        verdict = run(*opened.setup, progress=opened.progress, seeds=seeds)
     if args.json:
         print_out(json_text(report.as_json(verdict, loaded)))
     else:
@@ -141,6 +154,23 @@ def check(args: argparse.Namespace, began: float) -> int:
         else:
             write_text(args.witness, motion, "witness")
     return STATUS[str(verdict.answer)]
+
+
+def _seeds(args: argparse.Namespace, opened: OpenCase) -> Walk | None:
+    """The motion of `--seeds`, without its marks: it may be of another case."""
+    if args.seeds is None:
+        return None
+    import numpy as np
+
+    from coverable_errors import Fault
+    from feasibility.cases import CaseError
+    from feasibility.results import load_motion
+    from feasibility.verdict import Walk
+
+    if opened.case.search.method != "complete":
+        raise CaseError(Fault("search.method", WHY_COMPLETE["seeds"]), opened.case.name)
+    motion = load_motion(args.seeds, opened.setup.robot)
+    return Walk(q=motion.q, cell=np.full(len(motion.q), -1))
 
 
 def show(args: argparse.Namespace, began: float) -> int:
@@ -246,7 +276,10 @@ def divide(args: argparse.Namespace, began: float) -> int:
 
 def explain(args: argparse.Namespace, began: float) -> int:
     """`coverable explain CASE`: what would make it feasible, or how far it can be tightened."""
-    with open_case(args, began, {"--html": args.html}, WHY_COMPLETE["explain"]) as opened:
+    outputs = {"--html": args.html}
+    if args.witness is not None:
+        outputs["--witness"] = os.path.join(args.witness, "x.csv")
+    with open_case(args, began, outputs, WHY_COMPLETE["explain"]) as opened:
         from feasibility.reports import explanation as report
         from feasibility.sensitivity import explain as run
 
@@ -256,6 +289,8 @@ def explain(args: argparse.Namespace, began: float) -> int:
         print_out(json_text(report.as_json(explanation, name)))
     else:
         print_out(report.as_text(explanation, name))
+    if args.witness is not None:
+        _write_witnesses(args.witness, explanation)
     if args.html is not None:
         from feasibility.viewer import view
 
@@ -264,3 +299,11 @@ def explain(args: argparse.Namespace, began: float) -> int:
         drawn = replace(drawn, legend=replace(drawn.legend, text=text))
         write_text(args.html, drawn.html(), "view")
     return STATUS[str(verdict.answer)]
+
+
+def _write_witnesses(folder: str, explanation: Explanation) -> None:
+    """The motion at each threshold, in a file named after the quantity."""
+    from feasibility.reports.explanation import witnesses
+
+    for name, text in witnesses(explanation).items():
+        write_text(os.path.join(folder, name), text, "witness")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 from feasibility.cut_words import what_opens
-from feasibility.reports.parts import filled
+from feasibility.reports.parts import csv_text, filled
 from feasibility.sensitivity import Dropped, Explanation, Finding, Kind, Quantity, Threshold
 from feasibility.verdict import Answer, Evidence, Verdict
 from feasibility.version import version
@@ -72,6 +73,25 @@ def _from_nearby(verdict: Verdict) -> str:
         "from a motion nearby, replayed; the search of `check` alone, with seed "
         f"{verdict.seed}, did not find one there."
     )
+
+
+def witnesses(explanation: Explanation) -> dict[str, str]:
+    """The covering motion at each threshold as CSV like that of `check --witness`, by file name.
+
+    Such as 'cone.csv', 'joint1-upper-limit.csv', 'shift-along-minus-y.csv'.
+    """
+    names = explanation.verdict.robot.joint_names
+    found: dict[str, str] = {}
+    for threshold in explanation.thresholds:
+        walk = None if threshold.feasible is None else threshold.feasible.witness
+        if walk is not None:
+            plain = threshold.quantity.name.replace("+", "plus ").replace("-", "minus ")
+            slug = re.sub(r"[^a-z0-9_]+", "-", plain.lower()).strip("-")
+            rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
+            lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
+            slug += f"-{len(found)}" if not slug or f"{slug}.csv" in found else ""
+            found[f"{slug}.csv"] = csv_text([["cell", *names], *lines])
+    return found
 
 
 def _unknown(explanation: Explanation) -> str:

@@ -29,6 +29,7 @@ from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
 from feasibility.verdict import Replay, Walk
+from robots import Kinematics
 
 
 def complete_search(
@@ -57,7 +58,7 @@ def complete_search(
     in_time, known = True, None
     try:
         if seeds is not None:
-            known = seeds if _replayed(problem, seeds).accepted else None
+            known = _known(problem, seeds)
             _plant(exploration, seeds)
         if known is None:
             explore(exploration, between_rounds(exploration, proving, problem.searched))
@@ -83,12 +84,25 @@ def _check_seeds(problem: Problem, seeds: Walk) -> None:
     checks.done()
 
 
+def _known(problem: Problem, seeds: Walk) -> Walk | None:
+    """The seeds where they cover all cells already, marked and replayed; None otherwise."""
+    marked = np.isin(np.arange(len(problem.cells)), seeds.cell)
+    return seeds if marked.all() and _replayed(problem, seeds).accepted else None
+
+
 def _plant(exploration: Exploration, seeds: Walk) -> None:
-    """Seed the cells that a known motion passes, as long as the best component misses some."""
-    for row in np.flatnonzero(seeds.cell >= 0).tolist():
+    """Seed the cells that a known motion passes, as long as the best component misses some.
+
+    Where it has no marks, the rows with the tool point nearest to each cell are taken.
+    """
+    rows = {int(seeds.cell[row]): row for row in np.flatnonzero(seeds.cell >= 0)[::-1].tolist()}
+    if not rows and len(seeds.q):
+        tips, _ = Kinematics(exploration.robot).tools(seeds.q)
+        for cell, point in enumerate(exploration.arrays.points):
+            rows[cell] = int(np.linalg.norm(tips - point, axis=1).argmin())
+    for cell, row in rows.items():
         if exploration.complete:
             return
-        cell = int(seeds.cell[row])
         if not exploration.covered[cell]:
             exploration.add_seeds(cell, wound(exploration.arrays, seeds.q[row])[None])
 
