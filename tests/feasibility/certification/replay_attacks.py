@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 from rasters import raster
-from test_mesh_witness import Reader
+from test_mesh_witness import SETTLED, Reader
 
 from feasibility.certification import replay_over_surface
 from robots import Kinematics
@@ -47,7 +47,10 @@ def attacked(name, seed):
     nobody = np.zeros(len(made.cells), dtype=bool)
     outcome = replay_over_surface(made.robot, made.cells, task, q, nobody)
     # The cone holds at a place that may lie a little beside the closest point.
-    wrong = off > task.tolerance * (1.0 + 1e-9) or tilt > task.cone + BESIDE * off
+    # On a mesh the reader's iteration ends that near to one, so its distance is a little too large.
+    unsettled = SETTLED if name == "mesh" else 0.0
+    most = task.tolerance * (1.0 + 1e-9) + unsettled
+    wrong = off > most or tilt > task.cone + BESIDE * off
     inside = steady and off < 0.99 * task.tolerance and tilt < 0.99 * task.cone
     return Attack(name, seed, outcome.accepted, bool(wrong), bool(inside), outcome.refusal)
 
