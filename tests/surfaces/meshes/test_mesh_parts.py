@@ -133,3 +133,14 @@ def test_a_sheet_is_one_part_with_little_beside_it():
     assert len(parts) == 1
     sides = np.linalg.norm(parts.slopes[0, :, :3], axis=1)
     assert np.sort(2.0 * sides) == pytest.approx([0.4, 0.6], rel=0.02)
+
+
+def test_single_faces_are_exact():
+    """Over one face without a crease points are affine, and so is what the normal is along."""
+    surface = MESHES["dome"]
+    parts = surface.parts(1e-12, 1e-12)
+    finest = parts.children[:, 0] < 0
+    assert finest.sum() == len(surface.mesh.faces)
+    assert parts.radius[finest, 0].max() < 1e-11
+    turn = np.linalg.norm(surface.corner_normals - np.roll(surface.corner_normals, 1, 1), axis=2)
+    assert parts.radius[finest, 1].max() < turn.max() ** 2 / 8.0

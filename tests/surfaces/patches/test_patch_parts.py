@@ -86,7 +86,7 @@ def test_radii_fall_by_four_where_sides_are_halved(patch):
         assert len(fine) < 7 * len(coarse)
 
 
-def test_radii_are_near_the_least_possible(patch):
+def test_radii_over_small_boxes_are_right_and_near_the_least_possible(patch):
     """No affine model leaves less than a third of the bound, over small boxes."""
     rng = np.random.default_rng(3)
     ends = np.array([patch.u_range, patch.v_range])
@@ -104,3 +104,5 @@ def test_radii_are_near_the_least_possible(patch):
             best, *_ = np.linalg.lstsq(affine, places, rcond=None)
             left = np.linalg.norm(places - affine @ best, axis=1).max()
             assert model.error[0] <= 3.0 * left + 1e-12
+            off = places - affine @ np.vstack([model.centre, model.slopes[0]])
+            assert np.linalg.norm(off, axis=1).max() <= model.error[0] * (1.0 + 1e-9) + 1e-12

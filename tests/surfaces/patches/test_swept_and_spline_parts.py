@@ -55,7 +55,7 @@ def test_every_place_lies_in_the_model_of_each_part_that_it_lies_on(patch):
     assert max(shrunk.points, shrunk.normals) > 1.0
 
 
-def test_radii_are_near_the_least_possible(patch):
+def test_radii_over_small_boxes_are_right_and_near_the_least_possible(patch):
     """No affine model leaves less than a quarter of the bound, over small boxes."""
     rng = np.random.default_rng(3)
     ends = np.array([patch.u_range, patch.v_range])
@@ -74,6 +74,8 @@ def test_radii_are_near_the_least_possible(patch):
             best, *_ = np.linalg.lstsq(affine, places, rcond=None)
             left = np.linalg.norm(places - affine @ best, axis=1).max()
             ratios.append((model.error[0] - 1e-9) / left)
+            off = places - affine @ np.vstack([model.centre, model.slopes[0]])
+            assert np.linalg.norm(off, axis=1).max() <= model.error[0] * (1.0 + 1e-9) + 1e-12
     assert np.median(ratios) <= 2.0
     assert max(ratios) <= 4.0
 
