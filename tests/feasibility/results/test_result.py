@@ -51,6 +51,10 @@ def test_a_result_comes_back_exactly(saved):
     assert dict(after.timing) == dict(before.timing)
     assert dict(after.statistics) == result.plain(before.statistics)
     assert np.array_equal(after.covered, before.covered)
+    assert (after.postures is None) == (before.postures is None)
+    if before.postures is not None:
+        assert np.array_equal(after.postures, before.postures)
+        assert after.postures.shape == (len(after.components), after.robot.n)
     assert [part.tolist() for part in after.components] == [
         part.tolist() for part in before.components
     ]
@@ -211,6 +215,10 @@ DAMAGED = {
     "motions do not fit": (
         lambda m: with_array(m, "graph_motion_lengths", np.full(edges_of(m), 10**18)),
         "does not fit",
+    ),
+    "postures do not fit": (
+        lambda m: with_array(m, "postures", np.zeros((1, 2))),
+        "postures",
     ),
     "components do not fit": (
         lambda m: with_array(m, "components_lengths", np.array([1])),
