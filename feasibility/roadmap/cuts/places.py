@@ -9,10 +9,10 @@ from feasibility.target_parts import target_parts
 from feasibility.task import Task
 from surfaces import Surface
 
-FLAT = 1.0  # [1] of the tolerance: largest radius of target points on the finest parts
-STRAIGHT = 0.2  # [1] of the cone chord: the same of approach directions
+FLAT = 0.5  # [1] of the tolerance: largest radius of target points on the finest parts
+STRAIGHT = 0.1  # [1] of the cone chord: the same of approach directions
 STRAIGHTEST = 1e-3  # [1] whatever the cone
-MOST_PARTS = 2048
+MOST_PARTS = 4096
 
 
 def places_on(surface: Surface, task: Task) -> Places:

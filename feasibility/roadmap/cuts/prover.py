@@ -104,8 +104,8 @@ class Prover:
     ) -> Iterator[tuple[dict[int, float], tuple[int, ...]]]:
         """Which joints to open, at which t, and which ones cuts may go through.
 
-        First none through wide joints, whose windings then do not matter; then wide joints opened
-        where that is possible, the rest with all their windings; then only those without limits.
+        First none through wide joints, whose windings then do not matter; then through those that
+        can be opened; then through all that have limits, with all their windings.
         """
         wide = wide_joints(self.arrays)
         narrow = tuple(j for j in range(len(limits.low)) if j not in wide)
@@ -117,11 +117,11 @@ class Prover:
         yield {}, narrow
         counted.left += saved
         self._open(counted, limits, components, wide)
-        bounded = [j for j in wide if np.isfinite(limits.high[j] - limits.low[j])]
         if self.opened:
-            yield dict(self.opened), (*narrow, *bounded, *(set(self.opened) - set(bounded)))
-        free = {j: t for j, t in self.opened.items() if j not in bounded}
-        if bounded and (free != self.opened or not self.opened):
+            yield dict(self.opened), (*narrow, *self.opened)
+        bounded = [j for j in wide if np.isfinite(limits.high[j] - limits.low[j])]
+        if bounded:
+            free = {j: t for j, t in self.opened.items() if j not in bounded}
             yield free, (*narrow, *bounded, *free)
 
     def _open(
