@@ -127,7 +127,7 @@ def _explained(
     _refine(prober, verdict, searches, done)
     motion = None if verdict.feasible else _over_given(prober, verdict, searches)
     if motion is None:
-        most = ALL_IN_ALL * float(verdict.statistics["fk"])
+        most = max(ALL_IN_ALL * float(verdict.statistics["fk"]), 2.0 * LEAST)
         done = [made.alone(found, most) for made, found in zip(searches, done, strict=True)]
     left_out = tuple(quantity.name for quantity in varied[len(done) :])
     seconds = time.monotonic() - began
