@@ -33,7 +33,7 @@ def test_a_bend_holds_whatever_the_second_derivative_does_within_its_bound():
     half, most, steps = 0.7, 3.0, 4000
     s = np.linspace(-half, half, steps + 1)
     worst = 0.0
-    for trial in range(300):
+    for trial in range(100):
         cuts = np.sort(rng.uniform(-half, half, rng.integers(0, 6) if trial else 0))
         second = most * np.where(np.searchsorted(cuts, s[:-1] + half / steps) % 2 == 0, 1.0, -1.0)
         width = 2.0 * half / steps
@@ -50,7 +50,7 @@ def test_a_bend_holds_whatever_the_second_derivative_does_within_its_bound():
 def test_a_turned_curve_lies_in_its_model():
     """What is left of the curve anything in its bounds; stretched, and with the angle first."""
     rng = np.random.default_rng(2)
-    for _ in range(300):
+    for _ in range(150):
         centre, slope = rng.normal(size=(2, 1, 2))
         error = rng.uniform(size=(1, 2)) * 10.0 ** rng.uniform(-6, 0)
         low, high = np.sort(rng.uniform(-3.0, 3.2, 2))
@@ -74,7 +74,7 @@ def test_unit_vectors_lie_in_their_model(dimension):
     """Whatever is left of the vectors, in the largest box and ball that the bounds allow."""
     rng = np.random.default_rng(dimension)
     told = 0
-    for _ in range(1000):
+    for _ in range(600):
         centre = rng.normal(size=(1, dimension)) * 10.0 ** rng.uniform(-2, 2)
         size = np.linalg.norm(centre)
         axis = centre / size
@@ -94,7 +94,7 @@ def test_unit_vectors_lie_in_their_model(dimension):
         unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
         left = unit - c - np.einsum("kc,cd->kd", x, g[0])
         assert np.linalg.norm(left, axis=1).max() <= radius[0] + 1e-12
-    assert told > 300
+    assert told > 180
 
 
 def test_vectors_that_may_be_zero_have_a_model_that_always_holds():
@@ -119,7 +119,7 @@ def test_a_part_above_two_others_holds_both():
     none = np.full((400, 2), -1)
     parts = SurfaceParts(both.centre, both.slopes, both.radius, none, none[:, 0])
     for models in (one, other):
-        for _ in range(50):
+        for _ in range(20):
             x = rng.choice(SIGNS, (400, 2))
             off = rng.normal(size=(400, 2, 3))
             off *= models.radius[..., None] / np.linalg.norm(off, axis=2, keepdims=True)

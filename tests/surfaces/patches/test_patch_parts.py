@@ -93,7 +93,7 @@ def test_radii_over_small_boxes_are_right_and_near_the_least_possible(patch):
     grid = np.linspace(-1.0, 1.0, 21)
     x = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
     affine = np.column_stack([np.ones(len(x)), x])
-    for _ in range(20):
+    for _ in range(10):
         middle = rng.uniform(ends[:, 0], ends[:, 1])
         half = np.diff(ends)[:, 0] * rng.uniform(1e-3, 0.02, 2)
         models = patch.part_models((middle - half)[None], (middle + half)[None])

@@ -17,6 +17,7 @@ VASE = [(0.2, 0.0), (0.35, 0.2), (0.15, 0.5), (0.25, 0.7)]
 BOWL = [(0.0, -0.4), (0.2, -0.35), (0.4, -0.1), (0.45, 0.1)]
 HEIGHT = np.linspace(0.0, 1.0, 200)
 WAVES = np.column_stack([0.3 + 0.03 * np.sin(20.0 * HEIGHT), HEIGHT])
+RIPPLES = np.column_stack([0.3 + 0.001 * np.sin(20.0 * HEIGHT), HEIGHT])
 BARREL, BARREL_WEIGHTS = turned([(0.3, 0), (0.5, 0.5), (0.2, 1)], [1, 2, 1], *full_turn())
 WEIGHTS = 10.0 ** RNG.uniform(-1.0, 1.0, (6, 7))
 TWICE = np.array([0, 0, 0, 0, 0.5, 0.5, 1, 1, 1, 1])
@@ -25,6 +26,8 @@ PATCHES = {
     "vase": revolution(VASE, angle_deg=(0, 360), **POSE),
     "bowl": revolution(BOWL, angle_deg=(-180, 180), side="outside"),
     "waves": revolution(WAVES, angle_deg=(10, 70)),
+    "ripples": revolution(RIPPLES, angle_deg=(10, 12), **POSE),
+    "ripples on a disc": revolution(RIPPLES[:, ::-1] + [0.1, 0.0], angle_deg=(10, 12)),
     "hood": bspline(hood(), **POSE),
     "weights from 0.1 to 10": bspline(hood(), weights=WEIGHTS, side="outside", **POSE),
     "a part of degree 5": bspline(hood(9, 8), degree=(5, 2), u=(0.21, 0.77), v=(0.1, 0.5)),

@@ -12,7 +12,7 @@ EAST, WEST = (sphere(0.5, (20, 90), ends) for ends in ((0, 180), (180, 360)))
 JOINED = {
     "zone": piecewise([EAST, WEST], **POSE),
     "turned": piecewise(
-        [plane((0.0, 0.2), (0.0, 0.2)), plane((0.0, 0.2), (-0.2, 0.0), rpy_deg=(180, 0, 180))]
+        [plane((0.0, 0.2), (0.0, 0.2)), plane((0.0, 0.2), (0.0, 0.2), rpy_deg=(180, 0, 180))]
     ),
     "can": piecewise(
         [
@@ -31,6 +31,7 @@ JOINED = {
 @pytest.mark.parametrize("name", JOINED)
 def test_every_place_of_every_piece_lies_in_its_parts(name):
     surface = JOINED[name]
+    assert any(surface.turned) == (name == "turned")
     parts = surface.parts(2e-3, 0.05, 2000)
     count = len(surface.pieces)
     above = np.full(len(parts), -1)

@@ -20,9 +20,9 @@ def test_a_case_that_falls_apart_does_so_whatever_its_surface_is_made_of(number)
 
 def test_a_feasible_case_is_never_proved_whatever_its_surface_is_made_of():
     rng, refused = np.random.default_rng(5), 0
-    for problem in stored("puma560", feasible=True)[::9]:
+    for problem in stored("puma560", feasible=True)[::14]:
         for kind, case in remade_problems(PUMA, problem):
             outcome = proved_though_covered(*case, rng, halves)
             assert outcome is not True, (problem.kind, kind)
             refused += outcome is False
-    assert refused >= 5
+    assert refused >= 4
