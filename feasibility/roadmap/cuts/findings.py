@@ -17,7 +17,7 @@ from robots.chain import tool
 
 SAMPLES = 100  # Newton tries onto the motion set, each attempt
 MOST_SAMPLES = 600
-CUT_TRIES = 60  # Newton tries on a cut before branch and bound
+CUT_TRIES = 30  # Newton tries on a cut before branch and bound
 ENOUGH = 3  # hits on a cut that end them
 LEAF_TRIES = 8  # Newton tries on a cell
 MOST_KEPT = 200  # unfinished statements
