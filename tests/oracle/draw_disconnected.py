@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import puma_oracle
 import ur5_oracle
+from following import Arm, settled
 from oracle_build import built
 from oracle_cases import Problem
 from random_cases import (
@@ -39,6 +40,7 @@ from feasibility import CauseKind, check
 from robots import load_robot
 
 SEEDS = {"puma560": 41, "ur5": 42, "panda": 43}
+STARTS = 12
 WANTED = {"puma560": 120, "ur5": 60, "panda": 40}
 
 
@@ -80,6 +82,22 @@ def draw_by_oracle(rng: np.random.Generator, arm: str) -> Apart | None:
     return on_patch(arm, problem)
 
 
+def reached_alone(problem: Problem, rng: np.random.Generator) -> bool:
+    """Whether inverse kinematics from a few random starts reaches every cell of the panda's."""
+    robot, cells, task = built(problem, load_robot("panda"))
+    arm, targets = Arm(robot), task.targets(cells)
+    chord = task.cone_chord + 1e-6
+    for point, approach in zip(targets.points, targets.approaches, strict=True):
+        for _ in range(STARTS):
+            found = arm.tool(settled(arm, arm.random(rng), point, approach, task.cone))
+            off = np.linalg.norm(found[0] - point), np.linalg.norm(found[1] - approach)
+            if off[0] < 1e-5 and off[1] <= chord:
+                break
+        else:
+            return False
+    return True
+
+
 def draw_panda(rng: np.random.Generator) -> Apart | None:
     """One problem for the panda that a search reaches all cells of, without joining all."""
     robot = load_robot("panda")
@@ -103,6 +121,8 @@ def draw_panda(rng: np.random.Generator) -> Apart | None:
     plain = problem.plain()
     plain["position"] = _round(place - middle)
     problem = Problem.read(plain)
+    if not reached_alone(problem, rng):
+        return None
     verdict = check(*built(problem, robot))
     alone = all(cause.kind is CauseKind.DISCONNECTED for cause in verdict.causes)
     return None if verdict.feasible or not alone else Apart(problem, None, None)
