@@ -35,6 +35,7 @@ FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search sho
 EXTRA = 3  # the same, for margins that are still wide once the others have had their share
 ALL_IN_ALL = 35  # verdicts of the case itself: all, with what `check` alone finds at thresholds
 LEAST = 20_000  # evaluations that they may always take
+CHECKED = 0.75  # [1] of that, spent at most before `check` itself is asked about a threshold
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
 SAME = 0.05  # [1], postures nearer than that are taken for one, see `_posture`
@@ -128,11 +129,29 @@ def _explained(
     motion = None if verdict.feasible else _over_given(prober, verdict, searches)
     if motion is None:
         most = max(ALL_IN_ALL * float(verdict.statistics["fk"]), 2.0 * LEAST)
-        done = [made.alone(found, most) for made, found in zip(searches, done, strict=True)]
+        done = [_alone(made, found, most) for made, found in zip(searches, done, strict=True)]
     left_out = tuple(quantity.name for quantity in varied[len(done) :])
     seconds = time.monotonic() - began
     found = Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds)
     return found, motion
+
+
+def _alone(made: ThresholdSearch, found: Threshold, most: float) -> Threshold:
+    """The same threshold; its feasible side tells whether `check` alone finds it, if that is known.
+
+    What a short search misses, `check` itself is asked about, up to `most` evaluations in all.
+    """
+    found, prober = made.alone(found, most), made.prober
+    if found.feasible is None or found.feasible.unaided is not False or made.good is None:
+        return found
+    left, unaided = prober.deadline - time.monotonic(), None
+    if prober.spent < CHECKED * most and left > 0.0:
+        limit = left if np.isfinite(left) else None
+        variant = made.quantity.applied(prober.given, made.good.k)
+        verdict = check(*variant, Search(seed=prober.seed, time_limit=limit))
+        prober.spent_before += int(verdict.statistics["fk"])
+        unaided = verdict.feasible
+    return replace(found, feasible=replace(found.feasible, unaided=unaided))
 
 
 def _over_given(
