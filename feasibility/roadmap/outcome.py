@@ -60,16 +60,19 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
             f"proved uncoverable {problem.within} ({named}{more}); the best motion covers "
             f"{exploration.n_covered} of {total}."
         )
+    if proving.unable or proving.attempts == 0 or proving.starved:
+        return ""
     kept = [gap for gap in proving.blocked if gap.points > 0]
-    if kept and not any(gap.points == 0 for gap in proving.blocked):
-        where = _between(problem.robot, max(kept, key=lambda gap: gap.high - gap.low))
-        return (
-            f"Every cell is reached, but by no single motion that was found (the best covers "
-            f"{exploration.n_covered} of {total}); nor is there a proof, because the arm has "
-            f"configurations on the surface between the parts, such as with {where}. A motion "
-            "through them may have been missed; another seed or finer cells may find it."
-        )
-    return ""
+    where = ""
+    if kept:
+        widest = max(kept, key=lambda gap: gap.high - gap.low)
+        where = f", such as with {_between(problem.robot, widest)}"
+    return (
+        f"Every cell is reached, but by no single motion that was found (the best covers "
+        f"{exploration.n_covered} of {total}); nor is there a proof, because the arm has "
+        f"configurations on the surface between the parts{where}. A motion through them may have "
+        "been missed; another seed or finer cells may find it."
+    )
 
 
 def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving) -> str:

@@ -30,6 +30,8 @@ class Proving:
     task: Task
     blocked: tuple[Blocked, ...] = ()
     """What kept the last attempt, see `Attempt.blocked`."""
+    starved: bool = False
+    """Did the last attempt run out of boxes? Otherwise it had nothing left to prove."""
     boxes: int = 0
     attempts: int = 0
     unable: str = ""
@@ -73,6 +75,7 @@ class Proving:
         self.boxes += made.boxes
         exploration.cut_tree, self.blocked = made.tree, made.blocked
         self._left = made.boxes_left
+        self.starved = made.boxes >= budget
         before = exploration.sizes()
         for cell, q in made.seeds:
             exploration.add_seeds(cell, wound(exploration.arrays, q)[None])
