@@ -39,9 +39,13 @@ from random_cases import (
 from feasibility import CauseKind, check
 from robots import load_robot
 
-SEEDS = {"puma560": 41, "ur5": 42, "panda": 43}
 STARTS = 12
-WANTED = {"puma560": 120, "ur5": 60, "panda": 40}
+JOBS = {
+    # arm: (seed, problems wanted) of each run
+    "puma560": ((41, 120),),
+    "ur5": ((42, 19), (142, 14)),
+    "panda": ((43, 34),),
+}
 
 
 class Apart(NamedTuple):
@@ -98,6 +102,20 @@ def reached_alone(problem: Problem, rng: np.random.Generator) -> bool:
     return True
 
 
+def narrower(rng: np.random.Generator, problem: Problem) -> Problem:
+    """The problem with a narrower cone, or with one end of a joint's range moved inwards."""
+    plain = problem.plain()
+    if rng.random() < 0.5:
+        plain["cone_deg"] = round(max(problem.cone_deg * rng.uniform(0.4, 0.8), 3.0), 2)
+    else:
+        limits, joint = [list(pair) for pair in problem.limits_deg], rng.integers(7)
+        moved = (limits[joint][1] - limits[joint][0]) * float(rng.uniform(0.15, 0.5))
+        end = int(rng.integers(2))
+        limits[joint][end] = round(limits[joint][end] + (-moved if end else moved), 4)
+        plain["limits_deg"] = limits
+    return Problem.read(plain)
+
+
 def draw_panda(rng: np.random.Generator) -> Apart | None:
     """One problem for the panda that a search reaches all cells of, without joining all."""
     robot = load_robot("panda")
@@ -121,9 +139,13 @@ def draw_panda(rng: np.random.Generator) -> Apart | None:
     plain = problem.plain()
     plain["position"] = _round(place - middle)
     problem = Problem.read(plain)
-    if not reached_alone(problem, rng):
-        return None
-    verdict = check(*built(problem, robot))
+    for _ in range(MOST_STEPS):
+        if not reached_alone(problem, rng):
+            return None
+        verdict = check(*built(problem, robot))
+        if not verdict.feasible:
+            break
+        problem = narrower(rng, problem)
     alone = all(cause.kind is CauseKind.DISCONNECTED for cause in verdict.causes)
     return None if verdict.feasible or not alone else Apart(problem, None, None)
 
@@ -133,10 +155,10 @@ def draw(rng: np.random.Generator, arm: str) -> Apart | None:
     return draw_panda(rng) if arm == "panda" else draw_by_oracle(rng, arm)
 
 
-def collect(arm: str, wanted: int, seed: int, path: Path) -> int:
-    """Draw until there are enough, and write them; returns how many were drawn."""
-    rng, kept, drawn = np.random.default_rng(seed), list[dict[str, Any]](), 0
-    while len(kept) < wanted:
+def collect(arm: str, wanted: int, seed: int, path: Path, kept: list[dict[str, Any]]) -> int:
+    """Add problems until so many are new, writing all; returns how many were drawn."""
+    rng, drawn, most = np.random.default_rng(seed), 0, len(kept) + wanted
+    while len(kept) < most:
         found, drawn = draw(rng, arm), drawn + 1
         if found is not None:
             rest = found._asdict()
@@ -157,10 +179,12 @@ def read_apart(arm: str) -> list[Apart]:
 def main() -> None:
     """Draw and write."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("arms", nargs="*", default=list(WANTED))
+    parser.add_argument("arms", nargs="*", default=list(JOBS))
     for arm in parser.parse_args().arms:
-        drawn = collect(arm, WANTED[arm], SEEDS[arm], HERE / f"{arm}_apart.json")
-        sys.stderr.write(f"{arm}: {WANTED[arm]} of {drawn} drawn\n")
+        kept = list[dict[str, Any]]()
+        for seed, wanted in JOBS[arm]:
+            drawn = collect(arm, wanted, seed, HERE / f"{arm}_apart.json", kept)
+            sys.stderr.write(f"{arm}: {wanted} of {drawn} drawn\n")
 
 
 if __name__ == "__main__":
