@@ -14,6 +14,7 @@ import numpy as np
 
 from feasibility.roadmap.cuts import Blocked, Prover, components_of, places_on
 from feasibility.roadmap.exploration import Exploration, wound
+from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
 from surfaces import SurfaceError
 
@@ -82,8 +83,15 @@ class Proving:
         return exploration.sizes() != before
 
     def _ready(self) -> Prover | None:
-        """The prover, made when it is first needed; None where the surface has no bounds."""
+        """The prover, made when it is first needed; None where there is to be none.
+
+        Over a sharp seam between pieces the targets jump. A tool may well go round in an arc, which
+        is not certified, nor ruled out: that nothing is on the surface in between proves nothing.
+        """
         if self._prover is None and not self.unable:
+            self.unable = blocked_curves(self.exploration.cells, self.task)
+            if self.unable:
+                return None
             try:
                 places = places_on(self.exploration.cells.surface, self.task)
             except SurfaceError as error:

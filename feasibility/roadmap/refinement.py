@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.clock import Clock
 from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import (
@@ -37,6 +38,7 @@ from surfaces import Finer
 # Each cell is cut into so many by so many, until a motion is found: at first, and in the end.
 COARSE, FINE = (3,), (9, 27)
 MOST_CELLS = 20_000  # finer cells; more are not tried
+MOST_EVALUATIONS = 400_000  # of the arm, over one set of finer cells
 BRIDGES = 24  # pairs of nodes that a round tries to bridge for each two components
 BRIDGING_ROUNDS, ROUNDS = 4, 2  # without gain: of bridges alone, and of self-motions too
 TOP = 4  # components that a round works on
@@ -69,7 +71,8 @@ def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
     finer.cells.curves  # noqa: B018 - part of the cells, made once
     arrays = arrays_of(exploration.robot, finer.cells, task)
     arrays = arrays._replace(off_target_cost=exploration.arrays.off_target_cost)
-    fine = Exploration(exploration.robot, finer.cells, arrays, exploration.seed, exploration.clock)
+    fine = Exploration(exploration.robot, finer.cells, arrays, exploration.seed)
+    fine.clock = _Budget(exploration, fine)
     origin = _put_there(exploration, fine, finer.same)
     try:
         fine.spread()
@@ -82,9 +85,30 @@ def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
                 improve(fine, fine.roots()[:TOP])
             else:
                 _bridge(fine)
+    except _BudgetSpentError:
+        _take_over(exploration, fine, finer.same, origin)
     finally:
         exploration.work.counts[0] += fine.work.counts[0]
     exploration.spread()
+
+
+class _BudgetSpentError(Exception):
+    """The search over one set of finer cells has taken enough."""
+
+
+class _Budget(Clock):
+    """The clock of a search, for one over finer cells, which it ends after so many evaluations."""
+
+    def __init__(self, exploration: Exploration, fine: Exploration) -> None:
+        """Tick for `exploration`, until `fine` has spent its budget."""
+        super().__init__()
+        self._exploration, self._fine = exploration, fine
+
+    def tick(self, done: int, total: int | None, text: str) -> None:
+        """See `Clock.tick`; the cells reported are those of the search itself."""
+        self._exploration.tick(f"finer cells: {text}")
+        if self._fine.work.counts[0] > MOST_EVALUATIONS:
+            raise _BudgetSpentError
 
 
 def _bridge(fine: Exploration) -> None:
