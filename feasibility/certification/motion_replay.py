@@ -94,8 +94,9 @@ def _largest_tilt(
     figure, which is taken where it is inside the cone.
     """
     share = 1.0 if beside else 0.0
-    error, chord, curvature = matched.error, matched.chord, share * matched.derivative_bounds[:, 2]
+    error, chord = matched.error, matched.chord
     with np.errstate(invalid="ignore", over="ignore"):  # a fold: inf * 0 is NaN, and refused
+        curvature = share * matched.derivative_bounds[:, 2]
         bound = axis_bound + curvature * derivative_bound
         before = chord[:-1] + curvature * error[:-1]
         after = chord[1:] + curvature * error[1:]

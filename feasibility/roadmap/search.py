@@ -32,6 +32,7 @@ RESTARTS = 6  # cells seeded anew before a search counts as exhausted
 TOP = 5  # components that a round works on
 DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
 SETTLED_ROUNDS = 12  # the same once a proof decides the verdict, and only more cells can be gained
+PARTED_ROUNDS = 3  # the same once a cut tree parts the components found
 MOST_ROUNDS = 200
 SEEDS = 6  # guesses at a missed cell, each round
 FIRST_BOXES = 1000  # boxes for each cell that no component has reached
@@ -145,7 +146,6 @@ def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
 def _rounds(exploration: Exploration, between: Between | None) -> None:
     """Step 3: rounds of seeding and exploring, until some in a row have gained nothing."""
     dry = 0
-    enough = SETTLED_ROUNDS if exploration.proved else DRY_ROUNDS
     for _ in range(MOST_ROUNDS):
         roots = exploration.roots()
         if not roots or not exploration.apart:
@@ -154,12 +154,17 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
         _round(exploration, roots[:TOP])
         exploration.rounds += 1
         dry = dry + 1 if exploration.sizes(TOP) == before else 0
-        if exploration.complete or dry >= enough:
+        if exploration.complete or dry >= _enough(exploration):
             return
-        if between is not None and between(dry):
+        if exploration.cut_tree is None and between is not None and between(dry):
             dry = 0
-        if exploration.complete or exploration.cut_tree is not None:
-            return
+
+
+def _enough(exploration: Exploration) -> int:
+    """Rounds without gain after which they end; fewer once a proof decides the verdict."""
+    if exploration.cut_tree is not None:
+        return PARTED_ROUNDS
+    return SETTLED_ROUNDS if exploration.proved else DRY_ROUNDS
 
 
 def _round(exploration: Exploration, top: list[int]) -> None:

@@ -28,7 +28,7 @@ def between_curves():
         (-97.7319, 58.855),
         (-54.7743, 94.7147),
     ]
-    robot = load_robot("puma560", limits_deg=limits)
+    robot = load_robot("puma560", limits=np.radians(limits))
     ball = sphere(
         0.3868,
         polar_deg=(47.0011, 150.9195),

@@ -39,7 +39,7 @@ def cubic_extrema(run: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     return np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))
 
 
-@pytest.mark.parametrize("name", ["5c", "panda"])
+@pytest.mark.parametrize("name", ["panda"])
 def test_the_cubics_between_samples_stay_inside_the_limits(name):
     path = tight_path(name)
     run = trajectory(path, SPEED)
