@@ -24,9 +24,9 @@ class Checked(NamedTuple):
     truth: Answer
 
 
-@pytest.fixture(scope="module", params=range(CHUNKS))
+@pytest.fixture(scope="module", params=(1, 3, 5, 7))
 def checked(request) -> list[Checked]:
-    """Every eighth of the stored problems, searched once."""
+    """An eighth of the stored problems; `make campaign NAME=stored_cases` has all of them."""
     found = []
     for name in ARMS:
         arm = load_robot(name)
