@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
@@ -30,17 +30,18 @@ def joint_value(robot: Robot, joint: int, value: float) -> str:
 
 def place_of(cut: Cut, robot: Robot) -> str:
     """Where a cut is: "joint3 = -82 deg", or a sum of joints."""
-    if cut.joint is not None:
-        return f"{robot.joint_names[cut.joint]} = {joint_value(robot, cut.joint, cut.value)}"
-    return f"{_sum(cut, robot)} = {_sum_value(cut, robot)}"
+    return hyperplane(cut.weights, cut.value, robot)
+
+
+def hyperplane(weights: ArrayLike, value: float, robot: Robot) -> str:
+    """Where w . q = t: "joint3 = -82 deg", or a sum of joints."""
+    return f"{sum_of(weights, robot)} = {sum_value(weights, value, robot)}"
 
 
 def nowhere(cut: Cut, robot: Robot, where: str = "on the surface") -> str:
     """What a cut says: "nowhere on the surface can joint3 be -82 deg"."""
-    if cut.joint is not None:
-        name = robot.joint_names[cut.joint]
-        return f"nowhere {where} can {name} be {joint_value(robot, cut.joint, cut.value)}"
-    return f"nowhere {where} can {_sum(cut, robot)} be {_sum_value(cut, robot)}"
+    value = sum_value(cut.weights, cut.value, robot)
+    return f"nowhere {where} can {sum_of(cut.weights, robot)} be {value}"
 
 
 def opened(tree: CutTree, robot: Robot) -> list[str]:
@@ -134,25 +135,24 @@ def _cell(leaf: Leaf, cells: Cells) -> list[int]:
     return list(cells.unravel(leaf.cell))
 
 
-def _sum(cut: Cut, robot: Robot) -> str:
-    """A weighted sum of joints: "0.6 joint2 - 0.8 joint3"."""
-    text = ""
-    for j in np.flatnonzero(cut.weights):
-        weight, name = cut.weights[j], robot.joint_names[j]
+def sum_of(weights: ArrayLike, robot: Robot) -> str:
+    """A joint's name, or a weighted sum of joints: "0.6 joint2 - 0.8 joint3"."""
+    text, weights = "", np.asarray(weights, dtype=float)
+    for j in np.flatnonzero(weights):
+        weight, name = weights[j], robot.joint_names[j]
         sign = ("-" if weight < 0.0 else "") if not text else (" - " if weight < 0.0 else " + ")
         times = "" if abs(weight) == 1.0 else f"{abs(weight):.3g} "
         text += f"{sign}{times}{name}"
     return text
 
 
-def _sum_value(cut: Cut, robot: Robot) -> str:
-    """The value of a weighted sum, with the unit that all its joints share."""
-    slides = robot.prismatic[np.flatnonzero(cut.weights)]
-    if slides.all():
-        return f"{_number(1e3 * cut.value)} mm"
-    if not slides.any():
-        return f"{_number(math.degrees(cut.value))} deg"
-    return f"{cut.value:.4g} (joints in radians and metres)"
+def sum_value(weights: ArrayLike, value: float, robot: Robot) -> str:
+    """The value of a weighted sum of joints, with the unit that they share."""
+    joints = np.flatnonzero(np.asarray(weights, dtype=float))
+    slides = robot.prismatic[joints]
+    if slides.all() or not slides.any():
+        return joint_value(robot, int(joints[0]), value)
+    return f"{value:.4g} (joints in radians and metres)"
 
 
 def _number(value: float) -> str:

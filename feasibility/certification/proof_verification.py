@@ -34,8 +34,9 @@ from feasibility.certification.linear_models import (
 from feasibility.certification.parts_agreement import disagreement
 from feasibility.certification.refutation import Refuter
 from feasibility.certification.region import TURN, Region
-from feasibility.certification.tree_shape import malformed, named_cut
+from feasibility.certification.tree_shape import malformed
 from feasibility.cut_tree import Cut, CutTree, Leaf
+from feasibility.cut_words import hyperplane
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells, SurfaceError, SurfaceParts
@@ -156,7 +157,7 @@ def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: Region) -> Iterat
         at = limits.low.copy(), limits.high.copy()
         at[0][joint] = at[1][joint] = value
         opened = np.eye(robot.n)[joint]
-        yield Claim(f"the opening {named_cut(robot, opened, value)}", Region.box(*at), None)
+        yield Claim(f"the opening {hyperplane(opened, value, robot)}", Region.box(*at), None)
         low[joint], high[joint] = value, value + TURN
     waiting: list[tuple[Cut | Leaf, Region]] = [(tree.root, Region.box(low, high))]
     leaves = 0
@@ -168,7 +169,7 @@ def _claims(robot: Robot, cells: Cells, tree: CutTree, limits: Region) -> Iterat
             yield Claim(f"leaf {leaves} (cell {name})", region, node.cell)
             continue
         weights = np.array(node.weights)
-        what = f"the cut {named_cut(robot, weights, node.value)}"
+        what = f"the cut {hyperplane(weights, node.value, robot)}"
         yield Claim(what, region.within(weights, node.value, node.value), None)
         waiting.append((node.above, region.within(weights, node.value, np.inf)))
         waiting.append((node.below, region.within(weights, -np.inf, node.value)))

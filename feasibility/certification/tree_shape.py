@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from robots import Robot
@@ -94,15 +93,3 @@ def _is_index(value: object, count: int) -> bool:
 def _is_number(value: object) -> bool:
     """Is it a finite number?"""
     return isinstance(value, float | int | np.floating | np.integer) and math.isfinite(value)
-
-
-def named_cut(robot: Robot, weights: NDArray[np.float64], value: float) -> str:
-    """A cut in words: "joint3 = -81.9 deg", or "joint1 + 0.5 joint2 = 1.2" in rad and m."""
-    (weighed,) = np.nonzero(weights)
-    if len(weighed) == 1:
-        j = weighed[0]
-        at = value / weights[j]
-        unit = f"{at:.4f} m" if robot.prismatic[j] else f"{np.degrees(at):.1f} deg"
-        return f"{robot.joint_names[j]} = {unit}"
-    terms = " + ".join(f"{weights[j]:.4g} {robot.joint_names[j]}" for j in weighed)
-    return f"{terms} = {value:.4g} (rad, m)"

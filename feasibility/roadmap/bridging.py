@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from feasibility.roadmap.arrays import SearchArrays, Work, aim
 from feasibility.roadmap.expansion import CONNECT_STEPS
-from feasibility.roadmap.graph import NODES, WAYPOINTS, Roadmap, add_edge, root_of, unite
+from feasibility.roadmap.graph import NODES, Roadmap, add_motion, root_of
 from feasibility.roadmap.self_motion import connect
 from feasibility.roadmap.tracking import MOST_STEPS, track
 
@@ -86,10 +86,7 @@ def bridge(
     # From x to the point, the self-motion there, and the motion from y backwards.
     motion = np.vstack([waypoints[0], between, waypoints[1][-2::-1], roadmap.q[y][None]])
     roadmap = reserve(len(motion))
-    first = roadmap.counters[WAYPOINTS]
-    roadmap.waypoints[first : first + len(motion)] = motion
-    add_edge(roadmap, x, y, len(motion))
-    unite(roadmap, roadmap.component[x], roadmap.component[y])
+    add_motion(roadmap, x, y, motion)
     return True
 
 

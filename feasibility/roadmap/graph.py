@@ -189,6 +189,17 @@ def add_edge(roadmap, x, y, rows):  # type: ignore[no-untyped-def]
     count[WAYPOINTS] += rows
 
 
+def add_motion(roadmap: Roadmap, x: int, y: int, motion: NDArray[np.float64]) -> None:
+    """Add an edge from node x to node y by a motion (k, n), its first configuration left out.
+
+    Their components become one. The arrays need space for it, see `Exploration.reserve`.
+    """
+    first = roadmap.counters[WAYPOINTS]
+    roadmap.waypoints[first : first + len(motion)] = motion
+    add_edge(roadmap, x, y, len(motion))
+    unite(roadmap, roadmap.component[x], roadmap.component[y])
+
+
 @kernel
 def joined_pairs(roadmap, pairs, component, state):  # type: ignore[no-untyped-def]
     """Mark the pairs of cells that an edge of the component joins already (state = 1)."""

@@ -23,6 +23,7 @@ from feasibility.roadmap.projection import (
 SLACK = 1e-3  # [1] share of the cone chord that is kept free
 GAIN = 1e-4  # [1] a step that brings the tool point nearer by a smaller share is the last
 STEPS = np.int64(40)  # from a guess
+STEPS_FROM_NEAR = np.int64(15)  # from the step before, of a track or a self-motion
 LEAST, FIRST, MOST = 1e-9, 1e-4, 10.0  # [1] damping, a share of the rows' squares
 CONE_WEIGHT = 10.0  # [1] of the cone's row beside those of the tool point
 

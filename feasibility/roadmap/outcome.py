@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from feasibility.cut_tree import CutTree, Leaf
-from feasibility.cut_words import sentence
+from feasibility.cut_words import sentence, sum_of, sum_value
 from feasibility.problem import Problem
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.cuts import Blocked
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.proving import Proving
 from feasibility.target_curves import blocked_curves
-from robots import Robot
 
 
 def proof_of(exploration: Exploration) -> CutTree | None:
@@ -66,7 +62,11 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
     where = ""
     if kept:
         widest = max(kept, key=lambda gap: gap.high - gap.low)
-        where = f", such as with {_between(problem.robot, widest)}"
+        low, high = (
+            sum_value(widest.weights, value, problem.robot) for value in (widest.low, widest.high)
+        )
+        name = sum_of(widest.weights, problem.robot)
+        where = f", such as with {name} between {low} and {high}"
     return (
         f"Every cell is reached, but by no single motion that was found (the best covers "
         f"{exploration.n_covered} of {total}); nor is there a proof, because the arm has "
@@ -88,17 +88,3 @@ def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving
         f"by no single component; the best covers {exploration.n_covered} of "
         f"{len(problem.cells)} cells ({nodes} nodes, {', '.join(tried)}, seed {exploration.seed})."
     )
-
-
-def _between(robot: Robot, gap: Blocked) -> str:
-    """The interval of a gap in words."""
-    joints = np.flatnonzero(gap.weights)
-    slides = bool(robot.prismatic[joints[0]])
-    low, high = (value * 1e3 if slides else math.degrees(value) for value in (gap.low, gap.high))
-    names = " + ".join(
-        robot.joint_names[j]
-        if gap.weights[j] == 1.0
-        else f"{gap.weights[j]:.3g} {robot.joint_names[j]}"
-        for j in joints
-    )
-    return f"{names} between {low:.1f} and {high:.1f} {'mm' if slides else 'deg'}"

@@ -172,28 +172,20 @@ def tilts(work, goal):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def cone_step(arrays, work, q, goal, narrow, damping):  # type: ignore[no-untyped-def]
+def cone_step(arrays, work, q, goal, narrow):  # type: ignore[no-untyped-def]
     """`least_step` with the cone: by both tilts where it is narrow, as long as joints suffice."""
     if narrow:
-        kept = work.rhs[3]
         tilts(work, goal)
-        if least_step(arrays, work, q, POINT_AND_TILTS, damping):
+        if least_step(arrays, work, q, POINT_AND_TILTS, DAMPING):
             free = 0
             for j in range(q.shape[0]):
                 if not work.held[j]:
                     free += 1
             if free >= POINT_AND_TILTS:
                 return True
-        chord = work.error[1, 1]
-        if not chord > 1e-12:
+        if not linearise(arrays, work, NEXT, goal) > 0.0:
             return False
-        work.rhs[3] = kept
-        for j in range(q.shape[0]):
-            total = 0.0
-            for k in range(3):
-                total += (work.axis[1, k] - work.target[1, k]) * work.axis_rows[k, j]
-            work.rows[3, j] = total / chord
-    return least_step(arrays, work, q, POINT_AND_CONE, damping)
+    return least_step(arrays, work, q, POINT_AND_CONE, DAMPING)
 
 
 @kernel
@@ -251,14 +243,14 @@ def project(arrays, work, q, slack, before, most):  # type: ignore[no-untyped-de
         work.stop_reason[1] = -1
         cone = chord > goal and usable
         if cone:
-            done = cone_step(arrays, work, q, goal, narrow, DAMPING)
+            done = cone_step(arrays, work, q, goal, narrow)
         else:
             done = least_step(arrays, work, q, POINT, DAMPING)
         # Would the step leave the cone? Then repeat it along the boundary of the cone.
         near = narrow or chord > 0.3 * goal
         if done and not cone and usable and near and predicted_chord(work) > goal:
             cone = True
-            done = cone_step(arrays, work, q, goal, narrow, DAMPING)
+            done = cone_step(arrays, work, q, goal, narrow)
         if not done and cone and goal < hard and chord > 1e-12:
             if narrow:
                 linearise(arrays, work, NEXT, hard)

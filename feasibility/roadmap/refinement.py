@@ -22,13 +22,11 @@ from feasibility.roadmap.graph import (
     COMPONENTS,
     EDGES,
     NODES,
-    WAYPOINTS,
     Roadmap,
-    add_edge,
+    add_motion,
     add_node,
     grown,
     root_of,
-    unite,
 )
 from feasibility.roadmap.search import improve
 from feasibility.roadmap.walk import edge_motion
@@ -76,15 +74,14 @@ def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
     origin = _put_there(exploration, fine, finer.same)
     try:
         fine.spread()
-        dry = 0
+        dry = 0 if _take_over(exploration, fine, finer.same, origin) else 1
         while exploration.apart and dry <= BRIDGING_ROUNDS + ROUNDS:
-            gained = _take_over(exploration, fine, finer.same, origin)
-            dry = 0 if gained else dry + 1
             fine.rounds += 1
             if dry > BRIDGING_ROUNDS:
                 improve(fine, fine.roots()[:TOP])
             else:
                 _bridge(fine)
+            dry = 0 if _take_over(exploration, fine, finer.same, origin) else dry + 1
     except _BudgetSpentError:
         _take_over(exploration, fine, finer.same, origin)
     finally:
@@ -157,7 +154,7 @@ def _take_over(
         if _root(exploration, x) != _root(exploration, y):
             back = routes.to(b)[::-1]
             motion = np.vstack([routes.to(a), edge_motion(fine.roadmap, edge)[1:], back[1:]])
-            _add_motion(exploration, x, y, motion)
+            add_motion(exploration.reserve(len(motion)), x, y, motion[1:])
             gained = True
     cell_of = np.full(len(fine.cells), -1)
     cell_of[same] = np.arange(len(same))
@@ -170,7 +167,7 @@ def _take_over(
             roadmap = exploration.reserve(0)
             y = add_node(exploration.arrays, exploration.work, roadmap, cell, motion[-1], own)
             origin[node] = int(y)
-            _add_motion(exploration, x, int(y), motion)
+            add_motion(exploration.reserve(len(motion)), x, int(y), motion[1:])
             gained = True
     return gained
 
@@ -178,15 +175,6 @@ def _take_over(
 def _root(exploration: Exploration, node: int) -> int:
     """The component of a node."""
     return int(root_of(exploration.roadmap, exploration.roadmap.component[node]))
-
-
-def _add_motion(exploration: Exploration, x: int, y: int, motion: NDArray[np.float64]) -> None:
-    """Add an edge with the waypoints of a motion (k, n) from node x to node y."""
-    roadmap = exploration.reserve(len(motion))
-    first = roadmap.counters[WAYPOINTS]
-    roadmap.waypoints[first : first + len(motion) - 1] = motion[1:]
-    add_edge(roadmap, x, y, len(motion) - 1)
-    unite(roadmap, roadmap.component[x], roadmap.component[y])
 
 
 class _Routes:

@@ -22,7 +22,7 @@ from feasibility.roadmap.arrays import (
     look_at,
     place,
 )
-from feasibility.roadmap.off_target import project_off_target
+from feasibility.roadmap.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.projection import (
     PROJECTION_STEPS,
     linearise,
@@ -33,7 +33,6 @@ from feasibility.roadmap.segment_bound import segment_holds
 
 CONE_SLACK = 1e-3  # [1] share of the cone chord kept free by a full step; less by a shorter one
 NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
-OFF_TARGET_STEPS = np.int64(15)  # of one step with the tool point off its target
 SETTLE_STEPS = np.int64(40)  # of `settle`
 
 
@@ -93,7 +92,7 @@ def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ign
     for j in range(q.shape[0]):
         work.trial[j] = q[j] + share * (goal[j] - q[j])
     place(arrays, work, NEXT, work.trial)
-    return project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
+    return project_off_target(arrays, work, work.trial, STEPS_FROM_NEAR)
 
 
 @kernel
@@ -183,7 +182,7 @@ def settle(arrays, work, target, approach, q, most):  # type: ignore[no-untyped-
         if not good and off_target:
             put(work.trial, q)
             place(arrays, work, NEXT, work.trial)
-            good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
+            good = project_off_target(arrays, work, work.trial, STEPS_FROM_NEAR)
         if good:
             position, cone = segment_holds(arrays, work, q, work.trial)
             good = position <= 1.0 and cone <= 1.0

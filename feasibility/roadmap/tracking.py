@@ -30,7 +30,7 @@ from feasibility.roadmap.arrays import (
     copy_slot,
     place,
 )
-from feasibility.roadmap.off_target import project_off_target
+from feasibility.roadmap.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.projection import linearise, project
 from feasibility.roadmap.segment_bound import segment_holds
 from feasibility.roadmap.self_motion import CONE_SLACK, margin_objective
@@ -39,7 +39,6 @@ SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step 
 OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool point off its target
 MOST_STEPS = 400  # accepted steps of one motion
 NEWTON_STEPS = np.int64(8)  # of one step
-OFF_TARGET_STEPS = np.int64(15)  # of one step off the target
 
 
 @kernel
@@ -63,7 +62,7 @@ def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
     if not good and off_target:
         put(work.trial, q)
         copy_slot(work)
-        good = project_off_target(arrays, work, work.trial, OFF_TARGET_STEPS)
+        good = project_off_target(arrays, work, work.trial, STEPS_FROM_NEAR)
     if not good:
         return np.inf, np.inf
     # Slot 0's errors are against the previous target: stored when that step was accepted.

@@ -50,6 +50,7 @@ def warm_up() -> None:
     from feasibility.roadmap.branch_and_bound import root_box
     from feasibility.roadmap.causes import diagnose
     from feasibility.roadmap.exploration import Exploration
+    from feasibility.roadmap.proving import Proving
     from feasibility.roadmap.search import close, explore
     from feasibility.roadmap.walk import covering_walk
     from feasibility.task import Task
@@ -64,6 +65,7 @@ def warm_up() -> None:
     close(exploration)
     exploration.explore_self_motions(0)
     exploration.rule(0, root_box(exploration.arrays), 1)
+    Proving(exploration, task).attempt(1)
     diagnose(exploration, 0)
     beyond = plane(width=(5.0, 5.02), length=(0.1, 0.12), side="outside").cells(1, 2)
     diagnose(Exploration(robot, beyond, arrays_of(robot, beyond, task), 0), 0)

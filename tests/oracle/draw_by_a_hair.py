@@ -10,9 +10,7 @@ Run this file to draw the cases again.
 
 from __future__ import annotations
 
-import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,7 +18,7 @@ import numpy as np
 from dense_replay import angles, placed
 from draw_tolerance_needed import ARMS, narrowed_limits, support
 from following import Arm
-from planted import HERE
+from planted import HERE, draw_and_write
 from set_down import KINDS, built, random_shape, rounded, set_down
 
 from robots import load_robot
@@ -83,34 +81,10 @@ def keeps(case: Hair) -> bool:
     return bool(inside and near and angles(axis[None], approach)[0] <= task.cone)
 
 
-def collect(wanted: int, seed: int) -> list[Hair]:
-    """Draw until there are enough."""
-    rng, kept, number = np.random.default_rng(seed), list[Hair](), 0
-    while len(kept) < wanted:
-        made = draw(rng, number)
-        number += 1
-        if made is not None:
-            kept.append(made)
-    return kept
-
-
 def read_hair(path: Path = HERE / "by_a_hair.json") -> list[Hair]:
     """The stored cases."""
     return [Hair(**case) for case in json.loads(path.read_text(encoding="utf-8"))]
 
 
-def main() -> None:
-    """Draw and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--wanted", type=int, default=120)
-    parser.add_argument("--seed", type=int, default=34)
-    parser.add_argument("--out", type=Path, default=HERE / "by_a_hair.json")
-    asked = parser.parse_args()
-    kept = collect(asked.wanted, asked.seed)
-    lines = ",\n".join(json.dumps(case._asdict(), separators=(",", ":")) for case in kept)
-    asked.out.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
-    sys.stderr.write(f"{len(kept)} cases\n")
-
-
 if __name__ == "__main__":
-    main()
+    draw_and_write(draw, __doc__, "by_a_hair", wanted=120, seed=34)

@@ -10,15 +10,12 @@ Run this file to draw the cases again.
 
 from __future__ import annotations
 
-import argparse
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from following import Arm, follow, measured, raster, settled
 from oracle_cases import Floats
-from planted import HERE, Planted, write_planted
+from planted import Planted, draw_and_write
 from set_down import KINDS, built, random_shape, rounded, set_down
 
 from robots import Robot, load_robot
@@ -105,28 +102,5 @@ def _over_first_cell(arm: Arm, setup: Any, first: Floats, q: Floats) -> Floats |
     return start if np.linalg.norm(arm.tool(start)[0] - target[0]) < 1e-6 else None
 
 
-def collect(wanted: int, seed: int) -> list[Planted]:
-    """Draw until there are enough."""
-    rng, kept, number = np.random.default_rng(seed), list[Planted](), 0
-    while len(kept) < wanted:
-        made = draw(rng, number)
-        number += 1
-        if made is not None:
-            kept.append(made)
-    return kept
-
-
-def main() -> None:
-    """Draw and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--wanted", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=32)
-    parser.add_argument("--out", type=Path, default=HERE / "narrow_cones.json")
-    asked = parser.parse_args()
-    kept = collect(asked.wanted, asked.seed)
-    write_planted(asked.out, kept)
-    sys.stderr.write(f"{len(kept)} cases\n")
-
-
 if __name__ == "__main__":
-    main()
+    draw_and_write(draw, __doc__, "narrow_cones", wanted=100, seed=32)

@@ -12,15 +12,12 @@ Run this file to draw the cases again.
 
 from __future__ import annotations
 
-import argparse
-import sys
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from following import Arm, Raster, follow, measured, raster
 from oracle_cases import Floats
-from planted import HERE, Planted, write_planted
+from planted import Planted, draw_and_write
 from scipy.optimize import minimize
 from set_down import KINDS, built, random_shape, rounded, set_down
 
@@ -145,28 +142,5 @@ def accepted(tables: dict[str, Any], q: Floats, share: float, name: str) -> Plan
     return Planted(name, tables, tuple(float(x) for x in q), "last", why)
 
 
-def collect(wanted: int, seed: int) -> list[Planted]:
-    """Draw until there are enough."""
-    rng, kept, number = np.random.default_rng(seed), list[Planted](), 0
-    while len(kept) < wanted:
-        made = draw(rng, number)
-        number += 1
-        if made is not None:
-            kept.append(made)
-    return kept
-
-
-def main() -> None:
-    """Draw and write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--wanted", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=31)
-    parser.add_argument("--out", type=Path, default=HERE / "tolerance_needed.json")
-    asked = parser.parse_args()
-    kept = collect(asked.wanted, asked.seed)
-    write_planted(asked.out, kept)
-    sys.stderr.write(f"{len(kept)} cases\n")
-
-
 if __name__ == "__main__":
-    main()
+    draw_and_write(draw, __doc__, "tolerance_needed", wanted=100, seed=31)

@@ -6,11 +6,13 @@ The motion itself is made again from that by `following.planted_motion`, and mea
 
 from __future__ import annotations
 
+import argparse
 import json
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+import sys
+from collections.abc import Callable, Iterable
+from itertools import count, islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from dense_replay import Floats
@@ -21,10 +23,10 @@ from feasibility.cases.case import Setup
 from feasibility.cases.toml import toml_document
 
 HERE = Path(__file__).parent
+T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True)
-class Planted:
+class Planted(NamedTuple):
     """A feasible case, and why it is."""
 
     name: str
@@ -48,9 +50,32 @@ class Planted:
         ).build()  # fmt: skip
 
 
-def write_planted(path: Path, cases: Iterable[Planted]) -> None:
+def collect(
+    draw: Callable[[np.random.Generator, int], T | None], wanted: int, seed: int
+) -> list[T]:
+    """Draw, with a counter, until there are enough that came about."""
+    rng = np.random.default_rng(seed)
+    made = (draw(rng, number) for number in count())
+    return list(islice((case for case in made if case is not None), wanted))
+
+
+def draw_and_write(
+    draw: Callable[[np.random.Generator, int], Any], about: str | None, name: str, **defaults: int
+) -> None:
+    """The command of a file that draws cases: how many, from which seed, and where they go."""
+    parser = argparse.ArgumentParser(description=about)
+    for option, default in defaults.items():
+        parser.add_argument(f"--{option}", type=int, default=default)
+    parser.add_argument("--out", type=Path, default=HERE / f"{name}.json")
+    asked = parser.parse_args()
+    cases = collect(draw, asked.wanted, asked.seed)
+    write_cases(asked.out, cases)
+    sys.stderr.write(f"{len(cases)} cases\n")
+
+
+def write_cases(path: Path, cases: Iterable[NamedTuple]) -> None:
     """One case a line, so that a change shows."""
-    lines = ",\n".join(json.dumps(asdict(case), separators=(",", ":")) for case in cases)
+    lines = ",\n".join(json.dumps(case._asdict(), separators=(",", ":")) for case in cases)
     path.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
 
 

@@ -60,6 +60,14 @@ def at_parameters(surface, u, v):
     return root, (2.0 * at - low[root] - high[root]) / (high[root] - low[root])
 
 
+def walk_all_over(surface, parts, count=10_000):
+    """A `walk` of places all over a patch of one box, from the root."""
+    u, v = spread(surface, count)
+    _, x = at_parameters(surface, u, v)
+    root = np.zeros(count, dtype=int)
+    return walk(parts, root, x, surface.point(u, v), surface.normal(u, v))
+
+
 def spread(surface, count, seed=7):
     """Parameters (k,) all over a patch, on its borders and corners too."""
     rng = np.random.default_rng(seed)

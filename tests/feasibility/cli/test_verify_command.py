@@ -139,8 +139,7 @@ def test_a_proved_result(ask, tmp_path):
     """Case 4d is one that the paper's table has as not coverable."""
     verdict = paper_verdict("4d")
     assert verdict.evidence is Evidence.PROOF
-    if verdict.proof is None:
-        pytest.skip("its proof is not kept")
+    assert verdict.proof is not None
     path = save_result(verdict, load_case("paper/4d"), tmp_path / "a.result")
     status, out, _ = ask(path)
     assert status == 0, out

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from part_walks import at_parameters, spread, walk
+from part_walks import walk_all_over
 from smooth_probes import POSE
 
 from surfaces import cone, cylinder, ellipsoid, hyperboloid, plane, sphere, torus
@@ -36,17 +36,9 @@ def patch(request):
     return PATCHES[request.param]
 
 
-def walked(patch, parts, count=10_000):
-    """A walk of places all over the patch, from the root."""
-    u, v = spread(patch, count)
-    _, x = at_parameters(patch, u, v)
-    root = np.zeros(count, dtype=int)
-    return walk(parts, root, x, patch.point(u, v), patch.normal(u, v))
-
-
 def test_every_place_lies_in_the_model_of_each_part_that_it_lies_on(patch):
     parts = patch.parts(FLAT, STRAIGHT, MOST)
-    used = walked(patch, parts)
+    used = walk_all_over(patch, parts)
     assert max(used.points, used.normals) <= 1.0
 
 
@@ -56,7 +48,7 @@ def test_a_smaller_radius_would_be_wrong(patch):
     if patch.kind == "plane":
         assert parts.radius.max() < 2e-12
         return
-    used = walked(patch, replace(parts, radius=0.8 * parts.radius))
+    used = walk_all_over(patch, replace(parts, radius=0.8 * parts.radius))
     assert used.points > 1.0
     assert used.normals > 1.0
 

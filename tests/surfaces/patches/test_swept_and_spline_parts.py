@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from part_walks import at_parameters, spread, walk
+from part_walks import walk_all_over
 from smooth_probes import POSE
 from spline_nets import TURN_KNOTS, full_turn, hood, turned
 
@@ -43,18 +43,11 @@ def patch(request):
     return PATCHES[request.param]
 
 
-def used(patch, parts, count=8_000):
-    u, v = spread(patch, count)
-    _, x = at_parameters(patch, u, v)
-    root = np.zeros(count, dtype=int)
-    return walk(parts, root, x, patch.point(u, v), patch.normal(u, v))
-
-
 def test_every_place_lies_in_the_model_of_each_part_that_it_lies_on(patch):
     parts = patch.parts(3e-3, 0.05, 1000)
-    walked = used(patch, parts)
+    walked = walk_all_over(patch, parts)
     assert max(walked.points, walked.normals) <= 1.0
-    shrunk = used(patch, replace(parts, radius=0.8 * parts.radius))
+    shrunk = walk_all_over(patch, replace(parts, radius=0.8 * parts.radius))
     assert max(shrunk.points, shrunk.normals) > 1.0
 
 
