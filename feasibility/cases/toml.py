@@ -10,12 +10,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from coverable_errors import CoverableError, Fault, shown
+from feasibility.cases.toml_limits import too_deep, too_much
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+", re.ASCII)
-# tomllib takes time and memory with the square of such a key's length.
-_LONG_PATH = re.compile(
-    r"""(?<![\w-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){99}""", re.ASCII
-)
 
 
 class TomlError(CoverableError):
@@ -46,14 +43,17 @@ def parse_toml(text: str) -> dict[str, Any]:
     Raises:
         TomlError: it is not TOML; the message has the line where the parser knows it.
     """
-    if _LONG_PATH.search(text):
-        raise TomlError("is nested too deeply")
+    excess = too_much(text)
+    if excess:
+        raise TomlError(excess)
     try:
-        return tomllib.loads(text)
-    except RecursionError as error:
-        raise TomlError("is nested too deeply") from error
+        tables = tomllib.loads(text)
     except ValueError as error:  # TOMLDecodeError, and Python's own limit on digits
         raise TomlError(f"is not valid TOML: {error}") from error
+    excess = too_deep(tables)
+    if excess:
+        raise TomlError(excess)
+    return tables
 
 
 def parse_setting(text: str) -> tuple[tuple[str, ...], Any]:
@@ -74,21 +74,28 @@ def parse_setting(text: str) -> tuple[tuple[str, ...], Any]:
     form = "expected table.key=value, such as task.cone_deg=10"
     if not equals:
         raise TomlError(f"has no '='; {form}")
+    for part in (key, value):
+        excess = too_much(part)
+        if excess:
+            raise TomlError(f"{excess}; {form}")
     try:
         path = _path(tomllib.loads(f"{key.strip()} = 0"))
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise TomlError(f"does not begin with a key; {form}") from error
     value = value.strip()
     if not value:
         return path, None
     try:
         table = tomllib.loads(f"value = {value}")
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         if value[0] in "[{\"'" or not value.isprintable():
             raise TomlError(f"the value is not valid TOML; {form}") from error
         return path, value
     if set(table) != {"value"}:
         raise TomlError(f"holds more than one setting; {form}")
+    excess = too_deep(table["value"], len(path))
+    if excess:
+        raise TomlError(f"{excess}; {form}")
     return path, table["value"]
 
 
