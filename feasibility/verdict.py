@@ -106,6 +106,9 @@ class Replay:
         return not self.accepted and math.isfinite(self.certificate.max_position_error)
 
 
+UNCHECKED = "collisions are not checked"
+"""What every answer, page and trajectory says."""
+
 DEFERRED = ("graph", "causes", "tree")
 
 
@@ -189,7 +192,7 @@ class Verdict:
         pairs = len(self.cells.pairs)
         return (
             f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
-            f"{self.n_edges} of {pairs} edges. {self.message}"
+            f"{self.n_edges} of {pairs} edges. {self.message} {UNCHECKED.capitalize()}."
         )
 
 

@@ -25,7 +25,7 @@ from feasibility.problem import Problem
 from feasibility.results import Result
 from feasibility.search import Search
 from feasibility.task import Task
-from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
+from feasibility.verdict import UNCHECKED, Answer, Certificate, Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
@@ -69,7 +69,8 @@ class Verification:
     def __repr__(self) -> str:
         """One line."""
         what = f"{len(self.cells)} cells by {self.robot.name}"
-        return f"{self.claim} {'holds' if self.holds else 'does not hold'}: {what}. {self.refusal}"
+        said = f"{self.claim} {'holds' if self.holds else 'does not hold'}: {what}."
+        return " ".join(filter(None, [said, self.refusal, f"{UNCHECKED.capitalize()}."]))
 
 
 @overload

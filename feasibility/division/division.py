@@ -13,7 +13,7 @@ from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
-from feasibility.verdict import Cause, Certificate, Walk
+from feasibility.verdict import UNCHECKED, Cause, Certificate, Walk
 from robots import Robot
 from surfaces import Cells
 
@@ -155,5 +155,5 @@ class Division(ReadOnlyArrays):
         number = len(self.patches)
         return (
             f"{number} patch{'' if number == 1 else 'es'}, {self.n_covered} of {len(self.cells)} "
-            f"cells. {self.message}"
+            f"cells. {self.message} {UNCHECKED.capitalize()}."
         )

@@ -33,7 +33,7 @@ from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
 from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
-from feasibility.verdict import Answer, CauseKind, Evidence
+from feasibility.verdict import UNCHECKED, Answer, CauseKind, Evidence
 from robots import Robot
 from surfaces import Cells
 
@@ -92,7 +92,8 @@ class Placements:
 
     def __repr__(self) -> str:
         """One line."""
-        return f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
+        said = f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
+        return f"{said} {UNCHECKED.capitalize()}."
 
 
 def place(

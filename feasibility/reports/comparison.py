@@ -10,6 +10,7 @@ from typing import Any
 from feasibility.reports.parts import COLOURS, MARGINS, aligned, csv_text, page, percent, table
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies import Arm, Comparison
+from feasibility.verdict import UNCHECKED
 from feasibility.version import version
 
 Column = tuple[str, Callable[[Arm], str]]
@@ -23,6 +24,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     """One object; arms in the order in which they were named."""
     return {
         "case": comparison.case,
+        "collisions": [],
         "robots": [asdict(arm) for arm in comparison.arms],
         "ranking": [arm.robot for arm in comparison.ranked],
         "version": version(),
@@ -89,7 +91,7 @@ def as_text(comparison: Comparison) -> str:
     rows += [[text(arm) for _, text in heads] for arm in comparison.ranked]
     rules = ["-" * max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [line.rstrip() for line in aligned([rows[0], rules, *rows[1:]])]
-    return "\n".join([headline(comparison), "", *lines])
+    return "\n".join([headline(comparison), f"  {UNCHECKED}", "", *lines])
 
 
 def headline(comparison: Comparison) -> str:

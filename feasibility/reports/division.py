@@ -64,6 +64,7 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         "connected": None if connected is fewest else _plan_json(connected, division),
         "left_out": causes_json(division.left_out, cells),
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
+        "collisions": [],
         "message": division.message,
         "timing": seconds(division.timing, PHASES, before_s),
         "robot": division.robot.name,

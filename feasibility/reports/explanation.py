@@ -9,7 +9,7 @@ from typing import Any
 from feasibility.cut_words import what_opens
 from feasibility.reports.parts import csv_text, filled
 from feasibility.sensitivity import Dropped, Explanation, Finding, Kind, Quantity, Threshold
-from feasibility.verdict import Answer, Evidence, Verdict
+from feasibility.verdict import UNCHECKED, Answer, Evidence, Verdict
 from feasibility.version import version
 
 HEADS = {
@@ -50,7 +50,7 @@ def as_text(explanation: Explanation, case_name: str) -> str:
         lines += ["", filled("  ", _dropped(verdict, explanation.dropped))]
     if explanation.left_out:
         lines += ["", filled("  ", _unknown(explanation))]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", f"  {UNCHECKED}"])
 
 
 def helpful(explanation: Explanation) -> list[str]:
@@ -253,6 +253,7 @@ def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
             "share": dropped.share,
             "waypoints": dropped.waypoints,
         },
+        "collisions": [],
         "evaluations": explanation.evaluations,
         "seconds": round(explanation.seconds, 6),
         "robot": verdict.robot.name,

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from feasibility.results import plain
-from feasibility.verdict import Cause, Certificate
+from feasibility.verdict import UNCHECKED, Cause, Certificate
 from feasibility.version import version
 from surfaces import Cells
 
@@ -44,7 +44,11 @@ def filled(head: str, text: str) -> str:
 
 
 def summary(head: str, rows: Iterable[tuple[str, str]], width: int = 12) -> list[str]:
-    """The answer in one line, an empty line, and named rows; rows without text are left out."""
+    """The answer in one line, an empty line, and named rows; rows without text are left out.
+
+    The last row says what is not checked.
+    """
+    rows = [*rows, ("note", UNCHECKED)]
     return [head, "", *(filled(f"  {name:<{width}}", text) for name, text in rows if text)]
 
 
@@ -132,7 +136,10 @@ def page(title: str, body: str, note: str) -> str:
         note: plain text at the end; the program's version follows.
     """
     return _PAGE.format(
-        title=html.escape(title), body=body, note=html.escape(f"{note} coverable {version()}")
+        title=html.escape(title),
+        unchecked=UNCHECKED,
+        body=body,
+        note=html.escape(f"{note} coverable {version()}"),
     )
 
 
@@ -161,6 +168,7 @@ table {{ border-collapse: collapse; margin-top: .4rem; width: 100%; }}
 th, td {{ text-align: left; padding: .3rem .8rem .3rem 0; border-bottom: 1px solid #e5e7eb;
   overflow-wrap: anywhere; }}
 td {{ font-variant-numeric: tabular-nums; }}
+.unchecked {{ color: #8a4b08; margin: 0; }}
 svg {{ max-width: 100%; height: auto; }}
 svg.bars text {{ font: 13px system-ui, sans-serif; fill: #1f2937; }}
 svg.bars text.tick {{ font-size: 11px; fill: #6b7280; }}
@@ -179,6 +187,7 @@ footer {{ margin-top: 1.8rem; color: #6b7280; font-size: .85rem; }}
 </head>
 <body>
 <h1>{title}</h1>
+<p class="unchecked">{unchecked}</p>
 {body}<footer>{note}</footer>
 </body>
 </html>

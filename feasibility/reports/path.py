@@ -57,6 +57,7 @@ def as_json(
         },
         "certificate": certificate_json(path.certificate),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
+        "collisions": [],
         "robot": path.robot.name,
         "version": version(),
     }

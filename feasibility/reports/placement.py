@@ -54,6 +54,7 @@ def as_json(
         "placements": [_found_json(trial) for trial in placements.found],
         "best": None if best is None else _found_json(best),
         "share": placements.share if _searched(best) else None,
+        "collisions": [],
         "cause": None if placements.cause is None else str(placements.cause),
         "causes": dict(placements.causes),
         "stations": None if plan is None else _stations_json(plan),

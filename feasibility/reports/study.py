@@ -20,6 +20,7 @@ from feasibility.reports.parts import (
 )
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
 from feasibility.studies import Row, Study, merit
+from feasibility.verdict import UNCHECKED
 from feasibility.version import version
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ def as_json(study: Study, rows: Sequence[Row]) -> dict[str, Any]:
         "study": study.name,
         "description": study.description,
         "parameters": list(study.labels),
+        "collisions": [],
         "tasks": len(rows),
         "verdicts": counts(rows),
         "failed": sum(row.status == "failed" for row in rows),
@@ -74,7 +76,7 @@ def as_csv(study: Study, rows: Sequence[Row]) -> str:
 def as_text(study: Study, rows: Sequence[Row]) -> str:
     """The outcome of the study: verdicts, by value where there are few, and the best rows."""
     lines = [study.description] if study.description else []
-    lines.append(headline(study, rows))
+    lines += [headline(study, rows), f"  {UNCHECKED}"]
     if found := causes(rows):
         listed = ", ".join(f"{cause} in {number}" for cause, number in found)
         lines.append(f"  most frequent cause of missed cells: {listed}.")

@@ -66,6 +66,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "edges": verdict.n_edges,
         "uncovered": causes_json(verdict.causes, verdict.cells),
         "certificate": _certificate(verdict),
+        "collisions": [],
         "proof": None
         if verdict.proof is None
         else proof_json(verdict.proof, verdict.robot, verdict.cells),

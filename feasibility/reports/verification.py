@@ -57,6 +57,7 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
         "certificate": certificate,
         "proof": None if found.proof is None else proof_json(found.proof, found.robot, found.cells),
         "boxes": found.boxes if found.proof is not None else None,
+        "collisions": [],
         "notes": list(notes),
         "robot": found.robot.name,
         "version": version(),

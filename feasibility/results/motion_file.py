@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import Fault, close, printable, shown
-from feasibility.results.trajectory_files import load_trajectory
+from feasibility.results.trajectory_files import COMMENT, load_trajectory
 from feasibility.safe_files import FileError, read_regular, shown_path
 from robots import Robot
 
@@ -77,20 +77,23 @@ def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
 
 def _from_csv(text: str, robot: Robot, name: str) -> Motion:
     """See `load_motion`."""
-    first = text.partition("\n")[0]
+    first = next((line for line in text.splitlines() if not line.startswith(COMMENT)), "")
     delimiter = max(DELIMITERS, key=first.count)
     lines = csv.reader(io.StringIO(text), delimiter=delimiter, strict=True)
-    rows = [(lines.line_num, row) for row in lines if any(word.strip() for word in row)]
+    rows = [
+        (lines.line_num, row) for row in lines
+        if any(word.strip() for word in row) and not row[0].startswith(COMMENT)
+    ]  # fmt: skip
     if not rows:
         raise FileError("is empty; expected a line of joint names, then a row a waypoint", name)
-    head = [word.strip() for word in rows[0][1]]
+    place, head = f"line {rows[0][0]}", [word.strip() for word in rows[0][1]]
     if all(map(_is_number, head)):
         expected = f"expected a first line of joint names: {', '.join(robot.joint_names)}"
         raise FileError(f"begins with numbers; {expected}", name)
     if len(head) > MOST_COLUMNS or len(rows) - 1 > MOST_ROWS:
         most = f"{MOST_ROWS:,} rows and {MOST_COLUMNS:,} columns"
         raise FileError(f"has more than {most}", name)
-    columns, faults = _columns(head, robot)
+    columns, faults = _columns(head, robot, place)
     if faults:
         raise FileError(faults, name)
     if len(rows) == 1:
@@ -129,8 +132,10 @@ def _number(word: str) -> float:
     return float(word) if _is_number(word) else math.nan
 
 
-def _columns(head: Sequence[str], robot: Robot) -> tuple[list[tuple[int, bool]], list[Fault]]:
-    """For each joint its column, and whether that is in degrees; and all faults."""
+def _columns(
+    head: Sequence[str], robot: Robot, place: str = "line 1"
+) -> tuple[list[tuple[int, bool]], list[Fault]]:
+    """For each joint its column, and whether that is in degrees; and all faults, at `place`."""
     faults, places = [], dict[str, list[tuple[int, bool]]]()
     degrees = {
         f"{joint}_deg": joint
@@ -146,12 +151,12 @@ def _columns(head: Sequence[str], robot: Robot) -> tuple[list[tuple[int, bool]],
             guess = close(word, robot.joint_names)
             hint = f"; did you mean {guess}?" if guess else ""
             text = f"is no joint of {robot.name}{hint}"
-            faults.append(Fault("", f"column {printable(word)!r} {text}", "line 1"))
+            faults.append(Fault("", f"column {printable(word)!r} {text}", place))
     for joint in robot.joint_names:
         found = places.get(joint, [])
         if len(found) != 1:
             what = "has no column" if not found else f"has {len(found)} columns"
-            faults.append(Fault("", f"joint {joint} {what}", "line 1"))
+            faults.append(Fault("", f"joint {joint} {what}", place))
     if faults:
         names = ", ".join(robot.joint_names)
         faults.append(Fault("", f"expected a column for each of {names}"))

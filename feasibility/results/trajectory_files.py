@@ -20,11 +20,13 @@ from numpy.typing import NDArray
 from coverable_errors import ArgumentError, Checks, CoverableError, Fault
 from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
 from feasibility.timing import Trajectory
+from feasibility.verdict import UNCHECKED
 
 MOST_SAMPLES = 1_000_000
 MOST_JOINTS = 64
 CAP = 64 << 20  # [bytes] largest file that is read
 FORMAT = "coverable trajectory 1"
+COMMENT = "#"  # begins the lines of a CSV that hold no numbers
 ARRAYS = {
     "time": "time", "positions": "q", "velocities": "dq", "accelerations": "ddq",
     "tool_speed": "tool_speed",
@@ -88,6 +90,7 @@ def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:
 def as_csv(trajectory: Trajectory) -> str:
     """One row a sample: time (s), joints, their velocities and accelerations, tool speed, cell."""
     text = io.StringIO()
+    text.write(f"{COMMENT} {UNCHECKED}\n")
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_columns(trajectory.joint_names))
     table = np.column_stack(
@@ -111,26 +114,30 @@ def from_csv(text: str) -> Trajectory:
         ArgumentError: it is something else.
     """
     try:
-        rows = list(csv.reader(io.StringIO(text), strict=True))
+        lines = csv.reader(io.StringIO(text), strict=True)
+        rows = [
+            (lines.line_num, row) for row in lines if not (row and row[0].startswith(COMMENT))
+        ]  # fmt: skip
     except csv.Error as error:
         raise ArgumentError(f"is not CSV: {error}") from error
-    head = rows[0] if rows else []
+    head = rows[0][1] if rows else []
     n = (len(head) - 3) // 3
     joints = tuple(head[1 : 1 + max(n, 0)])
     if n < 1 or n > MOST_JOINTS or head != _columns(joints):
         raise ArgumentError(
-            "line 1: expected the columns time, the joints, their velocities "
-            "(joint_velocity), their accelerations (joint_acceleration), tool_speed, cell"
+            f"line {rows[0][0] if rows else 1}: expected the columns time, the joints, their "
+            "velocities (joint_velocity), their accelerations (joint_acceleration), tool_speed, "
+            "cell"
         )
     if len(rows) - 1 > MOST_SAMPLES:
         raise ArgumentError(f"has more than {MOST_SAMPLES:,} samples")
     checks = Checks("")
     table = np.full((len(rows) - 1, len(head) - 1), math.nan)
     cells = np.full(len(rows) - 1, -1, dtype=np.int64)
-    for k, row in enumerate(rows[1:]):
+    for k, (line, row) in enumerate(rows[1:]):
         if len(row) != len(head):
             checks.keep(
-                Fault("", f"expected {len(head)} columns, found {len(row)}", f"line {k + 2}")
+                Fault("", f"expected {len(head)} columns, found {len(row)}", f"line {line}")
             )
             continue
         try:
@@ -138,7 +145,7 @@ def from_csv(text: str) -> Trajectory:
             cells[k] = int(row[-1]) if row[-1] else -1
         except (ValueError, OverflowError):
             text = "expected numbers, and a whole number or nothing as cell"
-            checks.keep(Fault("", text, f"line {k + 2}"))
+            checks.keep(Fault("", text, f"line {line}"))
     checks.done()
     columns = np.split(table, np.cumsum([1, n, n, n]), axis=1)
     return Trajectory(
@@ -152,7 +159,8 @@ def from_csv(text: str) -> Trajectory:
 def as_json_text(trajectory: Trajectory) -> str:
     """One object; times in seconds, radians or metres; cell is null between centres."""
     cells = [None if cell < 0 else cell for cell in trajectory.cell.tolist()]
-    record: dict[str, Any] = {"format": FORMAT, "joint_names": list(trajectory.joint_names)}
+    record: dict[str, Any] = {"format": FORMAT, "collisions": []}
+    record["joint_names"] = list(trajectory.joint_names)
     record |= {key: getattr(trajectory, name).tolist() for key, name in ARRAYS.items()}
     return json.dumps({**record, "cell": cells}, allow_nan=False) + "\n"
 
@@ -170,10 +178,11 @@ def from_json_text(text: str) -> Trajectory:
     except ValueError as error:
         raise ArgumentError(f"is not JSON: {error}") from error
     keys = {"format", "joint_names", *ARRAYS, "cell"}
+    known = keys | {"collisions"}  # older files have none
     if not isinstance(record, dict) or record.get("format") != FORMAT:
         raise ArgumentError(f'expected an object with "format": "{FORMAT}"')
     faults = [Fault(key, "is missing") for key in sorted(keys - set(record))]
-    faults += [Fault(key[:40], "is not known here") for key in sorted(set(record) - keys)]
+    faults += [Fault(key[:40], "is not known here") for key in sorted(set(record) - known)]
     if faults:
         raise ArgumentError(faults)
     checks = Checks()
@@ -224,6 +233,7 @@ def as_yaml(trajectory: Trajectory) -> str:
     Tool speed and cells, which the message has no fields for, stand there as comments.
     """
     lines = ["# trajectory_msgs/JointTrajectory, in radians, metres and seconds"]
+    lines += [f"# {UNCHECKED}"]
     lines += [
         f"joint_names: {json.dumps(list(trajectory.joint_names), ensure_ascii=False)}",
         "points:",

@@ -16,6 +16,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 
+from feasibility.verdict import UNCHECKED
 from feasibility.viewer.threejs import Colour, Command, hex_colour, pack
 
 
@@ -75,7 +76,11 @@ def page(
 def _legend(legend: Legend, animated: bool) -> str:
     """The overlay as HTML."""
     title, text = html.escape(legend.title), html.escape(legend.text)
-    lines = [f"<summary>{title}</summary>", f"<p>{text}</p>"]
+    lines = [
+        f"<summary>{title}</summary>",
+        f"<p>{text}</p>",
+        f'<p class="unchecked">{UNCHECKED}</p>',
+    ]
     for entry in legend.entries:
         swatch = f'<i style="background:#{hex_colour(entry.colour):06x}"></i>'
         box = ""

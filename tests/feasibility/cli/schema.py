@@ -56,6 +56,7 @@ CHECK = {
             "min_limit_margin_deg": Maybe(float),
         }
     ),
+    "collisions": [str],
     "proof": Maybe({"kind": OneOf("cell", "cut"), "opened": Named(float), "tree": ProofTree()}),
     "timing": SECONDS,
     "robot": str,

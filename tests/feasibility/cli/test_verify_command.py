@@ -34,6 +34,7 @@ VERIFY = {
     ),
     "proof": Maybe({"kind": OneOf("cell", "cut"), "opened": dict, "tree": ProofTree()}),
     "boxes": Maybe(int),
+    "collisions": [str],
     "notes": [str],
     "robot": str,
     "version": str,
@@ -111,7 +112,7 @@ def test_bad_input(ask, plate, tmp_path):
     case, motion = plate
     for args, word in (
         ((case, tmp_path / "none.csv"), "there is no such file"),
-        ((case, case), "line 1: column"),
+        ((case, case), "line 2: column"),
         ((tmp_path / "none.toml", motion), "there is no such file"),
         ((case,), "coverable verify CASE MOTION"),
         ((motion,), "coverable verify CASE MOTION"),

@@ -102,7 +102,7 @@ def test_yaml_is_what_ros_reads():
 
 
 def test_csv_names_its_columns():
-    head = as_csv(run_of("ur5")).split("\n", 1)[0].split(",")
+    head = as_csv(run_of("ur5")).splitlines()[1].split(",")
     joints = list(verdict_of("ur5").robot.joint_names)
     assert head[:7] == ["time", *joints]
     assert head[7] == f"{joints[0]}_velocity"
@@ -186,7 +186,7 @@ def test_times_that_do_not_rise_are_refused():
     run = small_run()
     rows = as_csv(run).splitlines()
     with pytest.raises(ValueError, match="times must rise"):
-        from_csv("\n".join([rows[0], rows[2], rows[1]]))
+        from_csv("\n".join([*rows[:2], rows[3], rows[2]]))
 
 
 def test_names_without_a_known_ending(tmp_path):
