@@ -5,6 +5,8 @@ from .case import Setup as Setup
 from .case import builtin_cases as builtin_cases
 from .case import load_case as load_case
 from .case import read_document as read_document
+from .keys import Key as Key
+from .keys import all_keys as all_keys
 from .robot_table import in_robot_table as in_robot_table
 from .robot_table import read_robot as read_robot
 from .surface_keys import CLOSED_FORM_KINDS as CLOSED_FORM_KINDS

@@ -18,7 +18,7 @@ from feasibility.cases.surface_table import (
     named_file,
     read_surface,
 )
-from feasibility.cases.table_reader import CaseError, Section
+from feasibility.cases.table_reader import CaseError, Section, table_words
 from feasibility.cases.toml import (
     TomlError,
     as_read,
@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 BUILT_IN = Path(__file__).with_name("built_in.toml")
 LARGEST_FILE = 256 * 1024  # bytes
 TABLES = ("robot", "surface", "task", "search")
+ROLL = "is not supported yet; leave it out: the roll about the approach direction is free"
 
 Tables = dict[str, Any]
 
@@ -218,7 +219,7 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
             faults.append(Fault(printable(title), f"is not known here; {hint}"))
     for title in TABLES[:3]:
         if title not in tables:
-            faults.append(Fault(title, f"is missing; expected a table [{title}]"))
+            faults.append(Fault(title, f"is missing; expected {table_words(title)}"))
     robot = read_robot(tables["robot"], faults) if "robot" in tables else None
     surface = read_surface(tables["surface"], faults) if "surface" in tables else None
     task = _read_task(tables["task"], faults) if "task" in tables else None
@@ -262,10 +263,7 @@ def _read_task(table: Any, faults: list[Fault]) -> Task | None:
             'a direction other than "normal" is not supported yet; leave it out: the surface '
             "normal is used",
         )
-    if section.has("roll_deg"):
-        free = "leave it out: the roll about the approach direction is free"
-        section.fault("roll_deg", f"is not supported yet; {free}")
-    section.refuse_others()
+    section.refuse_others({"roll_deg": ROLL})
     return section.make(Task, values)
 
 

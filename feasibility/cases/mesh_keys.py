@@ -14,8 +14,6 @@ if TYPE_CHECKING:
     from surfaces.meshes import MeshSurface, TriangleMesh
     from surfaces.meshes.cells import MeshCells
 
-MESH_KEYS = ("file", "scale", "cell_size", "faces", "box", "cut", "facing")
-MESH_FILE = "the path of a mesh (STL, OBJ, PLY, OFF or GLB), relative to the case file"
 MOST_MESH_CELLS = 20_000  # as `surfaces.meshes.cells` has it
 NAMES = {
     "low": "box[0]",
@@ -34,7 +32,7 @@ def read_mesh_keys(section: Section) -> dict[str, Any]:
     from surfaces.meshes.files import metres_per_unit
 
     values = section.take("scale", "cell_size", "faces", "box", "cut", "facing")
-    file = section.text("file", MESH_FILE, required=True)
+    file = section.text("file", required=True)
     if file is not None:
         values["file"] = os.path.abspath(os.path.expanduser(file))
     if "scale" in values:
@@ -70,7 +68,7 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
     """Read the file, take the part that the keys select, and place it.
 
     Args:
-        values: of `MESH_KEYS`.
+        values: of the keys that only a mesh has.
         pose: `side`, `position` and `rpy_deg`.
 
     Raises:
@@ -139,8 +137,7 @@ def _faults_of(key: str) -> Iterator[None]:
 def _check_faces(section: Section, value: Any) -> None:
     """Numbers of faces; which there are, the file says."""
     if not isinstance(value, list) or not value:
-        expected = "must be an array of whole numbers >= 0, numbers of faces of the repaired mesh"
-        section.wrong("faces", value, expected)
+        section.wrong_type("faces", value)
         return
     before = len(section.faults)
     for k, number in enumerate(value):
@@ -158,8 +155,7 @@ def _check_parts(section: Section, values: Values) -> None:
         if isinstance(box, list) and len(box) == 2:
             section.make(checked_box, dict(zip(("low", "high"), box, strict=True)), NAMES)
         else:
-            corners = "[[x0, y0, z0], [x1, y1, z1]]"
-            section.wrong("box", box, f"must be {corners} in metres, two opposite corners")
+            section.wrong_type("box", box)
     for key, check, arguments in (
         ("cut", checked_plane, {"point": "point", "normal": "normal"}),
         ("facing", checked_cone, {"direction": "direction", "within_deg": "half_angle_deg"}),

@@ -100,10 +100,10 @@ def read_robot(table: Any, faults: list[Fault]) -> RobotPart | None:
     """Read the [robot] table; None where it has faults. No URDF is read for it."""
     from robots import check_arguments
 
-    section = Section("robot", table, faults)
     before = len(faults)
-    name = section.text("name", "the name of a robot; `coverable robots` lists them")
-    urdf = section.text("urdf", "the path of a URDF file, relative to the case file")
+    section = Section("robot", table, faults)
+    name = section.text("name")
+    urdf = section.text("urdf")
     if "name" in section.table and "urdf" in section.table:
         section.fault("name", "contradicts robot.urdf; give one of the two")
     elif not section.table.keys() & {"name", "urdf"} and section.is_table:
@@ -112,15 +112,14 @@ def read_robot(table: Any, faults: list[Fault]) -> RobotPart | None:
         section.fault("name", f"must be a name, got the path {shown(name)}; write urdf = it")
     values = section.take("approach_axis", "lock")
     if not isinstance(values.get("lock", {}), Mapping):
-        lock = "a table of joints and values (rad or m), such as { joint7 = 0.0 }"
-        section.wrong("lock", values.pop("lock"), f"must be {lock}")
+        section.wrong_type("lock", values.pop("lock"))
     section.make(check_arguments, values)
     part = RobotPart(
         name=name,
         urdf=None if urdf is None else os.path.abspath(os.path.expanduser(urdf)),
         package_dirs=_package_dirs(section),
-        tool_frame=section.text("tool_frame", "the name of a link"),
-        limits=section.text("limits", "the name of a limit set of the robot"),
+        tool_frame=section.text("tool_frame"),
+        limits=section.text("limits"),
         limits_deg=_limits_deg(section),
         limits_m=_limits_by_name(section, "limits_m", METRES),
         **frozen(values),
@@ -158,8 +157,7 @@ def _package_dirs(section: Section) -> tuple[str, ...]:
     """Folders, made absolute."""
     value = section.take("package_dirs").get("package_dirs", [])
     if not isinstance(value, list) or not all(map(is_text, value)):
-        folders = 'an array of folders, such as ["meshes"], relative to the case file'
-        section.wrong("package_dirs", value, f"must be {folders}")
+        section.wrong_type("package_dirs", value)
         return ()
     return tuple(os.path.abspath(os.path.expanduser(folder)) for folder in value)
 
@@ -171,8 +169,7 @@ def _limits_deg(section: Section) -> tuple[Pair, ...] | dict[str, Pair] | None:
         return _limits_by_name(section, "limits_deg", DEG)
     section.has("limits_deg")
     if not isinstance(value, list) or not value:
-        pairs = "an array of [low, high] in degrees, one per joint, or a table by joint name"
-        section.wrong("limits_deg", value, f"must be {pairs}")
+        section.wrong_type("limits_deg", value)
         return None
     return tuple(section.interval(f"limits_deg[{i}]", pair, DEG) for i, pair in enumerate(value))
 
@@ -181,8 +178,7 @@ def _limits_by_name(section: Section, key: str, unit: str) -> dict[str, Pair] | 
     """Limits of some joints by name."""
     value = section.take(key).get(key)
     if value is not None and not isinstance(value, Mapping):
-        some = f"a table of joints and [low, high] in {unit}, such as {{ joint4 = [-1, 1] }}"
-        section.wrong(key, value, f"must be {some}")
+        section.wrong_type(key, value)
         return None
     pairs = {
         joint: section.interval(f"{key}.{printable(joint)}", pair, unit)

@@ -8,8 +8,16 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import MISSING, alternatives, shown
-from feasibility.cases.mesh_keys import MESH_KEYS
-from feasibility.cases.table_reader import DEG, METRES, CaseError, Section, frozen, in_file
+from feasibility.cases.keys import kinds, own_keys
+from feasibility.cases.table_reader import (
+    DEG,
+    METRES,
+    CaseError,
+    Section,
+    frozen,
+    in_file,
+    with_example,
+)
 
 if TYPE_CHECKING:
     from surfaces.patches import Patch
@@ -17,38 +25,21 @@ if TYPE_CHECKING:
 MOST_CELLS = 1_000_000  # the graph of a verdict takes some kilobytes a cell
 NET_KEYS = ("points", "degree", "knots", "weights")
 OR_FILE = ', or give file = "net.json" or "net.csv"'
-NET_FILE = "the path of a control net (.json or .csv), relative to the case file"
 
+OWN_KEYS: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {kind: tuple(own_keys(kind)) for kind in kinds()}
+)
+"""The keys that each kind has beside those of all surfaces."""
 PATCHES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
-        "sphere": {"radius": "radius", "u_deg": "polar_deg", "v_deg": "azimuth_deg"},
-        "cylinder": {"radius": "radius", "u_deg": "angle_deg", "v": "height"},
-        "hyperboloid": {
-            "radius": "waist",
-            "flare": "flare",
-            "u_deg": "angle_deg",
-            "v": "height",
-        },
-        "plane": {"u": "width", "v": "length"},
-        "cone": {"radius": "radius", "slope": "slope", "u_deg": "angle_deg", "v": "height"},
-        "torus": {"ring": "ring", "tube": "tube", "u_deg": "u_deg", "v_deg": "v_deg"},
-        "ellipsoid": {"semi_axes": "semi_axes", "u_deg": "polar_deg", "v_deg": "azimuth_deg"},
-        "revolution": {"profile": "profile", "v_deg": "angle_deg"},
-        "bspline": {key: key for key in (*NET_KEYS, "u", "v")},
+        kind: {key.name: key.argument for key in own_keys(kind).values() if key.name != "file"}
+        for kind in kinds()
+        if kind not in ("piecewise", "mesh")
     }
 )
-"""The keys of each kind, and the arguments of its constructor that they stand for."""
+"""The keys of each kind of patch, and the arguments of its constructor that they stand for."""
 WHOLE = ("degree", "faces", "pieces")
 """Keys whose values hold no real numbers."""
-OPTIONAL = ("degree", "knots", "weights", "u", "v")
-"""Keys that a bspline may leave out."""
-PIECES_KEYS = ("pieces", "gap")
-OWN_KEYS: Mapping[str, tuple[str, ...]] = {
-    **{kind: tuple(keys) for kind, keys in PATCHES.items()},
-    "bspline": ("file", *PATCHES["bspline"]),
-    "piecewise": PIECES_KEYS,
-    "mesh": MESH_KEYS,
-}
 CLOSED_FORM_KINDS = ("sphere", "cylinder", "hyperboloid", "plane")
 """The kinds that the greedy search knows."""
 
@@ -56,7 +47,7 @@ CLOSED_FORM_KINDS = ("sphere", "cylinder", "hyperboloid", "plane")
 def read_patch(section: Section, kind: str) -> dict[str, Any]:
     """The values of a kind's own keys, as they are written."""
     values = section.take(*PATCHES[kind])
-    file = section.text("file", NET_FILE) if kind == "bspline" else None
+    file = section.text("file") if kind == "bspline" else None
     if file is not None:
         values["file"] = os.path.abspath(os.path.expanduser(file))
         if "points" in values:
@@ -71,8 +62,7 @@ def read_grid(section: Section) -> tuple[int, int] | None:
     written = section.take("cells").get("cells", MISSING)
     if not isinstance(written, list) or len(written) != 2:
         if section.is_table:
-            expected = "must be two whole numbers, cells along u and along v, such as [9, 10]"
-            section.wrong("cells", written, expected)
+            section.wrong_type("cells", written)
         return None
     arguments = dict(zip(("nu", "nv"), written, strict=True))
     counts = section.make(grid_counts, arguments, {"nu": "cells[0]", "nv": "cells[1]"})
@@ -105,7 +95,7 @@ def build_patch(
     arguments = {
         argument: values.get(key, MISSING)
         for key, argument in PATCHES[kind].items()
-        if key in values or not (kind == "bspline" and key in OPTIONAL)
+        if key in values or own_keys(kind)[key].default is None or key == "points"
     }
     try:
         if file is not None:
@@ -119,7 +109,10 @@ def build_patch(
         if file is not None and not all(fault.key in own for fault in error.faults):
             raise CaseError(in_file(error, file, place)) from error
         keys = {argument: key for key, argument in PATCHES[kind].items()}
-        faults = [fault.renamed(keys, place) for fault in error.faults]
+        faults = [
+            with_example(fault.renamed(keys), own_keys(kind)).renamed({}, place)
+            for fault in error.faults
+        ]
         if kind == "bspline" and "points" not in values:
             missing = f"{place}.points"
             faults = [

@@ -73,8 +73,7 @@ def read_pieces(section: Section) -> dict[str, Any]:
     entries = values.get("pieces", MISSING)
     if not isinstance(entries, list) or not 1 <= len(entries) <= MOST_PIECES:
         if section.is_table:
-            tables = f"1 to {MOST_PIECES} tables [[{section.name}.pieces]], a patch each"
-            section.wrong("pieces", entries, f"must be {tables}")
+            section.wrong_type("pieces", entries)
         return values
     found = [_piece(section, k, entry) for k, entry in enumerate(entries)]
     pieces = values["pieces"] = tuple(piece for piece in found if piece is not None)
@@ -123,12 +122,13 @@ def cut_pieces(surface: Piecewise, values: Mapping[str, Any]) -> PieceCells:
 def _piece(section: Section, k: int, entry: Any) -> PiecePart | None:
     """One entry; None where it has faults."""
     place = f"{section.name}.pieces[{k}]"
-    piece = Section(place, entry, section.faults)
     before = len(section.faults)
+    piece = Section(place, entry, section.faults)
     kind = piece.word("kind", tuple(PATCHES), required=True)
     pose = piece.take("position", "rpy_deg")
     if kind is None:  # which other keys belong here is not known
         return None
+    piece.of_kind(kind)
     values = read_patch(piece, kind)
     cells = read_grid(piece)
     own_side = f"is that of all pieces; write it as {section.name}.side, and leave it out here"
@@ -212,13 +212,14 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
     """
     from surfaces import check_pose
 
-    section = Section("surface", table, faults)
     before = len(faults)
+    section = Section("surface", table, faults)
     kind = section.word("kind", tuple(OWN_KEYS), required=True)
     pose = section.take("side", "position", "rpy_deg")
     if kind is None:  # which other keys belong here is not known
         section.make(check_pose, pose)
         return None
+    section.of_kind(kind)
     values, cells = _values(section, kind)
     hints = foreign_keys(kind)
     if kind == "piecewise":

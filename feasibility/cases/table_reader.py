@@ -1,4 +1,4 @@
-"""Reading one table of a case: which keys there are; constructors judge their values."""
+"""Reading one table of a case by the reference of keys; constructors judge the values."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from coverable_errors import (
     printable,
     shown,
 )
+from feasibility.cases.keys import Key, keys_of
 from feasibility.safe_files import shown_path
 
 MOST_GUESSES = 20  # unknown keys for which a known one is looked up
@@ -35,7 +36,11 @@ class CaseError(CoverableError):
 
 
 class Section(Checks):
-    """One table of a case while it is read; every fault gets the table's name before its key."""
+    """One table of a case while it is read; every fault gets the table's name before its key.
+
+    Which keys it may have, and what their values must be, `feasibility.cases.keys` says. A table
+    that is not there, such as one of a study, may have the keys that are read.
+    """
 
     def __init__(self, name: str, table: Any, faults: list[Fault]) -> None:
         """Read `table`; what is wrong is added to `faults`.
@@ -48,23 +53,32 @@ class Section(Checks):
         super().__init__(name, CaseError)
         self.name = name
         self.faults = faults
-        self._known: list[str] = []
+        self.keys = keys_of(name)
+        self._read: list[str] = []
         self.is_table = isinstance(table, Mapping)
         self.table: Mapping[str, Any] = table if self.is_table else {}
         if not self.is_table:
-            self.fault("", f"must be a table [{name}], got {shown(table)}")
+            self.fault("", f"must be {table_words(name)}, got {shown(table)}")
+
+    def of_kind(self, kind: str) -> None:
+        """Say of which kind the surface is: it has the keys of that kind too."""
+        self.keys = keys_of(self.name, kind)
 
     def keep(self, fault: Fault) -> None:
         """Keep a fault of a key of this table, or of the table itself."""
-        super().keep(fault.renamed({}, self.name))
+        super().keep(with_example(fault, self.keys).renamed({}, self.name))
 
     def fault(self, key: str, message: str) -> None:
         """Keep a fault that one sentence says."""
         self.keep(Fault(key, message))
 
+    def wrong_type(self, key: str, value: Any) -> None:
+        """Keep the fault that a value is not what the reference says."""
+        self.wrong(key, value, f"must be {self.keys[key].type}")
+
     def has(self, key: str) -> bool:
-        """Whether the key is written; it counts as known from here on."""
-        self._known.append(key)
+        """Whether the key is written."""
+        self._read.append(key)
         return key in self.table
 
     def take(self, *keys: str) -> dict[str, Any]:
@@ -93,14 +107,14 @@ class Section(Checks):
                 self.keep(fault.renamed(names))
             return None
 
-    def text(self, key: str, expected: str, *, required: bool = False) -> str | None:
-        """A string with something in it."""
+    def text(self, key: str, expected: str = "", *, required: bool = False) -> str | None:
+        """A string with something in it; `expected` says what, where the reference does not."""
         if not self.has(key) and not (required and self.is_table):
             return None
         value = self.table.get(key, MISSING)
         if is_text(value):
             return str(value)
-        self.wrong(key, value, f"must be {expected}")
+        self.wrong(key, value, f"must be {expected or self.keys[key].type}")
         return None
 
     def word(self, key: str, options: Sequence[str], *, required: bool = False) -> str | None:
@@ -112,17 +126,41 @@ class Section(Checks):
         return found if len(self.faults) == before else None
 
     def refuse_others(self, hints: Mapping[str, str] = {}) -> None:
-        """Keep a fault for every key that was not read.
+        """Keep a fault for every key that there is not.
 
         Args:
-            hints: what to say about keys that belong elsewhere.
+            hints: what to say about keys that do not belong here.
         """
-        unknown = [key for key in self.table if key not in self._known]
+        known = tuple(self.keys) or tuple(dict.fromkeys(self._read))
+        unknown = [key for key in self.table if key in hints or key not in known]
         for number, key in enumerate(unknown):
-            guess = close(key, self._known) if number < MOST_GUESSES else ""
-            remedy = f"did you mean {guess}?" if guess else f"known are {', '.join(self._known)}"
+            guess = close(key, known) if number < MOST_GUESSES else ""
+            remedy = f"did you mean {guess}?" if guess else f"known are {', '.join(known)}"
             text = hints.get(key, f"is not known here; {remedy}")
             self.fault(printable(key), text)
+
+
+def table_words(name: str) -> str:
+    """What a table is: its keys, and those that it needs with examples.
+
+    Example:
+        >>> table_words("surface.cut")  # doctest: +ELLIPSIS
+        'a table [surface.cut] with the keys point, normal, such as { point = [0, 0, 0.1], ...
+    """
+    keys = keys_of(name).values()
+    text = f"a table [{name}]"
+    if keys:
+        text += f" with the keys {', '.join(key.name for key in keys)}"
+    needed = [key.written for key in keys if key.default is None]
+    return f"{text}, such as {{ {', '.join(needed)} }}" if needed else text
+
+
+def with_example(fault: Fault, keys: Mapping[str, Key]) -> Fault:
+    """The fault; where a key is missing, with an example of it."""
+    key = keys.get(fault.key)
+    if key is None or fault.fault != "is missing" or "such as" in fault.expected:
+        return fault
+    return fault._replace(expected=f"{fault.expected}, such as {key.written}")
 
 
 def is_text(value: Any) -> bool:

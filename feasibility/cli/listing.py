@@ -1,4 +1,4 @@
-"""`coverable cases` and `coverable robots`: what a case file can name."""
+"""`coverable cases`, `robots` and `keys`: what there is, and what a case file can say."""
 
 from __future__ import annotations
 
@@ -15,9 +15,14 @@ WIDE = 240  # columns of a file, so that nothing is wrapped
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
-    """Add both commands."""
+    """Add the commands."""
     add_command(subcommands, "cases", cases, help="list the built-in cases")
     add_command(subcommands, "robots", robots, help="list the robots by name")
+    parser = add_command(subcommands, "keys", keys, help="print the reference of the case file")
+    parser.add_argument(
+        "table", metavar="TABLE", nargs="?",
+        help="robot, surface, task or search; or a kind of surface, such as mesh",
+    )  # fmt: skip
 
 
 def cases(args: argparse.Namespace, began: float) -> int:
@@ -31,6 +36,15 @@ def robots(args: argparse.Namespace, began: float) -> int:
     """`coverable robots`: the robots that a case can name."""
     rows = robot_rows()
     print_out(json_text({"robots": rows}) if args.json else robots_table(rows))
+    return 0
+
+
+def keys(args: argparse.Namespace, began: float) -> int:
+    """`coverable keys [TABLE]`: what a case file can say."""
+    from feasibility.reports import keys as report
+
+    found = report.keys_under(args.table)
+    print_out(json_text(report.as_json(found)) if args.json else report.as_text(found))
     return 0
 
 

@@ -6,7 +6,7 @@ import os
 
 from hypothesis import strategies as st
 
-from feasibility.cases.mesh_keys import MESH_KEYS
+from feasibility.cases.surface_keys import OWN_KEYS
 from feasibility.cases.surface_table import PiecePart, SurfacePart
 
 lengths = st.floats(0.01, 100)
@@ -100,7 +100,7 @@ def meshes(draw):
     if sized := draw(st.booleans()):
         optional["cell_size"] = lengths
     values = {"file": draw(paths)}
-    for key in MESH_KEYS[1:]:  # in the order in which they are written
+    for key in OWN_KEYS["mesh"][1:]:  # in the order in which they are written
         if key in optional and (key == "cell_size" or draw(st.booleans())):
             values[key] = draw(optional[key])
     return values, None if sized else draw(st.integers(1, 20_000))
