@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
+import secrets
 import stat
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO
@@ -12,6 +12,7 @@ from typing import IO
 import coverable_files
 from coverable_errors import CoverableError
 from coverable_files import reason
+from feasibility.interrupts import settle, unfinished
 
 
 class FileError(CoverableError):
@@ -70,27 +71,31 @@ def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], objec
 
     Raises:
         FileError: the file cannot be written; nothing is left behind.
+        KeyboardInterrupt: there has been a Ctrl-C in a command; nothing is left behind.
     """
     check_writable(path)
     if _is_special(Path(path)):
         return _write_through(Path(path), write)
     # A link is followed, so that the file it points to is replaced and not the link.
     file = Path(os.path.realpath(path))
-    temporary = ""
+    temporary = os.fspath(file.with_name(f".{file.name[:40]}.{secrets.token_hex(8)}"))
     try:
-        handle, temporary = tempfile.mkstemp(prefix=f".{file.name[:40]}.", dir=file.parent)
-        with open(handle, "wb") as stream:
-            write(stream)
-            stream.flush()
-            os.fsync(stream.fileno())
-        os.chmod(temporary, _mode(file))
-        os.replace(temporary, file)
+        with unfinished(temporary):
+            with open(temporary, "xb", opener=_private) as stream:
+                write(stream)
+                stream.flush()
+                os.fsync(stream.fileno())
+            os.chmod(temporary, _mode(file))
+            settle()
+            os.replace(temporary, file)
     except OSError as error:
         raise FileError(f"cannot be written: {reason(error)}", shown_path(path)) from error
-    finally:
-        if temporary and os.path.exists(temporary):
-            os.unlink(temporary)
     return Path(path)
+
+
+def _private(path: str, flags: int) -> int:
+    """Open a new file that nobody else reads while it is written."""
+    return os.open(path, flags, 0o600)
 
 
 def _is_special(file: Path) -> bool:

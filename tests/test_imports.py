@@ -34,7 +34,7 @@ surfaces.meshes.files
 surfaces.meshes: mesh_surface selection
 surfaces.meshes.cells
 surfaces.places
-feasibility: clock compiled cone cut_tree cut_words found notices problem read_only safe_files search target_curves target_parts task verdict version
+feasibility: clock compiled cone cut_tree cut_words found interrupts notices problem read_only safe_files search target_curves target_parts task verdict version
 feasibility.certification
 feasibility.paper
 feasibility.cases
@@ -55,7 +55,9 @@ feasibility.studies
 feasibility.placement
 feasibility.viewer
 feasibility.reports
-feasibility.cli
+feasibility.cli: case_commands command console listing main place study_compare verify
+coverable_command
+feasibility.cli: __main__
 coverable
 """  # noqa: E501
 

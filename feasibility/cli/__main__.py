@@ -1,5 +1,5 @@
 """`python -m feasibility.cli`: the command `coverable`."""
 
-from feasibility.cli.main import run
+from coverable_command import run
 
 run()

@@ -18,6 +18,7 @@ from feasibility.cli.command import (
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
+from feasibility.interrupts import forgive
 from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
@@ -192,6 +193,7 @@ def show(args: argparse.Namespace, began: float) -> int:
         try:
             live.wait()
         except KeyboardInterrupt:
+            forgive()
             print_err("")
     return 0
 

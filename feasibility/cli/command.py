@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from feasibility.cli.console import Bar, print_err, progress_bar
+from feasibility.interrupts import settle
 from feasibility.safe_files import FileError, check_writable, shown_path, write_whole
 
 if TYPE_CHECKING:
@@ -135,14 +136,13 @@ def open_case(
         from feasibility.cases import CaseError, load_case
         from feasibility.notices import compiling_notice
 
-        progress.settle()
         case = load_case(args.case, args.settings)
         check_outputs(outputs, args.case)
         if only_complete and case.search.method != "complete":
             raise CaseError(Fault("search.method", only_complete), case.name)
         with compiling_notice():  # cutting a mesh into cells has kernels of its own
             setup = case.build()
-        progress.settle()
+        settle()
         for note in setup.robot.notes:
             print_err(f"note: {setup.robot.name}: {note}")
         for note in setup.cells.notes:

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import io
 import os
-import signal
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from types import FrameType
 from typing import Any, TextIO
 
+from feasibility.interrupts import settle
+
 PAUSE = 0.05  # [s] between two updates of the progress bar
-IMPORTER = "importlib._bootstrap"
 
 
 def prepare() -> None:
@@ -28,8 +26,10 @@ def print_out(text: str) -> None:
     """Write an answer to stdout. A reader that has gone away (`| head`) is no error.
 
     Raises:
+        KeyboardInterrupt: there has been a Ctrl-C; nothing is written.
         OSError: stdout cannot be written for another reason, such as a full disk.
     """
+    settle()
     with suppress(BrokenPipeError):
         _write(sys.stdout, text)
 
@@ -57,51 +57,9 @@ def _write(stream: TextIO | None, text: str) -> None:
 
 
 @contextmanager
-def interruptible() -> Iterator[Callable[[], None]]:
-    """Remember a Ctrl-C that Python would lose.
-
-    A KeyboardInterrupt raised while the interpreter runs one of its own callbacks (as during
-    imports) is printed and dropped, and a library whose import is interrupted reports that it is
-    broken. So the first Ctrl-C lets a running import end. The context yields a function that raises
-    KeyboardInterrupt if there has been a Ctrl-C: call it often, and before an answer is given.
-    """
-    seen = False
-
-    def note(number: int, frame: FrameType | None) -> None:
-        nonlocal seen
-        again, seen = seen, True
-        if again or not _importing(frame):
-            signal.default_int_handler(number, frame)
-
-    def settle() -> None:
-        if seen:
-            raise KeyboardInterrupt
-
-    default = signal.getsignal(signal.SIGINT) is signal.default_int_handler
-    if not default or threading.current_thread() is not threading.main_thread():
-        yield settle  # Ctrl-C has another handler
-        return
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield settle
-    except Exception:
-        settle()  # an interrupted library may raise an error of its own
-        raise
-    finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def _importing(frame: FrameType | None) -> bool:
-    """Is a module being imported there?"""
-    while frame is not None and frame.f_globals.get("__name__") != IMPORTER:
-        frame = frame.f_back
-    return frame is not None
-
-
-@contextmanager
 def progress_bar() -> Iterator[Bar]:
     """A progress bar, and a Ctrl-C that is never lost: at the latest it is raised at the end."""
-    with interruptible() as settle, Bar(settle) as bar:
+    with Bar() as bar:
         yield bar
         settle()
 
@@ -109,16 +67,11 @@ def progress_bar() -> Iterator[Bar]:
 class Bar:
     """A progress bar on a terminal's stderr; nothing elsewhere.
 
-    A search reports to it, and it appears with the first report.
+    A search reports to it, and it appears with the first report. Each report asks for a Ctrl-C.
     """
 
-    def __init__(self, settle: Callable[[], None] = lambda: None) -> None:
-        """Look whether there is a terminal.
-
-        Args:
-            settle: called at each report, see `interruptible`.
-        """
-        self.settle = settle
+    def __init__(self) -> None:
+        """Look whether there is a terminal."""
         self.shown = sys.stderr is not None and sys.stderr.isatty()
         self._bar: Any = None
         self._task: Any = None
@@ -126,7 +79,7 @@ class Bar:
 
     def __call__(self, done: int, total: int | None, text: str) -> None:
         """Show that `done` of `total` parts (None: unknown how many) are done."""
-        self.settle()
+        settle()
         now = time.monotonic()
         if not self.shown or (now - self._last < PAUSE and done != total):
             return

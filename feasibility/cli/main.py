@@ -17,8 +17,8 @@ from coverable_errors import CoverableError
 from feasibility.cli import case_commands, listing, place, study_compare, verify
 from feasibility.cli.command import BAD_INPUT
 from feasibility.cli.console import prepare, print_err, print_out
+from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once
 
-INTERRUPTED = 130
 TRACEBACK = "COVERABLE_TRACEBACK"
 NO_CACHE = "cannot cache function"  # numba's words
 
@@ -69,14 +69,15 @@ def main(argv: Sequence[str] | None = None) -> int:
         The exit status; nothing is raised.
     """
     began = time.perf_counter()
-    prepare()
     try:
-        args = _parser().parse_args(argv)
-        return int(args.run(args, began))
+        with interruptible():
+            prepare()
+            args = _parser().parse_args(argv)
+            return int(args.run(args, began))
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
-        print_err("coverable: interrupted")
+        print_err(MESSAGE)
         return INTERRUPTED
     except Exception as error:  # noqa: BLE001 - the last line before the user
         if _with_traceback():
@@ -124,6 +125,7 @@ def run() -> NoReturn:
     Every file is closed by then. Taking numba and Pinocchio apart in order would take another third
     of a second, also after Ctrl-C.
     """
+    leave_at_once()
     if not _with_traceback():
         # Nobody can do anything about the half-made objects of a Ctrl-C, taken apart.
         sys.unraisablehook = lambda _: None

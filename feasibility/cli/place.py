@@ -20,6 +20,7 @@ from feasibility.cli.command import (
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
+from feasibility.interrupts import settle
 from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
@@ -97,7 +98,7 @@ def run_place(args: argparse.Namespace, began: float) -> int:
         count = COUNT if args.count is None else args.count
         store = None if args.out is None else stack.enter_context(Store(args.out))
         workers = stack.enter_context(open_workers(args.workers, args.dask))
-        evaluator: Evaluator = StudyEvaluator(case, workers, store, lambda *rest: progress.settle())
+        evaluator: Evaluator = StudyEvaluator(case, workers, store, lambda *_: settle())
         placements = place(
             *setup[:3], region, setup.search, evaluator=evaluator, progress=progress,
             count=count, time_limit=args.time_limit,
