@@ -99,6 +99,7 @@ def greedy_check(
     return _decided(Problem.of(robot, cells, task), search, progress, from_start)
 
 
+NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
 Method = Callable[[Problem, Search, Clock], Found]
 
 
@@ -172,7 +173,7 @@ def _answer(
 ) -> tuple[Answer, Evidence, str]:
     """Answer, evidence, and the sentences that say what was done."""
     if len(problem.cells) == 0:
-        return Answer.FEASIBLE, Evidence.WITNESS, "There are no cells to cover."
+        return Answer.FEASIBLE, Evidence.WITNESS, NO_CELLS
     if replayed is not None and replayed.accepted:
         waypoints = str(replayed.certificate.waypoints)
         message = found.accepted.replace("{waypoints}", waypoints)

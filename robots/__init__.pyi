@@ -5,6 +5,7 @@ from .chain import jacobians as jacobians
 from .errors import RobotError as RobotError
 from .kinematics import Kinematics as Kinematics
 from .library import RobotInfo as RobotInfo
+from .library import joint_kinds as joint_kinds
 from .library import list_robots as list_robots
 from .library import load_robot as load_robot
 from .robot import Robot as Robot

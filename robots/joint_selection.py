@@ -7,58 +7,103 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from coverable_errors import close_matches
-from robots.errors import RobotError
+from coverable_errors import Fault, alternatives, close_matches
 
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf, JointInfo
 
 MOST_NAMES = 40  # that a message lists
+MOST_SHOWN = 8  # that a note lists
+
+
+TOOL_LINKS = ("tcp", "tool0", "flange", "ee_link")
+"""Names of the link that carries the tool, as arms have them; the first one present is taken."""
 
 
 class Selection(NamedTuple):
     """The joints of a robot."""
 
     tool_frame: str
+    """Empty where it is not known."""
     free: tuple[JointInfo, ...]
     """Base to tip."""
     locked: dict[str, float]
     """Every other moving joint with the value it is held at, rad or m."""
+    notes: tuple[str, ...]
+    """What was chosen."""
+    faults: tuple[Fault, ...]
+    """What is wrong; all else is without it."""
+    is_chain: bool
+    """Whether the free joints can be used."""
 
 
 def select_joints(
     checked: CheckedUrdf,
-    name: str,
     tool_frame: str | None,
     lock: Mapping[str, float],
     limits: str | Mapping[str, ArrayLike] | ArrayLike | None,
 ) -> Selection:
     """Choose the free joints, those from the root link to the tool frame, and hold all others.
 
-    Arguments and errors are those of `robots.pinocchio_model.robot_from_urdf`.
+    Arguments are those of `robots.pinocchio_model.robot_from_urdf`; nothing is raised, so that all
+    that is wrong can be said at once.
     """
-    tool = _tool_frame(checked, name, tool_frame)
-    _check_lock(checked, name, lock)
-    free = _free_joints(checked, tool, lock)
-    _check_free(checked, name, tool, free, limits)
-    return Selection(tool, free, _locked_values(checked, {joint.name for joint in free}, lock))
+    tool, words = _tool_frame(checked, tool_frame)
+    faults = [] if tool else [Fault("", words)]
+    notes = (words,) if tool and words else ()
+    wrong = _lock_faults(checked, lock)
+    faults += wrong.values()
+    held = {joint: value for joint, value in lock.items() if joint not in wrong}
+    free = _free_joints(checked, tool, held) if tool else ()
+    of_chain = _chain_faults(checked, tool, free, limits) if tool else []
+    locked = _locked_values(checked, {joint.name for joint in free}, held)
+    is_chain = bool(tool) and not of_chain
+    return Selection(tool, free, locked, notes, (*faults, *of_chain), is_chain)
 
 
-def _tool_frame(checked: CheckedUrdf, name: str, link: str | None) -> str:
-    """The tool link: the one that is named, or the only leaf."""
-    if link is None:
-        if len(checked.leaves) == 1:
-            return checked.leaves[0]
-        raise RobotError(
-            f"robot {name!r}: {checked.path} has {len(checked.leaves)} leaf links, so tool_frame "
-            f"must name one: {', '.join(checked.leaves)} (or any other link)"
-        )
-    if link not in checked.links:
-        raise RobotError(
-            f"robot {name!r}: {checked.path} has no link {link!r} for tool_frame; "
-            + suggestion(link, checked.links)
-        )
-    return link
+def _tool_frame(checked: CheckedUrdf, link: str | None) -> tuple[str, str]:
+    """The tool link, and what is to be said about it.
+
+    It is the one that is named, or the only leaf; of several leaves the first link of `TOOL_LINKS`,
+    or the only leaf that moves. Where none of this helps it is empty, and the words are a fault.
+    """
+    if link is not None and link in checked.links:
+        return link, ""
+    if link is not None:
+        hint = suggestion(link, checked.links)
+        return "", f"{checked.path} has no link {link!r} for tool_frame; {hint}"
+    if len(checked.leaves) == 1:
+        return checked.leaves[0], ""
+    moved = _moved_links(checked)
+    known = next((name for name in TOOL_LINKS if name in moved), None)
+    if known is not None:
+        others = [leaf for leaf in checked.leaves if leaf != known]
+        return known, f"tool_frame is {known!r}, by its name; it may be {_any_of(others)} as well"
+    leaves = [leaf for leaf in checked.leaves if leaf in moved]
+    if len(leaves) == 1:
+        return leaves[0], f"tool_frame is {leaves[0]!r}, the only leaf link that a joint moves"
+    listed = leaves or checked.leaves
+    return "", (
+        f"{checked.path} has {len(listed)} leaf links, so tool_frame must name one: "
+        f"{', '.join(listed)} (or any other link; one called {alternatives(TOOL_LINKS)} would be "
+        "taken by itself)"
+    )
+
+
+def _moved_links(checked: CheckedUrdf) -> set[str]:
+    """The links that a moving joint lies before, seen from the root."""
+    moved: set[str] = set()
+    for joint in checked.joints:  # from the root outwards
+        if joint.moves or joint.parent in moved:
+            moved.add(joint.child)
+    return moved
+
+
+def _any_of(names: Sequence[str]) -> str:
+    """Some links that could be named instead."""
+    return alternatives([repr(name) for name in names[:MOST_SHOWN]]) + (
+        " or another link" if len(names) > MOST_SHOWN else ""
+    )
 
 
 def suggestion(name: str, known: Sequence[str]) -> str:
@@ -70,25 +115,26 @@ def suggestion(name: str, known: Sequence[str]) -> str:
     return f"it has: {shown}" + (", ..." if len(known) > MOST_NAMES else "")
 
 
-def _check_lock(checked: CheckedUrdf, name: str, lock: Mapping[str, float]) -> None:
-    """Refuse locked joints that do not exist, do not move, or are held outside their limits."""
+def _lock_faults(checked: CheckedUrdf, lock: Mapping[str, float]) -> dict[str, Fault]:
+    """By name, locked joints that do not exist, do not move, or are held outside their limits."""
     moving = {joint.name: joint for joint in checked.joints if joint.moves}
-    faults = []
+    faults = {}
     for joint_name, value in lock.items():
         joint = moving.get(joint_name)
         if joint is None:
             hint = suggestion(joint_name, list(moving))
-            faults.append(f"lock names {joint_name!r}, which is no moving joint; {hint}")
+            text = f"lock names {joint_name!r}, which is no moving joint; {hint}"
+            faults[joint_name] = Fault("", text)
             continue
         unit = "m" if joint.kind == "prismatic" else "rad"
         low, high = joint.limits
         if not low <= value <= high:
-            faults.append(
+            faults[joint_name] = Fault(
+                "",
                 f"lock holds joint {joint_name!r} at {value:g} {unit}, outside its limits "
-                f"{low:g} .. {high:g} {unit}"
+                f"{low:g} .. {high:g} {unit}",
             )
-    if faults:
-        raise RobotError(faults, f"robot {name!r}")
+    return faults
 
 
 def _free_joints(
@@ -111,19 +157,21 @@ def _free_joints(
         free = kept
 
 
-def _check_free(
+def _chain_faults(
     checked: CheckedUrdf,
-    name: str,
     tool: str,
     free: Sequence[JointInfo],
     limits: str | Mapping[str, ArrayLike] | ArrayLike | None,
-) -> None:
-    """Refuse a chain without free joints, or with joints that cannot move freely."""
+) -> list[Fault]:
+    """What is wrong with a chain without free joints, or with joints that cannot move freely."""
     if not free:
-        raise RobotError(
-            f"robot {name!r}: no free joint lies between the root link {checked.root!r} and "
-            f"{tool!r} of {checked.path}; choose a tool_frame further out, or lock fewer joints"
-        )
+        return [
+            Fault(
+                "",
+                f"no free joint lies between the root link {checked.root!r} and {tool!r} of "
+                f"{checked.path}; choose a tool_frame further out, or lock fewer joints",
+            )
+        ]
     faults = []
     for joint in free:
         if joint.mimic is not None and joint.fault is None:
@@ -138,8 +186,7 @@ def _check_free(
             # Limits given by the caller replace bad limits, not a mimic of an unknown joint.
             if not (gets_limits and joint.lower is None and joint.mimic is None):
                 faults.append(joint.fault)
-    if faults:
-        raise RobotError(faults, f"robot {name!r}, {checked.path}")
+    return [Fault("", fault, place=checked.path) for fault in faults]
 
 
 def _locked_values(

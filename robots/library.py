@@ -26,6 +26,11 @@ from robots.robot import Robot
 
 HERE = Path(__file__).parent
 DATA = "example-robot-data"
+BRING_YOUR_OWN = (
+    'Any other arm comes as a URDF: urdf = "my_arm.urdf" in a case, load_robot("my_arm.urdf") in '
+    "Python. The maker's ROS description package has one, often as xacro, which is expanded first: "
+    "xacro my_arm.urdf.xacro > my_arm.urdf"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +82,9 @@ def load_robot(
         limits: replaces the URDF's limits: a named set, (n, 2) rad or m, or a mapping
             joint -> (lower, upper).
         tool_frame: the link whose origin is the tool point; default from the library, and for a
-            URDF file its only leaf link.
+            URDF file its only leaf link. Where there are several, the first link called tcp,
+            tool0, flange or ee_link that a joint moves, else the only leaf that one moves; a note
+            says which.
         approach_axis: (3,) in the tool frame; default from the library, else +z.
         lock: joints to hold, name -> rad or m, in addition to those the library holds.
         package_dirs: one or more folders in which `package://` meshes are looked up.
@@ -127,9 +134,34 @@ def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:
         return None
     raise RobotError(
         f"there is no robot {name_or_path!r} in the library; "
-        f"{suggestion(name_or_path, list(library))} "
-        "(`coverable robots` lists them all; a path ending in .urdf loads a file)"
+        f"{suggestion(name_or_path, list(library))} (`coverable robots` lists them all). "
+        f"{BRING_YOUR_OWN}"
     )
+
+
+def joint_kinds(
+    name_or_path: str | os.PathLike[str],
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+) -> dict[str, str]:
+    """The kind of every moving joint of a URDF, by name, whatever else the arm is loaded with.
+
+    Args:
+        name_or_path, package_dirs: see `load_robot`.
+
+    Raises:
+        RobotError: the name is unknown, or the URDF has faults.
+
+    Example:
+        >>> joint_kinds("puma560")["joint6"]
+        'revolute'
+    """
+    from robots.urdf import check_urdf
+
+    info = _find(name_or_path)
+    path = Path(name_or_path).expanduser() if info is None else info.urdf
+    folders = (*package_dirs, *(() if info is None else info.package_dirs))
+    checked = check_urdf(path, package_dirs=folders)
+    return {joint.name: joint.kind for joint in checked.joints if joint.moves}
 
 
 @cache

@@ -12,9 +12,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from coverable_errors import Fault
 from robots.errors import RobotError
-from robots.joint_selection import select_joints
-from robots.robot import Robot
+from robots.joint_selection import Selection, select_joints, suggestion
+from robots.robot import Robot, no_limit_set
 
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf
@@ -48,31 +49,70 @@ def robot_from_urdf(
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
             limits, or a joint on the chain has a fault and is neither locked nor given limits.
     """
-    tool, free, locked = select_joints(checked, name, tool_frame, lock or {}, limits)
-    free_names = [joint.name for joint in free]
-    model = reduced_model(parse(checked.text, checked.path), free_names, locked, tool)
-    robot = Robot(
+    chosen = select_joints(checked, tool_frame, lock or {}, limits)
+    faults = list(chosen.faults)
+    sets = limit_sets or {}
+    if not chosen.is_chain:
+        faults += _limit_faults(checked, limits, sets)
+        raise RobotError(faults, f"robot {name!r}")
+    robot = _of_selection(checked, chosen, name, approach_axis, sets)
+    try:
+        robot = robot if limits is None else robot.with_limits(limits)
+    except RobotError as error:
+        faults += error.faults
+    if faults:
+        raise RobotError(faults, f"robot {name!r}")
+    return robot
+
+
+def _of_selection(
+    checked: CheckedUrdf,
+    chosen: Selection,
+    name: str,
+    approach_axis: ArrayLike,
+    limit_sets: Mapping[str, Mapping[str, tuple[float, float]]],
+) -> Robot:
+    """The robot with its own limits; arguments as above."""
+    free_names = [joint.name for joint in chosen.free]
+    full = parse(checked.text, checked.path)
+    return Robot(
         name=name,
-        model=model,
-        tool_frame=tool,
+        model=reduced_model(full, free_names, chosen.locked, chosen.tool_frame),
+        tool_frame=chosen.tool_frame,
         approach_axis=np.asarray(approach_axis),
         joint_names=tuple(free_names),
-        joint_kinds=tuple(joint.kind for joint in free),
+        joint_kinds=tuple(joint.kind for joint in chosen.free),
         # Not from Pinocchio's model, which loses the limits of continuous joints.
-        lower=np.array([joint.limits[0] for joint in free]),
-        upper=np.array([joint.limits[1] for joint in free]),
-        max_velocity=np.array([joint.max_velocity or math.nan for joint in free]),
+        lower=np.array([joint.limits[0] for joint in chosen.free]),
+        upper=np.array([joint.limits[1] for joint in chosen.free]),
+        max_velocity=np.array([joint.max_velocity or math.nan for joint in chosen.free]),
         limit_sets={
-            title: np.array([rows[joint.name] for joint in free])
-            for title, rows in (limit_sets or {}).items()
-            if all(joint.name in rows for joint in free)
+            title: np.array([rows[joint] for joint in free_names])
+            for title, rows in limit_sets.items()
+            if all(joint in rows for joint in free_names)
         },
         urdf=os.path.abspath(checked.path),
         package_dirs=checked.package_dirs,
-        locked=locked,
-        notes=checked.warnings,
+        locked=chosen.locked,
+        notes=(*checked.warnings, *chosen.notes),
     )
-    return robot if limits is None else robot.with_limits(limits)
+
+
+def _limit_faults(
+    checked: CheckedUrdf,
+    limits: str | Mapping[str, ArrayLike] | ArrayLike | None,
+    limit_sets: Mapping[str, Mapping[str, tuple[float, float]]],
+) -> list[Fault]:
+    """What is wrong with limits whatever the tool frame is."""
+    if isinstance(limits, str) and limits not in limit_sets:
+        return [Fault("", no_limit_set(limits, limit_sets))]
+    moving = [joint.name for joint in checked.joints if joint.moves]
+    named = limits if isinstance(limits, Mapping) else {}
+    return [
+        Fault("", f"limits name {joint!r}, which is no moving joint; {suggestion(joint, moving)}")
+        for joint in named
+        if joint not in moving
+    ]
 
 
 def parse(text: str, path: str) -> pin.Model:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -190,10 +190,7 @@ class Robot:
         """
         if isinstance(limits, str):
             if limits not in self.limit_sets:
-                known = ", ".join(sorted(self.limit_sets)) or "none"
-                raise RobotError(
-                    f"robot {self.name!r} has no limit set {limits!r}; it has: {known}"
-                )
+                raise RobotError(no_limit_set(limits, self.limit_sets), f"robot {self.name!r}")
             table = np.array(self.limit_sets[limits], dtype=float)
         elif isinstance(limits, Mapping):
             table = self._limits_by_name(limits)
@@ -201,8 +198,9 @@ class Robot:
             table = _numbers(limits, f"limits of robot {self.name!r}")
         if table.shape != (self.n, 2):
             raise RobotError(
-                f"limits of robot {self.name!r} must have shape ({self.n}, 2), one (lower, upper) "
-                f"for each of {', '.join(self.joint_names)}; got shape {table.shape}"
+                f"limits must have shape ({self.n}, 2), one (lower, upper) for each of "
+                f"{', '.join(self.joint_names)}; got shape {table.shape}",
+                f"robot {self.name!r}",
             )
         return replace(self, lower=table[:, 0], upper=table[:, 1])
 
@@ -221,14 +219,19 @@ class Robot:
             table[self.joint_names.index(joint)] = values
         if faults:
             raise RobotError(
-                f"robot {self.name!r}: {'; '.join(faults)}; "
-                f"its free joints are: {', '.join(self.joint_names)}"
+                f"{'; '.join(faults)}; its free joints are: {', '.join(self.joint_names)}",
+                f"robot {self.name!r}",
             )
         return table
 
     def __repr__(self) -> str:
         """One line: name, joints and tool."""
         return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r})"
+
+
+def no_limit_set(name: str, known: Iterable[str]) -> str:
+    """That there is no limit set of this name, and which there are."""
+    return f"there is no limit set {name!r}; it has: {', '.join(sorted(known)) or 'none'}"
 
 
 def _numbers(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coverable_errors import MISSING, Fault, alternatives, close, printable
-from feasibility.cases.robot_table import RobotPart, in_robot_table, read_robot
+from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
 from feasibility.cases.surface_keys import CLOSED_FORM_KINDS
 from feasibility.cases.surface_table import (
     SurfacePart,
@@ -229,27 +229,13 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
         known = f'"greedy" works on {kinds} only, not on a surface of kind {surface.kind}'
         faults.append(Fault("search.method", f'{known}; use "complete"'))
     if faults and "robot" in tables:
-        faults += _robot_faults(robot, tables["robot"])
+        faults += faults_of_loading(tables["robot"])
     if faults and "surface" in tables:
         part = surface or named_file(tables["surface"])
         faults += faults_of_building(part) if part is not None else []
     if faults or robot is None or surface is None or task is None or search is None:
         raise CaseError(faults, name)
     return Case(robot, surface, task, search, name)
-
-
-def _robot_faults(part: RobotPart | None, table: Any) -> list[Fault]:
-    """The faults of loading the arm, or of the one that a faulty table names."""
-    from robots import RobotError
-
-    if part is None and isinstance(table, dict) and "name" in table and "urdf" not in table:
-        part = read_robot({"name": table["name"]}, [])
-    try:
-        if part is not None:
-            part.build()
-    except RobotError as error:
-        return in_robot_table(error)
-    return []
 
 
 def _read_task(table: Any, faults: list[Fault]) -> Task | None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
-from coverable_errors import Fault, printable, shown
+from coverable_errors import Fault, is_number, printable, shown
 from feasibility.cases.table_reader import DEG, METRES, Pair, Section, Triple, frozen, is_text
 
 if TYPE_CHECKING:
@@ -51,29 +51,53 @@ class RobotPart:
         """
         from robots import RobotError, load_robot
 
-        robot = load_robot(
-            self.urdf or self.name or "",
-            limits=self._limits(),
-            tool_frame=self.tool_frame,
-            approach_axis=self.approach_axis,
-            lock=self.lock or None,
-            package_dirs=self.package_dirs,
-        )
+        source = self.urdf or self.name or ""
+        try:
+            robot = load_robot(
+                source,
+                limits=self._limits(),
+                tool_frame=self.tool_frame,
+                approach_axis=self.approach_axis,
+                lock=self.lock or None,
+                package_dirs=self.package_dirs,
+            )
+        except RobotError as error:
+            units = self._wrong_units(self._kinds_alone())
+            raise RobotError((*error.faults, *units), error.source) from error
+        in_order = robot.joint_names if isinstance(self.limits_deg, tuple) else ()
         kinds = dict(zip(robot.joint_names, robot.joint_kinds, strict=True))
-        in_degrees = robot.joint_names if isinstance(self.limits_deg, tuple) else self.limits_deg
-        faults = [
-            Fault("limits_deg", f"gives degrees for joint {joint!r}, which slides; use limits_m")
-            for joint in in_degrees or ()
-            if kinds[joint] == "prismatic"
-        ]
-        faults += [
-            Fault("limits_m", f"gives metres for joint {joint!r}, which turns; use limits_deg")
-            for joint in self.limits_m or ()
-            if kinds[joint] != "prismatic"
-        ]
+        faults = self._wrong_units(kinds, in_order)
         if faults:
             raise RobotError(faults, f"robot {robot.name!r}")
         return robot
+
+    def _kinds_alone(self) -> dict[str, str]:
+        """The kinds of all moving joints, by name; none where the URDF itself is at fault."""
+        from robots import RobotError, joint_kinds
+
+        try:
+            return joint_kinds(self.urdf or self.name or "", self.package_dirs)
+        except RobotError:
+            return {}
+
+    def _wrong_units(self, kinds: Mapping[str, str], in_order: Iterable[str] = ()) -> list[Fault]:
+        """Degrees for joints that slide, metres for joints that turn.
+
+        Args:
+            kinds: of joints, by name.
+            in_order: the joints of a list `limits_deg`.
+        """
+        by_name = self.limits_deg if isinstance(self.limits_deg, Mapping) else {}
+        faults = [
+            Fault("limits_deg", f"gives degrees for joint {joint!r}, which slides; use limits_m")
+            for joint in (*in_order, *by_name)
+            if kinds.get(joint) == "prismatic"
+        ]
+        return faults + [
+            Fault("limits_m", f"gives metres for joint {joint!r}, which turns; use limits_deg")
+            for joint in self.limits_m or ()
+            if kinds.get(joint, "prismatic") != "prismatic"
+        ]
 
     def _limits(self) -> str | list[Pair] | dict[str, Pair] | None:
         """The limits as `load_robot` takes them, rad or m."""
@@ -98,22 +122,35 @@ def _radians(pair: Pair) -> Pair:
 
 def read_robot(table: Any, faults: list[Fault]) -> RobotPart | None:
     """Read the [robot] table; None where it has faults. No URDF is read for it."""
-    from robots import check_arguments
-
     before = len(faults)
-    section = Section("robot", table, faults)
-    name = section.text("name")
-    urdf = section.text("urdf")
+    part = _part(Section("robot", table, faults))
+    return part if len(faults) == before else None
+
+
+def faults_of_loading(table: Any) -> list[Fault]:
+    """What loading the arm of a table says, without those of its values that cannot be read."""
+    from robots import RobotError
+
+    part = _part(Section("robot", table, []))
+    if (part.name is None) == (part.urdf is None):
+        return []
+    try:
+        part.build()
+    except RobotError as error:
+        return in_robot_table(error)
+    return []
+
+
+def _part(section: Section) -> RobotPart:
+    """What a [robot] table says; what is wrong with it is added to the section's faults."""
+    name, urdf = section.text("name"), section.text("urdf")
     if "name" in section.table and "urdf" in section.table:
         section.fault("name", "contradicts robot.urdf; give one of the two")
     elif not section.table.keys() & {"name", "urdf"} and section.is_table:
         section.fault("name", "is missing; expected the name of a robot, or urdf = a URDF file")
     if name is not None and (os.sep in name or name.lower().endswith(URDF_ENDINGS)):
         section.fault("name", f"must be a name, got the path {shown(name)}; write urdf = it")
-    values = section.take("approach_axis", "lock")
-    if not isinstance(values.get("lock", {}), Mapping):
-        section.wrong_type("lock", values.pop("lock"))
-    section.make(check_arguments, values)
+        name = None
     part = RobotPart(
         name=name,
         urdf=None if urdf is None else os.path.abspath(os.path.expanduser(urdf)),
@@ -122,11 +159,29 @@ def read_robot(table: Any, faults: list[Fault]) -> RobotPart | None:
         limits=section.text("limits"),
         limits_deg=_limits_deg(section),
         limits_m=_limits_by_name(section, "limits_m", METRES),
-        **frozen(values),
+        **_axis_and_lock(section),
     )
     _refuse_contradictions(section)
     section.refuse_others()
-    return part if len(faults) == before else None
+    return part
+
+
+def _axis_and_lock(section: Section) -> dict[str, Any]:
+    """The approach axis and the held joints, without what is wrong."""
+    from robots import check_arguments
+
+    values = section.take("approach_axis", "lock")
+    if not isinstance(values.get("lock", {}), Mapping):
+        section.wrong_type("lock", values.pop("lock"))
+    before = len(section.faults)
+    section.make(check_arguments, values)
+    if len(section.faults) > before:
+        wrong = {fault.key for fault in section.faults[before:]}
+        lock = values.get("lock", {})
+        values["lock"] = {joint: value for joint, value in lock.items() if is_number(value)}
+        if "robot.approach_axis" in wrong:
+            del values["approach_axis"]
+    return cast("dict[str, Any]", frozen(values))
 
 
 def _refuse_contradictions(section: Section) -> None:

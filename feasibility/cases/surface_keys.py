@@ -56,23 +56,19 @@ def read_patch(section: Section, kind: str) -> dict[str, Any]:
 
 
 def read_grid(section: Section) -> tuple[int, int] | None:
-    """Cells along u and v."""
-    from surfaces.patches import grid_counts
-
+    """Cells along u and v, at least one of each."""
     written = section.take("cells").get("cells", MISSING)
     if not isinstance(written, list) or len(written) != 2:
         if section.is_table:
             section.wrong_type("cells", written)
         return None
-    arguments = dict(zip(("nu", "nv"), written, strict=True))
-    counts = section.make(grid_counts, arguments, {"nu": "cells[0]", "nv": "cells[1]"})
-    # An empty grid has no cells, but its sides are walked through all the same.
-    if counts is not None and max(counts[0], 1) * max(counts[1], 1) > MOST_CELLS:
+    before = len(section.faults)
+    nu, nv = (section.whole(f"cells[{k}]", count, 1) for k, count in enumerate(written))
+    if nu * nv > MOST_CELLS:
         section.fault(
             "cells", f"makes more than {MOST_CELLS:,} cells ({shown(written)}); use a coarser grid"
         )
-        return None
-    return counts
+    return (nu, nv) if len(section.faults) == before else None
 
 
 def build_patch(

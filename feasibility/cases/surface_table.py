@@ -251,7 +251,9 @@ def named_file(table: Any) -> SurfacePart | None:
     plain["cells"] = 1 if table["kind"] == "mesh" else [1, 1]
     if table["kind"] == "mesh" and "scale" in table:
         plain["scale"] = table["scale"]
-    return read_surface(plain, [])
+    known = read_surface(plain, [])
+    # The likely size of a part is nothing to go by where its scale is wrong.
+    return known if known or "scale" not in plain else read_surface(plain | {"scale": 1.0}, [])
 
 
 def _values(section: Section, kind: str) -> tuple[dict[str, Any], tuple[int, int] | int | None]:

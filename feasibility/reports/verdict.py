@@ -34,6 +34,7 @@ SENTENCES = {
     Answer.INFEASIBLE: "infeasible: no single continuous motion covers the whole surface.",
     Answer.UNDECIDED: "undecided: neither a covering motion nor a proof against one was found.",
 }
+EMPTY = "feasible: there are no cells, so there is nothing to cover; the arm was not looked at."
 GREEDY_NO = "infeasible: not found by the greedy search, which cannot rule a motion out."
 EVIDENCE = {
     Evidence.WITNESS: "a motion that an independent replay accepted, between its waypoints too",
@@ -106,11 +107,14 @@ def _revolute_margin(verdict: Verdict) -> float:
 
 def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     """The verdict for people: the answer first, its evidence, why cells are missed."""
+    title = ("case", f"{case.name}  {case.description}".rstrip())
+    if not len(verdict.cells):
+        return "\n".join(summary(EMPTY, [title]))
     head = SENTENCES[verdict.answer]
     if verdict.answer is Answer.INFEASIBLE and verdict.method == "greedy":
         head = GREEDY_NO
     rows = [
-        ("case", f"{case.name}  {case.description}".rstrip()),
+        title,
         ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
         ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),

@@ -41,15 +41,6 @@ TEXTS = {
         task = { standoff = 0.005, cone_deg = 45 }
         search = { method = "greedy", step_deg = 0.05 }
     """,
-    "no cells": """
-        robot = { name = "puma560" }
-        surface.kind = "sphere"
-        surface.radius = 1
-        surface.u_deg = [40, 60]
-        surface.v_deg = [60, 90]
-        surface.cells = [0, 3]
-        task = { standoff = 0.005, cone_deg = 45 }
-    """,
 }
 
 
@@ -63,6 +54,13 @@ def small_case(name):
 def small_verdict(name):
     """Its verdict."""
     return check(*small_case(name).build())
+
+
+@cache
+def empty_verdict():
+    """That of the small plate cut into no cells, which Python alone can ask."""
+    setup = small_case("plate").build()
+    return check(setup.robot, setup.cells.surface.cells(0, 3), setup.task)
 
 
 @cache

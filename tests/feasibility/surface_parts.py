@@ -11,7 +11,7 @@ from feasibility.cases.surface_table import PiecePart, SurfacePart
 
 lengths = st.floats(0.01, 100)
 triples = st.tuples(*[st.floats(-1e6, 1e6)] * 3)
-grids = st.tuples(st.integers(0, 500), st.integers(0, 500))
+grids = st.tuples(st.integers(1, 500), st.integers(1, 500))
 paths = st.text("abc/é ._-", min_size=1, max_size=9).map(lambda name: os.path.abspath(f"x{name}"))
 PROFILES = (
     ((0.2, 0.0), (0.3, 0.2), (0.1, 0.5)),

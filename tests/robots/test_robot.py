@@ -90,7 +90,7 @@ def test_limits_that_make_no_sense_are_refused(puma, limits, message):
 
 
 def test_a_robot_without_limit_sets_says_so():
-    with pytest.raises(RobotError, match="'ur5' has no limit set 'set-1'; it has: none"):
+    with pytest.raises(RobotError, match="'ur5': there is no limit set 'set-1'; it has: none"):
         load_robot("ur5", limits="set-1")
 
 

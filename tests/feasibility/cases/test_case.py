@@ -351,8 +351,8 @@ def test_a_file_may_have_windows_line_ends_and_a_byte_order_mark(tmp_path):
     assert load_case(path) == Case.from_toml(GOOD)
 
 
-def test_grids_from_empty_to_the_cap(tmp_path):
-    empty = load_case("paper/4a", ["surface.cells=[0, 3]"])
-    assert len(empty.build().cells) == 0
+def test_grids_from_one_cell_to_the_cap():
+    one = load_case("paper/4a", ["surface.cells=[1, 1]"])
+    assert len(one.build().cells) == 1
     side = math.isqrt(MOST_CELLS)
     assert load_case("paper/4a", [f"surface.cells=[{side}, {side}]"]).surface.cells == (side, side)

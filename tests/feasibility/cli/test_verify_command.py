@@ -125,7 +125,7 @@ def test_bad_input(ask, plate, tmp_path):
         assert word in err, err
 
 
-@pytest.mark.parametrize("name", ["plate", "greedy dome", "no cells"])
+@pytest.mark.parametrize("name", ["plate", "greedy dome"])
 def test_results_that_are_feasible(ask, name, tmp_path):
     path = save_result(small_verdict(name), small_case(name), tmp_path / "a.result")
     status, out, _ = ask(path)

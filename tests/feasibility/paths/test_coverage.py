@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from dense_replay import assert_motion, assert_over
 from path_cases import BEST, FEASIBLE, PATCHES, path_of, verdict_of
-from small_cases import paper_verdict, small_case, small_verdict
+from small_cases import empty_verdict, paper_verdict, small_case, small_verdict
 
 from feasibility import Task, check
 from feasibility.certification import replay
@@ -343,7 +343,7 @@ def test_a_path_of_the_greedy_search():
 
 def test_a_path_of_no_cells():
     with pytest.raises(PathError, match="no cells to cover"):
-        coverage_path(small_verdict("no cells"))
+        coverage_path(empty_verdict())
     with pytest.raises(PathError, match="no cells are named"):
         coverage_path(small_verdict("plate"), only=[])
 

@@ -9,7 +9,7 @@ import networkx as nx
 import numpy as np
 import pytest
 from schema import CHECK, conforms
-from small_cases import TEXTS, paper_verdict, small_case, small_verdict
+from small_cases import TEXTS, empty_verdict, paper_verdict, small_case, small_verdict
 
 from feasibility import check
 from feasibility.cases import load_case
@@ -218,6 +218,13 @@ def test_the_csv_is_one_motion_over_every_cell_centre(name):
     assert "\r" not in text
 
 
-@pytest.mark.parametrize("name", ["long plate", "no cells"])
-def test_there_is_no_csv_without_a_motion(name):
-    assert as_csv(small_verdict(name)) is None
+def test_there_is_no_csv_without_a_motion():
+    assert as_csv(small_verdict("long plate")) is None
+    assert as_csv(empty_verdict()) is None
+
+
+def test_a_verdict_over_no_cells_says_so_first():
+    text = as_text(empty_verdict(), small_case("plate"))
+    assert text.startswith("feasible: there are no cells, so there is nothing to cover")
+    assert "motion" not in text
+    assert "there is nothing to cover" in repr(empty_verdict())
