@@ -31,7 +31,7 @@ surfaces.piecewise
 surfaces.meshes: triangle_mesh normals closest_point facets mesh_parts
 surfaces.meshes.repair
 surfaces.meshes.files
-surfaces.meshes: mesh_surface selection
+surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
 surfaces.places
 feasibility: clock compiled cone cut_tree cut_words found interrupts notices problem read_only safe_files search target_curves target_parts task verdict version

@@ -22,6 +22,7 @@ from surfaces.meshes.normals import (
     sectors,
     unit,
 )
+from surfaces.meshes.sources import triangles_of
 from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.part_growth import grown
 from surfaces.parts import MOST_PARTS, SurfaceParts
@@ -259,7 +260,9 @@ def mesh(
         source: path of an STL, OBJ, PLY, OFF or GLB file; or a `TriangleMesh`; or anything with
             `vertices` and `faces`, such as a `trimesh.Trimesh`. The files and the last kind are
             checked and repaired, see `surfaces.meshes.repair.clean`.
-        scale: metres per unit of the source; see `surfaces.meshes.files.read_mesh`.
+        scale: metres per unit of the source. Without it the unit is the one in the `units` of a
+            `trimesh.Trimesh`, else the metre, and a part above 20 m or below 1 mm is refused, but
+            for a `TriangleMesh`, which is in metres; see `surfaces.meshes.files.read_mesh`.
         side: 'outside' for a tool on the side that the faces look to, 'inside' for the other.
         position: (3,) m, origin of the mesh's frame in the root frame.
         rpy_deg: (3,) fixed-axis roll, pitch, yaw of the mesh's frame.
@@ -276,21 +279,6 @@ def mesh(
     check = Checks("mesh")
     pose = check.pose(side, position, rpy_deg)
     check.done()
-    triangles = _triangles(source, scale)
+    triangles = triangles_of(source, scale)
     normals = corner_normals(triangles)
     return MeshSurface(mesh=triangles, corner_normals=normals, crease_normals=normals, **pose)
-
-
-def _triangles(source: Any, scale: float | None) -> TriangleMesh:
-    """The clean triangles of a source."""
-    from surfaces.meshes.files import metres_per_unit, read_mesh
-    from surfaces.meshes.repair import clean
-
-    if not (hasattr(source, "vertices") and hasattr(source, "faces")):
-        return read_mesh(source, scale)
-    unit = metres_per_unit(scale, "the mesh")
-    if not isinstance(source, TriangleMesh):
-        return clean(unit * np.asarray(source.vertices), source.faces)
-    if scale is None:
-        return source
-    return TriangleMesh(unit * source.vertices, source.faces, source.history)

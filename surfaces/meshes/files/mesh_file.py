@@ -84,7 +84,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> Trian
         mesh = clean(vertices, raw.faces, history=raw.notes)
         if scale is not None:
             return mesh
-        return _with_likely_unit(mesh)
+        return with_likely_unit(mesh)
     except (FileFault, SurfaceError) as error:
         raise SurfaceError(error.faults, name) from error
 
@@ -137,19 +137,32 @@ def _check_start(head: bytes, suffix: str) -> None:
             raise SurfaceError(f"is {own[1:].upper()} by its first bytes; name it {own}")
 
 
-def _with_likely_unit(mesh: TriangleMesh) -> TriangleMesh:
-    """Refuse a part of unlikely size, and note one that is wider than most arms reach."""
+def with_likely_unit(mesh: TriangleMesh, what: str = "the file", unit: float = 1.0) -> TriangleMesh:
+    """Refuse a part of unlikely size, and note one that is wider than most arms reach.
+
+    Args:
+        mesh: in metres, if the unit is right.
+        what: has the triangles, for the message.
+        unit: metres per unit that was assumed.
+
+    Raises:
+        SurfaceError: the part is wider than 20 m, or narrower than 1 mm.
+    """
     wide = float(mesh.extent.max())
     if wide > LARGEST_PART:
-        raise SurfaceError(
-            f"the part is {wide:.4g} m wide; if the file is in millimetres give scale = 0.001 "
-            f"({wide * 0.001:.3g} m), if in inches scale = 0.0254 ({wide * 0.0254:.3g} m), and if "
-            "it is that wide scale = 1.0"
+        others = (
+            f"if {what} is in millimetres give scale = 0.001 ({wide * 0.001:.3g} m), if in inches "
+            f"scale = 0.0254 ({wide * 0.0254:.3g} m), and "
         )
+        advice = f"{others if unit == 1.0 else ''}if it is that wide scale = {unit}"
+        raise SurfaceError(f"the part is {wide:.4g} m wide; {advice}")
     if wide < SMALLEST_PART:
+        reason, larger = "it was scaled from millimetres to metres twice", 1000.0
+        if unit < 1.0:
+            reason, larger = f"{what} is in metres", 1.0
         raise SurfaceError(
-            f"the part is {wide:.3g} m wide; if it was scaled from millimetres to metres twice "
-            f"give scale = 1000 ({wide * 1000:.3g} m), and if it is that small scale = 1.0"
+            f"the part is {wide:.3g} m wide; if {reason} give scale = {larger:g} "
+            f"({wide / unit * larger:.3g} m), and if it is that small scale = {unit}"
         )
     if wide <= WIDE_PART:
         return mesh
