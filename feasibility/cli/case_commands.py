@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import os
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from feasibility.cli.command import (
@@ -288,18 +287,16 @@ def explain(args: argparse.Namespace, began: float) -> int:
         explanation = run(*opened.setup, progress=opened.progress)
     name, verdict = opened.case.name, explanation.verdict
     if args.json:
-        print_out(json_text(report.as_json(explanation, name)))
+        print_out(json_text(report.as_json(explanation, name, opened.case)))
     else:
-        print_out(report.as_text(explanation, name))
+        print_out(report.as_text(explanation, name, opened.case))
     if args.witness is not None:
         _write_witnesses(args.witness, explanation)
     if args.html is not None:
         from feasibility.viewer import view
 
-        drawn = view(verdict, name)
-        text = " · ".join([drawn.legend.text, *report.helpful(explanation)])
-        drawn = replace(drawn, legend=replace(drawn.legend, text=text))
-        write_text(args.html, drawn.html(), "view")
+        page = report.as_html(explanation, name, view(verdict, name), opened.case)
+        write_text(args.html, page, "page")
     return STATUS[str(verdict.answer)]
 
 

@@ -1,62 +1,134 @@
-"""An explanation as sentences for people, and as one JSON object."""
+"""An explanation as a table for people, as one page beside the view, and as one JSON object."""
 
 from __future__ import annotations
 
+import html
 import math
 import re
-from typing import Any
+import shlex
+from typing import TYPE_CHECKING, Any
 
-from feasibility.cut_words import what_opens
-from feasibility.reports.parts import csv_text, filled
-from feasibility.sensitivity import Dropped, Explanation, Finding, Kind, Quantity, Threshold
-from feasibility.verdict import UNCHECKED, Answer, Evidence, Verdict
+from feasibility.reports.changes import key, settings, worded
+from feasibility.reports.explanation_words import (
+    SEEDED,
+    best_changes,
+    headline,
+    helpful,
+    helpless,
+    idle_limits,
+    joint_rows,
+    row_of,
+    sentence,
+    what_it_opens,
+)
+from feasibility.reports.parts import aligned, csv_text, filled, page, table
+from feasibility.sensitivity import Change, Dropped, Explanation, Finding, Quantity, Threshold
+from feasibility.verdict import UNCHECKED, Answer, Verdict, Walk
 from feasibility.version import version
 
-HEADS = {
-    Answer.FEASIBLE: "feasible. How far it can be tightened, one parameter at a time:",
-    Answer.INFEASIBLE: "infeasible. What would make it feasible, one change at a time:",
-    Answer.UNDECIDED: "undecided. What was found to make it feasible, one change at a time:",
-}
-SEEDED = "[1]"  # behind thresholds that a search without known motions did not find
+if TYPE_CHECKING:
+    from feasibility.cases import Case
+    from feasibility.viewer import View
+
+FEASIBLE_HEADS = ("tightened alone", "now", "feasible to", "beyond that")
+HEADS = ("one change", "now", "feasible from", "short of that")
+JOINTS = ("joint", "limits", "used")
 
 
-def as_text(explanation: Explanation, case_name: str) -> str:
-    """The thresholds for people: what helps first, then what does not."""
+def as_text(explanation: Explanation, case_name: str, case: Case | None = None) -> str:
+    """The thresholds for people: the most useful change first.
+
+    Args:
+        explanation: what was found.
+        case_name: what the case is called.
+        case: the case, for the `--set` that makes the change; see `settings`.
+    """
     verdict = explanation.verdict
-    head = HEADS[verdict.answer] if explanation.thresholds else f"{verdict.answer}."
-    lines = [f"{case_name}: {head}", filled("  ", verdict.message)]
-    if explanation.alone is not None:
-        lines.append(filled("  ", _seeded(explanation.alone)))
+    lines = [filled("", f"{case_name}: {headline(explanation)}")]
     if len(verdict.cells) == 0:
-        return f"{case_name}: there are no cells to cover, so there is nothing to explain."
-    helps = [t for t in explanation.thresholds if t.feasible is not None]
-    others = [t for t in explanation.thresholds if t.feasible is None]
-    if not verdict.feasible:
-        helps.sort(key=_effort)
-    lines += [""] if helps or others else []
-    lines += [filled("  - ", sentence(threshold, verdict)) for threshold in helps]
-    if not helps and others:
-        lines.append(filled("  ", "No single change that was tried was found to make it feasible."))
-    if others:
-        lines += ["", "What does not help alone:"]
-        ruled_out = [_helpless_label(t.quantity) for t in others if t.ruled_out]
-        if ruled_out:
-            lines.append(filled("  - ", f"proved: {'; '.join(ruled_out)}."))
-        for threshold in (t for t in others if not t.ruled_out):
-            lines.append(filled("  - ", sentence(threshold, verdict)))
-    if any(t.feasible is not None and t.feasible.unaided is False for t in helps):
-        lines += ["", filled("  ", f"{SEEDED} {_from_nearby(verdict)}")]
-    if explanation.dropped is not None:
-        lines += ["", filled("  ", _dropped(verdict, explanation.dropped))]
-    if explanation.left_out:
-        lines += ["", filled("  ", _unknown(explanation))]
+        return "\n".join([*lines, f"  {UNCHECKED}"])
+    command = to_try(explanation, case_name, case)
+    lines += [f"  try  {command}"] if command else []
+    lines += ["", *(filled("  ", text) for text in _findings(explanation))]
+    rows = [row_of(threshold) for threshold in helpful(explanation)]
+    if rows:
+        lines += ["", *_table([FEASIBLE_HEADS if verdict.feasible else HEADS, *rows])]
+    what, joints = joint_rows(explanation)
+    if joints:
+        lines += ["", *_table([(*JOINTS[:2], f"used by {what}"), *joints])]
+    lines += [filled("  ", text) for text in _remarks(explanation)]
     return "\n".join([*lines, "", f"  {UNCHECKED}"])
 
 
-def helpful(explanation: Explanation) -> list[str]:
-    """The thresholds at which a feasible value was found, a sentence each."""
+def as_html(explanation: Explanation, case_name: str, view: View, case: Case | None = None) -> str:
+    """One page: the most useful change, and tables beside the view of the case as given."""
     verdict = explanation.verdict
-    return [sentence(t, verdict) for t in explanation.thresholds if t.feasible is not None]
+    command = to_try(explanation, case_name, case)
+    parts = [f"<p>To try: <code>{html.escape(command)}</code></p>"] if command else []
+    parts += [f"<p>{html.escape(text)}</p>" for text in _findings(explanation)]
+    rows = [row_of(threshold) for threshold in helpful(explanation)]
+    if rows:
+        heads = FEASIBLE_HEADS if verdict.feasible else HEADS
+        parts.append(table(heads, [map(html.escape, row) for row in rows]))
+    what, joints = joint_rows(explanation)
+    if joints:
+        uses = (*JOINTS[:2], f"used by {what}")
+        parts.append(table(uses, [map(html.escape, row) for row in joints]))
+    parts += [f"<p>{html.escape(text)}</p>" for text in _remarks(explanation) if text]
+    inner = html.escape(view.html(), quote=True)
+    frame = f'<iframe srcdoc="{inner}" title="the case as given"></iframe>'
+    body = f'<div class="beside">{frame}<div>{"".join(parts)}</div></div>\n'
+    return page(f"{case_name}: {headline(explanation)}", body, "")
+
+
+def to_try(explanation: Explanation, case_name: str, case: Case | None = None) -> str:
+    """The command that decides the case with the most useful change; empty where none helps."""
+    values = settings(best_changes(explanation), explanation.verdict, case)
+    words = [part for value in values for part in ("--set", value)]
+    return shlex.join(["coverable", "check", case_name, *words]) if values else ""
+
+
+def _table(rows: list[Any]) -> list[str]:
+    """Rows with columns of equal width; the last one may be long, and is wrapped."""
+    last = [row[-1] for row in rows]
+    starts = aligned([tuple(row[:-1]) for row in rows])
+    return [filled(f"  {start}  ", text) for start, text in zip(starts, last, strict=True)]
+
+
+def _findings(explanation: Explanation) -> list[str]:
+    """What the verdict rests on."""
+    alone = explanation.alone
+    return [explanation.verdict.message] + ([] if alone is None else [_seeded(alone)])
+
+
+def _remarks(explanation: Explanation) -> list[str]:
+    """What stands below the tables, an empty text before each."""
+    verdict = explanation.verdict
+    helps = helpful(explanation)
+    opens = [(row_of(t).change, what_it_opens(t, verdict)) for t in helps]
+    texts = [f"{change}: {said}." for change, said in opens if said]
+    texts.append(idle_limits(explanation))
+    if not helps and explanation.thresholds:
+        texts.append("No single change that was tried was found to make it feasible.")
+    if explanation.pair is not None:
+        texts.append(_pair(explanation))
+    texts += helpless(explanation)
+    if any(t.feasible is not None and t.feasible.unaided is False for t in helps):
+        texts.append(f"{SEEDED} {_from_nearby(verdict)}")
+    if explanation.dropped is not None:
+        texts.append(_dropped(verdict, explanation.dropped))
+    if explanation.left_out:
+        texts.append(_unknown(explanation))
+    return [line for text in texts if text for line in ("", text)]
+
+
+def _pair(explanation: Explanation) -> str:
+    """The two changes that do it together."""
+    if explanation.pair is None:
+        return ""
+    both = " and ".join(map(worded, explanation.pair.changes))
+    waypoints = len(explanation.pair.witness.q)
+    return f"Two changes together make it feasible: {both}; {waypoints:,} waypoints, replayed."
 
 
 def _seeded(alone: Verdict) -> str:
@@ -76,22 +148,34 @@ def _from_nearby(verdict: Verdict) -> str:
 
 
 def witnesses(explanation: Explanation) -> dict[str, str]:
-    """The covering motion at each threshold as CSV like that of `check --witness`, by file name.
+    """The covering motions as CSV like that of `check --witness`, by file name.
 
-    Such as 'cone.csv', 'joint1-upper-limit.csv', 'shift-along-minus-y.csv'.
+    At each threshold, such as 'cone.csv', 'joint1-upper-limit.csv', 'shift-along-minus-y.csv';
+    with two changes together ('pair.csv'), and without the cells to drop ('dropped.csv').
     """
-    names = explanation.verdict.robot.joint_names
+    pair, dropped = explanation.pair, explanation.dropped
+    walks: list[tuple[str, Walk | None]] = [
+        (threshold.quantity.name, threshold.feasible.witness)
+        for threshold in explanation.thresholds
+        if threshold.feasible is not None
+    ]
+    walks.append(("pair", None if pair is None else pair.witness))
+    walks.append(("dropped", None if dropped is None else dropped.witness))
     found: dict[str, str] = {}
-    for threshold in explanation.thresholds:
-        walk = None if threshold.feasible is None else threshold.feasible.witness
+    for name, walk in walks:
         if walk is not None:
-            plain = threshold.quantity.name.replace("+", "plus ").replace("-", "minus ")
+            plain = name.replace("+", "plus ").replace("-", "minus ")
             slug = re.sub(r"[^a-z0-9_]+", "-", plain.lower()).strip("-")
-            rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
-            lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
             slug += f"-{len(found)}" if not slug or f"{slug}.csv" in found else ""
-            found[f"{slug}.csv"] = csv_text([["cell", *names], *lines])
+            found[f"{slug}.csv"] = _as_csv(explanation.verdict, walk)
     return found
+
+
+def _as_csv(verdict: Verdict, walk: Walk) -> str:
+    """A motion as CSV."""
+    rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
+    lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
+    return csv_text([["cell", *verdict.robot.joint_names], *lines])
 
 
 def _unknown(explanation: Explanation) -> str:
@@ -113,129 +197,15 @@ def _dropped(verdict: Verdict, dropped: Dropped) -> str:
     missed = "cell" if number == 1 else f"{number:,} cells"
     which = f"the {missed} that the best motion misses ({100.0 * dropped.share:.3g} % of the area)"
     if dropped.waypoints is None:
-        return f"Dropping {which} may leave one motion, but none was certified."
+        return f"Dropping {which} may leave one motion, but none could be certified."
     return (
         f"Dropping {which} leaves one motion over the other {cells - number:,}: "
         f"{dropped.waypoints:,} waypoints, replayed."
     )
 
 
-def _effort(threshold: Threshold) -> float:
-    """The share of its range that a change needs; the smallest is listed first."""
-    quantity, found = threshold.quantity, threshold.feasible
-    span = abs(quantity.end - quantity.given)
-    return abs(found.value - quantity.given) / span if found is not None and span > 0.0 else 1.0
-
-
-def sentence(threshold: Threshold, verdict: Verdict) -> str:
-    """One threshold as a sentence.
-
-    Args:
-        threshold: what was found.
-        verdict: of the case as given; where it is feasible the threshold is a margin.
-    """
-    tightened = verdict.feasible
-    quantity, found = threshold.quantity, threshold.feasible
-    if found is None:
-        return _helpless(threshold)
-    value, now = shown(quantity, found.value, True), shown(quantity, quantity.given)
-    text = (_margin if tightened else _remedy)(quantity, value, now)
-    if threshold.span is not None:
-        text += f", and on to {shown(quantity, threshold.span.feasible.value)}"
-        if threshold.span.other is not None:
-            text += f" ({_against(quantity, threshold.span.other)})"
-    if threshold.other is not None:
-        text += f"; {_against(quantity, threshold.other)}"
-    elif tightened and found.value == quantity.end:
-        text += ", the furthest value tried"
-    opens = what_it_opens(threshold, verdict)
-    text += f"; {opens}" if opens else ""
-    return text + ("." if found.unaided is not False else f" {SEEDED}.")
-
-
-def what_it_opens(threshold: Threshold, verdict: Verdict) -> str:
-    """How the motion of a changed case gets past the proof of this one; empty without cuts."""
-    found, proof = threshold.feasible, verdict.proof
-    if found is None or found.witness is None or proof is None or proof.kind != "cut":
-        return ""
-    return what_opens(proof, found.witness.q, verdict.robot, verdict.cells)
-
-
-def _margin(quantity: Quantity, value: str, now: str) -> str:
-    """How far a feasible case can be tightened."""
-    if quantity.kind is Kind.SHIFT:
-        return f"the surface can shift by {value} {quantity.name.removeprefix('shift ')}"
-    if quantity.kind is Kind.STANDOFF:
-        return f"the standoff can {_change(quantity)} to {value} ({now} now)"
-    name = "alpha" if quantity.kind is Kind.CONE else f"the {quantity.name}"
-    return f"{name} can tighten to {value} ({now} now)"
-
-
-def _remedy(quantity: Quantity, value: str, now: str) -> str:
-    """What would make a case feasible."""
-    if quantity.kind is Kind.CONE:
-        return f"feasible from alpha = {value} on ({now} now)"
-    if quantity.kind in (Kind.LOWER, Kind.UPPER):
-        joint, side, _ = quantity.name.rsplit(" ", 2)
-        direction = "down" if side == "lower" else "up"
-        return f"{joint} would need {direction} to {value}; it stops at {now}"
-    if quantity.kind is Kind.STANDOFF:
-        return f"feasible when the standoff {_change(quantity)}s to {value} ({now} now)"
-    return f"feasible when the surface shifts by {value} {quantity.name.removeprefix('shift ')}"
-
-
-def _helpless(threshold: Threshold) -> str:
-    """No value was found to help."""
-    quantity, other = threshold.quantity, threshold.other
-    text = _helpless_label(quantity)
-    if threshold.tried:
-        text += f" ({threshold.tried})"
-    if other is not None:
-        text += f": {_against(quantity, other)}"
-    return text + "."
-
-
-def _helpless_label(quantity: Quantity) -> str:
-    """A quantity and the range that was searched."""
-    return {
-        Kind.CONE: "a wider cone, up to ",
-        Kind.LOWER: f"the {quantity.name}, down to ",
-        Kind.UPPER: f"the {quantity.name}, up to ",
-        Kind.STANDOFF: f"a {quantity.name}, as far as ",
-        Kind.SHIFT: f"a {quantity.name}, up to ",
-    }[quantity.kind] + shown(quantity, quantity.end)
-
-
-def _change(quantity: Quantity) -> str:
-    """Whether a standoff becomes larger or smaller."""
-    return "grow" if quantity.end > quantity.given else "shrink"
-
-
-def _against(quantity: Quantity, other: Finding) -> str:
-    """Why a value is not feasible."""
-    if other.value == quantity.given and (
-        other.evidence is not Evidence.PROOF or other.cell is None
-    ):
-        return f"{other.answer} at the given {shown(quantity, other.value)}"
-    return f"at {shown(quantity, other.value, False)} {other.detail}"
-
-
-def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str:
-    """A value with its unit: degrees or millimetres, to two digits.
-
-    A feasible limit or cone is rounded to where it allows more, one that is not to where it allows
-    less, so that what was found holds for the printed number too.
-    """
-    value, unit = (math.degrees(value), "deg") if quantity.unit == "rad" else (1e3 * value, "mm")
-    if feasible is None or not quantity.monotone:
-        return f"{round(value, 2):.10g} {unit}"
-    up = feasible != (quantity.kind is Kind.LOWER)
-    cents = round(100.0 * value, 4)  # what conversions leave behind is no reason to round
-    return f"{(math.ceil(cents) if up else math.floor(cents)) / 100.0:.10g} {unit}"
-
-
-def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
-    """The explanation as the object that `coverable explain --json` prints."""
+def as_json(explanation: Explanation, case_name: str, case: Case | None = None) -> dict[str, Any]:
+    """The explanation as the object that `coverable explain --json` prints; see `as_text`."""
     verdict = explanation.verdict
     dropped = explanation.dropped
     return {
@@ -245,6 +215,12 @@ def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
         "cells": len(verdict.cells),
         "covered": verdict.n_covered,
         "thresholds": [_threshold(t, verdict) for t in explanation.thresholds],
+        "useful": {
+            "sentence": headline(explanation),
+            "set": settings(best_changes(explanation), verdict, case),
+        },
+        "pair": explanation.pair and [_change(change) for change in explanation.pair.changes],
+        "joints": _joints(explanation),
         "not_looked_at": list(explanation.left_out),
         "dropped": dropped
         and {
@@ -262,6 +238,23 @@ def as_json(explanation: Explanation, case_name: str) -> dict[str, Any]:
     }
 
 
+def _change(change: Change) -> dict[str, Any]:
+    """One of two changes as an object; keys say the unit."""
+    quantity = change.quantity
+    given = _number(quantity, "given", quantity.given)
+    return {
+        "quantity": quantity.name,
+        "key": key(quantity),
+        **given,
+        **_number(quantity, "value", change.value),
+    }
+
+
+def _joints(explanation: Explanation) -> list[dict[str, str]]:
+    """The limits of each joint, and the range that the motion uses, in words."""
+    return [dict(zip(JOINTS, row, strict=True)) for row in joint_rows(explanation)[1]]
+
+
 def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:
     """One threshold as an object; keys say the unit."""
     quantity, span = threshold.quantity, threshold.span
@@ -271,6 +264,7 @@ def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:
         found |= _number(quantity, "resolution", threshold.resolution)
     return {
         "quantity": quantity.name,
+        "key": key(quantity),
         "kind": str(quantity.kind),
         **found,
         "feasible": _finding(quantity, threshold.feasible),

@@ -181,6 +181,14 @@ figcaption {{ color: #4b5563; font-size: .85rem; overflow-wrap: anywhere; }}
 .bar {{ display: block; width: 9rem; height: .7rem; background: #eef0f3; }}
 .bar b {{ display: block; height: 100%; background: #4b7fb3; }}
 iframe {{ width: 100%; height: 620px; border: 1px solid #e5e7eb; }}
+body:has(.beside) {{ max-width: none; }}
+.beside {{ display: flex; flex-wrap: wrap; gap: 1.5rem; margin-top: .8rem; }}
+.beside iframe {{ flex: 3 1 32rem; width: auto; height: 82vh; }}
+.beside div {{ flex: 2 1 30rem; min-width: 0; }}
+th {{ white-space: nowrap; }}
+.beside td:nth-child(2), .beside td:nth-child(3) {{ white-space: nowrap; }}
+.beside td:first-child {{ min-width: 9rem; }}
+code {{ font-size: .85rem; overflow-wrap: anywhere; }}
 footer {{ margin-top: 1.8rem; color: #6b7280; font-size: .85rem; }}
 @media print {{ h2, table, figure {{ break-inside: avoid; }} }}
 </style>

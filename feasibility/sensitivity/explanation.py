@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.checking import check
+from feasibility.division import divide
 from feasibility.roadmap import HERE, Exploration, margin_shares, place
 from feasibility.search import Progress, Search
 from feasibility.sensitivity.limited_search import Attempt
+from feasibility.sensitivity.pairs import PairSearch
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.threshold_search import BEYOND, ThresholdSearch
 from feasibility.sensitivity.thresholds import (
@@ -35,6 +37,7 @@ FEW, EACH = 200, 20  # evaluations, and those for each cell, that any search sho
 EXTRA = 3  # the same, for margins that are still wide once the others have had their share
 ALL_IN_ALL = 35  # verdicts of the case itself: all, with what `check` alone finds at thresholds
 LEAST = 20_000  # evaluations that they may always take
+PAIRS = 24  # verdicts' worth of evaluations that the search for two changes may take
 CHECKED = 0.75  # [1] of that, spent at most before `check` itself is asked about a threshold
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
@@ -131,8 +134,14 @@ def _explained(
         most = max(ALL_IN_ALL * float(verdict.statistics["fk"]), 2.0 * LEAST)
         done = [_alone(made, found, most) for made, found in zip(searches, done, strict=True)]
     left_out = tuple(quantity.name for quantity in varied[len(done) :])
+    pair, spent = None, prober.spent
+    if not verdict.feasible and motion is None and all(t.feasible is None for t in done):
+        cost = cost_of(verdict)
+        most = max(PAIRS * cost, LEAST)
+        pairs = PairSearch(variant, verdict, q, cost, most, deadline, tick)
+        pair, spent = pairs.find(varied), spent + pairs.spent
     seconds = time.monotonic() - began
-    found = Explanation(verdict, tuple(done), left_out, dropped, prober.spent, seconds)
+    found = Explanation(verdict, tuple(done), left_out, dropped, spent, seconds, pair)
     return found, motion
 
 
@@ -285,15 +294,27 @@ def known_configurations(verdict: Verdict) -> NDArray[np.float64]:
 
 
 def drop(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> Dropped:
-    """What the best motion misses, and whether one motion covers all the rest."""
-    covered, areas = verdict.covered, verdict.cells.areas
-    most = 2 * cost_of(verdict)
-    rest = prober.attempt(prober.arrays, q, most, deep=False, needed=covered)
-    rest = prober.confirmed(prober.given, rest, covered)
-    cells = np.flatnonzero(~covered)
+    """What the best motion misses, and one motion over all the rest, if that can be certified.
+
+    Where a short search for it fails, the largest patch of a division has a motion of its own.
+    """
+    covered = verdict.covered
+    rest = prober.attempt(prober.arrays, q, 2 * cost_of(verdict), deep=False, needed=covered)
+    walk = prober.confirmed(prober.given, rest, covered).walk
+    left = prober.deadline - time.monotonic()
+    if walk is None and covered.any() and left > 0.0:
+        limit = left if np.isfinite(left) else None
+        plan = divide(*prober.given, Search(seed=verdict.seed, time_limit=limit)).fewest
+        patches = [patch for patch in plan.patches if patch.accepted]
+        if patches:
+            largest = max(patches, key=lambda patch: patch.area)
+            walk, covered = largest.walk, np.zeros(len(covered), dtype=bool)
+            covered[largest.cells] = True
+    cells, areas = np.flatnonzero(~covered), verdict.cells.areas
     return Dropped(
         cells=cells,
         area=float(areas[cells].sum()),
         share=float(areas[cells].sum() / areas.sum()),
-        waypoints=None if rest.walk is None else len(rest.walk.q),
+        waypoints=None if walk is None else len(walk.q),
+        witness=walk,
     )

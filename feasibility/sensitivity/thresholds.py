@@ -254,9 +254,27 @@ class Threshold:
         return self.feasible is None and self.quantity.monotone and end and proved
 
 
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One quantity, and a value of it other than the one given."""
+
+    quantity: Quantity
+    value: float
+    """rad or m."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pair:
+    """Two changes that make a case feasible together, where none of them does alone."""
+
+    changes: tuple[Change, ...]
+    witness: Walk
+    """The covering motion, which the replay accepted."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Dropped(ReadOnlyArrays):
-    """The cells without which one motion covers the rest: those that the best one misses."""
+    """The cells without which one motion covers the rest."""
 
     cells: NDArray[np.int64]
     """(k,) flat indices."""
@@ -266,6 +284,8 @@ class Dropped(ReadOnlyArrays):
     """Of the whole area, 0..1."""
     waypoints: int | None
     """Of the motion that covers all others, which the replay accepted; None where there is none."""
+    witness: Walk | None = None
+    """That motion."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -283,6 +303,8 @@ class Explanation:
     """Evaluations of the arm that the thresholds took, a box of a proof counting as one."""
     seconds: float
     """Time that they took."""
+    pair: Pair | None = None
+    """Two changes together, where no single one helps; None where none was found either."""
     alone: Verdict | None = None
     """What `check` says with the seed given and no motion known, where `verdict` owes its motion to
     the witness of a threshold; None where `verdict` is that."""

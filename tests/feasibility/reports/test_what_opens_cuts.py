@@ -31,9 +31,7 @@ def test_a_motion_across_the_cut_opens_it() -> None:
     found = explanation(Walk(q, np.array([0, 1])))
     place = place_of(proof.root, found.verdict.robot)
     said = f"the motion then crosses {place}, as none can now"
-    assert f"feasible from alpha = 9 deg on (3 deg now); {said}." in " ".join(
-        as_text(found, "x").split()
-    )
+    assert f"task.cone_deg: {said}." in " ".join(as_text(found, "x").split())
     (threshold,) = as_json(found, "x")["thresholds"]
     assert threshold["opens"] == said
     assert threshold["sentence"].endswith(f"{said}.")
@@ -52,4 +50,5 @@ def test_nothing_is_said_without_a_cut_or_a_motion() -> None:
     walk = Walk(np.zeros((2, 6)), np.array([0, 1]))
     for found in (explanation(None), explanation(walk, proof=False)):
         assert as_json(found, "x")["thresholds"][0]["opens"] is None
-        assert "then" not in as_text(found, "x").split("on (3 deg now)")[1]
+        assert "task.cone_deg:" not in as_text(found, "x")
+        assert " then " not in as_text(found, "x")

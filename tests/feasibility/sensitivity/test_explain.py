@@ -13,7 +13,9 @@ import pytest
 from paper_cases import PAPER_CASES
 
 from feasibility import Answer, Evidence, Search, Task, Verdict, check
-from feasibility.reports.explanation import as_json, as_text, shown
+from feasibility.reports.changes import label, shown
+from feasibility.reports.explanation import as_json, as_text
+from feasibility.reports.explanation_words import helpful
 from feasibility.sensitivity import Explanation, Kind, Quantity, Threshold, explain
 from feasibility.sensitivity import explanation as explanations
 from feasibility.sensitivity.probes import Prober
@@ -118,8 +120,9 @@ def test_4d_names_joint1_and_granting_what_it_needs_is_enough() -> None:
     assert verdict_at(variant, found, value + math.radians(0.1)).answer is Answer.FEASIBLE
     less = verdict_at(variant, found, value - math.radians(0.5))
     assert (less.answer, less.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
-    text = as_text(explained("4d"), "paper/4d")
-    assert f"joint1 would need up to {shown(found.quantity, value)}; it stops at 10 deg" in text
+    text = " ".join(as_text(explained("4d"), "paper/4d").split())
+    limit = f"robot.limits_deg.joint1 (upper) {shown(found.quantity, value, True)} (10 deg now)"
+    assert text.startswith(f"paper/4d: infeasible. One change makes it feasible: {limit}.")
 
 
 def test_4d_drops_the_cells_that_no_motion_covers() -> None:
@@ -151,8 +154,8 @@ def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry() -> None:
     assert verdict_at(variant, found, value + math.radians(0.1)).answer is Answer.FEASIBLE
     less = verdict_at(variant, found, value - math.radians(0.5 + 1.0))
     assert less.answer is not Answer.FEASIBLE
-    text = as_text(explained("stiff wrist"), "stiff wrist")
-    assert f"feasible from alpha = {shown(found.quantity, value)} on (20 deg now)" in text
+    text = " ".join(as_text(explained("stiff wrist"), "stiff wrist").split())
+    assert f"task.cone_deg 20 deg {shown(found.quantity, value, True)}" in text
 
 
 def branch_tilts(point: np.ndarray, approach: np.ndarray) -> list[float]:
@@ -358,7 +361,7 @@ def test_out_of_time_is_said_and_nothing_is_claimed() -> None:
     # Cells that nothing was looked for at are no cells to drop.
     assert "what would have to be dropped is unknown" in text
     assert "have to be dropped." not in text
-    assert "would need" not in text
+    assert "makes it feasible" not in text
     assert "No single change" not in text or explanation.thresholds
 
 
@@ -454,17 +457,20 @@ def leaves(value: Any) -> Iterator[Any]:
 
 
 @pytest.mark.parametrize("name", ["plate", "long plate", "stiff wrist", "deep plate", "4d"])
-def test_json_has_plain_numbers_and_the_text_every_sentence(name: str) -> None:
+def test_json_has_plain_numbers_and_the_text_what_helps(name: str) -> None:
     explanation = explained(name)
     result = as_json(explanation, name)
     assert json.loads(json.dumps(result, allow_nan=False)) == result
     assert all(isinstance(leaf, (str, int, float, type(None))) for leaf in leaves(result))
     words = " ".join(as_text(explanation, name).split())
     for found, said in zip(explanation.thresholds, result["thresholds"], strict=True):
-        if found.ruled_out:
-            assert f"{shown(found.quantity, found.quantity.end)}" in words
-        else:
-            assert " ".join(said["sentence"].split()) in words
+        if found in helpful(explanation):
+            assert found.feasible is not None
+            value = shown(found.quantity, found.feasible.value, True)
+            assert f"{label(found.quantity)} " in words
+            assert f" {value}" in words
+        assert label(found.quantity) in said["sentence"]
+        assert said["key"] in label(found.quantity)
         unit = "deg" if found.quantity.unit == "rad" else "m"
         scale = 180.0 / math.pi if unit == "deg" else 1.0
         assert said[f"given_{unit}"] == pytest.approx(scale * found.quantity.given, abs=1e-5)

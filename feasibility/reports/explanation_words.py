@@ -1,0 +1,267 @@
+"""Thresholds in words: a sentence each, a row each, and the one change that helps most."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from feasibility.cut_words import what_opens
+from feasibility.reports.changes import LIMITS, label, shown, worded
+from feasibility.reports.parts import counted
+from feasibility.sensitivity import Change, Explanation, Finding, Kind, Quantity, Threshold
+from feasibility.verdict import Evidence, Verdict
+
+SEEDED = "[1]"  # behind thresholds that a search without known motions did not find
+SPARE = 1.0 / 3.0  # [1] of a joint's range: a limit that may tighten by more does not matter
+FURTHEST = "the furthest value tried"
+
+
+class Row(NamedTuple):
+    """One threshold, as a table shows it."""
+
+    change: str
+    now: str
+    value: str
+    beyond: str
+    """What is known on the other side of the threshold."""
+
+
+# -- which thresholds are worth a line ------------------------------------------------------------
+
+
+def helpful(explanation: Explanation) -> list[Threshold]:
+    """The thresholds with a feasible side that say something, the most useful one first.
+
+    Of a feasible case those with the least to spare; of another those that ask for the least.
+    """
+    found = [t for t in explanation.thresholds if t.feasible is not None]
+    return sorted((t for t in found if matters(t, explanation.verdict)), key=effort)
+
+
+def matters(threshold: Threshold, verdict: Verdict) -> bool:
+    """Does it say something? Not of a limit that a feasible case is far from using."""
+    quantity, found = threshold.quantity, threshold.feasible
+    if not verdict.feasible or quantity.kind not in LIMITS or found is None:
+        return True
+    robot = verdict.robot
+    width = float(robot.upper[quantity.joint] - robot.lower[quantity.joint])
+    return bool(threshold.other is not None and threshold.margin <= SPARE * width)
+
+
+def effort(threshold: Threshold) -> float:
+    """The share of its range that a change needs, or that a margin leaves, 0..1."""
+    quantity, found = threshold.quantity, threshold.feasible
+    span = abs(quantity.end - quantity.given)
+    return abs(found.value - quantity.given) / span if found is not None and span > 0.0 else 1.0
+
+
+def best_changes(explanation: Explanation) -> tuple[Change, ...]:
+    """What makes a case feasible with the least effort: one change, or two; empty if none does."""
+    if explanation.verdict.feasible:
+        return ()
+    for threshold in helpful(explanation):
+        if threshold.feasible is not None:
+            return (Change(threshold.quantity, threshold.feasible.value),)
+    return () if explanation.pair is None else explanation.pair.changes
+
+
+def headline(explanation: Explanation) -> str:
+    """The one most useful thing to know."""
+    verdict, dropped = explanation.verdict, explanation.dropped
+    if len(verdict.cells) == 0:
+        return "there are no cells to cover, so there is nothing to explain."
+    if verdict.feasible:
+        rows = helpful(explanation)
+        least = f" The least to spare: {_spare(rows[0])}." if rows else ""
+        return f"feasible.{least}"
+    changes = best_changes(explanation)
+    if changes:
+        one = "One change makes it feasible" if len(changes) == 1 else "Two changes together do"
+        return f"{verdict.answer}. {one}: {' and '.join(map(worded, changes))}."
+    if dropped is not None and dropped.waypoints is not None:
+        rest = len(verdict.cells) - len(dropped.cells)
+        without = f"without {counted(len(dropped.cells), 'cell')} one motion covers the other"
+        return f"{verdict.answer}. No change was found to help; {without} {rest:,}."
+    why = "No change was found to help" if explanation.thresholds else "Nothing was looked at"
+    return f"{verdict.answer}. {why}."
+
+
+def _spare(threshold: Threshold) -> str:
+    """How far a feasible case can be tightened along one quantity."""
+    row, quantity = row_of(threshold), threshold.quantity
+    if quantity.kind is Kind.SHIFT:
+        return f"{row.change} by {row.value}"
+    way = "up" if quantity.end > quantity.given else "down"
+    return f"{row.change} {way} to {row.value} ({row.now} now)"
+
+
+def row_of(threshold: Threshold) -> Row:
+    """One threshold as a row of a table."""
+    quantity, found, other = threshold.quantity, threshold.feasible, threshold.other
+    now = "-" if quantity.kind is Kind.SHIFT else shown(quantity, quantity.given)
+    if found is None:
+        return Row(label(quantity), now, "-", "" if other is None else _against(quantity, other))
+    value = shown(quantity, found.value, True)
+    if threshold.span is not None:
+        value += f" .. {shown(quantity, threshold.span.feasible.value)}"
+    beyond = FURTHEST if other is None and found.value == quantity.end else ""
+    if other is not None:
+        beyond = _against(quantity, other)
+    mark = f" {SEEDED}" if found.unaided is False else ""
+    return Row(label(quantity), now, value + mark, beyond)
+
+
+def idle_limits(explanation: Explanation) -> str:
+    """The limits that a feasible case is far from using, in one line; empty without any."""
+    idle = [
+        t.quantity
+        for t in explanation.thresholds
+        if t.feasible is not None and not matters(t, explanation.verdict)
+    ]
+    names = _joints(explanation.verdict, idle)
+    return f"Limits that do not matter: {', '.join(names)}." if names else ""
+
+
+def helpless(explanation: Explanation) -> list[str]:
+    """What was found not to help, a line for what is proved and one for what is not."""
+    others = [t for t in explanation.thresholds if t.feasible is None]
+    groups = {
+        "Proved not to help alone": [t for t in others if t.ruled_out],
+        "Not found to help alone": [t for t in others if not t.ruled_out],
+    }
+    return [
+        f"{head}: {'; '.join(_in_short(explanation.verdict, group))}."
+        for head, group in groups.items()
+        if group
+    ]
+
+
+def _in_short(verdict: Verdict, group: Sequence[Threshold]) -> Iterator[str]:
+    """Quantities with the furthest value that was tried, those of one kind together."""
+    for threshold in group:
+        quantity = threshold.quantity
+        if quantity.kind in (Kind.CONE, Kind.STANDOFF):
+            yield f"{label(quantity)} to {shown(quantity, quantity.end)}"
+    limits = [t.quantity for t in group if t.quantity.kind in LIMITS]
+    if limits:
+        yield f"wider limits of {', '.join(_joints(verdict, limits))}"
+    shifts = [t.quantity for t in group if t.quantity.kind is Kind.SHIFT]
+    if shifts:
+        ways = ", ".join(q.name.removeprefix("shift along ") for q in shifts)
+        yield f"surface.position {ways} by up to {shown(shifts[0], shifts[0].end)}"
+
+
+def _joints(verdict: Verdict, limits: Iterable[Quantity]) -> list[str]:
+    """Joints with the sides of their limits: 'joint1', 'joint2 (upper)'."""
+    sides: dict[int, list[str]] = {}
+    for quantity in limits:
+        side = "lower" if quantity.kind is Kind.LOWER else "upper"
+        sides.setdefault(quantity.joint, []).append(side)
+    names = verdict.robot.joint_names
+    return [names[j] + ("" if len(both) == 2 else f" ({both[0]})") for j, both in sides.items()]
+
+
+# -- joints ---------------------------------------------------------------------------------------
+
+
+def joint_rows(explanation: Explanation) -> tuple[str, list[list[str]]]:
+    """Which motion, and for each joint its limits and the range that this motion uses."""
+    verdict, dropped = explanation.verdict, explanation.dropped
+    walk, what = verdict.witness, "the covering motion"
+    if walk is None and dropped is not None and dropped.witness is not None:
+        rest = counted(len(verdict.cells) - len(dropped.cells), "cell")
+        walk, what = dropped.witness, f"the motion over {rest}"
+    if walk is None:
+        return "", []
+    robot, rows = verdict.robot, []
+    used = np.stack([walk.q.min(axis=0), walk.q.max(axis=0)], axis=1)
+    limits = np.stack([robot.lower, robot.upper], axis=1)
+    for k, name in enumerate(robot.joint_names):
+        rows.append([name, *(_range(pair[k], bool(robot.prismatic[k])) for pair in (limits, used))])
+    return what, rows
+
+
+def _range(ends: Iterable[float], slides: bool) -> str:
+    """'-90 .. 10 deg', or 'free'."""
+    low, high = (end if slides else math.degrees(end) for end in ends)
+    if not math.isfinite(low) and not math.isfinite(high):
+        return "free"
+    digits = 4 if slides else 1
+    return f"{round(low, digits):.10g} .. {round(high, digits):.10g} {'m' if slides else 'deg'}"
+
+
+# -- sentences ------------------------------------------------------------------------------------
+
+
+def sentence(threshold: Threshold, verdict: Verdict) -> str:
+    """One threshold as a sentence.
+
+    Args:
+        threshold: what was found.
+        verdict: of the case as given; where it is feasible the threshold is a margin.
+    """
+    quantity, found = threshold.quantity, threshold.feasible
+    if found is None:
+        return _helpless(threshold)
+    value, now = shown(quantity, found.value, True), shown(quantity, quantity.given)
+    text = (_margin if verdict.feasible else _remedy)(quantity, value, now)
+    if threshold.span is not None:
+        text += f", and on to {shown(quantity, threshold.span.feasible.value)}"
+        if threshold.span.other is not None:
+            text += f" ({_against(quantity, threshold.span.other)})"
+    if threshold.other is not None:
+        text += f"; {_against(quantity, threshold.other)}"
+    elif verdict.feasible and found.value == quantity.end:
+        text += f", {FURTHEST}"
+    opens = what_it_opens(threshold, verdict)
+    text += f"; {opens}" if opens else ""
+    return text + ("." if found.unaided is not False else f" {SEEDED}.")
+
+
+def what_it_opens(threshold: Threshold, verdict: Verdict) -> str:
+    """How the motion of a changed case gets past the proof of this one; empty without cuts."""
+    found, proof = threshold.feasible, verdict.proof
+    if found is None or found.witness is None or proof is None or proof.kind != "cut":
+        return ""
+    return what_opens(proof, found.witness.q, verdict.robot, verdict.cells)
+
+
+def _margin(quantity: Quantity, value: str, now: str) -> str:
+    """How far a feasible case can be tightened."""
+    if quantity.kind is Kind.SHIFT:
+        return f"{label(quantity)} can move by {value}"
+    change = "tighten"
+    if quantity.kind is Kind.STANDOFF:
+        change = "grow" if quantity.end > quantity.given else "shrink"
+    return f"{label(quantity)} can {change} to {value} ({now} now)"
+
+
+def _remedy(quantity: Quantity, value: str, now: str) -> str:
+    """What would make a case feasible."""
+    if quantity.kind is Kind.SHIFT:
+        return f"feasible with {label(quantity)} moved by {value}"
+    start = "feasible from" if quantity.kind is Kind.CONE else "feasible with"
+    return f"{start} {label(quantity)} = {value} ({now} now)"
+
+
+def _helpless(threshold: Threshold) -> str:
+    """No value was found to help."""
+    quantity, other = threshold.quantity, threshold.other
+    text = f"{label(quantity)} to {shown(quantity, quantity.end)} does not help alone"
+    if threshold.tried:
+        text += f" ({threshold.tried})"
+    if other is not None:
+        text += f": {_against(quantity, other)}"
+    return text + "."
+
+
+def _against(quantity: Quantity, other: Finding) -> str:
+    """Why a value is not feasible."""
+    if other.value == quantity.given and (
+        other.evidence is not Evidence.PROOF or other.cell is None
+    ):
+        return f"{other.answer} at the given {shown(quantity, other.value)}"
+    return f"at {shown(quantity, other.value, False)} {other.detail}"
