@@ -4,6 +4,7 @@ from .chain import frames as frames
 from .chain import jacobians as jacobians
 from .errors import RobotError as RobotError
 from .kinematics import Kinematics as Kinematics
+from .library import GROUPS as GROUPS
 from .library import RobotInfo as RobotInfo
 from .library import joint_kinds as joint_kinds
 from .library import list_robots as list_robots

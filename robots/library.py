@@ -51,16 +51,27 @@ class RobotInfo:
     limits: str | None = None
     """Path of a file of named limit sets."""
     package_dirs: tuple[str, ...] = ()
+    group: str = "manipulator"
+    """What carries it: one of `GROUPS`."""
+
+
+GROUPS = {
+    "manipulator": "manipulators",
+    "humanoid": "arms of humanoids and of robots on wheels",
+    "legged": "arms on legged robots",
+}
+"""Kinds of robots whose arms the library has, manipulators first, and what they are called."""
 
 
 def list_robots() -> tuple[RobotInfo, ...]:
-    """Every robot that `load_robot` knows by name, in the order of the library; reads no URDF.
+    """Every robot that `load_robot` knows by name, manipulators first; reads no URDF.
 
     Example:
         >>> [info.name for info in list_robots()][:3]
         ['puma560', 'ur3', 'ur3_limited']
     """
-    return tuple(_library().values())
+    order = tuple(GROUPS)
+    return tuple(sorted(_library().values(), key=lambda info: order.index(info.group)))
 
 
 def load_robot(
@@ -182,6 +193,7 @@ def _library() -> Mapping[str, RobotInfo]:
             lock=MappingProxyType(entry.get("lock", {})),
             limits=str(HERE / entry["limits"]) if "limits" in entry else None,
             package_dirs=() if built_in else (str(share),),
+            group=entry.get("group", "manipulator"),
         )
     return MappingProxyType(entries)
 

@@ -85,9 +85,11 @@ def robot_rows() -> list[dict[str, Any]]:
         rows.append(
             {
                 "name": info.name,
+                "group": info.group,
                 "description": info.description,
                 "source": info.source,
                 "tool_frame": robot.tool_frame,
+                "degrees_of_freedom": robot.n,
                 "reach_m": robot.reach if math.isfinite(robot.reach) else None,
                 "limit_sets": sorted(robot.limit_sets),
                 "joints": joints,
@@ -121,10 +123,13 @@ def cases_table(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def robots_table(rows: Sequence[dict[str, Any]]) -> str:
-    """The robots for people: joints by kind, reach, limits in order of the joints."""
-    return _table(
-        ["robot", "joints", "reach", "limits (deg unless in m)", "limit sets"],
-        [
+    """The robots for people, by group: degrees of freedom, reach, limits in order of the joints."""
+    from robots import GROUPS
+
+    headings = ["robot", "degrees of freedom", "reach", "limits (deg unless in m)", "limit sets"]
+    tables = []
+    for group, title in GROUPS.items():
+        lines = [
             [
                 row["name"],
                 _kinds(row["joints"]),
@@ -133,8 +138,10 @@ def robots_table(rows: Sequence[dict[str, Any]]) -> str:
                 ", ".join(row["limit_sets"]),
             ]
             for row in rows
-        ],
-    )
+            if row["group"] == group
+        ]
+        tables.append(f"{title.capitalize()}\n\n{_table(headings, lines)}")
+    return "\n\n".join(tables)
 
 
 def _kinds(joints: Sequence[dict[str, Any]]) -> str:

@@ -30,7 +30,6 @@ from feasibility.notices import NOTICE, compiling_notice
 from feasibility.results import load_result, save_result
 from feasibility.version import version
 from feasibility.viewer.live_server import LiveView
-from robots import list_robots
 
 COMMAND = [sys.executable, "-m", "feasibility.cli"]
 GUARD_S = 300  # against hanging alone
@@ -392,32 +391,6 @@ def test_cases_lists_the_built_in_ones(ask):
     assert status == 0
     assert [row["name"] for row in rows] == list(builtin_cases())
     assert rows[0]["cells"] == [9, 10]
-
-
-def test_robots_lists_joints_reach_and_limits(ask):
-    status, out, err = ask("robots")
-    lines = out.splitlines()
-    names = [info.name for info in list_robots()]
-    assert (status, err) == (0, "")
-    assert [line.split()[0] for line in lines[1:]] == names
-    puma = lines[1 + names.index("puma560")]
-    assert "1.41 m" in puma
-    assert "-180..180" in puma
-    assert "set-1, set-2, set-3, set-4" in puma
-    kinova = lines[1 + names.index("kinova")]
-    assert "6 (3 continuous)" in kinova
-    assert "free, 47..313, 19..341, free, 30..330, free" in kinova
-
-    status, out, _ = ask("robots", "--json")
-    rows = {row["name"]: row for row in json.loads(out)["robots"]}
-    assert list(rows) == names
-    assert rows["puma560"]["joints"][0] == {
-        "name": "joint1",
-        "kind": "revolute",
-        "limits_deg": [-180.0, 180.0],
-    }
-    assert rows["kinova"]["joints"][0]["limits_deg"] is None
-    assert len(rows["panda"]["joints"]) == 7
 
 
 # start and progress

@@ -1,4 +1,4 @@
-"""`coverable keys`: the whole reference, one table of it, and names that there are not."""
+"""`coverable robots` and `coverable keys`: what there is, what is said, and names of nothing."""
 
 import json
 
@@ -6,6 +6,7 @@ import pytest
 
 from feasibility.cases import all_keys
 from feasibility.cli import main as cli
+from robots import GROUPS, list_robots
 
 
 @pytest.fixture
@@ -58,3 +59,46 @@ def test_keys_of_a_table_that_there_is_not(ask, asked, words):
     status, out, err = ask("keys", asked)
     assert (status, out) == (2, "")
     assert words in err
+
+
+def test_robots_lists_joints_reach_and_limits_manipulators_first(ask):
+    status, out, err = ask("robots")
+    lines = out.splitlines()
+    names = [info.name for info in list_robots()]
+    assert (status, err) == (0, "")
+    listed = {line.split()[0]: line for line in lines if " m  " in line}
+    assert list(listed) == names
+    heads = [lines.index(title.capitalize()) for title in GROUPS.values()]
+    assert heads == sorted(heads)
+    puma = listed["puma560"]
+    assert "1.41 m" in puma
+    assert "-180..180" in puma
+    assert "set-1, set-2, set-3, set-4" in puma
+    kinova = listed["kinova"]
+    assert "6 (3 continuous)" in kinova
+    assert "free, 47..313, 19..341, free, 30..330, free" in kinova
+
+    status, out, _ = ask("robots", "--json")
+    rows = {row["name"]: row for row in json.loads(out)["robots"]}
+    assert list(rows) == names
+    groups = [row["group"] for row in rows.values()]
+    assert groups == sorted(groups, key=list(GROUPS).index)
+    for name, group in (("ur5", "manipulator"), ("so101", "manipulator"), ("b1_z1", "legged"),
+                        ("pr2_left", "humanoid"), ("talos_arm", "humanoid")):  # fmt: skip
+        assert rows[name]["group"] == group
+    assert rows["puma560"]["joints"][0] == {
+        "name": "joint1",
+        "kind": "revolute",
+        "limits_deg": [-180.0, 180.0],
+    }
+    assert rows["kinova"]["joints"][0]["limits_deg"] is None
+    assert len(rows["panda"]["joints"]) == rows["panda"]["degrees_of_freedom"] == 7
+
+
+@pytest.mark.parametrize("name", ["ur10e", "iiwa", "kr210", "my_arm"])
+def test_an_unknown_robot_is_answered_with_how_to_bring_a_urdf(ask, name):
+    status, out, err = ask("check", "paper/4a", "--set", f"robot.name={name}")
+    assert (status, out) == (2, "")
+    assert f"there is no robot '{name}'" in err
+    for words in ('urdf = "my_arm.urdf" in a case', "load_robot(", "xacro", "coverable robots"):
+        assert words in err
