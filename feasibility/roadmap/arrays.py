@@ -111,6 +111,16 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
     )
 
 
+def passable(arrays: SearchArrays) -> NDArray[np.bool_]:
+    """(M,) curves along which a motion can be certified, as far as the surface goes."""
+    bent = np.isinf(arrays.derivative_bounds[:, :2]).any(axis=1)
+    curve = np.repeat(np.arange(len(arrays.deviations)), np.diff(arrays.first_piece))
+    most = np.array([arrays.tolerance, arrays.cone_chord])
+    usable = np.asarray((arrays.deviations < most).all(axis=1), dtype=np.bool_)
+    usable[curve[bent]] = False
+    return usable
+
+
 class Work(NamedTuple):
     """Working memory of one thread; slot 0 is where the arm is, slot 1 where it tries to go."""
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from feasibility.clock import Clock
 from feasibility.cut_tree import CutTree
-from feasibility.roadmap.arrays import SearchArrays, Work, work_for
+from feasibility.roadmap.arrays import SearchArrays, Work, passable, work_for
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
 from feasibility.roadmap.expansion import close_pairs, explore_self_motions, seed_cell, spread_out
@@ -29,10 +29,11 @@ from feasibility.roadmap.graph import (
     root_of,
 )
 from robots import Robot
-from surfaces import Cells
+from surfaces import Cells, components
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
 GUESSES = 4  # of one `explore_self_motions`
+TOP = 5  # components that a round works on
 BRIDGES = 6  # pairs of nodes that one round tries to bridge
 PATIENCE = 60  # failed connections of two components before `explore_self_motions` gives them up
 
@@ -60,6 +61,8 @@ class Exploration:
     """How often a bridge between two nodes was tried."""
     pairs: NDArray[np.int64] = field(init=False)
     """(M + 1,) state of each neighbouring pair, see `close_pairs`."""
+    parts: NDArray[np.int64] = field(init=False)
+    """(N,) which part of the surface each cell is in, as the curves join them."""
 
     def __post_init__(self) -> None:
         """Set up the empty roadmap, the random numbers and the neighbours."""
@@ -84,6 +87,7 @@ class Exploration:
         self.indptr, self.indices = self.cells.neighbours
         self.links = self.cells.neighbours.links
         self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
+        self.parts = components(self.cells.pairs[passable(self.arrays)], len(self.cells))
 
     # -- reading the roadmap -------------------------------------------------------------------
 
@@ -123,6 +127,21 @@ class Exploration:
         return not bool(self.covered[self.reached].all())
 
     @property
+    def improvable(self) -> bool:
+        """Could motions along the curves between centres gain anything?
+
+        Not where some component covers all that is reached of each part of the surface, as these
+        curves join it: over a sharp crease, or from one piece to another that it does not touch,
+        there is no motion.
+        """
+        reached = self.reached
+        if self.parts.max(initial=0) == 0:
+            return self.apart
+        cover = self.roadmap.cover[self.roots()].astype(bool)
+        parts = [(self.parts == part) & reached for part in range(self.parts.max() + 1)]
+        return not all(cover[:, part].all(axis=1).any() for part in parts if part.any())
+
+    @property
     def n_edges(self) -> int:
         """Neighbouring pairs of cells with a motion between them, found by `close`."""
         return int((self.pairs[:-1] == 1).sum())
@@ -133,8 +152,8 @@ class Exploration:
         roots = slots[self.roadmap.parent[slots] == slots]
         return [int(r) for r in roots[np.argsort(-self.roadmap.size[roots], kind="stable")]]
 
-    def sizes(self, most: int | None = None) -> tuple[int, ...]:
-        """How many cells the components cover, the largest ones first."""
+    def sizes(self, most: int | None = TOP) -> tuple[int, ...]:
+        """How many cells the largest components cover, the largest first; of all with None."""
         return tuple(int(self.roadmap.size[r]) for r in self.roots()[:most])
 
     def covers(self, component: int) -> NDArray[np.bool_]:

@@ -48,18 +48,17 @@ class Proving:
             budget: boxes that may be examined; up to `MOST_BOXES` if it looks as if they would do.
 
         Returns:
-            True when there is a proof, or a gain.
+            True when there is a proof, or the largest components gained by it.
         """
-        gained = False
+        before = self.exploration.sizes()
         for _ in range(ATTEMPTS):
             seeded = self._attempt(budget)
-            gained |= seeded
             if self.exploration.cut_tree is not None:
                 return True
             if self.exploration.complete or not (seeded or self._left < MOST_BOXES):
                 break
             budget = max(budget, int(min(2.0 * self._left, MOST_BOXES)) if not seeded else 0)
-        return gained
+        return self.exploration.sizes() != before
 
     def _attempt(self, budget: int) -> bool:
         """One attempt; True when its seeds made the search grow."""
@@ -77,10 +76,10 @@ class Proving:
         exploration.cut_tree, self.blocked = made.tree, made.blocked
         self._left = made.boxes_left
         self.starved = made.boxes >= budget
-        before = exploration.sizes()
+        before = exploration.sizes(None)
         for cell, q in made.seeds:
             exploration.add_seeds(cell, wound(exploration.arrays, q)[None])
-        return exploration.sizes() != before
+        return exploration.sizes(None) != before
 
     def _ready(self) -> Prover | None:
         """The prover, made when it is first needed; None where there is to be none.

@@ -39,7 +39,7 @@ MOST_CELLS = 20_000  # finer cells; more are not tried
 MOST_EVALUATIONS = 400_000  # of the arm, over one set of finer cells
 BRIDGES = 24  # pairs of nodes that a round tries to bridge for each two components
 BRIDGING_ROUNDS, ROUNDS = 4, 2  # without gain: of bridges alone, and of self-motions too
-TOP = 4  # components that a round works on
+MOST = 4  # components that a round works on
 
 
 def refine(exploration: Exploration, task: Task, levels: tuple[int, ...]) -> bool:
@@ -70,15 +70,17 @@ def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
     arrays = arrays_of(exploration.robot, finer.cells, task)
     arrays = arrays._replace(off_target_cost=exploration.arrays.off_target_cost)
     fine = Exploration(exploration.robot, finer.cells, arrays, exploration.seed)
+    if not exploration.improvable and fine.parts.max() == exploration.parts.max():
+        return  # the finer curves pass where the others do not either
     fine.clock = _Budget(exploration, fine)
     origin = _put_there(exploration, fine, finer.same)
     try:
         fine.spread()
         dry = 0 if _take_over(exploration, fine, finer.same, origin) else 1
-        while exploration.apart and dry <= BRIDGING_ROUNDS + ROUNDS:
+        while exploration.apart and fine.improvable and dry <= BRIDGING_ROUNDS + ROUNDS:
             fine.rounds += 1
             if dry > BRIDGING_ROUNDS:
-                improve(fine, fine.roots()[:TOP])
+                improve(fine, fine.roots()[:MOST])
             else:
                 _bridge(fine)
             dry = 0 if _take_over(exploration, fine, finer.same, origin) else dry + 1
@@ -110,7 +112,7 @@ class _Budget(Clock):
 
 def _bridge(fine: Exploration) -> None:
     """Try to bridge each two of the largest components."""
-    top = fine.roots()[:TOP]
+    top = fine.roots()[:MOST]
     for a, b in combinations(top, 2):
         one, other = (int(root_of(fine.roadmap, root)) for root in (a, b))
         if one != other:

@@ -23,13 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
-from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.exploration import TOP, Exploration
 from feasibility.roadmap.graph import NODES, root_of
 from feasibility.roadmap.self_motion import margin_shares
 
 PIVOT_SEEDS = 8
 RESTARTS = 6  # cells seeded anew before a search counts as exhausted
-TOP = 5  # components that a round works on
 DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
 SETTLED_ROUNDS = 12  # the same once a proof decides the verdict, and only more cells can be gained
 PARTED_ROUNDS = 3  # the same once a cut tree parts the components found
@@ -150,10 +149,11 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
         roots = exploration.roots()
         if not roots or not exploration.apart:
             return  # the best component covers every cell that any component covers
-        before = exploration.sizes(TOP)
-        _round(exploration, roots[:TOP])
+        before = exploration.sizes()
+        if exploration.improvable:
+            _round(exploration, roots[:TOP])
         exploration.rounds += 1
-        dry = dry + 1 if exploration.sizes(TOP) == before else 0
+        dry = dry + 1 if exploration.sizes() == before else 0
         if exploration.complete or dry >= _enough(exploration):
             return
         if exploration.cut_tree is None and between is not None and between(dry):
