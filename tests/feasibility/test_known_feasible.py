@@ -5,11 +5,12 @@ from functools import cache
 import pytest
 from dense_replay import assert_witness
 from draw_between_curves import read_between
+from draw_disconnected import read_apart
 from oracle_build import built
 from planted import HERE, read_planted
 from widening import WIDENINGS, case_of, decided, lost, widened
 
-from feasibility import Search, check
+from feasibility import Answer, Search, check
 from feasibility.cases import load_case
 from robots import load_robot
 
@@ -55,3 +56,10 @@ def narrow(number):
 def test_what_is_wider_loses_nothing_whatever_the_arm(number, what):
     tables, rng = case_of(number)
     assert lost(narrow(number), decided(widened(rng, tables, what))) == ""
+
+
+def test_a_passage_too_narrow_to_be_found_is_not_called_infeasible():
+    """The oracle's motion goes round the border of the arm's reach, with 0.003 deg to the cone."""
+    case = read_apart("puma560")[61]
+    assert case.tight_feasible
+    assert check(*built(case.problem, load_robot("puma560"))).answer is not Answer.INFEASIBLE

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from feasibility import Answer, Evidence, check
 from feasibility.cases import Case
-from feasibility.placement import AXES, Pose, Region
+from feasibility.placement import AXES, Pose, Region, Trial, place
+from feasibility.reports.placement import settings_of
 
 SHIFT, TURN_DEG = 0.3, 40.0  # [m], [deg] that a surface is moved by, at most
 
@@ -72,6 +74,25 @@ TEXTS = {
     """,
 }
 
+MOVED = [
+    ("puma560 pipe", 2),
+    ("puma560 pipe", 21),
+    ("puma560 dome", 12),
+    ("puma560 dome", 21),
+    ("ur5 plate", 3),
+    ("ur5 plate", 9),
+    ("ur5 pipe", 3),
+    ("ur5 pipe", 8),
+    ("ur5 pipe", 15),
+    ("panda plate", 3),
+    ("panda plate", 10),
+    ("panda dome", 7),
+    ("panda dome", 9),
+]
+"""Cases, and seeds of shifts."""
+DEAR = [("panda dome", 7), ("ur5 pipe", 3)]
+"""Those that take most of the time."""
+
 
 def placement_case(name: str) -> Case:
     """The case of that name, feasible as it stands."""
@@ -91,3 +112,31 @@ def region_about(pose: Pose) -> Region:
     widths = [SHIFT] * 3 + [TURN_DEG] * 3
     ends = zip(AXES, pose.values.tolist(), widths, strict=True)
     return Region.around(pose, {name: (v - w, v + w) for name, v, w in ends})
+
+
+def assert_put_back(name: str, seed: int) -> None:
+    """Infeasible where it was moved to; in the region around it `place` finds a feasible place."""
+    case = placement_case(name)
+    away = moved_away(case, seed)
+    moved = case.with_overrides(settings_of(away)).build()
+    assert check(*moved).answer is Answer.INFEASIBLE
+    region = region_about(away)
+    placements = place(*moved[:3], region, moved.search, count=32, around=2, keep=2)
+    assert placements.answer is Answer.FEASIBLE
+    assert placements.evidence is Evidence.WITNESS
+    for trial in placements.found:
+        assert region.holds(trial.pose)
+        assert check(*case.with_overrides(settings_of(trial.pose)).build()).feasible
+        assert trial.complete
+        assert trial.share == 1.0
+        assert trial.margins is not None
+        assert 0.0 <= trial.margin == min(vars_of(trial)) <= 1.0
+    assert placements.best is placements.found[0]
+    margins = [trial.margin for trial in placements.found]
+    assert margins == sorted(margins, reverse=True)
+
+
+def vars_of(trial: Trial) -> tuple[float, ...]:
+    """The three shares."""
+    assert trial.margins is not None
+    return trial.margins.limits, trial.margins.cone, trial.margins.reach
