@@ -160,6 +160,11 @@ class SurfacePart:
         return self.kind if file is None else os.path.basename(file)
 
     @property
+    def is_grid(self) -> bool:
+        """Whether the cells lie in rows and columns."""
+        return isinstance(self.cells, tuple)
+
+    @property
     def counts(self) -> list[int]:
         """The number of cells along u and v, or of all cells of a mesh; empty if not known yet."""
         cells = self.cells

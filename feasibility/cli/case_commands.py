@@ -21,6 +21,7 @@ from feasibility.interrupts import forgive
 from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
+    from feasibility.cases import Case
     from feasibility.cli.command import OpenCase
     from feasibility.paths import Order
     from feasibility.sensitivity import Explanation
@@ -200,7 +201,14 @@ def show(args: argparse.Namespace, began: float) -> int:
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
-    with open_case(args, began, outputs, WHY_COMPLETE["path"]) as opened:
+
+    def judge(case: Case) -> None:
+        from feasibility.paths import check_order
+
+        if args.order is not None:
+            check_order(args.order, case.surface.kind, case.surface.is_grid)
+
+    with open_case(args, began, outputs, WHY_COMPLETE["path"], judge) as opened:
         from feasibility.checking import check
         from feasibility.paths import coverage_path
         from feasibility.reports import path as report

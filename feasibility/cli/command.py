@@ -118,6 +118,7 @@ def open_case(
     began: float,
     outputs: Mapping[str, str | None],
     only_complete: str = "",
+    judge: Callable[[Case], None] = lambda case: None,
 ) -> Iterator[OpenCase]:
     """Load `args.case` with `args.settings`, print its notes, and show progress meanwhile.
 
@@ -126,6 +127,7 @@ def open_case(
         began: `time.perf_counter()` when the command began.
         outputs: files by their flag, see `check_outputs`; checked before anything is built.
         only_complete: why the command refuses the greedy search; empty where it does not.
+        judge: called with the case before anything is built; raises to refuse it.
 
     Raises:
         CaseError: the case cannot be used.
@@ -140,6 +142,7 @@ def open_case(
         check_outputs(outputs, args.case)
         if only_complete and case.search.method != "complete":
             raise CaseError(Fault("search.method", only_complete), case.name)
+        judge(case)
         with compiling_notice():  # cutting a mesh into cells has kernels of its own
             setup = case.build()
         settle()

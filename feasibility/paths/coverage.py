@@ -25,9 +25,9 @@ from feasibility.paths.metrics import PathFigures, figures_of
 from feasibility.paths.motion_graph import MotionGraph, motion_graph_of
 from feasibility.paths.order import (
     GRID_ORDERS,
-    ORDERS,
     Order,
     PathError,
+    check_order,
     closed_sides,
     grid_order,
     route,
@@ -105,8 +105,7 @@ def coverage_path(
         >>> round(path.figures.length, 3), round(path.figures.revisited_share, 3)
         (0.367, 0.0)
     """
-    if order not in ORDERS:
-        raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
+    check_order(order, verdict.cells.surface.kind, len(verdict.cells.shape) == 2)
     needed = _needed(verdict, only)
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     found = _least_revisiting(motion_graph_of(verdict), cells, order, needed)
@@ -171,11 +170,10 @@ def _least_revisiting(
     """The motion over cells in an order that revisits least, of those that are tried.
 
     Raises:
-        PathError: no such order, or no motion leads from cell to cell.
+        PathError: no motion leads from cell to cell.
     """
     attempts = _Attempts(graph, cells, needed)
     if order != "shortest":
-        route(cells, order, needed)  # it refuses orders that these cells do not have
         attempts.along_grid(order)
         return attempts.best()
     attempts.along(route(cells, order, needed, graph.joined_cells()))

@@ -92,6 +92,26 @@ def closed_sides(cells: Cells) -> tuple[bool, bool]:
     )
 
 
+def check_order(order: str, kind: str, grid: bool) -> None:
+    """Refuse an order that cells do not have, before anything is searched for.
+
+    Args:
+        order: one of `ORDERS`.
+        kind: of the surface.
+        grid: whether its cells lie in rows and columns.
+
+    Raises:
+        PathError: there is no such order, or these cells do not have it.
+    """
+    if order not in ORDERS:
+        raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
+    if order in GRID_ORDERS and not grid:
+        raise PathError(
+            f"the order {order!r} follows the rows and columns of a grid, which the cells of a "
+            f"{kind} surface are not; use order 'shortest'"
+        )
+
+
 def route(
     cells: Cells,
     order: Order,
@@ -112,14 +132,8 @@ def route(
     Raises:
         PathError: no such order, or one that these cells do not have.
     """
-    if order not in ORDERS:
-        raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
     grid = len(cells.shape) == 2
-    if order in GRID_ORDERS and not grid:
-        raise PathError(
-            f"the order {order!r} follows the rows and columns of a grid, which these "
-            f"{len(cells)} cells of a {cells.surface.kind} are not; use order 'shortest'"
-        )
+    check_order(order, cells.surface.kind, grid)
     wanted = np.ones(len(cells), dtype=bool) if needed is None else needed
     names = GRID_ORDERS if order == "shortest" else (order,)
     orders = [grid_order(name, int(cells.shape[0]), int(cells.shape[1])) for name in names if grid]

@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from feasibility.cases import load_case
+from feasibility.cases import Case, load_case
 from feasibility.certification import replay
 from feasibility.cli.main import main
 from feasibility.reports.path import at_least, at_most
@@ -117,6 +117,39 @@ def test_bad_input_is_one_message(argv, words, capsys):
     assert out == ""
     assert words in err
     assert "Traceback" not in err
+
+
+MESH = """\
+robot.name = "ur5"
+task = { standoff = 0.02, cone_deg = 30 }
+surface = { kind = "mesh", file = "part.stl", side = "outside", cells = 9 }
+"""
+PIECES = """\
+robot.name = "ur5"
+task = { standoff = 0.02, cone_deg = 30 }
+[surface]
+kind = "piecewise"
+pieces = [{ kind = "plane", u = [0, 1], v = [0, 1], cells = [2, 3] }]
+"""
+
+
+@pytest.mark.parametrize("order", ["rows", "columns", "spiral"])
+@pytest.mark.parametrize(("kind", "text"), [("mesh", MESH), ("piecewise", PIECES)])
+def test_an_order_that_there_is_not_is_refused_before_any_work(
+    kind, text, order, tmp_path, capsys, monkeypatch
+):
+    """Nothing is built for it: neither the mesh's file nor the arm is looked at."""
+
+    def build(self):
+        raise AssertionError("the case was built")
+
+    monkeypatch.setattr(Case, "build", build)
+    (tmp_path / "case.toml").write_text(text)
+    status, out, err = run(capsys, "path", str(tmp_path / "case.toml"), "--order", order)
+    assert (status, out) == (2, "")
+    assert f"'{order}'" in err
+    assert kind in err
+    assert "use order 'shortest'" in err
 
 
 def test_a_division_is_drawn(tmp_path, capsys):

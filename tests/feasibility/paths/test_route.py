@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise, permutations, product
+from types import SimpleNamespace
 
 import networkx as nx
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from mesh_patches import sheet
 from small_cases import paper_verdict
 
-from feasibility.paths import PathError
+from feasibility.paths import PathError, coverage_path
 from feasibility.paths import order as routes
 from feasibility.paths.order import (
     GRID_ORDERS,
@@ -180,6 +181,9 @@ def test_orders_of_a_mesh():
     for order in GRID_ORDERS:
         with pytest.raises(PathError, match=f"{order}.*not.*use order 'shortest'"):
             route(cells, order)
+        nothing = SimpleNamespace(cells=cells)  # no verdict is asked for a motion
+        with pytest.raises(PathError, match=f"{order}.*not.*use order 'shortest'"):
+            coverage_path(nothing, order)
 
 
 def test_an_unknown_order_is_refused_with_the_known_ones():
