@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from feasibility.task import Task
 from robots import Robot
-from surfaces import Cells
+from surfaces import Cells, Surface
 
 NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
 
@@ -38,7 +38,7 @@ class Problem:
         """
         _refuse_other_types(
             (robot, "robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
-            (cells, "cells", Cells, "a surface cut into cells, such as surface.cells(9, 10)"),
+            (cells, "cells", Cells, _cells_wanted(cells)),
             (task, "task", Task, "a Task, such as Task(standoff=0.02, cone_deg=20)"),
             *others,
         )
@@ -56,6 +56,18 @@ class Problem:
     def within(self) -> str:
         """Tolerance and cone in words."""
         return f"within {1e3 * self.task.effective_tolerance:g} mm and {self.task.cone_deg:g} deg"
+
+
+def _cells_wanted(given: object) -> str:
+    """What the cells should be, for whom gave a surface that is not cut, or a function."""
+    if callable(given):
+        return (
+            "a surface cut into cells; a surface of your own formula is given by points of it, "
+            "bspline(points).cells(9, 10), or by triangles, mesh(triangles).cells(100)"
+        )
+    how = {"mesh": "count=100", "piecewise": "[(3, 4), (3, 4)]"}
+    kind = given.kind if isinstance(given, Surface) else ""
+    return f"a surface cut into cells, such as surface.cells({how.get(kind, '9, 10')})"
 
 
 def _refuse_other_types(*given: Given) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
-from coverable_errors import MISSING, Fault
+from coverable_errors import MISSING, Fault, alternatives, close, shown
 from feasibility.cases.mesh_keys import build_mesh, cut_mesh, read_count, read_mesh_keys
 from feasibility.cases.surface_keys import (
     MOST_CELLS,
@@ -20,7 +20,7 @@ from feasibility.cases.surface_keys import (
     read_patch,
     try_patch,
 )
-from feasibility.cases.table_reader import ORIGIN, CaseError, Section, Triple, frozen
+from feasibility.cases.table_reader import ORIGIN, CaseError, Section, Triple, frozen, is_text
 
 if TYPE_CHECKING:
     from surfaces import Cells, Surface
@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from surfaces.piecewise import PieceCells, Piecewise
 
 MOST_PIECES = 200  # as `surfaces.piecewise` has it
+OWN_FORMULA = (
+    "a surface of your own formula r(u, v) is given by points of it, as a bspline, or by "
+    "triangles, as a mesh"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +223,7 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
 
     before = len(faults)
     section = Section("surface", table, faults)
-    kind = section.word("kind", tuple(OWN_KEYS), required=True)
+    kind = _kind(section)
     pose = section.take("side", "position", "rpy_deg")
     if kind is None:  # which other keys belong here is not known
         section.make(check_pose, pose)
@@ -237,6 +241,16 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
     if len(faults) > before:
         return None
     return SurfacePart(kind, frozen_values(values), cells, **frozen(pose))
+
+
+def _kind(section: Section) -> str | None:
+    """The kind of surface; None after a fault."""
+    written, kinds = section.table.get("kind"), tuple(OWN_KEYS)
+    if is_text(written) and written not in kinds and not close(written, kinds):
+        listed = alternatives([repr(kind) for kind in kinds])
+        section.fault("kind", f"must be {listed}, got {shown(written)}; {OWN_FORMULA}")
+        return None
+    return section.word("kind", kinds, required=True)
 
 
 def faults_of_building(part: SurfacePart) -> list[Fault]:

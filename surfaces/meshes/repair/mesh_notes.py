@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surfaces.adjacency import components
 
@@ -12,6 +13,10 @@ if TYPE_CHECKING:
     from surfaces.meshes.triangle_mesh import TriangleMesh
 
 LISTED = 5  # pieces that a note names
+OUTWARD = 0.5  # [1] from which on a border line is a hole, see `_outward`
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 
 def notes_of(mesh: TriangleMesh) -> tuple[str, ...]:
@@ -38,7 +43,11 @@ def _about_pieces(mesh: TriangleMesh) -> list[str]:
 
 
 def _about_borders(mesh: TriangleMesh) -> list[str]:
-    """Counts the border lines that are not the outer one of a piece."""
+    """Counts holes, and the open ends of pieces that have several, such as pipes.
+
+    A border line is a hole where the surface goes on away from its middle, as round a hole in a
+    plate. The longest of each piece is none.
+    """
     edges = mesh.edges
     if not len(edges.border_faces):
         return []
@@ -47,19 +56,52 @@ def _about_borders(mesh: TriangleMesh) -> list[str]:
     _, ends = np.unique(edges.border_vertices, return_inverse=True)
     ends = ends.reshape(-1, 2)
     loops = components(ends, int(ends.max()) + 1)[ends[:, 0]]
-    lengths = np.bincount(loops, edges.border_lengths)
+    lengths: Floats = np.bincount(loops, edges.border_lengths).astype(float)
     piece = np.zeros(len(lengths), np.int64)
     piece[loops] = mesh.pieces[edges.border_faces]
-    # Of each piece, the longest border line counts as the outer one.
+    longest = np.zeros(len(lengths), dtype=bool)
     ordered = np.lexsort((-lengths, piece))
-    outer = np.concatenate([[True], np.diff(piece[ordered]) > 0])
-    holes = lengths[ordered[~outer]]
-    if not len(holes):
-        return []
-    return [
-        f"the mesh has {counted(len(holes), 'hole')} (border lines beside the longest of each "
-        f"piece); the longest is {holes.max():.4g} m around"
-    ]
+    longest[ordered[np.concatenate([[True], np.diff(piece[ordered]) > 0])]] = True
+    hole = ~longest & (_outward(mesh, loops, lengths) > OUTWARD)
+    notes = []
+    if hole.any():
+        notes.append(
+            f"the mesh has {counted(int(hole.sum()), 'hole')}; the longest is "
+            f"{lengths[hole].max():.4g} m around"
+        )
+    open_ends = np.bincount(piece[~hole])
+    if (open_ends > 1).any():
+        several = ~hole & (open_ends[piece] > 1)
+        notes.append(
+            f"the mesh has {int(several.sum())} open ends, as a pipe has two; the longest is "
+            f"{lengths[several].max():.4g} m around"
+        )
+    return notes
+
+
+def _outward(mesh: TriangleMesh, loops: Ints, lengths: Floats) -> Floats:
+    """How far the surface goes on away from the middle of each border line, -1 .. 1.
+
+    1 round a hole in a plate, 0 at the end of a pipe, -1 at the outer border of a plate.
+
+    Args:
+        mesh: the mesh.
+        loops: (B,) the line that each border edge is part of.
+        lengths: (L,) m, of the lines.
+    """
+    edges = mesh.edges
+    start, end = mesh.vertices[edges.border_vertices].transpose(1, 0, 2)
+    middles, along = 0.5 * (start + end), end - start
+    weights = edges.border_lengths
+    centres = np.stack(
+        [np.bincount(loops, weights * middles[:, axis]) / lengths for axis in range(3)], axis=1
+    )
+    normals = mesh.face_normals[edges.border_faces]
+    inwards = np.cross(normals, along)  # a face lies to the left of its edges
+    off = middles - centres[loops]
+    size = np.linalg.norm(inwards, axis=1) * np.linalg.norm(off, axis=1)
+    share = np.einsum("bi,bi->b", inwards, off) / np.maximum(size, np.finfo(float).tiny)
+    return np.asarray(np.bincount(loops, weights * share) / lengths)
 
 
 def _about_sides(mesh: TriangleMesh) -> list[str]:

@@ -216,6 +216,9 @@ BAD_CASES = {
     # surface
     "no kind": changed('kind = "sphere"\n', "", "surface.kind", "is missing", "'plane'"),
     "misspelt kind": changed('"sphere"', '"shpere"', "surface.kind", 'did you mean "sphere"?'),
+    "a formula of one's own": changed(
+        '"sphere"', '"parametric"', "surface.kind", "r(u, v)", "as a bspline", "as a mesh"
+    ),
     "kind is a list": changed('"sphere"', '["sphere"]', "surface.kind", "must be"),
     "mesh key": added("surface", "cell_size = 0.1", "surface.cell_size", "belongs to a mesh"),
     "file of nothing": added(

@@ -323,6 +323,59 @@ def test_holes_are_counted_and_measured():
     assert "0.4 m around" in note
 
 
+def pipe(radii, heights, n=24):
+    """Rings of n points about z, joined from each to the next; outward is away from z."""
+    angle = np.linspace(0, 2 * np.pi, n, endpoint=False)
+    rings = [
+        np.column_stack([r * np.cos(angle), r * np.sin(angle), np.full(n, z)])
+        for r, z in zip(radii, heights, strict=True)
+    ]
+    k, nxt = np.arange(n), (np.arange(n) + 1) % n
+    bands = [
+        [
+            [k + b * n, nxt + b * n, nxt + (b + 1) * n],
+            [k + b * n, nxt + (b + 1) * n, k + (b + 1) * n],
+        ]
+        for b in range(len(rings) - 1)
+    ]
+    faces = np.concatenate([np.array(band).transpose(0, 2, 1).reshape(-1, 3) for band in bands])
+    return np.concatenate(rings), faces
+
+
+# Border lines: holes, and open ends where a piece has more than one.
+OPEN = {
+    "pipe": (pipe([1, 1, 1], [0, 1, 2]), 0, 2),
+    "long pipe": (pipe([0.05] * 9, range(9)), 0, 2),
+    "waisted pipe": (pipe([1, 0.5, 1], [0, 1, 2]), 0, 2),
+    "funnel, steep": (pipe([1, 0.8], [0, 2]), 0, 2),
+    "disc with a hole": (pipe([0.2, 1], [0, 0]), 1, 0),
+    "flat ring": (pipe([0.9, 1], [0, 0]), 1, 0),
+    "shallow dish with a hole": (pipe([0.2, 0.6, 1], [0, 0.1, 0.3]), 1, 0),
+}
+
+
+@pytest.mark.parametrize("name", OPEN)
+@pytest.mark.parametrize("flipped", [False, True])
+def test_the_ends_of_a_pipe_are_no_holes(name, flipped):
+    (vertices, faces), holes, ends = OPEN[name]
+    turn, _ = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))
+    mesh = clean(vertices @ turn.T, faces[:, ::-1] if flipped else faces)
+    notes = [note for note in notes_of(mesh) if "hole" in note or "open end" in note]
+    expected = [f"{holes} hole;"] * bool(holes) + [f"{ends} open ends"] * bool(ends)
+    assert len(notes) == len(expected)
+    for note, words in zip(notes, expected, strict=True):
+        assert words in note
+
+
+def test_a_pipe_with_a_hole_in_its_side():
+    vertices, faces = pipe([1] * 9, np.linspace(0, 4, 9))
+    middles = vertices[faces].mean(axis=1)
+    window = (np.abs(middles[:, 2] - 2) < 0.6) & (middles[:, 0] > 0.8)
+    notes = notes_of(clean(vertices, faces[~window]))
+    assert any("1 hole;" in note for note in notes)
+    assert any("2 open ends" in note for note in notes)
+
+
 def knotted(rng):
     """Faces between points of a small grid: many are straight, doubled or meet in bundles."""
     count = int(rng.integers(3, 12))
