@@ -26,7 +26,6 @@ from surfaces import bspline, mesh, sphere
 
 HERE = Path(__file__).parent
 SIZE = (900, 650)  # [pixel]
-NO_CONTROLS = "<style>.dg { display: none }</style>"  # meshcat's panel of controls
 LARGEST = 200_000  # [byte] of a PNG
 
 
@@ -104,7 +103,6 @@ def main() -> None:
             if name not in PICTURES:
                 parser.error(f"there is no picture {name!r}; there are {', '.join(PICTURES)}")
             page = PICTURES[name]().save_html(folder / f"{name}.html")
-            page.write_text(page.read_text(encoding="utf-8") + NO_CONTROLS, encoding="utf-8")
             photograph(page, HERE / f"{name}.png")
 
 

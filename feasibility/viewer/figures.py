@@ -49,7 +49,7 @@ def plot_graph(verdict: Verdict, title: str | None = None) -> Plot:
 
     Args:
         verdict: of either method.
-        title: above the figure; default says what is covered.
+        title: above the figure, before the verdict; default names the arm and the surface.
     """
     from matplotlib.collections import LineCollection
 
@@ -75,7 +75,7 @@ def plot_causes(verdict: Verdict, title: str | None = None) -> Plot:
 
     Args:
         verdict: of either method.
-        title: above the figure; default says what is covered.
+        title: above the figure, before the verdict; default names the arm and the surface.
     """
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Patch
@@ -101,7 +101,7 @@ def plot_sides(verdict: Verdict, title: str | None = None) -> Plot:
 
     Args:
         verdict: infeasible by a cut tree.
-        title: above the figure; default says what is covered.
+        title: above the figure, before the verdict; default names the arm and the surface.
 
     Raises:
         ArgumentError: its proof is no cut.
@@ -215,10 +215,16 @@ def _over_parameters(verdict: Verdict, title: str | None) -> tuple[Plot, Axes]:
             figure.set_figheight(float(np.clip(5.6 * height / width + 1.3, 2.8, 7.0)))
         axes.set_xlim(corners[:, 0].min(), corners[:, 0].max())
         axes.set_ylim(corners[:, 1].max(), corners[:, 1].min())
-    covered = f"{verdict.n_covered} of {len(verdict.cells)} cells, {verdict.n_edges} edges"
+    what = f"{verdict.robot.name} on a {verdict.cells.surface.kind}"
     axes.set(xlabel=flat.labels[0], ylabel=flat.labels[1])
-    axes.set_title(title or f"{verdict.robot.name} on a {verdict.cells.surface.kind}: {covered}")
+    axes.set_title(f"{title or what}: {in_short(verdict)}")
     return figure, axes
+
+
+def in_short(verdict: Verdict) -> str:
+    """The verdict in a few words: 'infeasible, 60 of 90 cells, 194 edges'."""
+    covered = f"{verdict.n_covered} of {len(verdict.cells)} cells"
+    return f"{verdict.answer}, {covered}, {verdict.n_edges} edges"
 
 
 def _mark_start(axes: Axes, verdict: Verdict) -> None:

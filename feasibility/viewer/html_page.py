@@ -52,8 +52,24 @@ class Camera:
     """Narrows meshcat's wide lens of 75 degrees: 2 gives 42."""
 
 
+@dataclass(frozen=True, slots=True)
+class Readout:
+    """What is read beside the time slider, at some times; between them it is interpolated."""
+
+    times: tuple[float, ...]
+    """s, rising from 0."""
+    rows: tuple[tuple[str, str, list[float]], ...]
+    """A name, a unit, and a value for each of the times."""
+    there_and_back: bool
+    """The motion is played to the end and back again."""
+
+
 def page(
-    commands: Iterable[Command], legend: Legend, camera: Camera, *, animated: bool = False
+    commands: Iterable[Command],
+    legend: Legend,
+    camera: Camera,
+    readout: Readout | None = None,
+    start: float = 0.0,
 ) -> str:
     """The page as HTML text.
 
@@ -61,26 +77,35 @@ def page(
         commands: of the scene, in order.
         legend: title, text and colours of the overlay.
         camera: where it looks from at first.
-        animated: offer a button that pauses and resumes the motion.
+        readout: of the motion: a button plays and pauses it, a slider goes through it.
+        start: s, where a motion that does not play at once waits.
     """
     return _TEMPLATE.format(
         title=html.escape(legend.title),
-        legend=_legend(legend, animated),
+        legend=_legend(legend, readout),
         program=_program(),
         # Each message behind its length in four bytes.
         commands=_base64(b"".join(len(m).to_bytes(4, "little") + m for m in pack(commands))),
-        setup=json.dumps(asdict(camera)),
+        setup=json.dumps({**asdict(camera), "start": start}),
+        readout=_in_script("null" if readout is None else json.dumps(asdict(readout))),
     )
 
 
-def _legend(legend: Legend, animated: bool) -> str:
-    """The overlay as HTML."""
+def _in_script(text: str) -> str:
+    """JSON that can stand in a script: names in it close no element."""
+    return text.replace("<", "\\u003c")
+
+
+def _legend(legend: Legend, readout: Readout | None) -> str:
+    """Text, player and parts of the scene as HTML."""
     title, text = html.escape(legend.title), html.escape(legend.text)
     lines = [
         f"<summary>{title}</summary>",
         f"<p>{text}</p>",
         f'<p class="unchecked">{UNCHECKED}</p>',
     ]
+    if readout is not None:
+        lines.append(_player(readout))
     for entry in legend.entries:
         swatch = f'<i style="background:#{hex_colour(entry.colour):06x}"></i>'
         box = ""
@@ -89,9 +114,21 @@ def _legend(legend: Legend, animated: bool) -> str:
             path = html.escape(entry.path, quote=True)
             box = f'<input type="checkbox" data-path="{path}"{checked}>'
         lines.append(f"<label>{box}{swatch}{html.escape(entry.label)}</label>")
-    if animated:
-        lines.append('<button type="button" id="pause">pause</button>')
     return "\n".join(lines)
+
+
+def _player(readout: Readout) -> str:
+    """Button, slider and the values at that moment."""
+    rows = [
+        f"<tr><th>{html.escape(name)}</th><td></td><td>{html.escape(unit)}</td></tr>"
+        for name, unit, _ in readout.rows
+    ]
+    end = readout.times[-1]
+    slider = f'<input type="range" id="time" min="0" max="{end:.3f}" step="any" value="0">'
+    return (
+        f'<div id="player"><button type="button" id="pause">pause</button>{slider}'
+        f'<output id="seconds"></output></div>\n<table id="readout">{"".join(rows)}</table>'
+    )
 
 
 def _base64(data: bytes) -> str:
@@ -115,17 +152,32 @@ _TEMPLATE = """<!DOCTYPE html>
 <meta charset="utf-8">
 <title>{title}</title>
 <style>
-body {{ margin: 0; font: 13px/1.45 system-ui, sans-serif; color: #222; }}
-#meshcat-pane {{ width: 100vw; height: 100vh; overflow: hidden; }}
-#legend {{ position: absolute; left: 12px; bottom: 12px; max-width: 21em; padding: 10px 14px;
-  max-height: calc(100vh - 44px); overflow: auto; overflow-wrap: anywhere;
-  background: rgba(255, 255, 255, 0.86); border-radius: 6px; box-shadow: 0 1px 4px #0003; }}
+body {{ margin: 0; display: flex; height: 100vh; font: 13px/1.45 system-ui, sans-serif;
+  color: #222; background: #fff; }}
+#meshcat-pane {{ flex: 1 1 auto; min-width: 0; height: 100vh; overflow: hidden; order: 2; }}
+#legend {{ flex: 0 0 20em; box-sizing: border-box; padding: 10px 14px; order: 1;
+  overflow: auto; overflow-wrap: anywhere; border-right: 1px solid #dfe3e8; }}
 #legend summary {{ font-size: 15px; font-weight: 600; cursor: pointer; }}
 #legend p {{ margin: 2px 0 6px; color: #444; }}
+#legend p.unchecked {{ color: #8a4b08; }}
 #legend label {{ display: flex; align-items: center; gap: 6px; }}
-#legend input {{ margin: 0; flex: none; }}
+#legend label input {{ margin: 0; flex: none; }}
 #legend i {{ width: 14px; height: 14px; border-radius: 3px; flex: none; }}
-#legend button {{ margin-top: 6px; }}
+#player {{ display: flex; align-items: center; gap: 6px; margin: 8px 0 2px; }}
+#player button {{ width: 4.2em; flex: none; }}
+#player input {{ flex: 1 1 auto; min-width: 0; }}
+#player output {{ flex: none; width: 4em; text-align: right; }}
+#readout {{ border-collapse: collapse; margin: 0 0 8px; width: 100%;
+  font-variant-numeric: tabular-nums; }}
+#readout th {{ text-align: left; font-weight: 400; color: #444; }}
+#readout td {{ text-align: right; width: 3.8em; }}
+#readout td:last-child {{ text-align: left; width: 2.2em; padding-left: 4px; color: #444; }}
+.dg {{ display: none !important; }}
+@media (max-width: 639px) {{
+  body {{ flex-direction: column; }}
+  #meshcat-pane {{ order: 1; flex: none; height: 62vh; }}
+  #legend {{ flex: 1 1 auto; border: 0; order: 2; }}
+}}
 </style>
 </head>
 <body>
@@ -144,25 +196,72 @@ async function unpacked(id) {{
   return await new Response(stream).arrayBuffer();
 }}
 function controls(viewer) {{
-  for (const box of document.querySelectorAll("#legend input")) {{
+  for (const box of document.querySelectorAll("#legend label input")) {{
     box.onchange = () => {{
       const path = box.dataset.path.split("/").filter((name) => name.length > 0);
       viewer.set_property(path, "visible", box.checked);
       viewer.set_dirty();
     }};
   }}
-  const button = document.getElementById("pause");
-  if (button) {{
-    const label = () => {{ button.textContent = viewer.animator.playing ? "pause" : "play"; }};
-    button.onclick = () => {{
-      if (viewer.animator.playing) viewer.animator.pause(); else viewer.animator.play();
-      label();
-    }};
+}}
+function player(viewer, readout, begin) {{
+  const animator = viewer.animator, end = readout.times[readout.times.length - 1];
+  const [button, slider, seconds] = ["pause", "time", "seconds"].map(
+    (id) => document.getElementById(id));
+  const cells = [...document.querySelectorAll("#readout tr")].map((row) => row.cells[1]);
+  const digits = (unit) => unit === "mm" ? 2 : 1;
+  const now = () => {{
+    const action = animator.actions[0];
+    const back = readout.there_and_back && action._loopCount > 0 && action._loopCount % 2 === 1;
+    return back ? end - action.time : action.time;
+  }};
+  const show = (time) => {{
+    const times = readout.times;
+    let k = 1;
+    while (k < times.length - 1 && times[k] < time) k += 1;
+    const span = times[k] - times[k - 1];
+    const share = span > 0 ? Math.min(Math.max((time - times[k - 1]) / span, 0), 1) : 1;
+    readout.rows.forEach(([, unit, values], row) => {{
+      const value = values[k - 1] + share * (values[k] - values[k - 1]);
+      cells[row].textContent = value.toFixed(digits(unit));
+    }});
+    slider.value = time;
+    seconds.textContent = time.toFixed(1) + " s";
+  }};
+  const label = () => {{ button.textContent = animator.playing ? "pause" : "play"; }};
+  const seek = (time) => {{
+    for (const action of animator.actions) action.reset().play();
+    animator.seek(time);
+    show(time);
+  }};
+  button.onclick = () => {{
+    if (animator.playing) animator.pause(); else animator.play();
     label();
-  }}
+  }};
+  slider.oninput = () => {{
+    if (animator.playing) animator.pause();
+    seek(Number(slider.value));
+    label();
+  }};
+  const follow = () => {{
+    if (animator.playing) show(now());
+    label();
+    window.requestAnimationFrame(follow);
+  }};
+  if (animator.playing) show(0); else seek(begin);
+  follow();
+}}
+function fitted(viewer, zoom) {{
+  const pane = document.getElementById("meshcat-pane");
+  const fit = () => {{
+    const [width, height] = [pane.clientWidth, pane.clientHeight];
+    viewer.camera.zoom = zoom * Math.min(1, width / height);
+    viewer.set_3d_pane_size(width, height);
+  }};
+  window.addEventListener("resize", fit);
+  fit();
 }}
 async function start() {{
-  document.getElementById("legend").open = window.innerWidth >= 640;
   const program = document.createElement("script");
   program.textContent = new TextDecoder().decode(await unpacked("program"));
   document.head.appendChild(program);
@@ -178,10 +277,11 @@ async function start() {{
   // The page's own y axis points up.
   const up = ([x, y, z]) => [x, z, -y];
   viewer.camera.position.set(...up(setup.eye));
-  viewer.camera.zoom = setup.zoom;
   viewer.controls.target.set(...up(setup.target));
-  viewer.set_dirty();
+  fitted(viewer, setup.zoom);
   controls(viewer);
+  const readout = {readout};
+  if (readout) player(viewer, readout, setup.start);
   window.viewer = viewer;
 }}
 function complain(error) {{

@@ -56,6 +56,7 @@ def view_path(
         case: name of the case, for the title.
     """
     robot, cells, figures = path.robot, path.cells, path.figures
+    count = int(path.needed.sum())
     if trajectory is None:
         motion = paced(robot, path.walk.q, False, "coverage path")
         speed = "not timed"
@@ -65,11 +66,12 @@ def view_path(
     strokes, tracks = _strokes(motion, 0.06 * cell_size(cells))
     again = f", {figures.revisited:.2g} m of it revisited" if figures.revisited > 0.0 else ""
     text = (
-        f"{robot.name}: {int(path.needed.sum())} cells in order {path.order}, "
+        f"{robot.name}: {counted(count)} in order {path.order}, "
         f"{figures.length:.2f} m{again}, {speed}"
     )
+    title = titled(f"feasible, one path over {counted(count)}", case)
     return compose(
-        robot, cells, titled("coverage path", case), text, [*cells_layers(cells), strokes], motion,
+        robot, cells, title, text, [*cells_layers(cells), strokes], motion,
         resting=path.walk.q[0], tracks=tracks,
     )  # fmt: skip
 
@@ -91,8 +93,11 @@ def view_division(division: Division, case: str | None = None) -> View:
         size = cell_size(cells)
         for k, move in enumerate(plan.moves):
             parts.append(_move(robot, move.start, move.end, f"{k + 1} to {k + 2}", size))
-    title = f"{len(plan.patches)} patch{'' if len(plan.patches) == 1 else 'es'}"
-    text = f"{robot.name}: {division.n_covered} of {len(cells)} cells; " + "; ".join(
+    patches = f"{len(plan.patches)} patch{'' if len(plan.patches) == 1 else 'es'}"
+    title = f"{division.n_covered} of {counted(len(cells))}: {patches}"
+    if division.n_covered < len(cells):
+        title += f", {len(cells) - division.n_covered} left out"
+    text = f"{robot.name}; " + "; ".join(
         f"move {k + 1} to {k + 2}: {move.described(FEW)}" for k, move in enumerate(plan.moves)
     )
     return compose(

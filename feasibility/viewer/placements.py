@@ -1,4 +1,4 @@
-"""Pictures of placements: the arm, and the surface at each pose tried, by what is covered there.
+"""Pictures of placements: the arm, the surface at its best and feasible poses, dots at the others.
 
 from coverable import view_placements
 view_placements(placements).save_html("placements.html")
@@ -20,14 +20,12 @@ from feasibility.search import Progress, Search
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.playback import Motion, motion_of
 from feasibility.viewer.poses import (
-    HIDDEN,
     Class,
     Tried,
     best_layers,
     class_layers,
     class_of_row,
     class_of_trial,
-    drawn_size,
     hidden,
     outline,
     placed,
@@ -57,7 +55,7 @@ def view_placements(
     play: bool = True,
     at: float = 0.0,
 ) -> View:
-    """Every placement tried as an outline of the surface, and the best one with its motion.
+    """The best placement with its motion, outlines of the feasible ones, a dot for each other one.
 
     Args:
         placements: what a search for placements found.
@@ -74,7 +72,8 @@ def view_placements(
         Tried(trial.pose, class_of_trial(trial), trial.covers[0] if len(trial.covers) else None)
         for trial in trials
     ]
-    title = titled(f"placements, {placements.answer} ({placements.evidence})", case)
+    answer = f"{placements.answer} ({placements.evidence})"
+    title = titled(f"{answer}, {len(placements.found)} of {len(trials)} placements feasible", case)
     text, stations = _found_text(placements, trials), []
     if plan is not None:
         layers = station_layers(placements.cells, plan)
@@ -125,7 +124,8 @@ def view_study(
     if len(drawn) < len(rows):
         text = f"{len(drawn)} of {text}"
         text += "; those that differ from the best one in more than the pose are not drawn"
-    title = titled("poses of the surface", name)
+    feasible = sum(row.result.get("verdict") == "feasible" for row in rows)
+    title = titled(f"{feasible} of {len(rows)} cases feasible", name)
     return _view(setup, tried, title, text, [], progress, play=play, at=at)
 
 
@@ -189,19 +189,13 @@ def _view(
         parts = best_layers(cells, tried[0], motion)
     if stations:  # the best single placement would lie among them
         parts = [hidden(layer) for layer in parts]
-    lines, size = outline(setup.cells), drawn_size(tried)
-    small = lines
-    if len(lines):
-        middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2.0
-        small = middle + size * (lines - middle)
-    if size < 1.0:
-        text += f". Outlines are drawn at {100.0 * size:.0f} % of their size"
+    lines = outline(setup.cells)
     drawn = compose(
         setup.robot, cells, title, f"{setup.robot.name}: {text}",
-        [*parts, *(layer for layer, _ in stations), *class_layers(small, tried)], motion,
+        [*parts, *(layer for layer, _ in stations), *class_layers(lines, tried)], motion,
         resting=robot_visuals.home(setup.robot), **playing,
     )  # fmt: skip
-    points = [placed(small, one.pose) for one in tried if one.kind not in HIDDEN]
+    points = [placed(lines, one.pose) for one in tried if one.kind is Class.FEASIBLE]
     full_size = [pose for _, pose in stations] or [one.pose for one in tried[:1]]
     points += [placed(lines, pose) for pose in full_size]
     points.append(_joints(setup.robot, motion))

@@ -5,7 +5,6 @@ An outline is light enough to be drawn at hundreds of poses.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
@@ -16,7 +15,7 @@ from numpy.typing import NDArray
 
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.viewer import threejs
-from feasibility.viewer.cell_meshes import patch
+from feasibility.viewer.cell_meshes import marks, patch
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Motion
@@ -44,9 +43,8 @@ FINEST = 8  # pieces that a cell's side is cut into, at most
 ALIKE = 1e-6  # [1] of the surface's size: corners nearer than this are one
 SMALL = 0.5  # [1] of the surface's size: a smaller boundary does not show where the surface lies
 STROKE = 0.12  # [1] of the surface's size: the stroke that points to the working side
-MOST_DRAWN = 200  # poses drawn of one class; of more, as many spread evenly over their ranks
-FULL_SIZE = 16  # poses up to which outlines are drawn in full size
-SMALLEST = 0.15  # [1] of their size
+MOST_DRAWN = 200  # feasible poses drawn; of more, as many spread evenly over their ranks
+DOT = 0.02  # [1] of the surface's size: radius of the dots of other poses
 THICK = 0.0045  # [1] of an outline's size: radius of those of feasible poses
 COVERED: Colour = (0.35, 0.60, 0.80)
 
@@ -75,7 +73,9 @@ COLOURS: dict[Class, Colour] = {
     Class.UNSEARCHED: (0.62, 0.62, 0.62),
     Class.FAILED: (0.15, 0.15, 0.15),
 }
-HIDDEN = (Class.UNSEARCHED, Class.FAILED)
+
+
+UNKNOWN = (Class.UNSEARCHED, Class.FAILED)  # the share covered there is not known
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -124,7 +124,7 @@ def best_layers(cells: Cells, best: Tried, motion: Motion | None) -> list[Layer]
     if len(cells) == 0:
         return []
     surface, *marks = cells_layers(cells)
-    label = "the surface at one of the poses" if best.kind in HIDDEN else "the best of them"
+    label = "the surface at one of the poses" if best.kind in UNKNOWN else "the best of them"
     parts = [replace(surface, entry=replace(surface.entry, label=label)), *marks]
     if best.cover is not None and not best.cover.all() and best.kind is not Class.FEASIBLE:
         for words, colour, which in (
@@ -156,10 +156,12 @@ def station_layers(cells: Cells, plan: StationPlan) -> list[Layer]:
 
 
 def class_layers(lines: Array, tried: Sequence[Tried]) -> list[Layer]:
-    """One layer for each class of poses: the outlines of at most `MOST_DRAWN` of them.
+    """One layer for each class of poses: outlines of the feasible ones, dots for the others.
+
+    Dots are hidden at first: there may be hundreds, and they say where was looked, no more.
 
     Args:
-        lines: (k, 2, 3) m, what is drawn at every pose, in the surface's frame.
+        lines: (k, 2, 3) m, what is drawn at every feasible pose, in the surface's frame.
         tried: the poses.
     """
     parts = []
@@ -167,25 +169,19 @@ def class_layers(lines: Array, tried: Sequence[Tried]) -> list[Layer]:
         poses = [one.pose for one in tried if one.kind is kind]
         if not poses or len(lines) == 0:
             continue
-        some, number = _spread(poses), str(len(poses))
-        if len(some) < len(poses):
-            number = f"{len(some)} of {len(poses)} drawn"
-        path = f"/poses/{threejs.safe_name(kind)}"
+        path, number = f"/poses/{threejs.safe_name(kind)}", str(len(poses))
         if kind is Class.FEASIBLE:
+            some = _spread(poses)
+            if len(some) < len(poses):
+                number = f"{len(some)} of {len(poses)} drawn"
             command = _thick(path, lines, some, COLOURS[kind])
         else:
-            every = np.concatenate([placed(lines, pose) for pose in some])
-            command = threejs.segments(path, every.reshape(-1, 3), COLOURS[kind])
+            middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2.0
+            dots = np.array([placed(middle, pose) for pose in poses])
+            command = threejs.mesh(path, *marks(dots, DOT * _size(lines)), COLOURS[kind], lit=False)
         layer = Layer((command,), Entry(f"{kind} ({number})", COLOURS[kind], path), len(poses))
-        parts.append(hidden(layer) if kind in HIDDEN else layer)
+        parts.append(layer if kind is Class.FEASIBLE else hidden(layer))
     return parts
-
-
-def drawn_size(tried: Sequence[Tried]) -> float:
-    """How large outlines are drawn, 0..1 of their size: the more there are, the smaller."""
-    numbers = Counter(one.kind for one in tried if one.kind not in HIDDEN)
-    shown = sum(min(number, MOST_DRAWN) for number in numbers.values())
-    return float(np.clip(np.sqrt(FULL_SIZE / max(shown, 1)), SMALLEST, 1.0))
 
 
 def _spread(poses: Sequence[Pose]) -> list[Pose]:

@@ -1,7 +1,7 @@
-"""The parts of a verdict's picture: surface, cells, graph G, causes, components, legend.
+"""The parts of a verdict's picture: surface, cells, graph G, causes, legend.
 
-Everything here is plain drawing commands with plain names, so that meshcat's own scene tree can
-show and hide each part; `html_page` and `live_server` present it.
+Everything here is plain drawing commands with plain names, so that the legend can show and hide
+each part; `html_page` and `live_server` present it.
 """
 
 from __future__ import annotations
@@ -46,10 +46,8 @@ PATCHES: tuple[Colour, ...] = (
     (0.94, 0.86, 0.20),
     (0.45, 0.35, 0.65),
 )
-COMPONENTS = tuple(PATCHES[k] for k in (4, 2, 3, 1))
 TRAIL_POINTS = 2_000
 LOST_SIZE = 0.16  # [1] of a cell's width, of a mark on a cell that is proved lost
-LISTED_COMPONENTS = 12  # components with a line of their own; the others are not drawn
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +73,12 @@ def layers(verdict: Verdict) -> list[Layer]:
         missed.append(layer if sides is None or kind != CauseKind.DISCONNECTED else hidden(layer))
     parted = [] if sides is None else side_layers(cells, sides)
     return [
-        *cells_layers(cells), *_graph(verdict), *_start(verdict), *parted, *missed,
-        *_components(verdict),
-    ]  # fmt: skip
+        *cells_layers(cells),
+        *_graph(verdict),
+        *_start(verdict),
+        *parted,
+        *missed,
+    ]
 
 
 def side_layers(cells: Cells, sides: Sides) -> list[Layer]:
@@ -223,17 +224,6 @@ def missed_layer(cells: Cells, kind: CauseKind | None, which: NDArray[np.int64])
     words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
     label = f"{words} ({len(which)})"
     return filled(cells, which, colour, f"/cells/{label}", label)
-
-
-def _components(verdict: Verdict) -> Iterator[Layer]:
-    """The cells of each connected component, hidden at first."""
-    if len(verdict.components) < 2:
-        return
-    for number, cells in enumerate(verdict.components[:LISTED_COMPONENTS], start=1):
-        colour = COMPONENTS[(number - 1) % len(COMPONENTS)]
-        words = f"component {number} ({counted(len(cells))})"
-        path = f"/components/{words}"
-        yield hidden(filled(verdict.cells, np.asarray(cells), colour, path, words, inset=0.15))
 
 
 def hidden(layer: Layer) -> Layer:

@@ -23,10 +23,11 @@ from feasibility.cut_words import sentence
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.html_page import Camera, Entry, Legend, page
+from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.playback import Motion, animate, motion_of
-from feasibility.viewer.scene import Layer, layers, trail
+from feasibility.viewer.readout import readout_of
+from feasibility.viewer.scene import Layer, counted, layers, trail
 from feasibility.viewer.threejs import Command
 from robots import Robot
 from surfaces import Cells
@@ -50,10 +51,14 @@ class View:
     """What the arm plays."""
     notes: tuple[str, ...]
     """What could not be drawn as the URDF says."""
+    readout: Readout | None = None
+    """Values beside the time slider; None where the arm does not move."""
+    start: float = 0.0
+    """s, where a motion waits that does not play at once."""
 
     def html(self) -> str:
         """One self-contained page; it fetches nothing and needs no server."""
-        return page(self.commands, self.legend, self.camera, animated=self.motion is not None)
+        return page(self.commands, self.legend, self.camera, self.readout, self.start)
 
     def save_html(self, path: str | os.PathLike[str]) -> Path:
         """Write the page to a file and return its path."""
@@ -95,17 +100,15 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     parts = layers(verdict)
     if motion is not None:
         parts.append(trail(verdict.cells, motion))
-    text = (
-        f"{verdict.robot.name}: {verdict.n_covered} of {len(verdict.cells)} cells in one "
-        f"continuous motion ({verdict.method} search)"
-    )
+    covered = f"{verdict.n_covered} of {counted(len(verdict.cells))}"
+    text = f"{verdict.robot.name}: {covered} in one continuous motion ({verdict.method} search)"
     if verdict.proof is not None:
         said = sentence(verdict.proof, verdict.robot, verdict.cells)
         text += f". Proved: {said}."
     return compose(
         verdict.robot,
         verdict.cells,
-        titled(f"{verdict.answer} ({verdict.evidence})", case),
+        titled(f"{verdict.answer} ({verdict.evidence}), {covered}", case),
         text,
         parts,
         motion,
@@ -148,10 +151,11 @@ def compose(
     for part in parts:
         commands += part.commands
         entries.append(part.entry)
-    q = resting
+    q, readout, start = resting, None, 0.0
     if motion is not None:
+        readout, start = readout_of(robot, cells, motion), float(at * motion.seconds[-1])
         commands.append(animate(robot, motion, play=play, tracks=tracks))
-        q = motion.at(np.array([at * motion.seconds[-1]]))[0]
+        q = motion.at(np.array([start]))[0]
     commands += robot_visuals.pose(robot, q)
     return View(
         robot=robot,
@@ -160,6 +164,8 @@ def compose(
         camera=camera_on(robot, cells, q, drawing.lowest),
         motion=motion,
         notes=drawing.notes,
+        readout=readout,
+        start=start,
     )
 
 

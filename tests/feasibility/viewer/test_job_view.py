@@ -58,7 +58,7 @@ def test_the_trail_appears_piece_by_piece_behind_the_tool():
     assert when[-1] == pytest.approx(view.motion.seconds[-1], rel=1e-6)
     assert all(keys["values"] == [False, True, True] for keys in appearing.values())
     assert "rows" in view.legend.text
-    assert view.legend.title == "paper/4a: coverage path"
+    assert view.legend.title == "paper/4a: feasible, one path over 90 cells"
 
 
 def test_the_arm_plays_the_walk():

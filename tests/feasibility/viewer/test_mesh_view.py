@@ -293,7 +293,7 @@ def test_the_flat_graph_shows_every_cell_with_its_border(verdict):
     np.testing.assert_allclose(dots["covered"], flat.centres[verdict.covered])
     np.testing.assert_allclose(dots["not covered"], flat.centres[~verdict.covered])
     assert figure.axes[0].get_aspect() == 1.0, "true to scale"
-    assert figure.axes[0].get_title().startswith("puma560 on a mesh: 18 of 24 cells")
+    assert figure.axes[0].get_title().startswith("puma560 on a mesh: infeasible, 18 of 24 cells")
 
 
 def test_the_flat_causes_show_every_cell_once(verdict):

@@ -56,8 +56,9 @@ def test_the_graph_is_unrolled_with_missed_cells_in_red(verdict):
     assert np.allclose(offsets(figure, "start").get_offsets(), centre[[0]], atol=1e-5)
     axes = figure.axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("v (degrees)", "u (degrees)")
-    assert axes.get_title() == f"puma560 on a sphere: 24 of 30 cells, {len(expected)} edges"
-    assert plot_graph(verdict, title="4b").axes[0].get_title() == "4b"
+    said = f"infeasible, 24 of 30 cells, {len(expected)} edges"
+    assert axes.get_title() == f"puma560 on a sphere: {said}"
+    assert plot_graph(verdict, title="4b").axes[0].get_title() == f"4b: {said}"
 
 
 def test_edges_over_a_seam_leave_at_one_border_and_come_in_at_the_other(puma):

@@ -4,6 +4,7 @@ import base64
 import gzip
 import html
 import itertools
+import json
 import re
 import shutil
 import socket
@@ -25,7 +26,7 @@ from scipy.spatial.transform import Rotation
 from feasibility import CauseKind
 from feasibility.viewer import cell_meshes as cell_shapes
 from feasibility.viewer import playback as motion
-from feasibility.viewer import scene, threejs, view
+from feasibility.viewer import scene, view
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.robot import joint_paths, pose
 from feasibility.viewer.viewer import show
@@ -160,14 +161,11 @@ def test_the_surface_is_smooth_and_its_normals_are_the_surfaces(feasible):
     assert area == pytest.approx(feasible.cells.areas.sum(), rel=2e-3)
 
 
-def test_other_components_can_be_shown(infeasible):
-    parts = (np.arange(3), np.array([5, 6]))
+def test_components_are_not_listed(infeasible):
+    """The cells that another motion reaches are in the colour of their cause."""
+    parts = tuple(np.array([k]) for k in range(12))
     drawn = view(replace(infeasible, components=parts))
-    entry = only(e for e in drawn.legend.entries if e.label == "component 2 (2 cells)")
-    assert entry.path == "/components/component 2 (2 cells)"
-    assert not entry.shown
-    hidden = threejs.set_property(entry.path, "visible", False)
-    assert hidden in drawn.commands
+    assert not any("component" in entry.label for entry in drawn.legend.entries)
 
 
 def test_key_frames_place_every_joint_where_pinocchio_does(feasible, drawn):
@@ -377,6 +375,47 @@ def test_a_script_waits_until_it_is_interrupted(feasible, monkeypatch):
         socket.create_connection(("127.0.0.1", live.port), timeout=120)
 
 
+def test_the_title_says_the_verdict_and_what_is_covered(feasible, infeasible):
+    assert view(feasible, "a").legend.title == "a: feasible (witness), 20 of 20 cells"
+    assert view(infeasible).legend.title == "infeasible (exhausted), 23 of 30 cells"
+
+
+def test_the_readout_is_what_pinocchio_says(feasible, drawn):
+    """Joint values, and distance and angle of the tool, at any time of the motion."""
+    shown, robot, surface = drawn.readout, feasible.robot, feasible.cells.surface
+    assert [row[0] for row in shown.rows] == [*robot.joint_names, "distance", "angle"]
+    assert [row[1] for row in shown.rows] == ["deg"] * 6 + ["mm", "deg"]
+    columns = np.array([row[2] for row in shown.rows])
+    data = robot.model.createData()
+    for k in range(0, len(shown.times), 7):
+        q = drawn.motion.at(np.array([shown.times[k]]))[0]
+        assert np.allclose(columns[:6, k], np.degrees(q), atol=0.06)
+        pin.framesForwardKinematics(robot.model, data, q)
+        tool = data.oMf[robot.tool_frame_id]
+        distance = 1.0 - np.linalg.norm(tool.translation - surface.position)  # a dome of 1 m
+        outward = (tool.translation - surface.position) / (1.0 - distance)
+        angle = np.degrees(np.arccos(tool.rotation @ robot.approach_axis @ outward))
+        assert np.allclose(columns[6:, k], [1e3 * distance, angle], atol=0.1)
+
+
+def test_the_page_has_a_player_where_the_arm_moves(feasible, drawn):
+    graph = nx.Graph(feasible.graph.edges)
+    graph.add_nodes_from(range(len(feasible.cells)))
+    still = view(replace(feasible, graph=graph, tree=None)).html()
+    moving = drawn.html()
+    for part in ('type="range"', 'id="readout"', 'id="pause"'):
+        assert part in moving
+        assert part not in still
+    assert ".dg { display: none !important; }" in moving
+
+
+def test_names_in_the_readout_close_no_script(drawn):
+    hostile = "</script><script>alert(1)</script>"
+    rows = ((hostile, "deg", [0.0, 1.0]),)
+    shown = replace(drawn.readout, rows=rows, times=(0.0, 1.0))
+    assert hostile not in replace(drawn, readout=shown).html()
+
+
 if BROWSER is not None:  # the data of the scene is tested above, with and without one
 
     def test_a_browser_paints_the_scene(feasible, tmp_path):
@@ -400,3 +439,49 @@ if BROWSER is not None:  # the data of the scene is tested above, with and witho
         assert ((blue > 180) & (red < 90) & (green < 120)).sum() > 300, "edges of G"
         assert ((green > 1.5 * red) & (green > 1.5 * blue)).sum() > 10, "the start"
         assert ((red > 200) & (green > 200) & (blue < red - 5)).sum() > 300, "the arm's body"
+
+    def test_the_slider_moves_the_arm_and_the_readout(feasible, tmp_path):
+        """The page is asked what it shows at some moments; the arm stands as the read-out says."""
+        drawn = view(feasible, play=False)
+        asked = [0.0, 1.3, 4.7]
+        page = drawn.html() + PROBE.replace("ASKED", str(asked))
+        file = tmp_path / "probe.html"
+        file.write_text(page, encoding="utf-8")
+        done = subprocess.run(
+            [
+                BROWSER, "--headless=new", "--no-sandbox", "--disable-gpu",
+                "--disable-dev-shm-usage", "--virtual-time-budget=15000",
+                f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", file.as_uri(),
+            ],
+            check=True, capture_output=True, timeout=300, text=True,
+        )  # fmt: skip
+        answers = json.loads(
+            html.unescape(re.search(r'<pre id="said">(.*?)</pre>', done.stdout)[1])
+        )
+        for time, answer in zip(asked, answers, strict=True):
+            q = drawn.motion.at(np.array([time]))[0]
+            assert np.allclose([float(x) for x in answer["values"][:6]], np.degrees(q), atol=0.6)
+            turn = Rotation.from_quat(answer["quaternion"]).as_matrix()
+            joint = feasible.robot.model.createData()
+            pin.forwardKinematics(feasible.robot.model, joint, q)
+            assert np.allclose(turn, joint.liMi[1].rotation, atol=0.02)
+
+
+PROBE = """<script>
+const wait = setInterval(() => {
+  if (!window.viewer) return;
+  clearInterval(wait);
+  const slider = document.getElementById("time"), said = [];
+  for (const time of ASKED) {
+    slider.value = time;
+    slider.dispatchEvent(new Event("input"));
+    const values = [...document.querySelectorAll("#readout tr")].map((r) => r.cells[1].textContent);
+    const joint = viewer.scene_tree.find(["robot", "joint joint1"]).object.quaternion;
+    said.push({ values, quaternion: [joint.x, joint.y, joint.z, joint.w] });
+  }
+  const note = document.createElement("pre");
+  note.id = "said";
+  note.textContent = JSON.stringify(said);
+  document.body.appendChild(note);
+}, 50);
+</script>"""
