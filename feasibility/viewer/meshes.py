@@ -1,31 +1,22 @@
-"""Triangles as they are drawn: read with trimesh, merged where close, split at creases, shaded."""
+"""Triangles as they are drawn: merged where close, split at creases, shaded."""
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import CoverableError
-from coverable_files import FileFault, read_regular
 from feasibility.viewer.threejs import Colour
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LARGEST_FILE = 200_000_000  # [byte]
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
 DEGREE = 57.0  # [1/rad] normals that agree to about a degree are one
 GREY: Colour = (0.72, 0.74, 0.77)
-
-
-class MeshError(CoverableError):
-    """A mesh file that cannot be drawn, and why."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,46 +38,6 @@ class Merged(NamedTuple):
     """(F', 3) indices of the vertices that were given."""
     kept: Ints
     """(F',) which of the given faces they were, in their order."""
-
-
-def read_mesh(file: Path, scale: Array, colour: Colour | None) -> list[Mesh]:
-    """Read every part of a mesh file.
-
-    Only the file itself is opened: textures and material files that it names are not.
-
-    Args:
-        file: STL, DAE, OBJ, PLY or another format of trimesh.
-        scale: (3,) factors along x, y and z.
-        colour: for parts that bring no colour of their own; grey where None.
-
-    Raises:
-        MeshError: the file is missing, too large, or holds no finite triangles.
-    """
-    import trimesh
-
-    try:
-        # From memory: trimesh cannot know where other files would lie.
-        stream = io.BytesIO(read_regular(file, LARGEST_FILE, "a mesh to draw"))
-        scene = trimesh.load_scene(stream, file_type=file.suffix.lstrip(".").lower())
-        parts = scene.dump()
-    except FileFault as fault:
-        raise MeshError(f"{file.name}: {fault}") from fault
-    except Exception as error:
-        raise MeshError(f"{file.name}: cannot be read as a mesh: {error}") from error
-    meshes = []
-    for part in parts:
-        if not isinstance(part, trimesh.Trimesh) or len(part.faces) == 0:
-            continue
-        vertices = np.asarray(part.vertices, dtype=float) * scale
-        if not np.isfinite(vertices).all():
-            raise MeshError(f"{file.name}: a vertex is not finite")
-        own, opacity = _colour(part)
-        meshes.append(
-            Mesh(vertices, np.asarray(part.faces, np.int64), own or colour or GREY, opacity)
-        )
-    if not meshes:
-        raise MeshError(f"{file.name}: holds no triangles")
-    return meshes
 
 
 def merge_vertices(
@@ -146,9 +97,11 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
     """Merge vertices that lie close together until all meshes have at most `budget` triangles.
 
     Vertices within one box of a grid become that which is nearest to their mean, and triangles that
-    collapse go. The grid starts at 0.01 mm (which only joins what is equal) and coarsens by half
-    from 0.4 mm to at most 2 cm. Meshes that use less than a quarter of an even share of the budget
-    are left as they are, so that small parts do not vanish beside large ones.
+    collapse go. The grid starts at 0.01 mm (which only joins what is equal) and coarsens by half,
+    or faster where there is far too much, from 0.4 mm to 2 cm. It goes on only while there is four
+    times the budget, as with parts of kilometres, in shares of each mesh's width. Meshes that use
+    less than a quarter of an even share of the budget are left as they are, so that small parts do
+    not vanish beside large ones.
 
     Returns:
         As many meshes as were given, in their order; some may have lost all their triangles.
@@ -156,10 +109,22 @@ def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:
     result = [_merged(mesh, 1e-5) for mesh in meshes]  # [m]
     spacing = 4e-4  # [m]
     small = budget / (4 * max(len(meshes), 1))
-    while sum(len(mesh.faces) for mesh in result) > budget and spacing <= 2e-2:
+    while _triangles(result) > budget and spacing <= 2e-2:
         result = [mesh if len(mesh.faces) < small else _merged(mesh, spacing) for mesh in result]
-        spacing *= 1.5
+        spacing *= 3.0 if _triangles(result) > 4 * budget else 1.5
+    share = 1 / 128
+    while _triangles(result) > 4 * budget and share <= 0.5:
+        result = [
+            mesh if len(mesh.faces) < small else _merged(mesh, share * float(np.ptp(mesh.vertices)))
+            for mesh in result
+        ]
+        share *= 2.0
     return result
+
+
+def _triangles(meshes: Sequence[Mesh]) -> int:
+    """How many triangles there are in all."""
+    return sum(len(mesh.faces) for mesh in meshes)
 
 
 def shaded(mesh: Mesh) -> tuple[Mesh, Array]:
@@ -240,20 +205,6 @@ def _doubled_areas(vertices: Array, faces: Ints) -> Array:
     """(F, 3) normals as long as twice the areas."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
-
-
-def _colour(part: Any) -> tuple[Colour | None, float]:
-    """The colour and opacity that a part brings along; None where it brings none."""
-    visual = part.visual
-    if visual.kind == "texture":
-        rgba = visual.material.main_color
-    elif visual.kind in ("vertex", "face"):
-        rgba = visual.main_color
-    else:
-        return None, 1.0
-    red, green, blue, alpha = (float(value) / 255.0 for value in rgba)
-    # An alpha of zero is a file's way of saying that it left transparency unset.
-    return (red, green, blue), alpha if alpha > 0.05 else 1.0
 
 
 def _numbered(keys: Ints) -> Ints:

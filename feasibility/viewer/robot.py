@@ -7,7 +7,6 @@ turns every joint about its own axis between two key frames, and the links keep 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,9 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility.viewer import threejs
-from feasibility.viewer.meshes import GREY, Mesh, MeshError, moved, read_mesh, shaded, thinned
+from feasibility.viewer.collada_limits import MeshError
+from feasibility.viewer.mesh_files import MeshFiles
+from feasibility.viewer.meshes import GREY, Mesh, moved, shaded, thinned
 from robots import Kinematics, Robot, RobotError
 from robots.urdf import Box, Capsule, Cylinder, MeshFile, Sphere, Visual
 
@@ -82,17 +83,22 @@ def draw(robot: Robot) -> Drawing:
     every link of a robot whose URDF cannot be read or has no visuals.
     """
     visuals, notes = _visuals(robot)
+    files = MeshFiles()
+    missing: dict[str, list[str]] = {}  # what is wrong -> links
     parts: dict[tuple[int, str], list[Mesh]] = {}
     for visual in visuals:
         frame = robot.model.frames[robot.model.getFrameId(visual.link, pin.FrameType.BODY)]
         try:
-            meshes = _meshes(visual)
+            meshes = _meshes(visual, files)
         except MeshError as error:
-            notes.append(f"not drawn: a shape of link {visual.link}: {error}")
+            missing.setdefault(str(error), []).append(visual.link)
             continue
         place = frame.placement.homogeneous @ visual.origin
         key = (int(frame.parentJoint), visual.link)
         parts.setdefault(key, []).extend(moved(mesh, place) for mesh in meshes)
+    for fault, links in missing.items():
+        more = f" and {len(links) - 1:,} more" if len(links) > 1 else ""
+        notes.append(f"not drawn: a shape of link {links[0]}{more}: {fault}")
     if notes or not parts:
         for joint in set(range(robot.n + 1)) - {joint for joint, _ in parts}:
             parts[joint, "capsule"] = [_capsule(robot, joint)]
@@ -132,11 +138,11 @@ def _visuals(robot: Robot) -> tuple[list[Visual], list[str]]:
     return [visual for visual in checked.visuals if visual.link in bodies], notes
 
 
-def _meshes(visual: Visual) -> list[Mesh]:
+def _meshes(visual: Visual, files: MeshFiles) -> list[Mesh]:
     """The triangles of one visual, in the visual's own frame.
 
     Raises:
-        MeshError: its file cannot be read.
+        MeshError: its file cannot be read, or it is more than can be drawn.
     """
     import trimesh
 
@@ -144,7 +150,7 @@ def _meshes(visual: Visual) -> list[Mesh]:
     colour = None if visual.rgba is None else (red, green, blue)
     match visual.geometry:
         case MeshFile(path, scale):
-            return read_mesh(Path(path), np.asarray(scale), colour)
+            return files.meshes(path, np.asarray(scale), colour)
         case Box(size):
             body = trimesh.creation.box(size)
         case Cylinder(radius, length):
@@ -155,6 +161,7 @@ def _meshes(visual: Visual) -> list[Mesh]:
             body.apply_translation(-body.bounds.mean(axis=0))
         case Sphere(radius):
             body = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    files.count(len(body.faces))
     return [_mesh(body, colour or GREY, opacity)]
 
 
@@ -187,7 +194,7 @@ def _capsule(robot: Robot, joint: int) -> Mesh:
         end = model.jointPlacements[joint + 1].translation
     else:
         end = model.frames[robot.tool_frame_id].placement.translation
-    radius = 0.03 * min(robot.reach, 10.0)
+    radius = 0.03 * min(max(robot.reach, 0.2), 10.0)  # [m]
     body = trimesh.creation.icosphere(subdivisions=3, radius=1.3 * radius)
     if np.linalg.norm(end) > 1e-6:
         rod = np.array([np.zeros(3), end])

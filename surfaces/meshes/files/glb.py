@@ -34,6 +34,7 @@ _HARMLESS = ("KHR_materials_", "KHR_texture_", "KHR_lights_", "EXT_texture_", "K
 MOST_ENTRIES = 100_000  # of a list: nodes, accessors
 Json = dict[str, Any]
 _SHAPE = {"attributes": {"POSITION": int}, "indices": int, "mode": int, "targets": object}
+_SHAPE["material"] = object
 _NUMBERS = dict.fromkeys(("bufferView", "byteOffset", "componentType", "count"), int)
 _VIEW = dict.fromkeys(("buffer", "byteOffset", "byteLength", "byteStride"), int)
 # What is read of a scene. Whole numbers are indices, counts and sizes, so never negative; one type
@@ -50,6 +51,7 @@ _SCENE: Json = {
     "accessors": [_NUMBERS | {"type": str, "normalized": bool, "sparse": object}],
     "bufferViews": [_VIEW],
     "buffers": [{"uri": object}],
+    "materials": object,
 }
 
 
@@ -61,12 +63,38 @@ class _Placed(NamedTuple):
     where: str
 
 
+class GlbPart(NamedTuple):
+    """One mesh of a scene, where the scene shows it."""
+
+    mesh: RawMesh
+    rgba: tuple[float, ...] | None
+    """Red, green, blue, opacity in 0 .. 1; None where it has no colour of its own."""
+
+
 def read_glb(stream: BinaryIO, size: int) -> RawMesh:
     """Read a GLB of `size` bytes: the triangles of its scene, placed as its nodes say.
 
     Raises:
         SurfaceError: not a GLB, damaged, too large, or with what we do not read.
     """
+    scene, data = _scene(stream, size)
+    parts, others = _parts(scene, data)
+    mesh = joined([part.mesh for part in parts])
+    notes = ["a GLB's y axis points up; the part is taken as the file has it"]
+    if len(parts) > 1:
+        notes.append(f"{len(parts)} meshes of the file's scene were joined")
+    if others:
+        notes.append(f"points and lines ({others} of the scene's meshes) were left out")
+    return RawMesh(mesh.vertices, mesh.faces, (*notes, *mesh.notes))
+
+
+def read_glb_parts(stream: BinaryIO, size: int) -> list[GlbPart]:
+    """Read a GLB as `read_glb` does, mesh by mesh with their colours."""
+    return _parts(*_scene(stream, size))[0]
+
+
+def _scene(stream: BinaryIO, size: int) -> tuple[Json, bytes]:
+    """What is read of a scene, and the bytes of its numbers."""
     content, data = _chunks(stream, size)
     scene = _checked(content)
     for name in scene.get("extensionsRequired", []):
@@ -75,7 +103,12 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
                 f"needs the glTF extension {name!r}, which is not read; export it without "
                 "compression and extensions"
             )
-    parts: list[RawMesh] = []
+    return scene, data
+
+
+def _parts(scene: Json, data: bytes) -> tuple[list[GlbPart], int]:
+    """The meshes of triangles that a scene shows, and how many others it has."""
+    parts: list[GlbPart] = []
     others = faces = vertices = 0
     for placed in _placed_primitives(scene):
         # A small file can show one mesh many times, so all is counted before it is made.
@@ -94,16 +127,21 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
         faces += corners // 3 if mode == _TRIANGLES else max(corners - 2, 0)
         vertices += position.get("count", 0)
         refuse_large(faces, vertices)
-        parts.append(_primitive(scene, data, placed, mode))
+        parts.append(GlbPart(_primitive(scene, data, placed, mode), _rgba(scene, placed)))
     if not faces:
         raise no_triangles()
-    mesh = joined(parts)
-    notes = ["a GLB's y axis points up; the part is taken as the file has it"]
-    if len(parts) > 1:
-        notes.append(f"{len(parts)} meshes of the file's scene were joined")
-    if others:
-        notes.append(f"points and lines ({others} of the scene's meshes) were left out")
-    return RawMesh(mesh.vertices, mesh.faces, (*notes, *mesh.notes))
+    return parts, others
+
+
+def _rgba(scene: Json, placed: _Placed) -> tuple[float, ...] | None:
+    """The plain colour of a primitive's material; None where there is none that can be read."""
+    try:
+        material = scene["materials"][placed.primitive["material"]]
+        factors = material.get("pbrMetallicRoughness", {}).get("baseColorFactor", [1.0] * 4)
+        rgba = tuple(_checked(factors, [float] * 4))
+    except (KeyError, IndexError, TypeError, AttributeError, SurfaceError):
+        return None
+    return tuple(min(max(part, 0.0), 1.0) for part in rgba)
 
 
 def _chunks(stream: BinaryIO, size: int) -> tuple[Any, bytes]:
@@ -127,7 +165,11 @@ def _chunks(stream: BinaryIO, size: int) -> tuple[Any, bytes]:
         )
     try:
         content = json.loads(stream.read(json_length).decode("utf-8"))
-    except (ValueError, RecursionError) as error:  # UnicodeDecodeError is a ValueError
+    except RecursionError as error:
+        raise SurfaceError(
+            "describes its scene in no valid JSON: it is nested too deeply"
+        ) from error
+    except ValueError as error:  # UnicodeDecodeError is one
         raise SurfaceError(f"describes its scene in no valid JSON: {error}"[:200]) from error
     head = stream.read(8)
     if not head:

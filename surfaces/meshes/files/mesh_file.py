@@ -7,15 +7,15 @@ number and index before it is used, and only the one file is opened, whatever it
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 
 from coverable_files import FileFault, open_regular, reason
 from surfaces.arguments import Checks
-from surfaces.meshes.files.glb import read_glb
+from surfaces.meshes.files.glb import GlbPart, read_glb, read_glb_parts
 from surfaces.meshes.files.obj_and_off import read_obj, read_off
 from surfaces.meshes.files.ply import read_ply
 from surfaces.meshes.files.raw_mesh import RawMesh
@@ -29,13 +29,17 @@ LARGEST_FILE = 512 << 20  # bytes
 LARGEST_PART, SMALLEST_PART = 20.0, 1e-3
 WIDE_PART = 5.0  # [m]: worth a note
 
-_READERS: dict[str, Callable[[BinaryIO, int], RawMesh]] = {
+Found = TypeVar("Found")
+Reader = Callable[[BinaryIO, int], Found]
+
+_READERS: dict[str, Reader[RawMesh]] = {
     ".stl": read_stl,
     ".obj": read_obj,
     ".ply": read_ply,
     ".off": read_off,
     ".glb": read_glb,
 }
+_PART_READERS: dict[str, Reader[RawMesh | list[GlbPart]]] = {**_READERS, ".glb": read_glb_parts}
 FORMATS = "STL, OBJ, PLY, OFF or GLB"
 # How files begin that are something else than their name says.
 _STARTS = {
@@ -78,7 +82,7 @@ def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> Trian
     name = repr(Path(os.fsdecode(path)).name[:100])
     try:
         unit = metres_per_unit(scale)
-        raw = _read(path)
+        raw = _read(path, _READERS)
         with np.errstate(over="ignore"):  # infinite coordinates are refused next
             vertices = raw.vertices * unit
         mesh = clean(vertices, raw.faces, history=raw.notes)
@@ -87,6 +91,30 @@ def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> Trian
         return with_likely_unit(mesh)
     except (FileFault, SurfaceError) as error:
         raise SurfaceError(error.faults, name) from error
+
+
+def read_parts(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> list[GlbPart]:
+    """Read a mesh file as it is, part by part and with colours, to be drawn: nothing is repaired.
+
+    Coordinates may be infinite or NaN; indices are those of vertices.
+
+    Args:
+        path: a file of one of the formats.
+        largest: bytes that it may have.
+
+    Raises:
+        SurfaceError: no such file, not a mesh, damaged, too large, or without triangles.
+    """
+    try:
+        found = _read(path, _PART_READERS, largest)
+    except FileFault as error:
+        raise SurfaceError(error.faults) from error
+    parts = found if isinstance(found, list) else [GlbPart(found, None)]
+    for part in parts:
+        faces, vertices = part.mesh.faces, part.mesh.vertices
+        if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
+            raise SurfaceError("names a vertex that it does not have; it is damaged")
+    return parts
 
 
 def metres_per_unit(scale: float | None, name: str = "") -> float:
@@ -104,15 +132,17 @@ def metres_per_unit(scale: float | None, name: str = "") -> float:
     return unit
 
 
-def _read(path: str | os.PathLike[str]) -> RawMesh:
+def _read(
+    path: str | os.PathLike[str], readers: Mapping[str, Reader[Found]], largest: int = LARGEST_FILE
+) -> Found:
     """Open a regular file, look at how it begins, and read it."""
     advice = "thin the mesh, or save it as binary STL"
-    with open_regular(path, LARGEST_FILE, f"a mesh as {FORMATS}", advice) as stream:
+    with open_regular(path, largest, f"a mesh as {FORMATS}", advice) as stream:
         suffix = Path(os.fsdecode(path)).suffix.lower()
         try:
             _check_start(stream.read(80), suffix)
             stream.seek(0)
-            return _READERS[suffix](stream, os.fstat(stream.fileno()).st_size)
+            return readers[suffix](stream, os.fstat(stream.fileno()).st_size)
         except OSError as error:
             raise SurfaceError(f"cannot be read: {reason(error)}") from error
 

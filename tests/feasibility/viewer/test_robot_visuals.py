@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 
-from feasibility.viewer.meshes import Mesh, MeshError, read_mesh, shaded, thinned, tubes
+from feasibility.viewer.meshes import Mesh, shaded, thinned, tubes
 from feasibility.viewer.robot import TRIANGLES, draw, joint_paths, joint_placements
 from feasibility.viewer.threejs import safe_name
 from robots import Kinematics, load_robot
@@ -128,20 +128,6 @@ def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
     assert len(drawn(bare)) == 2
     (note,) = draw(bare).notes
     assert "two.urdf" in note
-
-
-def test_textures_and_materials_beside_a_mesh_are_not_opened(tmp_path, monkeypatch):
-    (tmp_path / "evil.obj").write_text(
-        "mtllib ../../etc/passwd\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n"
-    )
-    opened = []
-    real = open
-    monkeypatch.setattr("builtins.open", lambda *a, **k: opened.append(a[0]) or real(*a, **k))
-    (mesh,) = read_mesh(tmp_path / "evil.obj", np.ones(3), (1.0, 0.0, 0.0))
-    assert len(mesh.faces) == 1
-    assert not [name for name in opened if "passwd" in str(name)]
-    with pytest.raises(MeshError, match=r"none\.stl"):
-        read_mesh(tmp_path / "none.stl", np.ones(3), None)
 
 
 def test_joint_placements_compose_to_pinocchios_tool():

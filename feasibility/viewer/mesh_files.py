@@ -1,0 +1,165 @@
+"""The mesh files of a robot's visuals: each read once, within caps on bytes, triangles and time.
+
+They are not trusted. Only the file itself is opened: textures and materials that it names are not.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from coverable_errors import CoverableError
+from coverable_files import read_regular, reason
+from feasibility.viewer.collada_limits import MeshError, check_collada
+from feasibility.viewer.meshes import GREY, Array, Ints, Mesh
+from feasibility.viewer.threejs import Colour
+from surfaces.meshes.files import read_parts
+
+LARGEST_FILES = {".stl": 64 << 20, ".glb": 64 << 20, ".dae": 64 << 20}  # bytes
+LARGEST_TEXT = 12 << 20  # bytes, of the other formats, which take longer
+MOST_TRIANGLES = 1_500_000  # of a whole robot, each use of a file counted
+MOST_SECONDS = 8.0  # of processor time, after which no other file is opened
+
+
+class FilePart(NamedTuple):
+    """One mesh of a file."""
+
+    vertices: Array
+    """(V, 3) in the file's unit."""
+    faces: Ints
+    """(F, 3) indices of vertices."""
+    rgba: tuple[float, ...] | None
+    """Red, green, blue, opacity in 0 .. 1; None where it brings no colour of its own."""
+
+    def drawn(self, scale: Array, colour: Colour | None) -> Mesh:
+        """The mesh, scaled, in its own colour or else in the one given."""
+        if self.rgba is None:
+            return Mesh(self.vertices * scale, self.faces, colour or GREY)
+        red, green, blue, alpha = self.rgba
+        # An alpha of zero is a file's way of saying that it left transparency unset.
+        alpha = alpha if alpha > 0.05 else 1.0
+        return Mesh(self.vertices * scale, self.faces, (red, green, blue), alpha)
+
+
+class MeshFiles:
+    """Reads mesh files for one drawing."""
+
+    def __init__(self, clock: Callable[[], float] = time.thread_time) -> None:
+        """Start with nothing read.
+
+        Args:
+            clock: processor time, s.
+        """
+        self._clock = clock
+        self._started = clock()
+        self._read: dict[str, list[FilePart] | MeshError] = {}
+        self._triangles = 0
+
+    def meshes(self, path: str, scale: Array, colour: Colour | None) -> list[Mesh]:
+        """The parts of a mesh file, scaled.
+
+        Args:
+            path: of a file that may be opened.
+            scale: (3,) factors along x, y and z.
+            colour: for parts that bring no colour of their own; grey where None.
+
+        Raises:
+            MeshError: it is no mesh, or there is too much to draw.
+        """
+        if path not in self._read:
+            self._read[path] = self._first_read(Path(path))
+        found = self._read[path]
+        if isinstance(found, MeshError):
+            raise MeshError(found.faults)
+        self.count(sum(len(part.faces) for part in found))
+        return [part.drawn(scale, colour) for part in found]
+
+    def count(self, triangles: int) -> None:
+        """Count triangles that will be drawn.
+
+        Raises:
+            MeshError: they are more than can be drawn.
+        """
+        if self._triangles + triangles > MOST_TRIANGLES:
+            raise MeshError(
+                f"the robot's shapes have more than {MOST_TRIANGLES:,} triangles; thin its meshes"
+            )
+        self._triangles += triangles
+
+    def _first_read(self, file: Path) -> list[FilePart] | MeshError:
+        """The parts of a file in its own unit, or what is wrong with it."""
+        if self._clock() - self._started > MOST_SECONDS:
+            return MeshError(f"reading took more than {MOST_SECONDS:g} s; thin the robot's meshes")
+        try:
+            return read_parts_of(file)
+        except MeshError as error:
+            return error
+
+
+def read_parts_of(file: Path) -> list[FilePart]:
+    """Read every part of a mesh file.
+
+    Args:
+        file: STL, OBJ, PLY, OFF, GLB or DAE.
+
+    Raises:
+        MeshError: the file is missing, damaged, too large, or holds no finite triangles.
+    """
+    suffix = file.suffix.lower()
+    largest = LARGEST_FILES.get(suffix, LARGEST_TEXT)
+    try:
+        if suffix == ".dae":
+            parts = _collada(read_regular(file, largest, "a mesh to draw"))
+        else:
+            parts = [
+                FilePart(part.mesh.vertices, part.mesh.faces, part.rgba)
+                for part in read_parts(file, largest)
+            ]
+    except CoverableError as fault:
+        raise MeshError(f"{file.name}: {fault}") from fault
+    parts = [part for part in parts if len(part.faces)]
+    if not parts:
+        raise MeshError(f"{file.name}: holds no triangles")
+    if not all(np.isfinite(part.vertices).all() for part in parts):
+        raise MeshError(f"{file.name}: has a vertex that is not finite")
+    return parts
+
+
+def _collada(data: bytes) -> list[FilePart]:
+    """A .dae by trimesh, after a look at what would become of it."""
+    import trimesh
+
+    check_collada(data)
+    log = logging.getLogger("trimesh")
+    before = log.level
+    log.setLevel(logging.CRITICAL)  # it prints tracebacks about textures
+    try:
+        # From memory: trimesh cannot know where other files would lie.
+        parts = trimesh.load_scene(io.BytesIO(data), file_type="dae").dump()
+    except Exception as error:
+        raise MeshError(f"cannot be read as a mesh: {reason(error)}") from error
+    finally:
+        log.setLevel(before)
+    return [
+        FilePart(np.asarray(part.vertices, float), np.asarray(part.faces, np.int64), _rgba(part))
+        for part in parts
+        if isinstance(part, trimesh.Trimesh)
+    ]
+
+
+def _rgba(part: Any) -> tuple[float, ...] | None:
+    """The colour that a part of trimesh brings along."""
+    visual = part.visual
+    if visual.kind == "texture":
+        rgba = visual.material.main_color
+    elif visual.kind in ("vertex", "face"):
+        rgba = visual.main_color
+    else:
+        return None
+    return tuple(float(value) / 255.0 for value in rgba)
