@@ -10,12 +10,13 @@ from coverable_errors import (
     Checks,
     CoverableError,
     Fault,
+    alternatives,
     close,
     is_number,
     printable,
     shown,
 )
-from feasibility.cases.keys import Key, keys_of
+from feasibility.cases.keys import Key, all_keys, keys_of
 from feasibility.safe_files import shown_path
 
 MOST_GUESSES = 20  # unknown keys for which a known one is looked up
@@ -135,24 +136,32 @@ class Section(Checks):
         unknown = [key for key in self.table if key in hints or key not in known]
         for number, key in enumerate(unknown):
             guess = close(key, known) if number < MOST_GUESSES else ""
-            remedy = f"did you mean {guess}?" if guess else f"known are {', '.join(known)}"
+            remedy = f"did you mean {guess}?" if guess else self._elsewhere(key, known)
             text = hints.get(key, f"is not known here; {remedy}")
             self.fault(printable(key), text)
 
+    def _elsewhere(self, key: str, known: Sequence[str]) -> str:
+        """Which other table of a case has a key that this one has not, or the keys of this one."""
+        tables = [other.table for other in all_keys() if other.name == key]
+        tables += [key] if keys_of(key) else []
+        if not tables or not self.keys:
+            return f"known are {', '.join(known)}"
+        return f"it belongs to {alternatives([f'[{name}]' for name in dict.fromkeys(tables)])}"
+
 
 def table_words(name: str) -> str:
-    """What a table is: its keys, and those that it needs with examples.
+    """What a table is: its keys, and an example of those that it needs, or of the first.
 
     Example:
         >>> table_words("surface.cut")  # doctest: +ELLIPSIS
         'a table [surface.cut] with the keys point, normal, such as { point = [0, 0, 0.1], ...
     """
-    keys = keys_of(name).values()
-    text = f"a table [{name}]"
-    if keys:
-        text += f" with the keys {', '.join(key.name for key in keys)}"
-    needed = [key.written for key in keys if key.default is None]
-    return f"{text}, such as {{ {', '.join(needed)} }}" if needed else text
+    keys = tuple(keys_of(name).values())
+    if not keys:
+        return f"a table [{name}]"
+    needed = [key.written for key in keys if key.default is None] or [keys[0].written]
+    names = ", ".join(key.name for key in keys)
+    return f"a table [{name}] with the keys {names}, such as {{ {', '.join(needed)} }}"
 
 
 def with_example(fault: Fault, keys: Mapping[str, Key]) -> Fault:

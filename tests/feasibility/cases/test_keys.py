@@ -2,6 +2,7 @@
 
 import copy
 import datetime
+import math
 import re
 import tomllib
 from pathlib import Path
@@ -50,6 +51,8 @@ def place_of(key):
     """A good case in which the key may stand, its table there, and what messages call the table."""
     kind, path, inner = copy.deepcopy(OTHERS.get(key.table, (key.kind or "sphere", (), {})))
     tables = tables_of(kind)
+    if key.table != "robot":
+        del tables["robot"]  # no arm is loaded for it
     if not path:
         return tables, tables[key.table], key.table
     tables["surface"][path[0]] = [inner] if path[1:] else inner
@@ -57,13 +60,18 @@ def place_of(key):
 
 
 def faults_of(tables):
-    """The faults of reading these tables, by key, without that of a file that is not there."""
+    """The faults of reading these tables, by key, without those of what is left out here."""
     from feasibility.cases.case import _from_tables
 
     try:
         _from_tables(tables, "case", ())
     except CaseError as error:
-        faults = [fault for fault in error.faults if "there is no such file" not in fault.message]
+        faults = [
+            fault
+            for fault in error.faults
+            if "there is no such file" not in fault.message
+            and not (fault.key == "robot" and "robot" not in tables)
+        ]
         return {fault.key: fault for fault in reversed(faults)}
     return {}
 
@@ -132,6 +140,72 @@ def test_an_unknown_key_is_answered_with_those_of_the_table_each_once(table):
     known = re.search(r"known are (.*)$", said)[1].split(", ")
     assert known == list(keys_of(table, inner.get("kind", "")))
     assert len(set(known)) == len(known)
+
+
+@pytest.mark.parametrize(
+    ("table", "line", "words"),
+    [
+        ("surface", "standoff", "it belongs to [task]"),
+        ("robot", "kind", "it belongs to [surface] or [surface.pieces]"),
+        ("task", "time_limit", "it belongs to [search]"),
+        ("task", "search", "it belongs to [search]"),
+        ("surface", "within_deg", "it belongs to [surface.facing]"),
+        ("search", "zzzz", "known are method, seed"),
+    ],
+)
+def test_a_key_of_another_table_is_sent_there(table, line, words):
+    tables = tables_of("sphere")
+    tables[table][line] = 1
+    assert words in faults_of(tables)[f"{table}.{line}"].message
+
+
+NOTHING = ("x", True, math.nan, math.inf, [], {}, [0, math.nan, 0])
+
+
+def edges_of(said):
+    """Values that a type takes, and values that it refuses; None for types without edges."""
+    if found := re.fullmatch(r"an? .*number in (\S+) \.\. (\S+)", said):
+        low, high = map(float, found.groups())
+        return [low, high], [low - 1e-6 * (1 + abs(low)), high * (1 + 1e-6) + 1e-9, *NOTHING]
+    if found := re.fullmatch(r"a number > (\S+) and <= (\S+)", said):
+        low, high = map(float, found.groups())
+        return [low + 1e-6, high], [low, high * (1 + 1e-6), *NOTHING]
+    if re.fullmatch(r"a finite number > 0", said):
+        return [1e-3], [0, -1e-9, *NOTHING]
+    if re.fullmatch(r"a finite number >= 0", said):
+        return [0, 1e-3], [-1e-9, *NOTHING]
+    if found := re.fullmatch(r"(?:'all' or )?a whole number >= (\d+)", said):
+        low = int(found[1])
+        return [low, low + 1], [low - 1, low + 0.5, float(low), 2**64, *NOTHING]
+    if said.startswith("two whole numbers >= 1"):
+        return [[1, 1], [2, 3]], [[0, 1], [1, 0], [1], [1, 1, 1], [1.0, 1], 1, *NOTHING]
+    if said == "three finite numbers":
+        return [[0, 0, 0], [1, -2.5, 3]], [[0, 0], [0, 0, 0, 0], 0, *NOTHING]
+    if said == "three finite numbers that are not all zero":
+        return [[0, 0, -1e-3]], [[0, 0, 0], [0, 0], [0, 0, 0, 1], *NOTHING]
+    if said.startswith("a pair [low, high]"):
+        return [], [[0.5, 0.5], [0.6, 0.4], [0.1], [0.1, 0.2, 0.3], 0.1, *NOTHING]
+    if re.fullmatch(r"'\w+' or '\w+'", said):
+        return re.findall(r"'(\w+)'", said), ["inward", 0, *NOTHING]
+    return None
+
+
+RANGES = [key for key in all_keys() if edges_of(key.type)]
+
+
+@pytest.mark.parametrize("key", RANGES, ids=title)
+def test_reading_takes_what_the_reference_says_and_nothing_else(key):
+    takes, refuses = edges_of(key.type)
+    for value in takes:
+        faults, name = with_value(key, value)
+        assert not any(fault.startswith(name) for fault in faults), value
+    for value in refuses:
+        faults, name = with_value(key, value)
+        assert any(fault.startswith(name) for fault in faults), value
+
+
+def test_most_keys_have_such_a_type():
+    assert len(RANGES) > 0.6 * len(all_keys())
 
 
 @pytest.mark.parametrize("table", ["robot", "surface", "task", "search", *OTHERS])
