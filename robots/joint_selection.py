@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from numpy.typing import ArrayLike
 
-from coverable_errors import Fault, alternatives, close_matches
+from coverable_errors import Fault, close_matches
 
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf, JointInfo
 
 MOST_NAMES = 40  # that a message lists
-MOST_SHOWN = 8  # that a note lists
+MOST_OTHERS = 8  # leaf links that a note lists
 
 
 TOOL_LINKS = ("tcp", "tool0", "flange", "ee_link")
@@ -75,18 +75,19 @@ def _tool_frame(checked: CheckedUrdf, link: str | None) -> tuple[str, str]:
     if len(checked.leaves) == 1:
         return checked.leaves[0], ""
     moved = _moved_links(checked)
+    leaves = [leaf for leaf in checked.leaves if leaf in moved]
     known = next((name for name in TOOL_LINKS if name in moved), None)
     if known is not None:
-        others = [leaf for leaf in checked.leaves if leaf != known]
-        return known, f"tool_frame is {known!r}, by its name; it may be {_any_of(others)} as well"
-    leaves = [leaf for leaf in checked.leaves if leaf in moved]
+        others = [repr(leaf) for leaf in leaves if leaf != known]
+        more = ", ..." if len(others) > MOST_OTHERS else ""
+        beside = f"; joints also move {', '.join(others[:MOST_OTHERS])}{more}" if others else ""
+        return known, f"tool_frame is {known!r}, chosen by its name{beside}"
     if len(leaves) == 1:
         return leaves[0], f"tool_frame is {leaves[0]!r}, the only leaf link that a joint moves"
     listed = leaves or checked.leaves
     return "", (
         f"{checked.path} has {len(listed)} leaf links, so tool_frame must name one: "
-        f"{', '.join(listed)} (or any other link; one called {alternatives(TOOL_LINKS)} would be "
-        "taken by itself)"
+        f"{', '.join(listed)} (or any other link)"
     )
 
 
@@ -97,13 +98,6 @@ def _moved_links(checked: CheckedUrdf) -> set[str]:
         if joint.moves or joint.parent in moved:
             moved.add(joint.child)
     return moved
-
-
-def _any_of(names: Sequence[str]) -> str:
-    """Some links that could be named instead."""
-    return alternatives([repr(name) for name in names[:MOST_SHOWN]]) + (
-        " or another link" if len(names) > MOST_SHOWN else ""
-    )
 
 
 def suggestion(name: str, known: Sequence[str]) -> str:

@@ -63,7 +63,8 @@ def test_a_urdf_as_it_comes(tmp_path, name):
     edges, expected = MADE[name]
     robot = load_text(tmp_path, tree(edges))
     assert robot.tool_frame == expected
-    assert [note for note in robot.notes if note.startswith(f"tool_frame is {expected!r}")]
+    (note,) = (note for note in robot.notes if note.startswith(f"tool_frame is {expected!r}"))
+    assert "'base'" not in note  # no joint moves it, so it is no choice
     assert load_text(tmp_path, tree(edges), tool_frame="upper").tool_frame == "upper"
 
 
