@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -186,6 +187,14 @@ class Verdict:
     def n_covered(self) -> int:
         """Number of cells that the best single component visits."""
         return int(self.covered.sum())
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        """Table, causes and picture, for notebooks; see `feasibility.reports.notebook`.
+
+        Loaded by its name when a notebook asks: no verdict needs pictures otherwise.
+        """
+        bundle: dict[str, str] = import_module("feasibility.reports.notebook").mimebundle(self)
+        return bundle
 
     def __repr__(self) -> str:
         """The verdict in one line."""

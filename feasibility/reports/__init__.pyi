@@ -2,6 +2,7 @@ from . import comparison as comparison
 from . import division as division
 from . import explanation as explanation
 from . import keys as keys
+from . import notebook as notebook
 from . import path as path
 from . import placement as placement
 from . import study as study

@@ -135,6 +135,17 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     return "\n".join(lines)
 
 
+def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
+    """What is said of any verdict: names, and a text each that may be empty."""
+    return [
+        ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
+        ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
+        ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
+        ("found", verdict.message),
+        ("certificate", _certificate_text(verdict)),
+    ]
+
+
 def _evidence(verdict: Verdict) -> str:
     """What the answer rests on."""
     if verdict.proof is not None and verdict.proof.kind == "cut":

@@ -9,6 +9,8 @@ from .path_and_division import view_division as view_division
 from .path_and_division import view_path as view_path
 from .placements import view_placements as view_placements
 from .placements import view_study as view_study
+from .view_figures import plot_view as plot_view
+from .view_figures import plot_views as plot_views
 from .viewer import View as View
 from .viewer import show as show
 from .viewer import view as view

@@ -263,9 +263,14 @@ def _name(cells: Cells, cell: int) -> str:
     return str(index) if len(index) > 1 else str(index[0])
 
 
+def plain(text: str) -> str:
+    """A text for a figure: a dollar sign in it is no mathematics."""
+    return text.replace("$", r"\$")
+
+
 def _joint_label(verdict: Verdict, joint: int) -> str:
-    """A joint's name with its unit; a dollar sign in it is no mathematics."""
-    name = verdict.robot.joint_names[joint].replace("$", r"\$")
+    """A joint's name with its unit."""
+    name = plain(verdict.robot.joint_names[joint])
     return f"{name} ({'mm' if verdict.robot.prismatic[joint] else 'degrees'})"
 
 

@@ -161,6 +161,13 @@ def pack(commands: Iterable[Command]) -> list[bytes]:
     return [umsgpack.packb(command) for command in commands]
 
 
+def numbers_of(attribute: dict[str, Any]) -> Array:
+    """The numbers of an attribute, flat, as floats: what `mesh` and `segments` have packed."""
+    kind = attribute["type"].removesuffix("Array").lower()
+    data = np.frombuffer(attribute["array"].data, np.dtype(kind).newbyteorder("<"))
+    return data.astype(float)
+
+
 def _object(path: str, kind: str, data: dict[str, Any], material: dict[str, Any]) -> Command:
     """The command that puts one object at `path`."""
     geometry = {"uuid": f"{path}#geometry", "type": "BufferGeometry", "data": data}

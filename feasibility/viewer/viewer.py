@@ -8,6 +8,7 @@ Nothing but other views, reports and commands imports the viewer.
 
 from __future__ import annotations
 
+import base64
 import html
 import os
 import sys
@@ -73,15 +74,40 @@ class View:
             live.open()
         return live
 
-    def _repr_html_(self) -> str:
-        """The page inside a notebook's output; it stays there when the notebook is saved."""
+    def image(self, width: int = 900, height: int = 560) -> Array:
+        """The picture as it is at first, painted without a browser: (height, width, 3), 0..1."""
+        from feasibility.viewer.painter import painted
+
+        return painted(self.commands, self.camera, width, height)
+
+    def png(self) -> bytes:
+        """That picture with title and legend, as PNG."""
+        from feasibility.viewer.view_figures import plot_view
+
+        return plot_view(self)._repr_png_()
+
+    def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
+        """The page inside a notebook's output, and a picture for where it is not shown.
+
+        A notebook that is not trusted, a printed one and one on GitHub show the picture.
+        """
+        picture = base64.b64encode(self.png()).decode("ascii")
         inner = html.escape(self.html(), quote=True)
-        style = "width: 100%; height: 560px; border: 0"
-        return f'<iframe srcdoc="{inner}" style="{style}" loading="lazy"></iframe>'
+        page = _BESIDE.format(picture=picture, page=inner)
+        return {"text/plain": repr(self), "text/html": page, "image/png": picture}
 
     def __repr__(self) -> str:
         """One line, for consoles."""
         return f"View({self.legend.title!r}: {self.legend.text})"
+
+
+# The page covers the picture; where frames are dropped or printed, the picture is left.
+_BESIDE = """<style>@media print {{ .coverable-view iframe {{ display: none; }} }}</style>
+<div class="coverable-view" style="position: relative; min-height: 560px">
+<img src="data:image/png;base64,{picture}" style="max-width: 100%; height: 560px">
+<iframe srcdoc="{page}" loading="lazy"
+ style="position: absolute; inset: 0; width: 100%; height: 560px; border: 0; background: #fff">
+</iframe></div>"""
 
 
 def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: float = 0.0) -> View:

@@ -1,0 +1,54 @@
+"""Views as flat figures: one with its legend, or several as small pictures side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol
+
+from feasibility.verdict import UNCHECKED
+from feasibility.viewer.figures import Plot, plain
+from feasibility.viewer.html_page import Legend
+
+
+class Drawn(Protocol):
+    """A view, or whatever else has a picture and a legend."""
+
+    @property
+    def legend(self) -> Legend:
+        """Title, text and entries."""
+
+    def image(self, width: int = ..., height: int = ...) -> Any:
+        """The picture, (height, width, 3)."""
+
+
+def plot_view(view: Drawn) -> Plot:
+    """The picture of a view, painted without a browser, with its title and its legend."""
+    from matplotlib.patches import Patch
+
+    figure = Plot(figsize=(7.6, 5.7), layout="constrained")
+    axes = figure.add_subplot()
+    axes.imshow(view.image(), interpolation="lanczos")
+    axes.set_axis_off()
+    figure.suptitle(plain(f"{view.legend.title}\n{UNCHECKED}"), fontsize=11)
+    shown = [entry for entry in view.legend.entries if entry.shown]
+    handles = [Patch(color=entry.colour, label=plain(entry.label)) for entry in shown]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    return figure
+
+
+def plot_views(views: Mapping[str, Drawn], columns: int = 4) -> Plot:
+    """Several views as one figure of small pictures, each below its title.
+
+    Args:
+        views: by their titles.
+        columns: pictures side by side.
+    """
+    rows = -(-len(views) // columns)
+    figure = Plot(figsize=(3.1 * columns, 3.0 * rows), layout="constrained")
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for axes in grid.flat:
+        axes.set_axis_off()
+    for axes, (title, view) in zip(grid.flat, views.items(), strict=False):
+        axes.imshow(view.image(360, 300), interpolation="lanczos")
+        axes.set_title(plain(title), fontsize=9)
+    return figure

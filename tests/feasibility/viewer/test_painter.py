@@ -1,0 +1,152 @@
+"""The picture painted without a browser: what is in it, where, and what hides what."""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+
+import numpy as np
+import pytest
+from fabricated import DOME, every_cause, verdict_on
+from PIL import Image
+from small_cases import small_verdict
+
+from feasibility.viewer import plot_views, threejs, view
+from feasibility.viewer.html_page import Camera
+from feasibility.viewer.painter import LENS, painted
+from robots import load_robot
+
+SIZE = (160, 120)
+EYE = (4.0, 0.0, 0.0)
+FRONT = Camera((0.0, 0.0, 0.0), EYE, zoom=2.0)  # right is +y, up is +z
+RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+SQUARE = np.array([[0, -1, -1], [0, 1, -1], [0, 1, 1], [0, -1, 1]], dtype=float)
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
+
+
+def square(path, colour, size=0.5, x=0.0, **looks):
+    """A square across the view, `size` m from middle to side, at a distance of 4 - x m."""
+    return threejs.mesh(path, size * SQUARE + [x, 0, 0], HALVES, colour, lit=False, **looks)
+
+
+def mask(image, colour):
+    return np.abs(image - colour).max(axis=2) < 0.02
+
+
+def test_a_square_is_where_the_lens_puts_it() -> None:
+    image = painted([square("/a", RED)], FRONT, *SIZE)
+    assert image.shape == (120, 160, 3)
+    rows, columns = np.nonzero(mask(image, RED))
+    side = 0.5 / 4.0 / (LENS / 2.0) * 60  # pixels from the middle
+    assert abs(rows.min() - (60 - side)) <= 1.0
+    assert abs(rows.max() + 1 - (60 + side)) <= 1.0
+    assert abs(columns.min() - (80 - side)) <= 1.0
+    assert abs(columns.max() + 1 - (80 + side)) <= 1.0
+
+
+def test_up_is_up_and_right_is_right() -> None:
+    dots = [square("/up", RED, 0.1), square("/right", GREEN, 0.1)]
+    placed = [np.eye(4), np.eye(4)]
+    placed[0][:3, 3], placed[1][:3, 3] = [0, 0, 0.6], [0, 0.6, 0]
+    moves = [
+        threejs.transform(path, place)
+        for path, place in zip(("/up", "/right"), placed, strict=True)
+    ]
+    image = painted([*dots, *moves], FRONT, *SIZE)
+    up, right = (np.argwhere(mask(image, colour)).mean(axis=0) for colour in (RED, GREEN))
+    assert up[0] < 40
+    assert abs(up[1] - 79.5) < 1.0
+    assert right[1] > 100
+    assert abs(right[0] - 59.5) < 1.0
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_what_is_nearer_hides_what_is_behind(order) -> None:
+    image = painted([square("/far", RED), square("/near", BLUE, x=1.0)][::order], FRONT, *SIZE)
+    assert not mask(image, RED).any()
+    assert mask(image, BLUE).sum() > 500
+
+
+def test_what_is_half_transparent_shows_what_is_behind() -> None:
+    glass = square("/near", BLUE, 1.0, x=1.0, opacity=0.5)
+    image = painted([glass, square("/far", RED)], FRONT, *SIZE)
+    assert mask(image, (0.5, 0.0, 0.5)).sum() > 500
+
+
+def test_hidden_parts_and_what_is_behind_the_camera_are_not_painted() -> None:
+    empty = painted([], FRONT, *SIZE)
+    hidden = threejs.set_property("/a", "visible", False)
+    assert np.array_equal(painted([square("/a/b", RED), hidden], FRONT, *SIZE), empty)
+    assert np.array_equal(painted([square("/a", RED, x=5.0)], FRONT, *SIZE), empty)
+    shown = threejs.set_property("/a", "visible", True)
+    assert mask(painted([square("/a/b", RED), hidden, shown], FRONT, *SIZE), RED).any()
+
+
+def test_lines_lie_on_what_they_are_drawn_on_and_are_hidden_behind_it() -> None:
+    ends = np.array([[0, -0.4, 0.0], [0, 0.4, 0.0]])
+    line = threejs.segments("/line", ends, GREEN)
+    assert mask(painted([square("/a", RED), line], FRONT, *SIZE), GREEN).sum() > 20
+    near = square("/a", RED, x=1.0)
+    assert not mask(painted([near, line], FRONT, *SIZE), GREEN).any()
+
+
+def test_joints_carry_what_comes_after_them() -> None:
+    """Two turns of 45 degrees about x bring the square from +y to +z."""
+    turn = np.eye(4)
+    c = math.sqrt(0.5)
+    turn[1:3, 1:3] = [[c, -c], [c, c]]
+    part = threejs.mesh("/j/k/p", 0.1 * SQUARE + [0, 0.6, 0], HALVES, RED, lit=False)
+    image = painted(
+        [part, threejs.transform("/j", turn), threejs.transform("/j/k", turn)], FRONT, *SIZE
+    )
+    row, column = np.argwhere(mask(image, RED)).mean(axis=0)
+    assert row < 40
+    assert abs(column - 79.5) < 1.0
+
+
+# -- in notebooks ---------------------------------------------------------------------------------
+
+
+def picture_of(bundle):
+    """The pixels of the picture in a notebook's output."""
+    with Image.open(io.BytesIO(base64.b64decode(bundle["image/png"]))) as image:
+        return np.asarray(image.convert("RGB"), dtype=int)
+
+
+def test_a_view_leaves_a_picture_beside_the_page() -> None:
+    """It holds the arm, the missed cells and the edges; the page has the same picture below it."""
+    missed = {5, 6, 13}
+    robot = load_robot("puma560", limits="set-1")
+    verdict = verdict_on(robot, DOME.cells(4, 5), missed=missed, causes=every_cause(missed))
+    bundle = view(verdict, play=False)._repr_mimebundle_()
+    assert set(bundle) == {"text/plain", "text/html", "image/png"}
+    red, green, blue = np.moveaxis(picture_of(bundle), -1, 0)
+    assert ((blue > 180) & (red < 90) & (green < 120)).sum() > 200, "edges of G"
+    assert ((red > 110) & (green < 60) & (blue < 90)).sum() > 200, "cells out of reach"
+    assert ((green > 1.5 * red) & (green > 1.5 * blue)).sum() > 10, "the start"
+    assert bundle["text/html"].count(bundle["image/png"]) == 1
+    page = bundle["text/html"]
+    assert page.index("<img") < page.index("<iframe")
+    assert "@media print" in page
+
+
+@pytest.mark.parametrize("name", ["plate", "long plate"])
+def test_a_verdict_is_a_table_its_causes_and_a_picture(name) -> None:
+    verdict = small_verdict(name)
+    bundle = verdict._repr_mimebundle_()
+    page = bundle["text/html"]
+    assert f"{verdict.n_covered} of {len(verdict.cells)} cells in one motion" in page
+    assert ("not covered" in page) == bool(verdict.causes)
+    assert "collisions are not checked" in page
+    assert bundle["image/png"] in page
+    assert picture_of(bundle).std() > 3
+    assert bundle["text/plain"] == repr(verdict)
+
+
+def test_small_pictures_stand_below_their_titles() -> None:
+    drawn = view(small_verdict("plate"), play=False)
+    figure = plot_views({"one": drawn, "two: $x$": drawn, "three": drawn}, columns=2)
+    shown = [axes for axes in figure.axes if axes.images]
+    assert [axes.get_title() for axes in shown] == ["one", r"two: \$x\$", "three"]
+    assert len(figure.axes) == 4
