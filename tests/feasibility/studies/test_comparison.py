@@ -157,7 +157,8 @@ def test_json_and_csv_hold_every_number(compared) -> None:
 
 
 def test_the_text_has_a_line_for_each_arm(compared) -> None:
-    head, empty, heads, dashes, *lines = as_text(compared).splitlines()
+    head, unchecked, empty, heads, dashes, *lines = as_text(compared).splitlines()
+    assert unchecked.strip() == "collisions are not checked"
     able = [arm.robot for arm in compared.ranked if arm.verdict == "feasible"]
     assert head.endswith(": " + ", ".join(able))
     assert (empty, set(dashes)) == ("", {"-", " "})
