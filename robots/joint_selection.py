@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf, JointInfo
 
 MOST_NAMES = 40  # that a message lists
+MOST_GUESSES = 20  # unknown names for which a known one is looked up
 MOST_OTHERS = 8  # leaf links that a note lists
 
 
@@ -112,12 +113,12 @@ def suggestion(name: str, known: Sequence[str]) -> str:
 def _lock_faults(checked: CheckedUrdf, lock: Mapping[str, float]) -> dict[str, Fault]:
     """By name, locked joints that do not exist, do not move, or are held outside their limits."""
     moving = {joint.name: joint for joint in checked.joints if joint.moves}
-    faults = {}
+    faults: dict[str, Fault] = {}
     for joint_name, value in lock.items():
         joint = moving.get(joint_name)
         if joint is None:
-            hint = suggestion(joint_name, list(moving))
-            text = f"lock names {joint_name!r}, which is no moving joint; {hint}"
+            hint = f"; {suggestion(joint_name, list(moving))}" if len(faults) < MOST_GUESSES else ""
+            text = f"lock names {joint_name!r}, which is no moving joint{hint}"
             faults[joint_name] = Fault("", text)
             continue
         unit = "m" if joint.kind == "prismatic" else "rad"

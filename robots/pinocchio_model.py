@@ -6,6 +6,7 @@ import math
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
+from itertools import zip_longest
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from coverable_errors import Fault
 from robots.errors import RobotError
-from robots.joint_selection import Selection, select_joints, suggestion
+from robots.joint_selection import MOST_GUESSES, Selection, select_joints, suggestion
 from robots.robot import Robot, no_limit_set
 
 if TYPE_CHECKING:
@@ -108,10 +109,11 @@ def _limit_faults(
         return [Fault("", no_limit_set(limits, limit_sets))]
     moving = [joint.name for joint in checked.joints if joint.moves]
     named = limits if isinstance(limits, Mapping) else {}
+    unknown = [joint for joint in named if joint not in moving]
+    hints = [f"; {suggestion(joint, moving)}" for joint in unknown[:MOST_GUESSES]]
     return [
-        Fault("", f"limits name {joint!r}, which is no moving joint; {suggestion(joint, moving)}")
-        for joint in named
-        if joint not in moving
+        Fault("", f"limits name {joint!r}, which is no moving joint{hint}")
+        for joint, hint in zip_longest(unknown, hints, fillvalue="")
     ]
 
 

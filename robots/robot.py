@@ -218,10 +218,8 @@ class Robot:
                 continue
             table[self.joint_names.index(joint)] = values
         if faults:
-            raise RobotError(
-                f"{'; '.join(faults)}; its free joints are: {', '.join(self.joint_names)}",
-                f"robot {self.name!r}",
-            )
+            faults[0] += f"; its free joints are: {', '.join(self.joint_names)}"
+            raise RobotError(faults, f"robot {self.name!r}")
         return table
 
     def __repr__(self) -> str:

@@ -76,7 +76,7 @@ def test_limits_by_name_array_and_mapping(puma):
     [
         ("set-9", "no limit set 'set-9'; it has: set-1, set-2, set-3, set-4"),
         ({"joint7": (0, 1)}, "no free joint 'joint7'.*free joints are: joint1, joint2"),
-        ({"joint1": 1.0, "typo": (0, 1)}, "'joint1' must be a pair.*no free joint 'typo'"),
+        ({"joint1": 1.0, "typo": (0, 1)}, "(?s)'joint1' must be a pair.*no free joint 'typo'"),
         ({"joint1": ("a", "b")}, "limits of joint 'joint1' must be an array of numbers"),
         ({"joint1": (1.0, -1.0)}, "joint 'joint1' has limits 1 .. -1"),
         (np.zeros((5, 2)), r"must have shape \(6, 2\), one \(lower, upper\) for each of joint1"),
@@ -87,6 +87,26 @@ def test_limits_by_name_array_and_mapping(puma):
 def test_limits_that_make_no_sense_are_refused(puma, limits, message):
     with pytest.raises(RobotError, match=message):
         puma.with_limits(limits)
+
+
+def test_thousands_of_wrong_joints_stay_readable(monkeypatch):
+    """And names that come close are looked up for a few of them, for that takes a while each."""
+    asked = []
+
+    def looked_up(name, *rest, **options):
+        asked.append(name)
+        return []
+
+    monkeypatch.setattr("robots.joint_selection.close_matches", looked_up)
+    many = {f"elbow{k}": (0.0, 1.0) for k in range(5000)}
+    held = dict.fromkeys(many, 0.0)
+    for wrong in ({"limits": many}, {"limits": many, "tool_frame": "l9"}, {"lock": held}):
+        asked.clear()
+        with pytest.raises(RobotError) as caught:
+            load_robot("puma560", **wrong)
+        assert len(caught.value.faults) >= 5000
+        assert len(str(caught.value)) < 6000
+        assert len(asked) < 50
 
 
 def test_a_robot_without_limit_sets_says_so():
