@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from coverable_errors import ArgumentError, alternatives, close
 from feasibility.cases import Key, all_keys
 
-HEADINGS = ("key", "value", "unit", "default", "meaning", "example")
+HEADINGS = ("key", "type", "unit", "default", "meaning", "example")
 NEEDED = "needed"
 HEAD = """\
 # The keys of a case file
