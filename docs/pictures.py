@@ -47,8 +47,7 @@ def mesh_hood() -> View:
     bulge = 0.04 * np.exp(-((y / 0.12) ** 2))
     sheet = bspline(np.stack([x, y, crown + bulge], axis=-1))
     drawn = sheet.cells(40, 48).triangles(np.arange(40 * 48), samples=1)
-    upward = drawn.faces[:, ::-1]
-    part = mesh(trimesh.Trimesh(drawn.vertices, upward), position=(0.5, 0, 0))
+    part = mesh(trimesh.Trimesh(drawn.vertices, drawn.faces), position=(0.5, 0, 0))
     verdict = check(load_robot("ur5"), part.cells(count=120), Task(standoff=0.02, cone_deg=20))
     return view(verdict, "hood of a car, a mesh", play=False, at=0.6)
 

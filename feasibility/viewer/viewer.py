@@ -82,9 +82,9 @@ class View:
 
     def png(self) -> bytes:
         """That picture with title and legend, as PNG."""
-        from feasibility.viewer.view_figures import plot_view
+        from feasibility.viewer.view_figures import plot_view, small_png
 
-        return plot_view(self)._repr_png_()
+        return small_png(plot_view(self))
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
         """The page inside a notebook's output, and a picture for where it is not shown.
