@@ -13,7 +13,15 @@ from feasibility.cases import TABLES, Case, toml_document
 from feasibility.placement.evaluator import LocalEvaluator, Margins, Stage, Trial
 from feasibility.placement.region import Pose
 from feasibility.search import Progress
-from feasibility.studies import Store, StudyTask, Workers, bits_of, cells_of, run_tasks
+from feasibility.studies import (
+    Store,
+    StudyTask,
+    Workers,
+    bits_of,
+    cells_of,
+    run_tasks,
+    trial_fault,
+)
 from feasibility.verdict import Answer, Evidence
 
 KEPT = 4  # surfaces that one worker keeps
@@ -54,8 +62,12 @@ class StudyEvaluator:
     def _all(self, poses: Sequence[Pose], how: Tables) -> list[Trial]:
         """One task for each pose."""
         tasks = [
-            StudyTask({**self.tables, "placement": {"pose": pose.values.tolist(), **how}},
-                      {"position": pose.position, "rpy_deg": pose.rpy_deg}, work=try_placement)
+            StudyTask(
+                {**self.tables, "placement": {"pose": pose.values.tolist(), **how}},
+                {"position": pose.position, "rpy_deg": pose.rpy_deg},
+                try_placement,
+                trial_fault,
+            )
             for pose in poses
         ]  # fmt: skip
         rows = run_tasks(tasks, self.workers, self.store, self.progress)

@@ -17,4 +17,5 @@ from .run import run_tasks as run_tasks
 from .scheduling import Workers as Workers
 from .scheduling import WorkersError as WorkersError
 from .store import Store as Store
+from .stored import trial_fault as trial_fault
 from .workers import open_workers as open_workers

@@ -13,6 +13,7 @@ from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies.outcome import arm_of, case_of, cut_of, finite, merit, outcome_of
 from feasibility.studies.run import StudyTask, run_tasks
+from feasibility.studies.stored import arm_fault
 
 if TYPE_CHECKING:
     from feasibility.studies.scheduling import Workers
@@ -113,7 +114,8 @@ def compare(
     tasks = []
     for tables in _tables_of(case, robots):
         tables["compare"] = {"divide": divide, "critical": critical}
-        tasks.append(StudyTask(tables, {"robot": tables["robot"]["name"]}, assess))
+        parameters = {"robot": tables["robot"]["name"]}
+        tasks.append(StudyTask(tables, parameters, assess, arm_fault))
     rows = run_tasks(tasks, workers, store, progress)
     arms = []
     for task, row in zip(tasks, rows, strict=True):

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any
@@ -15,6 +15,7 @@ from feasibility.search import Progress
 from feasibility.studies.outcome import evaluate
 from feasibility.studies.scheduling import Answer, Tables, Work, Workers, schedule
 from feasibility.studies.store import Record, Status, Store
+from feasibility.studies.stored import outcome_fault
 from feasibility.version import version
 
 KEEP_S = 0.5  # [s] for which finished tasks may wait to be written together
@@ -37,11 +38,16 @@ class StudyTask:
     """What varies in the study, for its table: JSON values."""
     work: Work = evaluate
     """What is done with the tables, in a worker: a function of a module, returning JSON values."""
+    fault: Callable[[Mapping[str, Any]], str] | None = None
+    """What is wrong with a result that a store holds, in words; empty where nothing is. Verdicts
+    are always judged, what other works return only where this is given."""
     key: str = field(init=False)
     """The same for the same work on the same tables, files and version of the program."""
 
     def __post_init__(self) -> None:
         """Work out the key: no module's name is in it, so that modules may move."""
+        if self.fault is None and self.work is evaluate:
+            object.__setattr__(self, "fault", outcome_fault)
         package = self.work.__module__.partition(".")[0]
         says = {
             "work": f"{package}.{self.work.__qualname__}",
@@ -99,8 +105,7 @@ def run_tasks(
         >>> row.result["verdict"], row.result["covered"]
         ('feasible', 90)
     """
-    kept = {} if store is None else store.find(task.key for task in tasks)
-    found = {key: record for key, record in kept.items() if record.status == "done"}
+    found = {} if store is None else _finished(store, tasks)
     missing = list({task.key: task for task in tasks if task.key not in found}.values())
     keeper = _Keeper(store, found, progress, total=len(found) + len(missing))
     try:
@@ -112,6 +117,17 @@ def run_tasks(
         keeper.flush()
     rows = [(task, found[task.key]) for task in tasks]
     return tuple(Row(task.parameters, r.status, r.result, r.seconds) for task, r in rows)
+
+
+def _finished(store: Store, tasks: Sequence[StudyTask]) -> dict[str, Record]:
+    """The records of the tasks that were done before, each judged."""
+    kept = store.find(task.key for task in tasks)
+    found = {key: record for key, record in kept.items() if record.status == "done"}
+    for task in {task.key: task for task in tasks if task.key in found}.values():
+        fault = task.fault(found[task.key].result) if task.fault else ""
+        if fault:
+            raise store.damaged(task.key, fault)
+    return found
 
 
 @dataclass(slots=True)

@@ -7,20 +7,25 @@ the process, what was kept before stays, and the file is never half written.
 from __future__ import annotations
 
 import json
+import math
 import os
 import sqlite3
+import stat
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from coverable_files import FileFault, open_regular
 from feasibility.safe_files import FileError, check_writable, shown_path
+from feasibility.studies.stored import json_object
 
 APPLICATION = 0x434F5642  # "COVB", in the header of every store
 FORMAT = 2  # of the file and of its keys; those of format 1 held the names of modules
 MAGIC = b"SQLite format 3\0"
 LARGEST = 2**62  # [byte] no limit
+LARGEST_ROW = 64 << 20  # [byte]
+BESIDE = ("-wal", "-shm", "-journal")  # files that SQLite keeps with a store
 PATIENCE = 5.0  # [s] that another process may hold the file
 
 TABLE = """
@@ -34,6 +39,7 @@ CREATE TABLE tasks (
 """
 
 FOREIGN = "is not a study file; give another name, or remove the file"
+DAMAGED_RECORD = "the record {!r} is damaged: {}; remove the file to start anew"
 DAMAGED = "is damaged ({}); remove it to start anew"
 HELD = "is held by another process; wait until that ends, or give another name"
 NO_PLACE = "cannot be written: {}; choose another place"
@@ -98,6 +104,8 @@ class Store(AbstractContextManager["Store"]):
         self._name = shown_path(path)
         in_memory = self.path == ":memory:"
         fresh = in_memory or self._is_new()
+        if not in_memory:
+            self._refuse_special_files()
         with self._reported():
             self._base = sqlite3.connect(
                 self.path if in_memory else os.path.abspath(self.path),
@@ -106,6 +114,7 @@ class Store(AbstractContextManager["Store"]):
             )
         try:
             with self._reported():
+                self._base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, LARGEST_ROW)
                 self._prepare(fresh)
         except StoreError:
             self._base.close()
@@ -128,6 +137,13 @@ class Store(AbstractContextManager["Store"]):
             raise self._refused(FOREIGN)
         return not head
 
+    def _refuse_special_files(self) -> None:
+        """A pipe where SQLite expects a file of its own would be waited for without end."""
+        for end in BESIDE:
+            beside = os.path.realpath(self.path) + end
+            if os.path.lexists(beside) and not stat.S_ISREG(os.lstat(beside).st_mode):
+                raise self._refused(f"{shown_path(beside)} is not a regular file; remove it")
+
     def _prepare(self, fresh: bool) -> None:
         """Make the table, or see that it is there and whole."""
         if not fresh:
@@ -148,6 +164,7 @@ class Store(AbstractContextManager["Store"]):
             (state,) = self._base.execute("PRAGMA quick_check(1)").fetchone()
             if state != "ok":
                 raise self._refused(DAMAGED.format(" ".join(str(state).split())))
+            self._refuse_other_contents()
         self._base.execute("PRAGMA journal_mode = WAL").fetchone()
         self._base.execute("PRAGMA synchronous = NORMAL")
         # Two runs may open a new file at the same time: one of them makes the table.
@@ -156,6 +173,12 @@ class Store(AbstractContextManager["Store"]):
                 self._base.execute(TABLE)
                 self._base.execute(f"PRAGMA application_id = {APPLICATION}")
                 self._base.execute(f"PRAGMA user_version = {FORMAT}")
+
+    def _refuse_other_contents(self) -> None:
+        """A view or a trigger in the file would be a program that runs when rows are read."""
+        made = self._base.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL").fetchall()
+        if [" ".join(str(sql).split()) for (sql,) in made] not in ([], [" ".join(TABLE.split())]):
+            raise self._refused(DAMAGED.format("it holds more than one table of results"))
 
     def _tables(self) -> list[str]:
         """Names of the tables in the file."""
@@ -223,14 +246,18 @@ class Store(AbstractContextManager["Store"]):
     def _record(self, row: tuple[Any, ...]) -> Record:
         """A row read back."""
         key, parameters, status, result, seconds = row
-        tables: tuple[Any, Any] = None, None
-        with suppress(TypeError, ValueError, RecursionError):
-            tables = json.loads(parameters), json.loads(result)
-        if not all(isinstance(table, dict) for table in tables) or not isinstance(seconds, float):
-            raise self._refused(
-                f"the record {str(key)[:20]!r} is damaged; remove the file to start anew"
-            )
-        return Record(key, tables[0], status, tables[1], seconds)
+        try:
+            if status not in ("done", "failed"):
+                raise ValueError("its status is neither done nor failed")
+            if not isinstance(seconds, float) or not 0.0 <= seconds < math.inf:
+                raise ValueError("its time is no finite number of seconds")
+            return Record(key, json_object(parameters), status, json_object(result), seconds)
+        except ValueError as error:
+            raise self.damaged(key, str(error)) from error
+
+    def damaged(self, key: str, fault: str) -> StoreError:
+        """The error about a record that no study has written."""
+        return self._refused(DAMAGED_RECORD.format(str(key)[:20], fault))
 
     def __len__(self) -> int:
         """Number of records.
