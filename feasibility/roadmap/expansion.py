@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.compiled import kernel, put
+from feasibility.compiled import inlined, kernel, put
 from feasibility.roadmap.arrays import OVERFLOW, SearchArrays, Work
 from feasibility.roadmap.graph import (
     BUDGET,
@@ -263,7 +263,7 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
     return DONE, guesses.shape[0], merged
 
 
-@kernel
+@inlined
 def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
     """The two nodes of a component over cells i and j that are nearest to each other; or -1, -1."""
     best_x, best_y, nearest = -1, -1, np.inf

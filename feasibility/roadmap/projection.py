@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from feasibility.compiled import inlined, kernel
 from feasibility.roadmap.arrays import (
     CONE,
     LIMIT,
@@ -145,7 +145,7 @@ def linearise(arrays, work, slot, chord_goal):  # type: ignore[no-untyped-def]
     return np.sqrt(norm)
 
 
-@kernel
+@inlined
 def tilts(work, goal):  # type: ignore[no-untyped-def]
     """Replace the cone row by two: the tilts of the axis along two directions across the target's.
 
@@ -188,7 +188,7 @@ def cone_step(arrays, work, q, goal, narrow):  # type: ignore[no-untyped-def]
     return least_step(arrays, work, q, POINT_AND_CONE, DAMPING)
 
 
-@kernel
+@inlined
 def predicted_chord(work):  # type: ignore[no-untyped-def]
     """|a - b| after `work.step`, to first order."""
     square = 0.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.compiled import kernel, put
+from feasibility.compiled import inlined, kernel, put
 from feasibility.roadmap.arrays import (
     HERE,
     NEXT,
@@ -78,7 +78,7 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
             work.secondary_step[j] -= push * work.rows[3, j]
 
 
-@kernel
+@inlined
 def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ignore[no-untyped-def]
     """Put a share of the way from q to the goal, projected, into `work.trial`; True on success."""
     copy_slot(work)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel, put
+from feasibility.compiled import inlined, kernel, put
 from feasibility.roadmap.arrays import (
     CONE,
     FOLD,
@@ -41,7 +41,7 @@ MOST_STEPS = 400  # accepted steps of one motion
 NEWTON_STEPS = np.int64(8)  # of one step
 
 
-@kernel
+@inlined
 def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
     """Distance between the targets of a curve at two parameters, over `arrays.scale`."""
     aim(arrays, work, curve, begin)
@@ -51,7 +51,7 @@ def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
     return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale
 
 
-@kernel
+@inlined
 def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
     """Project q, with its secondary step, onto the target ahead; `work.trial` is the result.
 

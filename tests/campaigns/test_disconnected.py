@@ -19,7 +19,7 @@ def has_uncoverable_cell(verdict):
 
 @pytest.mark.parametrize(
     ("arm", "least_count", "least_proved"),
-    [("puma560", 100, 0.95), ("ur5", 50, 0.90), ("panda", 20, 0.50)],
+    [("puma560", 100, 0.95), ("ur5", 50, 0.90), ("panda", 30, 0.50)],
 )
 def test_most_are_proved(arm, least_count, least_proved):
     robot, found, wrong, doubtful, counted = load_robot(arm), Tally(), [], [], Tally()

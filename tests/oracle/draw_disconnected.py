@@ -44,7 +44,7 @@ JOBS = {
     # arm: (seed, problems wanted) of each run
     "puma560": ((41, 120),),
     "ur5": ((42, 19), (142, 14), (905, 45)),
-    "panda": ((43, 34),),
+    "panda": ((43, 34), (906, 11)),
 }
 
 
