@@ -35,6 +35,8 @@ def _page(verdict: Verdict, picture: str) -> str:
         rows.append(("not covered", html.escape(text)))
     rows.append(("note", UNCHECKED))
     body = table(("", html.escape(SENTENCES[verdict.answer])), rows)
+    for cell in ("<th>", "<td>"):  # Jupyter's own style is for numbers
+        body = body.replace(cell, f'{cell[:-1]} style="text-align: left">')
     return (
         '<div style="display: flex; flex-wrap: wrap; gap: 1rem; align-items: flex-start">'
         f'<div style="flex: 1 1 24rem">{body}</div>'

@@ -187,7 +187,7 @@ body:has(.beside) {{ max-width: none; }}
 .beside div {{ flex: 2 1 30rem; min-width: 0; }}
 th {{ white-space: nowrap; }}
 .beside td:nth-child(2), .beside td:nth-child(3) {{ white-space: nowrap; }}
-.beside td:first-child {{ min-width: 9rem; }}
+.beside td:first-child {{ white-space: nowrap; }}
 code {{ font-size: .85rem; overflow-wrap: anywhere; }}
 footer {{ margin-top: 1.8rem; color: #6b7280; font-size: .85rem; }}
 @media print {{ h2, table, figure {{ break-inside: avoid; }} }}

@@ -25,7 +25,6 @@ FINER = 2  # pixels painted for one of the picture, each way
 LIGHTS = np.array([[0.5, -0.35, 0.8], [-0.6, 0.5, 0.4]])  # towards them, in the root frame
 STRENGTHS = np.array([0.5, 0.25])
 AMBIENT = 0.42
-SKY, FLOOR = np.array([1.0, 1.0, 1.0]), np.array([0.93, 0.95, 0.97])
 BIAS = 2e-3  # [1] of the depth: lines on a surface are seen
 
 
@@ -52,8 +51,7 @@ def painted(commands: Iterable[Command], camera: Camera, width: int, height: int
         height: pixels.
     """
     tall, wide = FINER * height, FINER * width
-    down = np.linspace(0.0, 1.0, tall)[:, None, None]
-    image = np.ascontiguousarray(np.broadcast_to(SKY + down * (FLOOR - SKY), (tall, wide, 3)))
+    image = np.ones((tall, wide, 3))
     depth = np.full((tall, wide), np.inf)
     # Solid triangles, lines, then what is half transparent.
     parts = sorted(_parts(commands), key=lambda part: (part.opacity < 1.0, part.faces is None))

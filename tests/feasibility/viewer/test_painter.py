@@ -125,6 +125,8 @@ def test_a_view_leaves_a_picture_beside_the_page() -> None:
     assert ((blue > 180) & (red < 90) & (green < 120)).sum() > 200, "edges of G"
     assert ((red > 110) & (green < 60) & (blue < 90)).sum() > 200, "cells out of reach"
     assert ((green > 1.5 * red) & (green > 1.5 * blue)).sum() > 10, "the start"
+    assert ((red > 1.5 * green) & (red > 1.5 * blue) & (red > 150)).sum() > 5, "the x axis"
+    assert len(bundle["image/png"]) < 150_000, "notebooks keep many"
     assert bundle["text/html"].count(bundle["image/png"]) == 1
     page = bundle["text/html"]
     assert page.index("<img") < page.index("<iframe")
