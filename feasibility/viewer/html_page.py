@@ -62,6 +62,8 @@ class Readout:
     """A name, a unit, and a value for each of the times."""
     there_and_back: bool
     """The motion is played to the end and back again."""
+    duration: float | None = None
+    """s that the motion takes in truth; None where it is not timed: its share is shown instead."""
 
 
 def page(
@@ -226,7 +228,10 @@ function player(viewer, readout, begin) {{
       cells[row].textContent = value.toFixed(digits(unit));
     }});
     slider.value = time;
-    seconds.textContent = time.toFixed(1) + " s";
+    const share_of_all = end > 0 ? time / end : 0;
+    seconds.textContent = readout.duration === null
+      ? (100 * share_of_all).toFixed(0) + " %"
+      : (share_of_all * readout.duration).toFixed(1) + " s";
   }};
   const label = () => {{ button.textContent = animator.playing ? "pause" : "play"; }};
   const seek = (time) => {{

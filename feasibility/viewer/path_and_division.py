@@ -6,6 +6,7 @@ view_path(path, trajectory).save_html("path.html")
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -70,10 +71,13 @@ def view_path(
         f"{figures.length:.2f} m{again}, {speed}"
     )
     title = titled(f"feasible, one path over {counted(count)}", case)
-    return compose(
+    drawn = compose(
         robot, cells, title, text, [*cells_layers(cells), strokes], motion,
         resting=path.walk.q[0], tracks=tracks,
     )  # fmt: skip
+    if trajectory is None or drawn.readout is None:
+        return drawn
+    return replace(drawn, readout=replace(drawn.readout, duration=trajectory.duration))
 
 
 def view_division(division: Division, case: str | None = None) -> View:

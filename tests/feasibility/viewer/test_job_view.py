@@ -11,6 +11,7 @@ from feasibility import check
 from feasibility.cases import load_case
 from feasibility.division import divide
 from feasibility.paths import coverage_path
+from feasibility.timing import trajectory
 from feasibility.viewer import view_division, view_path
 from feasibility.viewer.path_and_division import STROKES
 from feasibility.viewer.playback import LONGEST
@@ -68,9 +69,20 @@ def test_the_arm_plays_the_walk():
     assert view.motion.seconds[-1] <= LONGEST
 
 
+def test_the_slider_shows_the_time_of_a_trajectory():
+    """Not that of the view, which shows long ones in a minute."""
+    run = trajectory(path(), 0.1)
+    assert run.duration > LONGEST
+    drawn = view_path(path(), run)
+    assert drawn.readout.duration == run.duration
+    assert drawn.readout.times[-1] <= LONGEST + 1e-9
+    assert view_path(path()).readout.duration is None
+
+
 def test_patches_and_what_is_left_out_are_coloured():
     """60 cells of the one patch, 30 that joint 1 cannot reach; the page needs nothing else."""
     view = view_division(division(), "paper/4d")
+    assert view.legend.title == "paper/4d: 60 of 90 cells: 1 patch, 30 left out"
     names = [entry.label for entry in view.legend.entries]
     assert "patch 1 (60 cells)" in names
     assert "not covered: joint limits (30)" in names

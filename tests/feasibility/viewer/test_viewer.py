@@ -318,7 +318,7 @@ def test_the_same_verdict_gives_the_same_page(feasible, drawn):
 
 
 def test_a_notebook_keeps_the_page(drawn):
-    frame = drawn._repr_html_()
+    frame = drawn._repr_mimebundle_()["text/html"]
     assert html.unescape(re.search(r'srcdoc="([^"]*)"', frame)[1]) == drawn.html()
 
 
@@ -360,7 +360,7 @@ def test_show_in_a_notebook_is_the_view_itself(feasible, monkeypatch):
 
     monkeypatch.setitem(sys.modules, "IPython", IPython)
     monkeypatch.setattr("webbrowser.open", pytest.fail)
-    assert show(feasible)._repr_html_().startswith("<iframe srcdoc=")
+    assert "<iframe srcdoc=" in show(feasible)._repr_mimebundle_()["text/html"]
 
 
 def test_a_script_waits_until_it_is_interrupted(feasible, monkeypatch):
@@ -407,6 +407,7 @@ def test_the_page_has_a_player_where_the_arm_moves(feasible, drawn):
         assert part in moving
         assert part not in still
     assert ".dg { display: none !important; }" in moving
+    assert drawn.readout.duration is None, "its pace is the view's own"
 
 
 def test_names_in_the_readout_close_no_script(drawn):
@@ -461,6 +462,8 @@ if BROWSER is not None:  # the data of the scene is tested above, with and witho
         for time, answer in zip(asked, answers, strict=True):
             q = drawn.motion.at(np.array([time]))[0]
             assert np.allclose([float(x) for x in answer["values"][:6]], np.degrees(q), atol=0.6)
+            end = drawn.readout.times[-1]
+            assert answer["share"] == f"{100 * time / end:.0f} %"
             turn = Rotation.from_quat(answer["quaternion"]).as_matrix()
             joint = feasible.robot.model.createData()
             pin.forwardKinematics(feasible.robot.model, joint, q)
@@ -475,9 +478,10 @@ const wait = setInterval(() => {
   for (const time of ASKED) {
     slider.value = time;
     slider.dispatchEvent(new Event("input"));
+    const share = document.getElementById("seconds").textContent;
     const values = [...document.querySelectorAll("#readout tr")].map((r) => r.cells[1].textContent);
     const joint = viewer.scene_tree.find(["robot", "joint joint1"]).object.quaternion;
-    said.push({ values, quaternion: [joint.x, joint.y, joint.z, joint.w] });
+    said.push({ share, values, quaternion: [joint.x, joint.y, joint.z, joint.w] });
   }
   const note = document.createElement("pre");
   note.id = "said";
