@@ -4,20 +4,32 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_errors import ArgumentError
-from feasibility.clock import Clock
+from feasibility.clock import Clock, OutOfTime
 from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search
 from feasibility.task import Task
-from feasibility.verdict import Answer, Evidence, Replay, Verdict, Walk, deferred
+from feasibility.verdict import Answer, Cause, Evidence, Replay, Verdict, Walk, deferred
 from robots import Robot
 from surfaces import Cells
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+
+NOT_BEGUN = "The time limit of {:g} s ran out while the search was prepared; nothing was searched."
+NOT_REPLAYED = (
+    "A motion over every cell was found, but the time limit of {:g} s ran out before the "
+    "independent replay had judged it."
+)
 
 
 def check(
@@ -27,6 +39,7 @@ def check(
     search: Search | None = None,
     progress: Progress | None = None,
     seeds: Walk | None = None,
+    clock: Clock | None = None,
 ) -> Verdict:
     """Can this arm move its tool over all of these cells in one continuous motion?
 
@@ -39,6 +52,8 @@ def check(
             best motion so far, all cells, and what is going on. What it raises ends the search.
         seeds: a motion over these cells, or over those of a case nearby, that the complete search
             begins from: the `witness` of another verdict, say. Its marks of cells may be missing.
+        clock: of the command that this is a part of: its limit and its progress callback count, not
+            those given here.
 
     Returns:
         The verdict. An infeasible surface is a result, not an error. The first call on a machine
@@ -67,8 +82,8 @@ def check(
     if search.method == "greedy":
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
-        return _decided(problem, search, progress, greedy_search)
-    return _decided(problem, search, progress, partial(complete_search, seeds=seeds))
+        return _decided(problem, search, progress, greedy_search, clock)
+    return _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
 
 
 def greedy_check(
@@ -113,21 +128,55 @@ class _Attempt(NamedTuple):
 
 
 def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> _Attempt:
-    """Search, and have the motion certified."""
+    """Search, and have the motion certified, both within the time limit."""
     called = time.monotonic()
-    found = method(problem, search, clock)
+    replayed = None
+    try:
+        found = method(problem, search, clock)
+    except OutOfTime:
+        found = _nothing(problem, clock)
     searched = time.monotonic()
-    replayed = None if found.replay is None else found.replay()
-    search_s = searched - max(called, clock.began)
+    try:
+        if found.replay is not None:
+            with clock.enforced():
+                replayed = found.replay()
+    except OutOfTime:
+        found = replace(found, unfinished=NOT_REPLAYED.format(clock.limit))
+    search_s = searched - float(np.fmax(called, clock.loaded))
     return _Attempt(found, replayed, search_s, time.monotonic() - searched)
 
 
+def _nothing(problem: Problem, clock: Clock) -> Found:
+    """What a search found whose time ran out before it began."""
+    covered = np.zeros(len(problem.cells), dtype=bool)
+
+    def make_graph() -> nx.Graph:
+        from feasibility.cell_graph import cell_graph
+
+        return cell_graph(problem.cells, covered)
+
+    return Found(
+        covered=covered,
+        components=(),
+        start=None,
+        n_edges=0,
+        counts={"fk": 0},
+        unfinished=NOT_BEGUN.format(clock.limit),
+        make_graph=make_graph,
+        make_causes=tuple,
+    )
+
+
 def _decided(
-    problem: Problem, search: Search, progress: Progress | None, method: Method
+    problem: Problem,
+    search: Search,
+    progress: Progress | None,
+    method: Method,
+    clock: Clock | None = None,
 ) -> Verdict:
     """Search, certify, and make the verdict."""
     called = time.monotonic()
-    clock = Clock(search.time_limit, progress)
+    clock = Clock(search.time_limit, progress) if clock is None else clock
     tried = [_attempt(problem, search, clock, method)]
     first = tried[0].replayed
     if tried[0].found.motion is not None and first is not None and first.narrowly_refused:
@@ -149,7 +198,7 @@ def _decided(
         seed=search.seed,
         graph=deferred(found.make_graph),
         covered=found.covered,
-        causes=deferred(found.make_causes),
+        causes=deferred(lambda: _causes(found, clock)),
         components=found.components,
         postures=found.postures,
         tree=deferred(found.make_tree),
@@ -158,7 +207,7 @@ def _decided(
         certificate=replayed.certificate if feasible and replayed is not None else None,
         proof=found.proof if evidence is Evidence.PROOF else None,
         timing={
-            "load_s": clock.began - called,
+            "load_s": float(np.fmax(clock.loaded, called)) - called,
             "search_s": sum(one.search_s for one in tried),
             "certify_s": sum(one.certify_s for one in tried),
             "total_s": time.monotonic() - called,
@@ -166,6 +215,15 @@ def _decided(
         n_edges=found.n_edges,
         statistics={**found.counts, "fk": sum(one.found.counts["fk"] for one in tried)},
     )
+
+
+def _causes(found: Found, clock: Clock) -> tuple[Cause, ...]:
+    """Why cells are missed; nothing where the time ran out before that was looked into."""
+    try:
+        with clock.enforced():
+            return found.make_causes()
+    except OutOfTime:
+        return ()
 
 
 def _answer(

@@ -1,23 +1,85 @@
-"""How long a search may take, and whom it keeps informed."""
+"""How long a command or a search may take, and whom it keeps informed."""
 
 from __future__ import annotations
 
 import math
+import sys
+import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
+from feasibility.interrupts import limited
 from feasibility.search import Progress
+
+GRACE, GRACE_SHARE = (
+    0.7,
+    0.05,
+)  # [s] and [1] of the limit: what does not look at the clock may go on
 
 
 class OutOfTime(Exception):
     """The time limit has run out."""
 
 
+class _Compiling:
+    """How long numba has compiled in this process; loading a kernel from its cache does not count.
+
+    numba compiles what a kernel calls while it compiles the kernel: the outermost counts.
+    """
+
+    def __init__(self) -> None:
+        """Nothing has been compiled."""
+        self.total, self.depth, self.since, self.known = 0.0, 0, 0.0, False
+        self.lock = threading.Lock()
+
+    def listen(self) -> None:
+        """Hear of compilations from now on, once numba is there."""
+        if self.known or "numba" not in sys.modules:
+            return
+        from numba.core import event
+
+        watch = self
+
+        class Listener(event.Listener):
+            """Begin and end of each compilation."""
+
+            def on_start(self, about: Any) -> None:
+                """A kernel that is in no cache begins to be compiled."""
+                watch.change(+1)
+
+            def on_end(self, about: Any) -> None:
+                """It has been."""
+                watch.change(-1)
+
+        event.register("numba:compile", Listener())
+        self.known = True
+
+    def change(self, by: int) -> None:
+        """One more compilation goes on, or one fewer."""
+        with self.lock:
+            now = time.monotonic()
+            self.total += now - self.since if self.depth else 0.0
+            self.depth, self.since = max(0, self.depth + by), now
+
+    def seconds(self) -> float:
+        """So far, with the compilation that goes on."""
+        return self.total + (time.monotonic() - self.since if self.depth else 0.0)
+
+
+compiling = _Compiling()
+
+
 class Clock:
-    """The time limit of a search and its progress callback.
+    """A time limit and a progress callback, of a search or of a whole command.
+
+    The clock stands still while kernels are compiled, which happens once on a machine.
 
     Attributes:
-        began: `time.monotonic()` at which the work began, its kernels loaded; NaN before that.
-        deadline: `time.monotonic()` after which `tick` raises `OutOfTime`; inf for no limit.
+        began: `time.monotonic()` at which the work began; NaN before that.
+        loaded: the same, at which the search itself did, its kernels loaded.
+        limit: seconds; inf for no limit.
     """
 
     def __init__(self, limit: float | None = None, progress: Progress | None = None) -> None:
@@ -27,21 +89,54 @@ class Clock:
             limit: seconds from `start` on; None for no limit.
             progress: called as progress(done, total, text). What it raises ends the search.
         """
-        self._limit = math.inf if limit is None else limit
+        self.limit = math.inf if limit is None else limit
         self._progress = progress
-        self.began, self.deadline = math.nan, math.inf
+        self.began, self.loaded = math.nan, math.nan
+        self._compiled = 0.0
+
+    def begin(self, began: float) -> Clock:
+        """Let the time run since `time.monotonic()` was `began`, as for a command."""
+        self.began, self._compiled = began, compiling.seconds()
+        return self
 
     def start(self) -> Clock:
-        """Let the time run from now on; a clock that runs already is left alone."""
+        """A search begins; the time runs from now on, unless it does already."""
+        if math.isnan(self.loaded):
+            self.loaded = time.monotonic()
         if math.isnan(self.began):
-            self.began = time.monotonic()
-            self.deadline = self.began + self._limit
+            self.began, self._compiled = self.loaded, compiling.seconds()
         return self
+
+    def part(self, share: float, progress: Progress | None = None) -> Clock:
+        """A clock that runs now, for a share of the time that is left."""
+        return Clock(share * self.left, progress).begin(time.monotonic())
+
+    @property
+    def deadline(self) -> float:
+        """`time.monotonic()` after which `tick` raises `OutOfTime`; inf for no limit."""
+        if math.isnan(self.began) or math.isinf(self.limit):
+            return math.inf
+        compiling.listen()
+        return self.began + self.limit + compiling.seconds() - self._compiled
+
+    @contextmanager
+    def enforced(self) -> Iterator[None]:
+        """Raise `OutOfTime` in the block, wherever it is, soon after the deadline.
+
+        For work of a command that does not look at the clock itself and leaves nothing half done
+        that would be used. Elsewhere than in a command it does nothing.
+        """
+        if math.isinf(self.limit):
+            yield
+            return
+        grace = GRACE + GRACE_SHARE * self.limit
+        with limited(lambda: self.left + grace, OutOfTime):
+            yield
 
     @property
     def out_of_time(self) -> bool:
         """Has the deadline passed?"""
-        return time.monotonic() > self.deadline
+        return not math.isinf(self.limit) and time.monotonic() > self.deadline
 
     @property
     def left(self) -> float:

@@ -3,7 +3,8 @@
 Python raises KeyboardInterrupt wherever the program happens to be, and there it may be dropped: in
 a callback of the interpreter, in a library's `except BaseException`, in an import, whose library
 then reports that it is broken. So a command notes it, raises it outside of imports only, and asks
-again (`settle`) wherever something would be put in place or said.
+again (`settle`) wherever something would be put in place or said. A time limit (`limited`) comes
+the same way.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from types import FrameType
@@ -21,6 +22,7 @@ from typing import Any
 INTERRUPTED = 130
 IMPORTER = "importlib._bootstrap"
 AGAIN = 0.01  # [s] after which a Ctrl-C that came during an import is tried again
+LONGEST = 0.5  # [s] between two looks at a time limit: clocks are put forward, machines sleep
 MESSAGE = "coverable: interrupted"
 
 
@@ -34,6 +36,19 @@ class _State:
     """It has not been raised yet, or in vain."""
     unfinished: set[str] = field(default_factory=set)
     """Files that are being written."""
+    active: bool = False
+    """Is there a block of `interruptible`?"""
+    limit: _Limit | None = None
+    """Of the block of `limited`, until it is reached."""
+
+
+@dataclass(slots=True)
+class _Limit:
+    """A time limit of a block."""
+
+    left: Callable[[], float]
+    error: type[Exception]
+    reached: bool = False
 
 
 _state = _State()
@@ -72,6 +87,29 @@ def forgive() -> None:
 
 
 @contextmanager
+def limited(left: Callable[[], float], error: type[Exception]) -> Iterator[None]:
+    """Raise an error in the block, wherever it is, when its time is up; not during an import.
+
+    Does nothing outside of `interruptible`.
+
+    Args:
+        left: seconds until then; it may grow meanwhile.
+        error: what to raise.
+    """
+    if not _state.active or _state.limit is not None:
+        yield
+        return
+    limit = _state.limit = _Limit(left, error)
+    _wake()
+    try:
+        yield
+    finally:
+        _state.limit = None
+    if limit.reached:  # and a library dropped the error
+        raise error
+
+
+@contextmanager
 def unfinished(path: str) -> Iterator[None]:
     """Remove a file at the end of the block, if it is still there, however the block ends."""
     _state.unfinished.add(path)
@@ -98,16 +136,25 @@ def interruptible() -> Iterator[None]:
     if not mine or threading.current_thread() is not threading.main_thread():
         yield
         return
-    hook, alarm = sys.unraisablehook, signal.signal(signal.SIGALRM, _again)
+    alarm = signal.signal(signal.SIGALRM, _again)
+    hooks = sys.unraisablehook, sys.excepthook
 
     def dropped(what: Any) -> None:
         if issubclass(what.exc_type, KeyboardInterrupt):
             _later()
         else:
-            hook(what)
+            hooks[0](what)
 
-    sys.unraisablehook = dropped
+    def printed(kind: type[BaseException], error: BaseException, trace: Any) -> None:
+        """Compiled modules print what they drop."""
+        if issubclass(kind, KeyboardInterrupt):
+            _later()
+        else:
+            hooks[1](kind, error, trace)
+
+    sys.unraisablehook, sys.excepthook = dropped, printed
     signal.signal(signal.SIGINT, _hear)
+    _state.active = True
     try:
         yield
     except (Exception, SystemExit):
@@ -116,11 +163,12 @@ def interruptible() -> Iterator[None]:
     else:
         settle()
     finally:
+        _state.heard = _state.due = _state.active = False
+        _state.limit = None
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGINT, before)
         signal.signal(signal.SIGALRM, alarm)
-        sys.unraisablehook = hook
-        _state.heard = _state.due = False
+        sys.unraisablehook, sys.excepthook = hooks
 
 
 def _hear(number: int, frame: FrameType | None) -> None:
@@ -132,20 +180,33 @@ def _hear(number: int, frame: FrameType | None) -> None:
 
 
 def _again(number: int, frame: FrameType | None) -> None:
-    """Raise a Ctrl-C that is due, unless a module is being imported."""
-    if not _state.due:
-        return
-    if _importing(frame):
-        _later()
-        return
-    _state.due = False
-    raise KeyboardInterrupt
+    """Raise what is due, a Ctrl-C or the end of the time, unless a module is being imported."""
+    late = _state.limit is not None and _state.limit.left() <= 0.0
+    if not (_state.due or late) or _importing(frame):
+        _wake()
+    elif _state.due:
+        _state.due = False
+        raise KeyboardInterrupt
+    elif _state.limit is not None:
+        error, _state.limit.reached = _state.limit.error, True
+        _state.limit = None
+        raise error
+
+
+def _wake() -> None:
+    """See that `_again` is called in time."""
+    seconds = 0.0
+    if _state.limit is not None:
+        seconds = min(max(_state.limit.left(), AGAIN), LONGEST)
+    if _state.due:
+        seconds = AGAIN
+    signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def _later() -> None:
     """Come back to a Ctrl-C in a moment."""
     _state.due = True
-    signal.setitimer(signal.ITIMER_REAL, AGAIN)
+    _wake()
 
 
 def _importing(frame: FrameType | None) -> bool:

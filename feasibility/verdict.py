@@ -142,9 +142,10 @@ class Verdict:
     """'complete' or 'greedy'."""
     seed: int
     graph: nx.Graph
-    """Graph G. Nodes: every flat cell index, with `q` (n,) or None where the best component does
-    not reach it. Edges: pairs of cells that a motion joins, with `motion` (k, n) from the smaller
-    index to the larger. Made when first read."""
+    """Graph G. Nodes: every flat cell index, with its centre `point` (3,) in m and `normal` (3,),
+    its `index` (row, column), `covered`, and `q` (n,) or None where the best component does not
+    reach it. Edges: pairs of cells that a motion joins, with `motion` (k, n) from the smaller index
+    to the larger. Made when first read; `networkx.write_graphml` takes it."""
     covered: NDArray[np.bool_]
     """(N,) cells that the best single component visits."""
     causes: tuple[Cause, ...] = ()

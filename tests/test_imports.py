@@ -34,7 +34,7 @@ surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
 surfaces.places
-feasibility: clock compiled cone cut_tree cut_words found interrupts notices problem read_only safe_files search target_curves target_parts task verdict version
+feasibility: cell_graph clock compiled cone cut_tree cut_words found interrupts notices problem read_only safe_files search target_curves target_parts task verdict version
 feasibility.certification
 feasibility.paper
 feasibility.cases

@@ -6,6 +6,7 @@ import argparse
 import os
 from typing import TYPE_CHECKING
 
+from coverable_errors import CoverableError
 from feasibility.cli.command import (
     STATUS,
     add_case,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from feasibility.sensitivity import Explanation
     from feasibility.verdict import Verdict, Walk
 
+INSIDE = "-"  # in place of a file: in the object that is printed
 ORDERS = ("rows", "columns", "spiral", "shortest")
 STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
 LATER_STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a patch,
@@ -48,7 +50,10 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         epilog=STATUSES,
     )  # fmt: skip
     parser.add_argument(
-        "--witness", metavar="FILE", help="write the covering motion as CSV (feasible only)"
+        "--witness",
+        metavar="FILE",
+        help="write the covering motion as CSV (feasible only); with --json, - puts it into the "
+        "object",
     )
     parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
     parser.add_argument(
@@ -126,16 +131,22 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
 
 def check(args: argparse.Namespace, began: float) -> int:
     """`coverable check CASE`: run the search, print the verdict, write the files asked for."""
-    outputs = {"--save": args.save, "--html": args.html, "--witness": args.witness}
+    within = args.witness == INSIDE
+    if within and not args.json:
+        raise CoverableError("--witness -: goes with --json; give the name of a file without it")
+    witness = None if within else args.witness
+    outputs = {"--save": args.save, "--html": args.html, "--witness": witness}
     with open_case(args, began, outputs) as opened:
         from feasibility.checking import check as run
         from feasibility.reports import verdict as report
 
         case, seeds = opened.case, _seeds(args, opened)
         loaded = opened.so_far()
-        verdict = run(*opened.setup, progress=opened.progress, seeds=seeds)
+        verdict = run(*opened.setup, seeds=seeds, clock=opened.clock)
+        verdict.causes  # noqa: B018 - looked into within the time limit
     if args.json:
-        print_out(json_text(report.as_json(verdict, loaded)))
+        found = report.as_json(verdict, loaded)
+        print_out(json_text(found | ({"witness": report.witness_json(verdict)} if within else {})))
     else:
         print_out(report.as_text(verdict, case, loaded))
     if args.save is not None:
@@ -147,13 +158,13 @@ def check(args: argparse.Namespace, began: float) -> int:
         from feasibility.viewer import view
 
         write_text(args.html, view(verdict, case.name).html(), "view")
-    if args.witness is not None:
+    if witness is not None:
         motion = report.as_csv(verdict)
         if motion is None:
             why = "has no stored motion" if verdict.feasible else f"is {verdict.answer}"
-            print_err(f"--witness: nothing written to {shown_path(args.witness)}: this case {why}")
+            print_err(f"--witness: nothing written to {shown_path(witness)}: this case {why}")
         else:
-            write_text(args.witness, motion, "witness")
+            write_text(witness, motion, "witness")
     return STATUS[str(verdict.answer)]
 
 
@@ -210,26 +221,34 @@ def path(args: argparse.Namespace, began: float) -> int:
 
     with open_case(args, began, outputs, WHY_COMPLETE["path"], judge) as opened:
         from feasibility.checking import check
+        from feasibility.clock import OutOfTime
         from feasibility.paths import coverage_path
         from feasibility.reports import path as report
         from feasibility.results import check_ending
         from feasibility.timing import motion_limits, trajectory
+        from feasibility.verdict import Answer
 
         for out in args.out:
             check_ending(out)
         robot, loaded = opened.setup.robot, opened.so_far()
         limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
-        verdict = check(*opened.setup, progress=opened.progress)
+        verdict = check(*opened.setup, clock=opened.clock)
         if not verdict.feasible:
             return _no_path(args, opened.case.name, verdict, loaded)
-        opened.progress(0, None, "planning the path")
         order: Order = args.order or ("rows" if len(verdict.cells.shape) == 2 else "shortest")
-        found = coverage_path(verdict, order)
-        opened.progress(0, None, "timing the path")
-        run = trajectory(
-            found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
-            period=args.period,
-        )  # fmt: skip
+        try:
+            with opened.clock.enforced():
+                opened.progress(0, None, "planning the path")
+                found = coverage_path(verdict, order)
+                opened.progress(0, None, "timing the path")
+                run = trajectory(
+                    found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
+                    period=args.period,
+                )  # fmt: skip
+        except OutOfTime:
+            late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
+            verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
+            return _no_path(args, opened.case.name, verdict, loaded)
     if args.json:
         print_out(json_text(report.as_json(found, run, limits)))
     else:
@@ -271,7 +290,7 @@ def divide(args: argparse.Namespace, began: float) -> int:
         from feasibility.reports import division as report
 
         loaded = opened.so_far()
-        division = run(*opened.setup, progress=opened.progress)
+        division = run(*opened.setup, clock=opened.clock)
     if args.json:
         print_out(json_text(report.as_json(division, loaded)))
     else:
@@ -292,7 +311,7 @@ def explain(args: argparse.Namespace, began: float) -> int:
         from feasibility.reports import explanation as report
         from feasibility.sensitivity import explain as run
 
-        explanation = run(*opened.setup, progress=opened.progress)
+        explanation = run(*opened.setup, progress=opened.progress, clock=opened.clock)
     name, verdict = opened.case.name, explanation.verdict
     if args.json:
         print_out(json_text(report.as_json(explanation, name, opened.case)))

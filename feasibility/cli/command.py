@@ -23,6 +23,7 @@ from feasibility.safe_files import FileError, check_writable, shown_path, write_
 
 if TYPE_CHECKING:
     from feasibility.cases import Case, Setup
+    from feasibility.clock import Clock
 
 Command = Callable[[argparse.Namespace, float], int]
 
@@ -104,12 +105,23 @@ class OpenCase:
     setup: Setup
     progress: Bar
     """To be called as progress(done, total, text)."""
+    clock: Clock
+    """Of the whole command, for the case's time limit; it reports to `progress`."""
     began: float
     """`time.perf_counter()` when the command began."""
 
     def so_far(self) -> float:
         """Seconds since then: called before the search, the time that loading took."""
         return time.perf_counter() - self.began
+
+
+class TooLate(Exception):
+    """The time limit ran out before there was an answer of any other kind."""
+
+    def __init__(self, case: Case, text: str, outputs: list[str], began: float) -> None:
+        """What to say: the case, what was not done, and the files that are not written."""
+        super().__init__(text)
+        self.case, self.text, self.outputs, self.began = case, text, outputs, began
 
 
 @contextmanager
@@ -119,6 +131,7 @@ def open_case(
     outputs: Mapping[str, str | None],
     only_complete: str = "",
     judge: Callable[[Case], None] = lambda case: None,
+    time_limit: float | None = None,
 ) -> Iterator[OpenCase]:
     """Load `args.case` with `args.settings`, print its notes, and show progress meanwhile.
 
@@ -128,14 +141,17 @@ def open_case(
         outputs: files by their flag, see `check_outputs`; checked before anything is built.
         only_complete: why the command refuses the greedy search; empty where it does not.
         judge: called with the case before anything is built; raises to refuse it.
+        time_limit: seconds, in place of the case's.
 
     Raises:
         CaseError: the case cannot be used.
         FileError: an output cannot be written.
+        TooLate: the time limit ran out first, here or in the block.
     """
     with progress_bar() as progress:
         from coverable_errors import Fault
         from feasibility.cases import CaseError, load_case
+        from feasibility.clock import Clock, OutOfTime
         from feasibility.notices import compiling_notice
 
         case = load_case(args.case, args.settings)
@@ -143,14 +159,23 @@ def open_case(
         if only_complete and case.search.method != "complete":
             raise CaseError(Fault("search.method", only_complete), case.name)
         judge(case)
-        with compiling_notice():  # cutting a mesh into cells has kernels of its own
-            setup = case.build()
-        settle()
-        for note in setup.robot.notes:
-            print_err(f"note: {setup.robot.name}: {note}")
-        for note in setup.cells.notes:
-            print_err(f"note: {case.surface.label}: {note}")
-        yield OpenCase(case, setup, progress, began)
+        limit = case.search.time_limit if time_limit is None else time_limit
+        clock = Clock(limit, progress).begin(time.monotonic() - (time.perf_counter() - began))
+        doing = "the arm was loaded and the surface cut into cells"
+        try:
+            with compiling_notice(), clock.enforced():  # cutting a mesh has kernels of its own
+                setup = case.build()
+            settle()
+            for note in setup.robot.notes:
+                print_err(f"note: {setup.robot.name}: {note}")
+            for note in setup.cells.notes:
+                print_err(f"note: {case.surface.label}: {note}")
+            doing = "the search was prepared"
+            yield OpenCase(case, setup, progress, clock, began)
+        except OutOfTime as late:
+            text = f"The time limit of {clock.limit:g} s ran out while {doing}"
+            files = [f"{flag}: {shown_path(path)}" for flag, path in outputs.items() if path]
+            raise TooLate(case, f"{text}; nothing was searched.", files, began) from late
 
 
 def check_outputs(outputs: Mapping[str, str | None], given: str = "") -> None:

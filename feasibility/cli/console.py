@@ -11,6 +11,7 @@ from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
 from feasibility.interrupts import settle
+from feasibility.search import Progress
 
 PAUSE = 0.05  # [s] between two updates of the progress bar
 
@@ -108,3 +109,30 @@ class Bar:
         """Remove the bar."""
         if self._bar is not None:
             self._bar.stop()
+
+
+def with_rate(bar: Progress, what: str = "") -> Progress:
+    """Progress in pieces, with their rate and an estimate of the time left.
+
+    Args:
+        bar: what shows it.
+        what: is being done; by default the text of each report.
+    """
+    began, first = time.monotonic(), -1
+
+    def report(done: int, total: int | None, text: str) -> None:
+        nonlocal first
+        first = done if first < 0 else first  # what an earlier run has done has no rate
+        bar(done, total, f"{what or text}{_rate(done - first, done, total, began)}")
+
+    return report
+
+
+def _rate(here: int, done: int, total: int | None, began: float) -> str:
+    """', 12.3/s, 2 min left'; empty until something is done."""
+    took = time.monotonic() - began
+    if here <= 0 or total is None or took <= 0.0:
+        return ""
+    left = (total - done) * took / here
+    words = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"
+    return f", {here / took:.1f}/s, {words} left"

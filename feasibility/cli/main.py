@@ -15,7 +15,7 @@ from typing import NoReturn
 
 from coverable_errors import CoverableError
 from feasibility.cli import case_commands, listing, place, study_compare, verify
-from feasibility.cli.command import BAD_INPUT
+from feasibility.cli.command import BAD_INPUT, STATUS, TooLate, json_text
 from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once
 
@@ -73,7 +73,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         with interruptible():
             prepare()
             args = _parser().parse_args(argv)
-            return int(args.run(args, began))
+            try:
+                return int(args.run(args, began))
+            except TooLate as late:
+                return _too_late(args, late)
     except SystemExit as end:
         return end.code if isinstance(end.code, int) else 0
     except KeyboardInterrupt:
@@ -86,6 +89,20 @@ def main(argv: Sequence[str] | None = None) -> int:
             print_err("".join(traceback.format_exception(error)))
         print_err(f"coverable: {_message(error)}")
         return BAD_INPUT
+
+
+def _too_late(args: argparse.Namespace, late: TooLate) -> int:
+    """Say that the time ran out before the work itself began; returns the exit status."""
+    from feasibility.reports import too_late as report
+
+    if args.json:
+        seconds = time.perf_counter() - late.began
+        print_out(json_text(report.as_json(late.case, late.text, seconds)))
+    else:
+        print_out(report.as_text(late.case, late.text))
+    for output in late.outputs:
+        print_err(f"nothing written to {output}")
+    return STATUS["undecided"]
 
 
 def _message(error: Exception) -> str:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from feasibility.cli.command import (
@@ -19,16 +21,19 @@ from feasibility.cli.command import (
     positive,
     write_text,
 )
-from feasibility.cli.console import print_err, print_out
+from feasibility.cli.console import print_err, print_out, with_rate
 from feasibility.interrupts import settle
 from feasibility.safe_files import shown_path, write_whole
 
 if TYPE_CHECKING:
+    from feasibility.cli.command import OpenCase
+    from feasibility.cli.console import Bar
     from feasibility.placement import Evaluator, PlacementMap, Placements, StationPlan
 
 AXES = {
     "x": "m", "y": "m", "z": "m", "roll": "degrees", "pitch": "degrees", "yaw": "degrees"
 }  # fmt: skip
+_LEAST = 1e-3  # [s] for a view, once the time is up: then it shows what is known
 PICTURES = (".png", ".svg", ".pdf")
 
 
@@ -60,7 +65,7 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     )
     parser.add_argument(
         "--time-limit", type=positive, metavar="S",
-        help="seconds for the search; stations, map and view take additional time",
+        help="seconds for the whole command, stations and map included (default: the case's)",
     )  # fmt: skip
 
 
@@ -80,42 +85,85 @@ def run_place(args: argparse.Namespace, began: float) -> int:
     """
     files = {"--csv": args.csv, "--map": args.map, "--out": args.out, "--html": args.html}
     drawn = chart = plan = None
-    with open_case(args, began, files) as opened, contextlib.ExitStack() as stack:
-        from feasibility.placement import (
-            COUNT,
-            Pose,
-            Region,
-            StudyEvaluator,
-            map_around_best,
-            place,
-            station_plan,
-        )
+    opening = open_case(args, began, files, time_limit=args.time_limit)
+    with opening as opened, contextlib.ExitStack() as stack:
+        from feasibility.placement import COUNT, Pose, Region, StudyEvaluator, place
         from feasibility.studies import Store, open_workers
 
-        case, setup, progress = opened.case, opened.setup, opened.progress
+        case, setup, clock = opened.case, opened.setup, opened.clock
         held = Pose.of_values([*case.surface.position, *case.surface.rpy_deg])
         region = Region.around(held, _ranges(args))
         count = COUNT if args.count is None else args.count
         store = None if args.out is None else stack.enter_context(Store(args.out))
         workers = stack.enter_context(open_workers(args.workers, args.dask))
-        evaluator: Evaluator = StudyEvaluator(case, workers, store, lambda *_: settle())
+        progress = _Progress(opened.progress)
+        evaluator: Evaluator = StudyEvaluator(case, workers, store, progress.within)
         placements = place(
             *setup[:3], region, setup.search, evaluator=evaluator, progress=progress,
-            count=count, time_limit=args.time_limit,
+            count=count, clock=clock,
         )  # fmt: skip
-        if args.stations and not placements.found:
-            plan = station_plan(placements, evaluator, setup.search, count, progress)
+        plan, chart = _further(args, opened, placements, evaluator, count)
         if args.html is not None:
             from feasibility.viewer import view_placements
 
-            drawn = view_placements(placements, setup.search, case.name, plan, progress=progress)
-        if args.map is not None:
-            chart = map_around_best(placements, evaluator, progress)
+            limit = None if math.isinf(clock.left) else max(clock.left, _LEAST)
+            search = replace(setup.search, time_limit=limit)
+            drawn = view_placements(
+                placements, search, case.name, plan, progress=opened.progress
+            )  # fmt: skip
     placements.timing["command_s"] = time.perf_counter() - began
     _report(args, placements, case.name, plan, chart)
     if drawn is not None:
         write_text(args.html, drawn.html(), "view")
     return STATUS[str(placements.answer)]
+
+
+def _further(
+    args: argparse.Namespace,
+    opened: OpenCase,
+    placements: Placements,
+    evaluator: Evaluator,
+    count: int,
+) -> tuple[StationPlan | None, PlacementMap | None]:
+    """Stations and map, where they are wanted; what there is no time for is said."""
+    from feasibility.clock import OutOfTime
+    from feasibility.placement import map_around_best, station_plan
+
+    plan = chart = None
+    clock, progress = opened.clock, _Progress(opened.progress)
+    wanted = "stations" if args.stations and not placements.found else ""
+    try:
+        with clock.enforced():
+            if wanted:
+                search = opened.setup.search
+                plan = station_plan(placements, evaluator, search, count, progress, clock)
+            wanted = "map" if args.map is not None else ""
+            if wanted:
+                chart = map_around_best(placements, evaluator, progress)
+    except OutOfTime:
+        missing = [wanted] + ["map"] * (wanted != "map" and args.map is not None)
+        print_err(f"no {' and no '.join(missing)}: the time limit of {clock.limit:g} s ran out")
+    return plan, chart
+
+
+class _Progress:
+    """Progress in placements, with an estimate of the time left; also within a batch of them."""
+
+    def __init__(self, bar: Bar) -> None:
+        """Nothing is reported yet."""
+        self._report, self._latest = with_rate(bar), (0, 0, "")
+
+    def __call__(self, done: int, total: int | None, text: str) -> None:
+        """Between batches."""
+        self._latest = done, total or 0, text
+        self._report(done, total, text)
+
+    def within(self, done: int, total: int | None, text: str) -> None:
+        """So many placements of the present batch."""
+        settle()
+        before, whole, text = self._latest
+        if text:
+            self._report(before + done, whole or None, text)
 
 
 def _ranges(args: argparse.Namespace) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from typing import TYPE_CHECKING
 
 from feasibility.cli.command import (
@@ -17,11 +16,10 @@ from feasibility.cli.command import (
     json_text,
     write_text,
 )
-from feasibility.cli.console import Bar, print_err, print_out, progress_bar
+from feasibility.cli.console import print_err, print_out, progress_bar, with_rate
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
-    from feasibility.search import Progress
     from feasibility.studies import Row, Study
     from feasibility.viewer import View
 
@@ -70,7 +68,7 @@ def study(args: argparse.Namespace, began: float) -> int:
             print_err(f"{stored_in} holds {before} finished cases; continuing from there")
         try:
             with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
-                rows = run_tasks(loaded.tasks, workers, store, _with_rate(bar, "deciding cases"))
+                rows = run_tasks(loaded.tasks, workers, store, with_rate(bar, "deciding cases"))
         except KeyboardInterrupt:
             print_err(f"{len(store)} cases are stored in {stored_in}; run again to continue")
             raise
@@ -98,7 +96,7 @@ def compare(args: argparse.Namespace, began: float) -> int:
     case = load_case(args.case, args.settings)
     robots = [name.strip() for name in args.robots.split(",") if name.strip()]
     with progress_bar() as bar, open_workers(args.workers, args.dask) as workers:
-        progress = _with_rate(bar, "comparing robots")
+        progress = with_rate(bar, "comparing robots")
         found = run(case, robots, workers, critical=args.critical, progress=progress)
     print_out(json_text(report.as_json(found)) if args.json else report.as_text(found))
     if args.csv is not None:
@@ -116,25 +114,3 @@ def _poses(study: Study, rows: tuple[Row, ...]) -> View | None:
         return None
     with progress_bar() as bar:
         return view_study(study.tasks, rows, study.name, progress=bar)
-
-
-def _with_rate(bar: Bar, what: str) -> Progress:
-    """Progress in cases, with rate and time left."""
-    began, first = time.monotonic(), -1
-
-    def report(done: int, total: int | None, text: str) -> None:
-        nonlocal first
-        first = done if first < 0 else first  # what an earlier run has done has no rate
-        bar(done, total, f"{what}{_rate(done - first, done, total, began)}")
-
-    return report
-
-
-def _rate(here: int, done: int, total: int | None, began: float) -> str:
-    """', 12.3/s, 2 min left'; empty until something is done."""
-    took = time.monotonic() - began
-    if here <= 0 or total is None or took <= 0.0:
-        return ""
-    left = (total - done) * took / here
-    words = f"{left:.0f} s" if left < 100 else f"{left / 60:.0f} min"
-    return f", {here / took:.1f}/s, {words} left"

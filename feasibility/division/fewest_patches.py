@@ -29,6 +29,10 @@ from feasibility.verdict import Cause
 from robots import Robot
 from surfaces import Cells
 
+LATE = (
+    "The time limit ran out before patches were planned and replayed: {} of {} cells are reached, "
+    "by motions that no plan was made of."
+)
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
 
@@ -38,6 +42,7 @@ def divide(
     task: Task,
     search: Search | None = None,
     progress: Progress | None = None,
+    clock: Clock | None = None,
 ) -> Division:
     """Divide a surface into the fewest patches that one continuous motion each covers.
 
@@ -52,8 +57,11 @@ def divide(
         search: settings of the complete search; where its time limit strikes, the patches are the
             fewest known.
         progress: called as progress(done, total, text) some times a second.
+        clock: of the command that this is a part of: its limit and its progress callback count, not
+            those given here.
 
     Raises:
+        OutOfTime: a command's time ran out before the search began.
         ArgumentError: the search is the greedy one, which keeps a single tree of motions.
         RobotError: the arm is no serial chain of one-dof joints.
 
@@ -74,15 +82,24 @@ def divide(
     called = time.monotonic()
     with compiling_notice():
         warm_up()
+    clock = (Clock(search.time_limit, progress) if clock is None else clock).start()
     began = time.monotonic()
-    exploration, apart, ended = _searched(robot, cells, task, search, progress)
+    exploration, apart, ended = _searched(robot, cells, task, search.seed, clock)
     searched = time.monotonic()
     folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
     blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
     nothing = Plan((), (), 0)
-    fewest, connected = (nothing, nothing) if blocked else plans(exploration, task)
-    missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
-    causes = _causes(exploration, missing, ended)
+    fewest, connected, missing = nothing, nothing, np.arange(len(cells))
+    causes, late = tuple[Cause, ...](), ""
+    try:
+        with clock.enforced():
+            if not blocked:
+                fewest, connected = plans(exploration, task, clock.left)
+            missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
+            causes = _causes(exploration, missing, ended)
+    except OutOfTime:
+        ended = False
+        late = "" if fewest.patches else LATE.format(int(exploration.reached.sum()), len(cells))
     total = len(cells) - len(missing), len(cells)
     return Division(
         robot=robot,
@@ -94,7 +111,7 @@ def divide(
         left_out=causes,
         unsettled=np.setdiff1d(missing, [cause.cell for cause in causes]),
         ended=ended and not blocked and not folded,
-        message=blocked or _message(fewest, connected, apart.number, total, ended, folded),
+        message=blocked or late or _message(fewest, connected, apart.number, total, ended, folded),
         at_least=min(apart.number, len(fewest.patches)),
         proof=apart.proof if fewest.patches else None,
         apart=apart.apart if fewest.patches else (),
@@ -126,12 +143,12 @@ def _statistics(exploration: Exploration) -> dict[str, int]:
 
 
 def _searched(
-    robot: Robot, cells: Cells, task: Task, search: Search, progress: Progress | None
+    robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock
 ) -> tuple[Exploration, ProvedBound, bool]:
     """The search with all components that it found, a bound, and whether it ran to its end."""
-    clock = Clock(search.time_limit, progress).start()
-    arrays = arrays_of(robot, cells, task)
-    exploration = Exploration(robot, cells, arrays, search.seed, clock)
+    with clock.enforced():
+        arrays = arrays_of(robot, cells, task)
+    exploration = Exploration(robot, cells, arrays, seed, clock)
     ended, apart = True, ProvedBound(min(1, len(cells)))
     try:
         explore(exploration)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from feasibility.certification import replay
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
-from feasibility.division.partition import Partition, fewest_patches
+from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
 from feasibility.roadmap import Exploration, Links, improve, links_of, patch_walk
@@ -34,6 +34,7 @@ DRY_ROUNDS = 10  # rounds without gain after which components are taken as they 
 MOST_ROUNDS = 60
 SEEDS = 6  # guesses at a cell, each round
 TOP = 6  # components of a cover that one round works on
+LEAST_SECONDS = 0.3  # for the cover of a division
 COVER_SECONDS = 2.0  # for the cover of one round, which need not be the best
 ELSEWHERE = 2  # state of a pair of cells that is not to be joined
 
@@ -52,12 +53,18 @@ class _Option:
     """Their configurations."""
 
 
-def plans(exploration: Exploration, task: Task) -> tuple[Plan, Plan]:
-    """The plan with the fewest motions, and the one with connected patches (maybe the same)."""
+def plans(exploration: Exploration, task: Task, left: float = np.inf) -> tuple[Plan, Plan]:
+    """The plan with the fewest motions, and the one with connected patches (maybe the same).
+
+    Args:
+        exploration: the search.
+        task: the task.
+        left: seconds for the proof that they are the fewest.
+    """
     roots, covers = cover_table(exploration)
-    cover = fewest_patches(
-        covers, np.ones(len(exploration.cells), dtype=bool), exploration.cells.pairs
-    )
+    everywhere = np.ones(len(exploration.cells), dtype=bool)
+    limit = min(TIME_LIMIT, max(left, LEAST_SECONDS))
+    cover = fewest_patches(covers, everywhere, exploration.cells.pairs, limit)
     fewest = plan_of(exploration, task, cover.fewest, roots, covers)
     if cover.connected is cover.fewest:
         return fewest, fewest

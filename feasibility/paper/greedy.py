@@ -144,7 +144,7 @@ def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run
         exhausted=f"A covering motion was not found by the greedy search: "
         f"{_why_not(run, steps, count)} ({settings}{capped}). Another start or method may "
         "find one.",
-        make_graph=lambda: graph_of(best, count),
+        make_graph=lambda: graph_of(best, cells),
         make_causes=lambda: _causes(problem, steps, run),
         make_tree=lambda: tree_of(best),
     )

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from feasibility.verdict import Verdict, Walk
 from robots import Kinematics
+from surfaces import Cells
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -56,12 +57,11 @@ class Tree:
         return self.space.q(self.edges[b, a][::-1] if forward is None else forward)
 
 
-def graph_of(tree: Tree, count: int) -> nx.Graph:
-    """Graph G over `count` cells: `q` on those that the tree touches, `motion` on the edges."""
-    import networkx as nx
+def graph_of(tree: Tree, cells: Cells) -> nx.Graph:
+    """Graph G over all cells: `q` on those that the tree touches, `motion` on the edges."""
+    from feasibility.cell_graph import cell_graph
 
-    graph: nx.Graph = nx.Graph()
-    graph.add_nodes_from(range(count), q=None)
+    graph = cell_graph(cells, np.isin(np.arange(len(cells)), list(tree.jcell)))
     for cell, jcell in tree.jcell.items():
         graph.nodes[cell]["q"] = tree.space.q(jcell)
     for low, high in map(sorted, tree.edges):

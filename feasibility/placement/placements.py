@@ -24,6 +24,7 @@ from typing import Any
 
 import numpy as np
 
+from feasibility.clock import Clock
 from feasibility.notices import compiling_notice
 from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
 from feasibility.placement.reach_bound import Beyond, Reach
@@ -110,6 +111,7 @@ def place(
     time_limit: float | None = None,
     evaluator: Evaluator | None = None,
     progress: Progress | None = None,
+    clock: Clock | None = None,
 ) -> Placements:
     """Where in a region may the surface stand, so that one continuous motion covers it?
 
@@ -123,9 +125,10 @@ def place(
         around: poses tried around each of the best, a round; 0 for no refinement.
         keep: feasible placements to verify, at most.
         early: whether bounds and probes may discard placements before a search is run.
-        time_limit: s, checked between batches; the final verdicts come on top.
+        time_limit: s, for all of it; looked at between batches, and in a command within them.
         evaluator: tries placements; default in this process.
         progress: called as progress(done, total, text); what it raises ends the search.
+        clock: of the command that this is a part of; its limit counts instead of `time_limit`.
 
     Returns:
         The placements. That there are none is a result, not an error.
@@ -146,6 +149,7 @@ def place(
     search = Search() if search is None else search
     _check_settings(cells, search, count, around, keep, time_limit)
     began = time.monotonic()
+    clock = (Clock(time_limit) if clock is None else clock).start()
     reach = Reach.of(robot, cells, task)
     answered = partial(Placements, robot, cells, task, region)
     if (beyond := reach.beyond(region)) is not None:
@@ -156,10 +160,8 @@ def place(
         with compiling_notice():
             warm_up()
         evaluator = LocalEvaluator(robot, cells, task, search)
-    deadline = np.inf if time_limit is None else began + time_limit
-    refinement = Refinement(evaluator, reach, region, search.seed, early, deadline, progress)
-    refinement.sweep(count)
-    refinement.refine(around)
+    refinement = Refinement(evaluator, reach, region, search.seed, early, clock, progress)
+    refinement.run(count, around)
     placements = _searched(answered, refinement, refinement.verified(keep))
     if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
         message = f"{placements.message} Wherever it stands: {closed}"
@@ -229,7 +231,8 @@ def _searched(
         answer, evidence = Answer.FEASIBLE, Evidence.WITNESS
         message = (
             f"{len(found)} feasible placement{'s' if len(found) > 1 else ''}, each with a replayed "
-            f"motion; the best leaves a margin of {found[0].margin:.3f}. {tried}."
+            f"motion; the best leaves a margin of {found[0].margin:.3f}. {tried}"
+            + ("; the time limit ran out before more were." if refinement.late else ".")
         )
     else:
         undecided = refinement.late or bool(failed)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
 
+from feasibility.clock import Clock, OutOfTime
 from feasibility.placement.evaluator import Stage, Trial
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, Region
@@ -21,7 +22,7 @@ ELITES = 4  # placements that are refined
 WIDTHS = (0.5, 0.35, 0.25, 0.17, 0.12, 0.08)  # [1] of the region, around the best
 CYCLES = 3  # times through the widths, as long as nothing is feasible
 APART = 0.05  # [1] of the region's widths: placements nearer to each other are alike
-BATCH = 64  # poses between two checks of the deadline and of progress
+BATCH = 64  # poses between two looks at the clock
 
 
 class Evaluator(Protocol):
@@ -56,7 +57,7 @@ class Refinement:
     region: Region
     seed: int
     early: bool
-    deadline: float
+    clock: Clock
     progress: Progress | None
     trials: list[Trial] = field(default_factory=list)
     drawn: int = 0
@@ -65,8 +66,16 @@ class Refinement:
     checks: dict[Pose, Trial] = field(default_factory=dict)
     late: bool = False
     """Has the time run out?"""
+    expected: int = 0
+    """Placements that are tried in all, if a search goes on to its end; an estimate."""
     streams: int = 0
     """Random sequences used so far, so that each is another one."""
+
+    def run(self, count: int, around: int) -> None:
+        """Spread `count` poses over the region, then try `around` around each of the best."""
+        self.expected = len(WIDTHS) * ELITES * around
+        self.sweep(count)
+        self.refine(around)
 
     def sweep(self, count: int) -> None:
         """Spread poses over the region, and try those that the bound leaves."""
@@ -99,7 +108,7 @@ class Refinement:
     def refine(self, around: int) -> None:
         """Try poses around the best, nearer and nearer."""
         for _ in range(CYCLES if around else 0):
-            for width in WIDTHS:
+            for done, width in enumerate(WIDTHS):
                 rows = [
                     self.region.near(trial.pose.values, width, around, self._stream())[:around]
                     for trial in self._elites(ELITES)
@@ -112,6 +121,8 @@ class Refinement:
                     fits = self.reach.within(values).all(axis=1)
                     self.bound += int((~fits).sum())
                     values = values[fits]
+                left = (len(WIDTHS) - done) * ELITES * around
+                self.expected = len(self.trials) + left
                 self._try(values, self.early)
             if any(trial.complete for trial in self.trials):
                 return
@@ -123,7 +134,11 @@ class Refinement:
     def verified(self, keep: int) -> list[Trial]:
         """The best placements that `check` calls feasible."""
         likely = self._elites(3 * keep, lambda trial: trial.complete)
-        while likely and sum(trial.feasible for trial in self.checks.values()) < keep:
+        while (
+            likely
+            and not self.late
+            and sum(trial.feasible for trial in self.checks.values()) < keep
+        ):
             some, likely = likely[:keep], likely[keep:]
             self._check([trial.pose for trial in some])
         found = [trial for trial in self.checks.values() if trial.feasible]
@@ -151,24 +166,39 @@ class Refinement:
 
     def _try(self, values: Array, early: bool) -> None:
         """Look into poses (k, 6), a batch at a time."""
+        if not self.trials:
+            self.expected += len(values)
         for start in range(0, len(values), BATCH):
-            if time.monotonic() > self.deadline:
-                self.late = True
-                return
             rows = values[start : start + BATCH]
-            self.trials += self.evaluator.try_all([Pose.of_values(row) for row in rows], early)
+            poses = [Pose.of_values(row) for row in rows]
+            self.trials += self._in_time(partial(self.evaluator.try_all, poses, early))
+            if self.late:
+                return
             if self.progress is not None:
                 done = sum(trial.complete for trial in self.trials)
-                self.progress(len(self.trials), None, f"trying placements, {done} covered")
+                text = f"trying placements, {done} covered"
+                self.progress(len(self.trials), max(self.expected, len(self.trials)), text)
 
     def _check(self, poses: list[Pose], causes: bool = False) -> None:
         """Run `check` on poses; its trials replace the earlier ones."""
         poses = [pose for pose in poses if causes or pose not in self.checks]
         if self.progress is not None:
-            self.progress(len(self.trials), None, "checking the best placements")
-        for trial in self.evaluator.check_all(poses, causes):
+            self.progress(len(self.trials), None, f"checking the best {len(poses)} placements")
+        checked = self._in_time(partial(self.evaluator.check_all, poses, causes))
+        for trial in checked:
             self.checks[trial.pose] = trial
             self.trials = [t for t in self.trials if t.pose != trial.pose] + [trial]
+
+    def _in_time(self, tried: Callable[[], list[Trial]]) -> list[Trial]:
+        """Some trials; none where the time has run out, before them or meanwhile."""
+        self.late |= self.clock.out_of_time
+        try:
+            if not self.late:
+                with self.clock.enforced():
+                    return tried()
+        except OutOfTime:
+            self.late = True
+        return []
 
     def _stream(self) -> int:
         """A seed that was not used before."""

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.clock import Clock
 from feasibility.division import set_cover
 from feasibility.placement.evaluator import LocalEvaluator, Trial
 from feasibility.placement.placements import COUNT, Placements
@@ -82,6 +83,7 @@ def station_plan(
     search: Search | None = None,
     count: int = COUNT,
     progress: Progress | None = None,
+    clock: Clock | None = None,
 ) -> StationPlan:
     """The fewest placements that together cover the surface, each by one continuous motion.
 
@@ -94,6 +96,7 @@ def station_plan(
         search: its settings; the seed is that of the replays, as of the evaluator.
         count: poses spread over the region and searched, besides those of `placements`.
         progress: called as progress(done, total, text); what it raises ends it.
+        clock: of the command that this is a part of.
 
     Returns:
         The plan. Optimal is meant among the motions found; more placements may need fewer.
@@ -105,7 +108,8 @@ def station_plan(
     trials = [trial for trial in placements.trials if len(trial.covers)]
     trials += search_all(evaluator, values, progress, "searching for stations")
     needed = np.ones(len(placements.cells), dtype=bool)
-    stations = fewest_stations([trial.covers for trial in trials], needed)
+    limit = TIME_LIMIT if clock is None else min(TIME_LIMIT, max(clock.left, 0.0))
+    stations = fewest_stations([trial.covers for trial in trials], needed, limit)
     local = LocalEvaluator(placements.robot, placements.cells, placements.task, search)
     chosen = [(trials[station.placement], station.component) for station in stations.stations]
     refusals = tuple(local.replayed(*motion) for motion in chosen)

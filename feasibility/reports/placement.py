@@ -29,7 +29,8 @@ SENTENCES = {
     Answer.UNDECIDED: "undecided: the search for a placement was stopped.",
 }
 PROVED = "none in the region: no placement there is feasible."
-COLUMNS = (*AXES, "stage", "in_reach", "probed", "share", "margin", "limits", "cone", "reach",
+MARGINS = ("margin", "limits", "cone", "reach")
+COLUMNS = ("x_m", "y_m", "z_m", *AXES[3:], "stage", "in_reach", "probed", "share", *MARGINS,
            "verdict")  # fmt: skip
 
 
@@ -174,18 +175,19 @@ def _found_text(placements: Placements) -> str:
     return (
         f"None found in the region: of {number['drawn']} placements {number['bound']} have a "
         f"target out of reach, {number['probe']} failed a few Newton starts, and none was searched"
-        + ("; the search was stopped first." if placements.answer is Answer.UNDECIDED else ".")
+        + ("; the time limit ran out first." if placements.answer is Answer.UNDECIDED else ".")
     )
 
 
 def _table(trials: Sequence[Trial]) -> list[str]:
     """Placements as aligned lines; the margins only where there are some."""
-    heads = ["x (m)", "y (m)", "z (m)", "roll", "pitch", "yaw (deg)", "share"]
+    heads = [f"{name} (m)" for name in AXES[:3]]
+    heads += [f"{name.removesuffix('_deg')} (deg)" for name in AXES[3:]] + ["share (%)"]
     with_margins = any(trial.margins is not None for trial in trials)
-    rows = [heads + (["margin", "limits", "cone", "reach"] if with_margins else [])]
+    rows = [heads + ([f"{name} (0..1)" for name in MARGINS] if with_margins else [])]
     for trial in trials:
         row = [f"{v:.3f}" for v in trial.pose.position] + [f"{v:.2f}" for v in trial.pose.rpy_deg]
-        row.append(percent(trial.share))
+        row.append(percent(trial.share).removesuffix("%").strip())
         if (m := trial.margins) is not None:
             row += [f"{v:.3f}" for v in (m.least, m.limits, m.cone, m.reach)]
         rows.append(row + ["-"] * (len(rows[0]) - len(row)))

@@ -22,7 +22,7 @@ from feasibility.reports.parts import (
 )
 from feasibility.reports.proof import proof_json
 from feasibility.results import plain
-from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict
+from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
 from surfaces import Cells
 
@@ -76,8 +76,17 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "method": verdict.method,
         "seed": int(verdict.seed),
         "version": version(),
-        "message": verdict.message,
+        "message": _message(verdict),
     }
+
+
+def _message(verdict: Verdict) -> str:
+    """What was found, and whether the time ran out before the causes were looked into."""
+    missed = len(verdict.cells) - verdict.n_covered
+    if len(verdict.causes) == missed:
+        return verdict.message
+    why = "a cell is" if missed == 1 else f"{missed:,} cells are"
+    return f"{verdict.message} Why {why} missed was not looked into: the time limit ran out."
 
 
 def _certificate(verdict: Verdict) -> dict[str, Any] | None:
@@ -118,7 +127,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
         ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
-        ("found", verdict.message),
+        ("found", _message(verdict)),
         ("certificate", _certificate_text(verdict)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),
     ]
@@ -232,15 +241,38 @@ def _narrower(verdict: Verdict) -> str:
     return "a part of the mesh (surface.box, cut, facing or faces)"
 
 
+def witness_json(verdict: Verdict) -> dict[str, Any] | None:
+    """The covering motion as JSON values, as `coverable check --json --witness -` has it.
+
+    Returns:
+        `joints`, their names; `q`, a row a waypoint, rad or m, unwrapped; `cell`, the flat index of
+        the cell whose centre the tool point is at in that row, null between centres. None where
+        there is no motion.
+    """
+    walk = _walk(verdict)
+    if walk is None:
+        return None
+    return {
+        "joints": list(verdict.robot.joint_names),
+        "q": walk.q.tolist(),
+        "cell": [None if cell < 0 else cell for cell in walk.cell.tolist()],
+    }
+
+
+def _walk(verdict: Verdict) -> Walk | None:
+    """The covering motion, also of the greedy search; None where there is none."""
+    if verdict.answer is not Answer.FEASIBLE:
+        return None
+    return tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
+
+
 def as_csv(verdict: Verdict) -> str | None:
     """The covering motion as CSV: `cell`, then one column per joint; None where there is none.
 
     Floats are written so that they read back as the same numbers. The motion of a greedy search
     follows its tree, which enters the cells but need not pass their centres, see `tree_walk`.
     """
-    if verdict.answer is not Answer.FEASIBLE:
-        return None
-    walk = tree_walk(verdict) if verdict.method == "greedy" else verdict.witness
+    walk = _walk(verdict)
     if walk is None:
         return None
     rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)

@@ -186,10 +186,13 @@ def _format(fields: Fields) -> int:
 
 def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verdict:
     """The verdict, every index and number checked."""
+    from feasibility.cell_graph import cell_graph
+
     count, n = len(cells), robot.n
-    graph = unpack_graph(archive, "graph", count, n)
     covered = np.zeros(count, dtype=bool)
     covered[read_cells(archive, "covered", count)] = True
+    graph = cell_graph(cells, covered)
+    graph.update(unpack_graph(archive, "graph", count, n))
     witness = None
     if fields.flag("has_witness"):
         q = archive.array("witness_q", np.float64, (None, n))

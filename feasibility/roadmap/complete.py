@@ -40,19 +40,23 @@ def complete_search(
     Args:
         problem: arm, cells and task.
         search: the seed is used, and the time limit for its message.
-        clock: started once the kernels are loaded; reports the cells of the best component.
+        clock: started once the kernels are loaded, unless it runs already; reports the cells of the
+            best component.
         seeds: a motion to begin from, see `check`.
 
     Raises:
         ArgumentError: the seeds do not fit the arm or the cells.
+        OutOfTime: a command's time ran out before the search began.
     """
     if seeds is not None:
         _check_seeds(problem, seeds)
     with compiling_notice():
         warm_up()
-    problem.cells.curves  # noqa: B018 - part of the cells, made once
+    with clock.enforced():
+        problem.cells.curves  # noqa: B018 - part of the cells, made once
     clock.start()
-    arrays = arrays_of(problem.robot, problem.cells, problem.searched)
+    with clock.enforced():
+        arrays = arrays_of(problem.robot, problem.cells, problem.searched)
     exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock)
     proving = Proving(exploration, problem.task)
     in_time, known = True, None

@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 def graph_of(exploration: Exploration) -> nx.Graph:
     """Graph G of the best component: every cell, and one motion for each connected pair.
 
-    Nodes carry `q` (n,), a configuration over the cell's centre, None for cells that the component
-    misses. Edges carry `motion` (k, n), from the smaller cell index to the larger.
+    Nodes carry what `cell_graph` gives them, and `q` (n,), a configuration over the cell's
+    centre, None for cells that the component misses. Edges carry `motion` (k, n), from the smaller
+    cell index to the larger.
     """
-    import networkx as nx
+    from feasibility.cell_graph import cell_graph
 
     roadmap, best = exploration.roadmap, exploration.best
-    graph: nx.Graph = nx.Graph()
-    graph.add_nodes_from(range(len(exploration.cells)), q=None)
+    graph = cell_graph(exploration.cells, exploration.covered)
     for x in range(roadmap.counters[NODES] - 1, -1, -1):
         if root_of(roadmap, roadmap.component[x]) == best:
             graph.nodes[int(roadmap.cell[x])]["q"] = roadmap.q[x].copy()

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.checking import check
+from feasibility.clock import Clock, OutOfTime
 from feasibility.division import divide
 from feasibility.roadmap import HERE, Exploration, margin_shares, place
 from feasibility.search import Progress, Search
@@ -43,7 +44,7 @@ GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
 SAME = 0.05  # [1], postures nearer than that are taken for one, see `_posture`
 NEAREST = 4  # changed cases whose motions are tried on the case as given
-PATIENCE = 20.0  # times the time limit of the verdict
+VERDICT_SHARE = 0.5  # of the time limit, at most, for the verdict of the case as given
 
 AS_GIVEN = "checking the case as given"
 
@@ -54,6 +55,7 @@ def explain(
     task: Task,
     search: Search | None = None,
     progress: Progress | None = None,
+    clock: Clock | None = None,
 ) -> Explanation:
     """Find what would make a case feasible, or by how much a feasible one may be tightened.
 
@@ -65,9 +67,10 @@ def explain(
         robot: the arm, with its limits.
         cells: the surface, cut into cells.
         task: standoff, cone and tolerance.
-        search: settings of the complete search. With a time limit for the verdict, everything
-            after it takes at most `PATIENCE` times that.
+        search: settings of the complete search. The time limit is for everything; the verdict of
+            the case as given gets half of it at most.
         progress: called as progress(done, total, text); what it raises ends the work.
+        clock: of the command that this is a part of; its limit counts instead of the search's.
 
     Returns:
         The verdict of the case as given, and the thresholds.
@@ -90,26 +93,26 @@ def explain(
             f"explain needs the complete search: method must be 'complete', got {search.method!r}"
         )
 
-    verdict = check(
-        robot, cells, task, search, progress and (lambda *_: progress(0, None, AS_GIVEN))
-    )
+    clock = (Clock(search.time_limit) if clock is None else clock).start()
+    reporting = progress and (lambda *_: progress(0, None, AS_GIVEN))
+    first = clock.part(VERDICT_SHARE, reporting)
+    verdict = check(robot, cells, task, search, clock=first)
     began = time.monotonic()
     if len(cells) == 0:
         return Explanation(verdict, (), (), None, 0, 0.0)
-    limit = np.inf if search.time_limit is None else PATIENCE * search.time_limit
-    found, motion = _explained(verdict, began, began + limit, progress)
+    found, motion = _explained(verdict, began, clock, progress)
     if motion is None:
         return found
-    seeded = check(robot, cells, task, search, seeds=motion)
+    seeded = check(robot, cells, task, search, seeds=motion, clock=clock.part(1.0))
     if not seeded.feasible:
         return found
-    again, _ = _explained(seeded, began, began + limit, progress)
+    again, _ = _explained(seeded, began, clock, progress)
     evaluations = found.evaluations + again.evaluations
     return replace(again, alone=verdict, evaluations=evaluations)
 
 
 def _explained(
-    verdict: Verdict, began: float, deadline: float, progress: Progress | None
+    verdict: Verdict, began: float, clock: Clock, progress: Progress | None
 ) -> tuple[Explanation, Walk | None]:
     """The thresholds of a case, and a motion over it as given that was found on the way."""
     variant = Variant(verdict.robot, verdict.cells, verdict.task)
@@ -120,8 +123,13 @@ def _explained(
         if progress is not None:
             progress(len(done), len(varied), "looking for thresholds")
 
-    prober = Prober(variant, verdict.seed, deadline, tick)
-    q = known_configurations(verdict)
+    try:
+        with clock.enforced():
+            prober = Prober(variant, verdict.seed, clock, tick)
+            q = known_configurations(verdict)
+    except OutOfTime:
+        names = tuple(quantity.name for quantity in varied)
+        return Explanation(verdict, (), names, None, 0, time.monotonic() - began), None
     dropped = None if verdict.feasible else drop(prober, verdict, q)
     motions = _motions(prober, verdict, q) if verdict.feasible else []
     searches: list[ThresholdSearch] = []
@@ -153,7 +161,7 @@ def _alone(made: ThresholdSearch, found: Threshold, most: float) -> Threshold:
     found, prober = made.alone(found, most), made.prober
     if found.feasible is None or found.feasible.unaided is not False or made.good is None:
         return found
-    left, unaided = prober.deadline - time.monotonic(), None
+    left, unaided = prober.clock.left, None
     if prober.spent < CHECKED * most and left > 0.0:
         limit = left if np.isfinite(left) else None
         variant = made.quantity.applied(prober.given, made.good.k)
@@ -204,7 +212,7 @@ def _thresholds(
     cost = cost_of(verdict)
     total = max(SHARE * cost, LEAST)
     for index, quantity in enumerate(varied):
-        if time.monotonic() > prober.deadline:
+        if prober.clock.out_of_time:
             return
         prober.tick()
         fair = (total - prober.spent) // (len(varied) - index)
@@ -220,7 +228,7 @@ def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[A
     """The witness of a feasible case, and covering motions in other postures."""
     angle = None if verdict.certificate is None else verdict.certificate.max_angle
     start = Attempt(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
-    if time.monotonic() > prober.deadline:
+    if prober.clock.out_of_time:
         return [start]
     return [start, *other_motions(prober, GUESSES, POSTURES)]
 
@@ -274,7 +282,7 @@ def _refine(
     wide = [k for k, t in enumerate(found) if verdict.feasible and t.steps_apart > max(BEYOND)]
     for done, k in enumerate(sorted(wide, key=lambda k: -found[k].steps_apart)):
         left = most - prober.spent
-        if left < EXTRA * cost or time.monotonic() > prober.deadline:
+        if left < EXTRA * cost or prober.clock.out_of_time:
             return
         searches[k].stop = prober.spent + left // (len(wide) - done)
         found[k] = searches[k].tighter(found[k])

@@ -8,7 +8,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -55,12 +54,12 @@ class Prober:
     """Searches one case and those nearby, and counts what that costs."""
 
     def __init__(
-        self, variant: Variant, seed: int, deadline: float, tick: Callable[[], None] | None = None
+        self, variant: Variant, seed: int, clock: Clock, tick: Callable[[], None] | None = None
     ) -> None:
         """Prepare the case as given; `tick` is called before each piece of work."""
         self.given = variant
         self.seed = seed
-        self.deadline = deadline
+        self.clock = clock
         self.arrays = arrays_of(*variant)
         self._latest = ("", 0), self.arrays
         beyond = replace(variant.task, standoff=variant.task.standoff + 1.0)
@@ -216,7 +215,7 @@ class Prober:
         robot, cells, _ = self.given
         robot = robot.with_limits(np.column_stack([arrays.lower, arrays.upper]))
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
-        clock = Clock(self.deadline - time.monotonic(), lambda *_: self.tick()).start()
+        clock = self.clock.part(1.0, lambda *_: self.tick())
         exploration = LimitedExploration(robot, cells, arrays, self.seed, clock, most=most)
         ended = False
         try:
@@ -245,7 +244,7 @@ class Prober:
             detail = f"the search ended without a covering motion; {best}"
             return Attempt(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)
         detail = f"not found with {int(exploration.work.counts[0])} evaluations of the arm; {best}"
-        if time.monotonic() > self.deadline:
+        if self.clock.out_of_time:
             detail = "unknown, because the time limit ran out"
         return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
 

@@ -8,7 +8,6 @@ what it finds instead is a configuration of another branch, which may go further
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
@@ -117,7 +116,7 @@ class ThresholdSearch:
         arrays = self.prober.arrays_at(self.quantity, self.good.k)
         nothing = np.full_like(self.good.attempt.q, np.nan)
         attempt = self.prober.attempt(arrays, nothing, most, deep=True)
-        late = time.monotonic() > self.prober.deadline
+        late = self.prober.clock.out_of_time
         cut_short = late or most < ALONE * self.verdict_cost
         unaided = None if cut_short and not attempt.found else attempt.found
         return replace(found, feasible=replace(found.feasible, unaided=unaided))

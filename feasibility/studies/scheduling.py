@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 from coverable_errors import CoverableError
+from feasibility.clock import OutOfTime
 
 AHEAD = 2  # tasks in flight for each worker: one at work, one waiting
 LOOK = 0.1  # [s] between two queries of the futures
@@ -78,6 +79,8 @@ def run_one(work: Work, tables: Tables) -> tuple[str | None, str, float]:
     result, failure = None, ""
     try:
         result = json.dumps(work(tables), allow_nan=False)
+    except OutOfTime:  # of the whole run, which ends with it
+        raise
     except Exception as error:  # noqa: BLE001 - one bad task must not end a study
         failure = one_line(error)
     return result, failure, time.perf_counter() - began

@@ -16,6 +16,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import Any
 
+from feasibility.clock import OutOfTime
 from feasibility.notices import compiling_notice, notify
 from feasibility.roadmap import SharedLock, warm_up, warm_up_in_turn
 from feasibility.studies.scheduling import BREAKS, Workers, WorkersError
@@ -92,6 +93,8 @@ class Here:
         future: Future[Any] = Future()
         try:
             future.set_result(work(*arguments))
+        except OutOfTime:
+            raise
         except Exception as error:  # noqa: BLE001 - it is the future's, as in every executor
             future.set_exception(error)
         return future

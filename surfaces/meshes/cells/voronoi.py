@@ -8,6 +8,7 @@ last digit: a turned mesh gets the same cells.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -25,6 +26,7 @@ _FINE = 749_371.0  # units of a rounded distance in one length; odd, so that no 
 _BITS = np.int64(22)  # of a face's index, in a heap's entries; MOST_FACES fits
 _MASK = np.int64((1 << 22) - 1)
 _FAR = np.int64(1 << 40)
+_MOST_SEEDS = 1024  # chosen in one go
 _SHIFT = 4.0  # added to distances, which offsets can make negative
 _WIDTH = np.int64(13)  # bits of a bucket: 1/91 of a cell, less than a face
 _BUCKETS = np.int64(91 * 64)  # what is farther than 60 cells waits in the last one
@@ -91,8 +93,30 @@ def _settle(across, step, distance, heap, size):  # type: ignore[no-untyped-def]
                 size = push(heap, size, (distance[other] << _BITS) | other)
 
 
-@kernel
-def far_seeds(across, step, piece, quota, border):  # type: ignore[no-untyped-def]
+class _Seeding(NamedTuple):
+    """Seeds that are being chosen."""
+
+    distance: NDArray[np.int64]
+    """(F,) of each face from the seeds so far."""
+    heap: NDArray[np.int64]
+    """Room for `_settle`."""
+    queue: NDArray[np.int64]
+    """(F,) the faces, the farthest first; entries may be out of date."""
+    missing: NDArray[np.int64]
+    """(P,) seeds that each piece still needs."""
+    end: NDArray[np.int64]
+    """(P,) where the seeds of each piece end."""
+    seeds: NDArray[np.int64]
+    """(N,) written."""
+
+
+def far_seeds(
+    across: NDArray[np.int64],
+    step: NDArray[np.int64],
+    piece: NDArray[np.int64],
+    quota: NDArray[np.int64],
+    border: int,
+) -> NDArray[np.int64]:
     """Seeds as far from each other as one after the other can be chosen.
 
     Args:
@@ -106,24 +130,47 @@ def far_seeds(across, step, piece, quota, border):  # type: ignore[no-untyped-de
     Returns:
         (N,) faces, those of piece 0 first, N the sum of `quota`.
     """
+    count = len(across)
+    state = _Seeding(
+        distance=np.full(count, _FAR),
+        heap=np.empty(4 * count, dtype=np.int64),
+        queue=np.empty(count, dtype=np.int64),
+        missing=quota.copy(),
+        end=np.cumsum(quota),
+        seeds=np.empty(quota.sum(), dtype=np.int64),
+    )
+    size = _begin_seeds(across, step, border, *state[:3])
+    chosen = 1
+    while size > 0:  # in parts, so that a Ctrl-C or a time limit comes in between
+        size = _more_seeds(across, step, piece, *state, size, chosen)
+        chosen = min(2 * chosen, _MOST_SEEDS)
+    return state.seeds
+
+
+@kernel
+def _begin_seeds(across, step, border, distance, heap, queue):  # type: ignore[no-untyped-def]
+    """Fill in the distances from the border, and the queue; returns its size."""
     count = across.shape[0]
-    distance = np.full(count, _FAR)
-    heap = np.empty(4 * count, dtype=np.int64)
     size = 0
     for face in range(count):
         if across[face].min() < 0:
             distance[face] = border
             size = push(heap, size, (border << _BITS) | face)
     _settle(across, step, distance, heap, size)
-    seeds = np.empty(quota.sum(), dtype=np.int64)
-    end = np.cumsum(quota)
     # Distances only fall, so the top of the queue is the farthest face once its entry is current.
-    queue = np.empty(count, dtype=np.int64)
     size = 0
     for face in range(count):
         size = push(queue, size, -((distance[face] << _BITS) | (_MASK - face)))
-    missing = quota.copy()
-    while size > 0:
+    return size
+
+
+@kernel
+def _more_seeds(  # type: ignore[no-untyped-def]
+    across, step, piece, distance, heap, queue, missing, end, seeds, size, most
+):
+    """Choose up to `most` seeds more; returns the queue's size, 0 when all are chosen."""
+    chosen = 0
+    while size > 0 and chosen < most:
         entry, size = pop(queue, size)
         far, face = (-entry) >> _BITS, _MASK - ((-entry) & _MASK)
         p = piece[face]
@@ -137,7 +184,8 @@ def far_seeds(across, step, piece, quota, border):  # type: ignore[no-untyped-de
         _settle(across, step, distance, heap, 1)
         seeds[end[p] - missing[p]] = face
         missing[p] -= 1
-    return seeds
+        chosen += 1
+    return size
 
 
 @kernel

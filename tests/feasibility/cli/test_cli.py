@@ -319,6 +319,32 @@ def test_outputs_are_written_and_named(ask, plate, tmp_path):
     assert page.read_text().lstrip().lower().startswith("<!doctype html>")
 
 
+def test_the_witness_in_the_json(ask, plate, tmp_path):
+    """The same numbers as in the file."""
+    walk = tmp_path / "walk.csv"
+    assert ask("check", plate, "--witness", walk)[0] == 0
+    header, *rows = csv.reader(walk.read_text().splitlines())
+    status, out, err = ask("check", plate, "--json", "--witness", "-")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    witness = found.pop("witness")
+    conforms(found, CHECK)
+    assert list(witness) == ["joints", "q", "cell"]
+    assert witness["joints"] == header[1:]
+    assert witness["q"] == [[float(value) for value in row[1:]] for row in rows]
+    assert witness["cell"] == [int(row[0]) if row[0] else None for row in rows]
+
+
+def test_where_there_is_no_witness_the_json_has_null(ask):
+    status, out, _ = ask("check", "paper/4f", "--json", "--witness", "-")
+    assert (status, json.loads(out)["witness"]) == (1, None)
+
+
+def test_the_witness_goes_to_stdout_within_json_only(ask, plate):
+    status, _, err = ask("check", plate, "--witness", "-")
+    assert "--witness -: goes with --json" in message(err, status)
+
+
 def test_no_witness_is_written_for_an_infeasible_case(ask, tmp_path):
     walk = tmp_path / "walk.csv"
     status, _, err = ask("check", "paper/4f", "--witness", walk)

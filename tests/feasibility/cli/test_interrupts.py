@@ -178,6 +178,23 @@ def test_in_a_callback_of_the_interpreter(monkeypatch, tmp_path, capsys):
     assert capsys.readouterr().err == INTERRUPTED
 
 
+def test_in_a_compiled_module_that_prints_and_drops_it(monkeypatch, tmp_path, capsys):
+    """As the generated code of Cython does where nothing can be raised."""
+
+    def check(*_, **__):
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt as error:
+            sys.excepthook(type(error), error, error.__traceback__)
+        while True:
+            pass
+
+    monkeypatch.setattr(feasibility.checking, "check", check)
+    (tmp_path / "out").mkdir()
+    assert check_all(tmp_path / "out") == 130
+    assert capsys.readouterr().err == INTERRUPTED
+
+
 def test_in_an_import_it_waits_until_the_module_is_whole(monkeypatch, tmp_path, capsys):
     lines = "import signal", "signal.raise_signal(signal.SIGINT)", "whole = True"
     (tmp_path / "imported_when_interrupted.py").write_text("\n".join(lines))

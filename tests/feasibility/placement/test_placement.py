@@ -6,6 +6,7 @@ import argparse
 import csv
 import io
 import json
+import re
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -532,12 +533,44 @@ def test_the_table_of_all_placements() -> None:
     placements = place(*setup[:3], region, count=16, around=1, keep=1)
     rows = list(csv.DictReader(io.StringIO(as_csv(placements))))
     assert len(rows) == len(placements.trials)
+    columns = ("x_m", "y_m", "z_m", "roll_deg", "pitch_deg", "yaw_deg")
     for row, trial in zip(rows, placements.trials, strict=True):
-        assert [float(row[axis]) for axis in AXES] == trial.pose.values.tolist()
+        assert [float(row[column]) for column in columns] == trial.pose.values.tolist()
         assert float(row["share"]) == trial.share
         assert row["stage"] == str(trial.stage)
     shares = [float(row["share"]) for row in rows]
     assert shares == sorted(shares, reverse=True)
+
+
+def test_every_column_for_people_has_its_unit() -> None:
+    setup = placement_case("panda plate").build()
+    region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.4, 1.2)})
+    placements = place(*setup[:3], region, count=8, around=0, keep=1)
+    head = next(line for line in as_text(placements).splitlines() if " (m)" in line)
+    assert head.split("  ")[-1] == "reach (0..1)"
+    columns = re.findall(r"(\w+) \(([^)]+)\)", head)
+    assert columns[:7] == [
+        *((name, "m") for name in "xyz"),
+        *((name, "deg") for name in ("roll", "pitch", "yaw")),
+        ("share", "%"),
+    ]
+    assert {unit for _, unit in columns[7:]} == {"0..1"}
+    assert re.sub(r"\w+ \([^)]+\)", "", head).strip() == ""
+
+
+def test_progress_estimates_the_end() -> None:
+    """The number expected never falls below what is done, and comes near to what is tried."""
+    setup = placement_case("panda plate").build()
+    region = Region.around(Pose.of_surface(setup.cells.surface), {"x": (0.4, 1.2)})
+    seen = []
+    place(
+        *setup[:3], region, count=200, around=2, keep=1,
+        progress=lambda done, total, text: seen.append((done, total, text)),
+    )  # fmt: skip
+    trying = [(done, total) for done, total, text in seen if text.startswith("trying")]
+    assert len(trying) > 3
+    assert all(done <= total for done, total in trying)
+    assert trying[0][1] <= 2 * trying[-1][0]
 
 
 def test_stations_where_no_single_placement_will_do() -> None:

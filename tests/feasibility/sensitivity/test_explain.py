@@ -13,6 +13,7 @@ import pytest
 from paper_cases import PAPER_CASES
 
 from feasibility import Answer, Evidence, Search, Task, Verdict, check
+from feasibility.clock import Clock
 from feasibility.reports.changes import label, shown
 from feasibility.reports.explanation import as_json, as_text
 from feasibility.reports.explanation_words import helpful
@@ -368,7 +369,7 @@ def test_out_of_time_is_said_and_nothing_is_claimed() -> None:
 def test_a_search_that_the_time_limit_cut_says_so() -> None:
     """Not "not found": more time may find it."""
     variant = variant_of("4a")
-    prober = Prober(variant, 0, deadline=0.0)
+    prober = Prober(variant, 0, Clock(1e-9).start())
     nothing = np.full((90, 6), np.nan)
     attempt = prober.attempt(prober.arrays, nothing, np.inf, deep=True)
     assert (attempt.answer, attempt.evidence) == (Answer.UNDECIDED, Evidence.BUDGET)

@@ -13,6 +13,7 @@ from dense_replay import tools
 from paper_cases import PAPER_CASES
 
 from feasibility import Task
+from feasibility.clock import Clock
 from feasibility.roadmap import Ruling, arrays_of
 from feasibility.sensitivity import Kind, Quantity, last_true
 from feasibility.sensitivity.explanation import apart, other_motions
@@ -35,7 +36,7 @@ def paper(name: str) -> Variant:
 
 
 def prober_of(variant: Variant) -> Prober:
-    return Prober(variant, 0, np.inf)
+    return Prober(variant, 0, Clock())
 
 
 # -- bisection -----------------------------------------------------------------------------------
