@@ -476,8 +476,8 @@ def test_a_terminal_sees_progress_and_a_file_does_not(plate):
     """The bar goes to stderr's terminal; stdout holds the answer alone."""
     program = "import sys, feasibility.checking as c; from feasibility.cli.main import main\n"
     program += "real = c.check\n"
-    program += "def told(*a, progress=None, **more):\n"
-    program += "    progress(3, 12, 'a search'); return real(*a, **more)\n"
+    program += "def told(*a, clock, **more):\n"
+    program += "    clock.report(3, 12, 'a search'); return real(*a, clock=clock, **more)\n"
     program += "c.check = told; sys.exit(main(sys.argv[1:]))"
     leader, follower = pty.openpty()
     child = subprocess.Popen(

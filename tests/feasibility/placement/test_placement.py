@@ -631,7 +631,7 @@ def test_the_command_answers_and_writes(tmp_path, capsys) -> None:
     assert -10 <= answer["placements"][0]["rpy_deg"][2] <= 10
     assert answer["map"]["axes"][0] == "yaw_deg"
     assert "<svg" in files["map"].read_text("utf-8")
-    assert files["csv"].read_text("utf-8").startswith("x,y,z,roll_deg")
+    assert files["csv"].read_text("utf-8").startswith("x_m,y_m,z_m,roll_deg")
     assert run_place(arguments(x=[3.0, 3.4], stations=True), time.perf_counter()) == 1
     assert "proved for the whole region" in " ".join(capsys.readouterr().out.split())
 
