@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +30,11 @@ from feasibility.verdict import Cause
 from robots import Robot
 from surfaces import Cells
 
-LATE = (
-    "The time limit ran out before patches were planned and replayed: {} of {} cells are reached, "
-    "by motions that no plan was made of."
+NOT_GREEDY = (
+    "a division needs search.method 'complete', got {!r}: the greedy search keeps one tree of "
+    "motions, not all components"
 )
+LATE = " Patches were not planned and replayed: the time limit ran out first."
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
 
@@ -75,10 +77,7 @@ def divide(
     """
     search = Search() if search is None else search
     if search.method != "complete":
-        raise ArgumentError(
-            f"a division needs search.method 'complete', got {search.method!r}: the greedy search "
-            "keeps one tree of motions, not all components"
-        )
+        raise ArgumentError(NOT_GREEDY.format(search.method))
     called = time.monotonic()
     with compiling_notice():
         warm_up()
@@ -88,36 +87,55 @@ def divide(
     searched = time.monotonic()
     folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
     blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
-    nothing = Plan((), (), 0)
-    fewest, connected, missing = nothing, nothing, np.arange(len(cells))
-    causes, late = tuple[Cause, ...](), ""
-    try:
-        with clock.enforced():
-            if not blocked:
-                fewest, connected = plans(exploration, task, clock.left)
-            missing = np.flatnonzero(fewest.patch_of(len(cells)) < 0)
-            causes = _causes(exploration, missing, ended)
-    except OutOfTime:
-        ended = False
-        late = "" if fewest.patches else LATE.format(int(exploration.reached.sum()), len(cells))
-    total = len(cells) - len(missing), len(cells)
+    shared = _shared(exploration, task, clock, blocked, ended)
+    fewest, ended = shared.fewest, ended and not shared.late
+    found = _message(shared, apart.number, len(cells), ended, folded)
     return Division(
         robot=robot,
         cells=cells,
         task=task,
         seed=search.seed,
         fewest=fewest,
-        connected=connected,
-        left_out=causes,
-        unsettled=np.setdiff1d(missing, [cause.cell for cause in causes]),
+        connected=shared.connected,
+        left_out=shared.causes,
+        unsettled=np.setdiff1d(shared.missing, [cause.cell for cause in shared.causes]),
         ended=ended and not blocked and not folded,
-        message=blocked or late or _message(fewest, connected, apart.number, total, ended, folded),
+        message=blocked or found,
         at_least=min(apart.number, len(fewest.patches)),
         proof=apart.proof if fewest.patches else None,
         apart=apart.apart if fewest.patches else (),
         timing=_timing(called, began, searched),
         statistics=_statistics(exploration),
     )
+
+
+class _Shared(NamedTuple):
+    """The cells shared out among patches."""
+
+    fewest: Plan
+    connected: Plan
+    missing: NDArray[np.int64]
+    """Cells in no patch."""
+    causes: tuple[Cause, ...]
+    late: bool
+    """Did a command's time run out meanwhile?"""
+
+
+def _shared(
+    exploration: Exploration, task: Task, clock: Clock, blocked: str, ended: bool
+) -> _Shared:
+    """Plans for what the search found, and why cells are in none, as far as there is time."""
+    total, nothing = len(exploration.cells), Plan((), (), 0)
+    shared = _Shared(nothing, nothing, np.arange(total), (), False)
+    try:
+        with clock.enforced():
+            if not blocked:
+                fewest, connected = plans(exploration, task, clock.left)
+                missing = np.flatnonzero(fewest.patch_of(total) < 0)
+                shared = shared._replace(fewest=fewest, connected=connected, missing=missing)
+            return shared._replace(causes=_causes(exploration, shared.missing, ended))
+    except OutOfTime:
+        return shared._replace(late=True)
 
 
 def _timing(called: float, began: float, searched: float) -> dict[str, float]:
@@ -181,10 +199,10 @@ def _no_motion(arrays: SearchArrays) -> bool:
     return nowhere or not arrays.cone_chord > 0.0
 
 
-def _message(
-    fewest: Plan, connected: Plan, at_least: int, total: tuple[int, int], ended: bool, folded: bool
-) -> str:
+def _message(shared: _Shared, at_least: int, cells: int, ended: bool, folded: bool) -> str:
     """One or two sentences: what was found, and on what it rests."""
+    fewest, connected = shared.fewest, shared.connected
+    total = cells - len(shared.missing), cells
     refused = [p.refusal for p in (*fewest.patches, *connected.patches) if not p.accepted]
     if refused:
         return (
@@ -198,7 +216,7 @@ def _message(
         return (
             "No motion covers any cell."
             if ended
-            else "The time limit ran out before any cell was covered."
+            else "The time limit ran out before any patch was found." + LATE * shared.late
         )
     what = f"{number} continuous motion{'s' if number > 1 else ''}"
     proof = f"; at least {at_least}, proved" if min(number, at_least) > 1 else ""

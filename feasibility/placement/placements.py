@@ -149,13 +149,11 @@ def place(
     search = Search() if search is None else search
     _check_settings(cells, search, count, around, keep, time_limit)
     began = time.monotonic()
-    clock = (Clock(time_limit) if clock is None else clock).start()
+    clock = clock or Clock(time_limit).start()
     reach = Reach.of(robot, cells, task)
     answered = partial(Placements, robot, cells, task, region)
     if (beyond := reach.beyond(region)) is not None:
-        placements = _ruled_out(answered, region, reach, beyond)
-        placements.timing["total_s"] = time.monotonic() - began
-        return placements
+        return _timed(_ruled_out(answered, region, reach, beyond), began)
     if evaluator is None:
         with compiling_notice():
             warm_up()
@@ -166,6 +164,11 @@ def place(
     if placements.answer is Answer.UNDECIDED and (closed := blocked_curves(cells, task)):
         message = f"{placements.message} Wherever it stands: {closed}"
         placements = replace(placements, message=message)
+    return _timed(placements, began)
+
+
+def _timed(placements: Placements, began: float) -> Placements:
+    """The same, with the seconds since then."""
     placements.timing["total_s"] = time.monotonic() - began
     return placements
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -146,7 +147,7 @@ def _explained(
     if not verdict.feasible and motion is None and all(t.feasible is None for t in done):
         cost = cost_of(verdict)
         most = max(PAIRS * cost, LEAST)
-        pairs = PairSearch(variant, verdict, q, cost, most, deadline, tick)
+        pairs = PairSearch(variant, verdict, q, cost, most, clock, tick)
         pair, spent = pairs.find(varied), spent + pairs.spent
     seconds = time.monotonic() - began
     found = Explanation(verdict, tuple(done), left_out, dropped, spent, seconds, pair)
@@ -309,11 +310,13 @@ def drop(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> Dropped:
     covered = verdict.covered
     rest = prober.attempt(prober.arrays, q, 2 * cost_of(verdict), deep=False, needed=covered)
     walk = prober.confirmed(prober.given, rest, covered).walk
-    left = prober.deadline - time.monotonic()
-    if walk is None and covered.any() and left > 0.0:
-        limit = left if np.isfinite(left) else None
-        plan = divide(*prober.given, Search(seed=verdict.seed, time_limit=limit)).fewest
-        patches = [patch for patch in plan.patches if patch.accepted]
+    if walk is None and covered.any() and not prober.clock.out_of_time:
+        patches = []
+        with suppress(OutOfTime):
+            division = divide(
+                *prober.given, Search(seed=verdict.seed), clock=prober.clock.part(1.0)
+            )
+            patches = [patch for patch in division.fewest.patches if patch.accepted]
         if patches:
             largest = max(patches, key=lambda patch: patch.area)
             walk, covered = largest.walk, np.zeros(len(covered), dtype=bool)

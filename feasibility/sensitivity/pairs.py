@@ -9,13 +9,13 @@ with a second shift.
 from __future__ import annotations
 
 import itertools
-import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.clock import Clock
 from feasibility.roadmap import Ruling
 from feasibility.sensitivity.limited_search import Attempt
 from feasibility.sensitivity.probes import Prober
@@ -49,7 +49,7 @@ class PairSearch:
     """Evaluations that one verdict of the case takes."""
     most: int
     """Evaluations after which no further search is begun."""
-    deadline: float
+    clock: Clock
     tick: Callable[[], None]
     spent: int = 0
 
@@ -91,7 +91,7 @@ class PairSearch:
 
     def _feasible(self, steps: Sequence[Step]) -> Attempt | None:
         """A covering motion of the case with some changes; None where none is found."""
-        if self.spent > self.most or time.monotonic() > self.deadline:
+        if self.spent > self.most or self.clock.out_of_time:
             return None
         prober = self._prober(steps)
         attempt = self._searched(prober)
@@ -119,7 +119,7 @@ class PairSearch:
         variant = self.given
         for quantity, k in steps:
             variant = quantity.applied(variant, k)
-        return Prober(variant, self.verdict.seed, self.deadline, self.tick)
+        return Prober(variant, self.verdict.seed, self.clock, self.tick)
 
     def _narrowed(self, steps: list[Step]) -> Pair | None:
         """Both changes made as small as they were found to do, one after the other."""

@@ -157,7 +157,8 @@ def test_paths(owner, name, ask, clock, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("plans", "before patches were planned"), ("_causes", "")]
+    ("name", "words"),
+    [("plans", "Patches were not planned and replayed"), ("_causes", "")],
 )
 def test_divisions(name, words, ask, clock, monkeypatch):
     monkeypatch.setattr(feasibility.division.fewest_patches, name, clock.endless)
