@@ -21,7 +21,6 @@ from bad_cases import BAD_CASES, GOOD, write
 from schema import CHECK, conforms
 from small_cases import TEXTS, small_case, small_verdict
 
-import coverable_command
 import feasibility.checking
 from feasibility import Answer, Evidence, Verdict
 from feasibility.cases import builtin_cases
@@ -450,8 +449,8 @@ def test_help_and_version_answer_on_stdout(ask):
 
 def test_the_installed_command_is_this_one():
     project = tomllib.loads((Path(__file__).parents[3] / "pyproject.toml").read_text())["project"]
-    assert project["scripts"] == {"coverable": f"{coverable_command.__name__}:run"}
-    assert callable(coverable_command.run)
+    # Its import makes Ctrl-C end this process: test_interrupts runs it in one of its own.
+    assert project["scripts"] == {"coverable": "coverable_command:run"}
 
 
 class Terminal(io.StringIO):
