@@ -8,7 +8,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-NOTICE = "compiling the search kernels (first run only, up to a minute) ..."
+COMPILING = "compiling {} (first run only, up to a minute) ..."
+NOTICE = COMPILING.format("the search kernels")
+CUTTING = COMPILING.format("the kernels that cut a surface into cells")
+GREEDY = COMPILING.format("the kernels of the greedy search")
 WAITING = (
     "waiting for the workers to load the search kernels (compiled on their first run, up to a "
     "minute) ..."
@@ -37,13 +40,14 @@ def slow_notice() -> Iterator[None]:
 
 @contextmanager
 def compiling_notice(
-    patience: float = PATIENCE, say: Callable[[], None] = notify
+    patience: float | None = None, say: Callable[[], None] | None = None, notice: str = NOTICE
 ) -> Iterator[None]:
     """Say that kernels are being compiled, if they are, and the block takes longer than `patience`.
 
     Args:
-        patience: seconds.
-        say: called once, from any thread.
+        patience: seconds; default `PATIENCE`.
+        say: called once, from any thread; default: writes the notice to stderr.
+        notice: which says what for.
 
     Example:
         >>> with compiling_notice():
@@ -71,11 +75,15 @@ def compiling_notice(
                 self.compiling, self.late = self.compiling or compiling, self.late or late
                 due = self.compiling and self.late and not self.said
                 self.said |= due
-            if due:
+            if due and say is not None:
                 say()
+            elif due:
+                notify(notice)
 
     watch = Watch()
-    timer = threading.Timer(patience, watch.look, kwargs={"late": True})
+    timer = threading.Timer(
+        PATIENCE if patience is None else patience, watch.look, kwargs={"late": True}
+    )
     timer.daemon = True
     timer.start()
     try:

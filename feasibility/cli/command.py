@@ -152,7 +152,7 @@ def open_case(
         from coverable_errors import Fault
         from feasibility.cases import CaseError, load_case
         from feasibility.clock import Clock, OutOfTime
-        from feasibility.notices import compiling_notice
+        from feasibility.notices import CUTTING, compiling_notice
 
         case = load_case(args.case, args.settings)
         check_outputs(outputs, args.case)
@@ -163,7 +163,7 @@ def open_case(
         clock = Clock(limit, progress).begin(time.monotonic() - (time.perf_counter() - began))
         doing = "the arm was loaded and the surface cut into cells"
         try:
-            with compiling_notice(), clock.enforced():  # cutting a mesh has kernels of its own
+            with compiling_notice(notice=CUTTING), clock.enforced():
                 setup = case.build()
             settle()
             for note in setup.robot.notes:

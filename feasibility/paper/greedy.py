@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.found import Found
-from feasibility.notices import compiling_notice
+from feasibility.notices import GREEDY, compiling_notice
 from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace
 from feasibility.paper.jcell_steps import Steps
@@ -78,7 +78,7 @@ def greedy_search(
     robot, task = problem.robot, problem.task
     cells = closed_form_grid(problem.cells)
     steps = Steps.of(robot, cells.closed_form, task, search)
-    with compiling_notice():
+    with compiling_notice(notice=GREEDY):
         space = JSpace(robot, cells, task, np.zeros(robot.n), search, steps)
         space.load()
     clock.start()

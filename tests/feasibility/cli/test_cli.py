@@ -7,6 +7,7 @@ import io
 import json
 import os
 import pty
+import re
 import signal
 import subprocess
 import sys
@@ -22,12 +23,13 @@ from schema import CHECK, conforms
 from small_cases import TEXTS, small_case, small_verdict
 
 import feasibility.checking
-from feasibility import Answer, Evidence, Verdict
-from feasibility.cases import builtin_cases
+from feasibility import Answer, Evidence, Verdict, notices
+from feasibility.cases import Case, builtin_cases
 from feasibility.cli import command, console
 from feasibility.cli import main as cli
 from feasibility.notices import NOTICE, compiling_notice
 from feasibility.results import load_result, save_result
+from feasibility.roadmap import complete
 from feasibility.version import version
 from feasibility.viewer.live_server import LiveView
 
@@ -57,7 +59,7 @@ def ask(capsys):
         out, err = capsys.readouterr()
         assert "Traceback" not in err
         # A busy machine may take a while to load kernels; that it says so has its own test.
-        return status, out, err.replace(NOTICE + "\n", "")
+        return status, out, re.sub(r"compiling .*first run only.*\n", "", err)
 
     return asked
 
@@ -533,3 +535,22 @@ def test_a_long_wait_for_kernels_is_explained(monkeypatch):
         numba.njit(lambda x: x + 1)(1)
         numba.njit(lambda x: x + 2)(1)
     assert sys.stderr.getvalue() == NOTICE + "\n"
+
+
+def test_what_is_compiled_is_said_once_for_each_purpose(monkeypatch, plate, capsys):
+    """Cutting surfaces and the search, each with its own words."""
+    monkeypatch.setattr(notices, "PATIENCE", 0.0)
+
+    def compiling(real):
+        def first(*args, **more):
+            for _ in range(2):  # kernels of one purpose
+                numba.njit(lambda x: x + 1)(1)
+            return real(*args, **more)
+
+        return first
+
+    monkeypatch.setattr(Case, "build", compiling(Case.build))
+    monkeypatch.setattr(complete, "warm_up", compiling(complete.warm_up))
+    assert cli.main(["check", plate]) == 0
+    assert sorted(capsys.readouterr().err.splitlines()) == sorted([notices.CUTTING, NOTICE])
+    assert len({notices.CUTTING, notices.GREEDY, NOTICE}) == 3

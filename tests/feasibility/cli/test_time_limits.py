@@ -67,6 +67,7 @@ def clock(monkeypatch):
 def ask(tmp_path, capsys):
     """Run a command on a small case within the limit: ask(case, *args) -> status, out, err."""
     small_verdict("plate")  # kernels
+    capsys.readouterr()  # that they were compiled, say
 
     def asked(text, command, *args):
         case = tmp_path / "case.toml"
