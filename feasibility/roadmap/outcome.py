@@ -56,10 +56,9 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
             f"proved uncoverable {problem.within} ({named}{more}); the best motion covers "
             f"{exploration.n_covered} of {total}."
         )
-    kept = [gap for gap in proving.blocked if gap.points > 0]
-    alarm = kept and len(kept) == len(proving.blocked)
-    if proving.unable or proving.attempts == 0 or (proving.starved and not alarm):
+    if proving.unable or proving.attempts == 0 or (proving.starved and not proving.alarmed):
         return ""
+    kept = [gap for gap in proving.blocked if gap.points > 0]
     where = ""
     if kept:
         widest = max(kept, key=lambda gap: gap.high - gap.low)

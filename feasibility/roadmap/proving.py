@@ -41,6 +41,11 @@ class Proving:
     """Boxes that the last attempt estimated to be missing."""
     _prover: Prover | None = field(default=None, init=False)
 
+    @property
+    def alarmed(self) -> bool:
+        """Do points of the motion set keep every gap open, so that there may well be a motion?"""
+        return bool(self.blocked) and all(gap.points > 0 for gap in self.blocked)
+
     def attempt(self, budget: int) -> bool:
         """Try a proof, and again as long as the seeds found gain something.
 
