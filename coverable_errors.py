@@ -13,6 +13,8 @@ from typing import Any, Final, NamedTuple, TypeVar
 MOST_SHOWN = 20  # faults in one message; `faults` has them all
 LONGEST_SHOWN = 80  # characters of a value in a message
 LARGEST_WHOLE = 2**63 - 1
+# Of any length, angle or time: squares and cubes of these are still numbers.
+SMALLEST, LARGEST = 1e-12, 1e12
 
 Word = TypeVar("Word", bound=str)
 
@@ -157,6 +159,8 @@ class Checks:
     ) -> float:
         """A finite number, `low` .. `high`."""
         number = real(value)
+        if self._is_beyond(key, number, expected):
+            return max(low, -LARGEST)
         if math.isfinite(number) and low <= number <= high:
             return number
         self.wrong(key, value, expected)
@@ -164,11 +168,23 @@ class Checks:
 
     def positive(self, key: str, value: object, unit: str = "metres") -> float:
         """A finite number > 0."""
-        number = real(value)
-        if 0.0 < number < math.inf:
+        number, expected = real(value), f"must be a finite number > 0 ({unit})"
+        if self._is_beyond(key, number, expected):
+            return 1.0
+        if SMALLEST <= number < math.inf:
             return number
-        self.wrong(key, value, f"must be a finite number > 0 ({unit})")
+        if 0.0 < number < SMALLEST:
+            self.keep(Fault(key, f"got {shown(value)}, below {SMALLEST:g}", expected=expected))
+        else:
+            self.wrong(key, value, expected)
         return 1.0
+
+    def _is_beyond(self, key: str, number: float, expected: str) -> bool:
+        """Keep a fault of a number whose square may be none."""
+        beyond = LARGEST < abs(number) < math.inf
+        if beyond:
+            self.keep(Fault(key, f"got {number:g}, beyond {LARGEST:g}", expected=expected))
+        return beyond
 
     def whole(
         self, key: str, value: object, low: int, high: int = LARGEST_WHOLE, or_word: str = ""
@@ -198,13 +214,19 @@ class Checks:
             self.wrong(key, value, expected)
         return options[0]
 
-    def numbers(self, key: str, value: Any, count: int, expected: str) -> list[float] | None:
-        """Some finite numbers; None after a fault."""
+    def numbers(
+        self, key: str, value: Any, count: int, expected: str, largest: float = LARGEST
+    ) -> list[float] | None:
+        """Some finite numbers, none beyond `largest`; None after a fault."""
         items = value.tolist() if hasattr(value, "tolist") else value
         if isinstance(items, Sequence) and not isinstance(items, (str, bytes)):
             found = [real(item) for item in items]
             if len(found) == count and all(map(math.isfinite, found)):
-                return found
+                if max(map(abs, found), default=0.0) <= largest:
+                    return found
+                what = f"got {shown(value)}, with a number beyond {largest:g}"
+                self.keep(Fault(key, what, expected=expected))
+                return None
         self.wrong(key, value, expected)
         return None
 
@@ -226,7 +248,7 @@ class Checks:
     def direction(self, key: str, value: Any) -> list[float]:
         """Three finite numbers that are not all zero; of any length."""
         expected = "must be three finite numbers that are not all zero, such as (0, 0, 1)"
-        found = self.numbers(key, value, 3, expected)
+        found = self.numbers(key, value, 3, expected, math.inf)
         if found is not None and max(map(abs, found)) >= 1e-12:
             return found
         if found is not None:

@@ -21,6 +21,8 @@ from robots.robot import Robot, no_limit_set
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf
 
+WORLD = "universe"  # what Pinocchio calls the world's frame
+
 
 def robot_from_urdf(
     checked: CheckedUrdf,
@@ -50,6 +52,9 @@ def robot_from_urdf(
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
             limits, or a joint on the chain has a fault and is neither locked nor given limits.
     """
+    if WORLD in checked.links:
+        fault = f"link {WORLD!r}: the name {WORLD!r} is Pinocchio's for the world; rename it"
+        raise RobotError(fault, checked.path)
     chosen = select_joints(checked, tool_frame, lock or {}, limits)
     faults = list(chosen.faults)
     sets = limit_sets or {}
@@ -127,7 +132,7 @@ def parse(text: str, path: str) -> pin.Model:
         RobotError: Pinocchio refuses the text.
     """
     with tempfile.TemporaryFile() as caught:
-        saved = os.dup(2)
+        saved = _duplicate(2)
         try:
             os.dup2(caught.fileno(), 2)
             model = pin.buildModelFromXML(text)
@@ -139,6 +144,14 @@ def parse(text: str, path: str) -> pin.Model:
             os.dup2(saved, 2)
             os.close(saved)
     return model
+
+
+def _duplicate(descriptor: int) -> int:
+    """Another descriptor of the same file; of nowhere where there is none."""
+    try:
+        return os.dup(descriptor)
+    except OSError:  # the process was started without it
+        return os.open(os.devnull, os.O_WRONLY)
 
 
 def reduced_model(

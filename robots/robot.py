@@ -75,13 +75,14 @@ class Robot:
                 f"nan where unknown; got {speeds.tolist()}"
             )
         object.__setattr__(self, "max_velocity", np.broadcast_to(speeds, n))  # read-only
-        length = float(np.linalg.norm(self.approach_axis))
-        if not (np.isfinite(length) and length > 1e-9):
+        largest = float(np.abs(self.approach_axis).max())
+        if not 1e-9 < largest < np.inf:
             raise RobotError(
                 f"robot {self.name!r}: approach_axis must be a finite vector that is not zero, "
                 f"such as [0, 0, 1]; got {self.approach_axis.tolist()}"
             )
-        object.__setattr__(self, "approach_axis", self.approach_axis / length)
+        axis = self.approach_axis / largest  # first, so that no square is too large
+        object.__setattr__(self, "approach_axis", axis / np.linalg.norm(axis))
         for array in (self.approach_axis, self.lower, self.upper):
             array.flags.writeable = False
         self._check_joints()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import sys
 import time
@@ -10,17 +9,35 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TextIO
 
+from coverable_errors import CoverableError, Fault, shown
 from feasibility.interrupts import settle
 from feasibility.search import Progress
 
+THREADS = "NUMBA_NUM_THREADS"
+MOST_THREADS = 1_024
 PAUSE = 0.05  # [s] between two updates of the progress bar
 
 
 def prepare() -> None:
-    """Write characters that the terminal's encoding lacks as escapes."""
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+    """Make sure that messages and answers cannot go astray.
+
+    Characters that the terminal's encoding lacks are written as escapes. A stream that the process
+    was started without goes nowhere: otherwise the next file that is opened would take its place,
+    and get what libraries print.
+
+    Raises:
+        CoverableError: an environment variable that numba reads is no number.
+    """
+    for descriptor in range(3):
+        try:
+            os.fstat(descriptor)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+    threads = os.environ.get(THREADS, "1")
+    if not (threads.isdecimal() and 1 <= int(threads[:9]) <= MOST_THREADS):
+        expected = f"must be a whole number in 1 .. {MOST_THREADS:,}"
+        found = f"got {shown(threads)} from the environment; unset it"
+        raise CoverableError(Fault(THREADS, found, expected=expected))
 
 
 def print_out(text: str) -> None:

@@ -111,6 +111,8 @@ def _message(error: Exception) -> str:
         return str(error)
     if isinstance(error, MemoryError):
         return "there is not enough memory; use fewer cells"
+    if isinstance(error, OSError) and not _has_working_directory():
+        return "the working directory has been deleted; change to one that exists"
     if isinstance(error, OSError):
         file = f"{error.filename}: " if error.filename else ""
         return f"{file}{error.strerror or error}"
@@ -129,6 +131,15 @@ def _message(error: Exception) -> str:
         f"this is a bug in coverable: {type(error).__name__}: {text}\n"
         f"Run the command again with {TRACEBACK}=1, and report what it prints."
     )
+
+
+def _has_working_directory() -> bool:
+    """Can relative paths be followed?"""
+    try:
+        os.getcwd()
+    except OSError:
+        return False
+    return True
 
 
 def _with_traceback() -> bool:

@@ -51,6 +51,7 @@ COUNTS = ("fk", "drawn", "bound", "probe", "search", "check", "boxes")  # see `s
 COUNT = 256  # poses spread over the region
 AROUND = 8  # poses tried around each of the best, a round
 KEEP = 5
+MOST = 100_000  # of any of these
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -177,15 +178,15 @@ def _check_settings(
     cells: Cells, search: Search, count: int, around: int, keep: int, time_limit: float | None
 ) -> None:
     """Refuse what makes no question."""
-    number = "expected a whole number >="
+    number = "expected a whole number in"
     method = f'the search for placements works with method "complete", not {search.method!r}'
     too_long = time_limit is not None and not 0.0 < time_limit < np.inf
     checks = {
         "there are no cells to cover; cut the surface into some": len(cells) == 0,
         method: search.method != "complete",
-        f"count: {number} 1 of poses to try, got {count}": count < 1,
-        f"around: {number} 0 of poses, got {around}": around < 0,
-        f"keep: {number} 1 of placements, got {keep}": keep < 1,
+        f"count: {number} 1 .. {MOST:,} of poses to try, got {count}": not 1 <= count <= MOST,
+        f"around: {number} 0 .. {MOST:,} of poses, got {around}": not 0 <= around <= MOST,
+        f"keep: {number} 1 .. {MOST:,} of placements, got {keep}": not 1 <= keep <= MOST,
         f"time_limit: expected a finite number > 0 (s), got {time_limit}": too_long,
     }
     faults = [text for text, wrong in checks.items() if wrong]

@@ -23,6 +23,8 @@ from feasibility.studies.scheduling import BREAKS, Workers, WorkersError
 
 ATTEMPTS = 3  # to start worker processes anew
 
+MOST = 1_000  # processes
+
 
 @contextmanager
 def open_workers(
@@ -38,7 +40,7 @@ def open_workers(
             one process does it while the others wait, and a line on stderr says so.
 
     Raises:
-        WorkersError: there is no such scheduler, both are given, or the count is negative.
+        WorkersError: there is no such scheduler, both are given, or the count is not in 0 .. 1,000.
 
     Example:
         >>> with open_workers(0) as workers:
@@ -47,8 +49,8 @@ def open_workers(
     """
     if address is not None and count is not None:
         raise WorkersError("give a number of worker processes or the address of Dask, not both")
-    if count is not None and count < 0:
-        raise WorkersError(f"the number of workers must be >= 0, got {count}")
+    if count is not None and not 0 <= count <= MOST:
+        raise WorkersError(f"the number of workers must be in 0 .. {MOST:,}, got {count}")
     workers: Workers
     if address is not None:
         from feasibility.studies.dask_workers import DaskWorkers

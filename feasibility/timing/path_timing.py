@@ -46,6 +46,7 @@ SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing all of it down
 SLOWINGS = 8  # times that the last of them is slowed down a little; and then as much as it needs
 SMALL = 1.004  # [1] times that this is slower
 RESERVE = 1e-3  # [1] share of all limits that is left free
+MOST_SAMPLES = 1_000_000  # of one trajectory
 
 
 def trajectory(
@@ -118,6 +119,12 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
             less * limits.velocity, less * share * limits.acceleration, less * limits.tool_speed
         )
         timed = timed_curve(robot, curve, given)
+        if timed.duration > MOST_SAMPLES * period:
+            raise PathError(
+                f"the motion takes {timed.duration:,.0f} s, more than {MOST_SAMPLES:,} samples "
+                f"{period:g} s apart; give a higher speed, velocity or acceleration, or a longer "
+                "period"
+            )
         runs = [samples(robot, timed, part * period) for part in PARTS]
         over = np.max([accelerations_used(run, limits) for run in runs], axis=0)
         if over.max() <= SLIGHTLY:

@@ -25,7 +25,8 @@ Array = NDArray[np.float64]
 ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, by default
 LOOSE = 0.02  # [1] share by which the bound on the tool's speed may be too careful
 FEWEST, FINEST = 2, 12  # places of the grid on one piece
-MOST = 1e6  # [rad/s], [m/s] or their acceleration; more is no limit, and refused
+# [rad/s], [m/s] or their acceleration: more is no limit, less does not move; both are refused.
+LEAST, MOST = 1e-6, 1e6
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,9 +66,10 @@ def motion_limits(
     """
     faults: list[str] = []
     speed = number(tool_speed)
-    if not 0.0 < speed <= MOST:
+    if not LEAST <= speed <= MOST:
         faults.append(
-            f"the tool speed must be a positive number of metres per second, got {tool_speed!r}"
+            f"the tool speed must be a positive number of metres per second in {LEAST:g} .. "
+            f"{MOST:g}, got {tool_speed!r}"
         )
     if velocity is None:
         fastest = robot.max_velocity
@@ -80,7 +82,7 @@ def motion_limits(
             )
     else:
         fastest = _per_joint(robot, "velocity", "rad/s or m/s", velocity, faults)
-    quickest = fastest / ACCELERATION_TIME
+    quickest = np.minimum(fastest, MOST) / ACCELERATION_TIME  # more is refused below
     if acceleration is not None:
         quickest = _per_joint(robot, "acceleration", "rad/s^2 or m/s^2", acceleration, faults)
     if faults:
@@ -102,8 +104,9 @@ def _per_joint(robot: Robot, name: str, unit: str, value: ArrayLike, faults: lis
         numbers = np.broadcast_to(np.array(value, dtype=float), (robot.n,))
     except (TypeError, ValueError):
         numbers = np.full(robot.n, math.nan)
-    if not ((numbers > 0.0) & (numbers <= MOST)).all():
-        form = f"{name} must be one positive number ({unit}), or {robot.n} for the joints"
+    if not ((numbers >= LEAST) & (numbers <= MOST)).all():
+        allowed = f"in {LEAST:g} .. {MOST:g} ({unit})"
+        form = f"{name} must be one positive number {allowed}, or {robot.n} for the joints"
         faults.append(f"{form}, got {value!r}")
     return numbers
 

@@ -1,6 +1,7 @@
 """Robot as a value: what it refuses, limits, pickling, reach."""
 
 import pickle
+import re
 from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
@@ -29,6 +30,20 @@ def test_arrays_are_copies_that_cannot_be_written(puma):
         robot.limit_sets["mine"] = np.zeros((6, 2))
     with pytest.raises(TypeError):
         robot.locked["joint1"] = 0.0
+
+
+@pytest.mark.parametrize("what", ["link name", "joint name"])
+@pytest.mark.parametrize("where", [0, -1])
+def test_a_link_or_a_joint_called_like_the_world(what, where, tmp_path):
+    text = random_arm(np.random.default_rng(1))
+    names = re.findall(rf'<{what}="(.*?)"', text)
+    with pytest.raises(RobotError, match=r"'universe' is Pinocchio's for the world; rename"):
+        load_text(tmp_path, text.replace(f'"{names[where]}"', '"universe"'))
+
+
+def test_an_axis_of_any_length_is_brought_to_one(puma):
+    axis = replace(puma, approach_axis=(0, 3e300, 4e300)).approach_axis
+    np.testing.assert_allclose(axis, [0, 0.6, 0.8])
 
 
 def test_the_approach_axis_is_brought_to_length_one(puma):
