@@ -49,7 +49,7 @@ def test_a_path_is_written_in_three_formats_that_replay(tmp_path, capsys):
         outcome = replay(robot, cells, task, trajectory.walk, np.ones(len(cells), dtype=bool))
         assert outcome.accepted, outcome.refusal
     assert all(file.name in err for file in files)
-    assert "coverage path" in view.read_text(encoding="utf-8")
+    assert "one path over" in view.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
@@ -168,8 +168,8 @@ def test_an_explanation_says_what_helps(tmp_path, capsys):
     view = tmp_path / "why.html"
     status, out, _ = run(capsys, "explain", "paper/4d", "--html", str(view))
     assert status == 1
-    assert "joint1 would need up to" in out
-    assert "joint1 would need up to" in view.read_text(encoding="utf-8")
+    assert "robot.limits_deg.joint1 (upper) 41.7 deg" in out
+    assert "robot.limits_deg.joint1 (upper) 41.7 deg" in view.read_text(encoding="utf-8")
     status, out, _ = run(capsys, "explain", "paper/4d", "--json")
     assert status == 1
     told = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} in JSON"))
