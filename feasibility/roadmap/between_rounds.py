@@ -30,19 +30,19 @@ def between_rounds(exploration: Exploration, proving: Proving, task: Task) -> Be
         # Where a cell is proved uncoverable already, only more cells can be gained.
         return not exploration.proved and proving.attempt(budget)
 
-    def between(dry: int) -> bool:
+    def between(dry: int) -> None:
         if not exploration.apart:
-            return False
+            return
         if dry == FIRST:
-            return proved(FEW_BOXES)
-        if dry == SECOND:
-            return proved(MORE_BOXES) or refine(exploration, task, COARSE)
-        if dry == THIRD:
+            proved(FEW_BOXES)
+        elif dry == SECOND and not proved(MORE_BOXES):
+            refine(exploration, task, COARSE)
+        elif dry == THIRD:
             before = exploration.sizes()
             restart(exploration)
-            return exploration.sizes() != before or proved(MORE_BOXES)
-        if dry == LAST:
-            return refine(exploration, task, FINE) or proved(MORE_BOXES)
-        return False
+            if exploration.sizes() == before:
+                proved(MORE_BOXES)
+        elif dry == LAST and not refine(exploration, task, FINE):
+            proved(MORE_BOXES)
 
     return between

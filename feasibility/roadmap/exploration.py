@@ -33,7 +33,6 @@ from surfaces import Cells, components
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
 GUESSES = 4  # of one `explore_self_motions`
-TOP = 5  # components that a round works on
 BRIDGES = 6  # pairs of nodes that one round tries to bridge
 PATIENCE = 60  # failed connections of two components before `explore_self_motions` gives them up
 
@@ -53,6 +52,8 @@ class Exploration:
     """Outcomes of branch and bound, by cell."""
     boxes: int = 0
     rounds: int = 0
+    stopped: bool = False
+    """Were there as many rounds as there may be, while they still gained something?"""
     cut_tree: CutTree | None = None
     """The proof that no motion covers every cell, once there is one."""
     finest: int = 1
@@ -152,8 +153,8 @@ class Exploration:
         roots = slots[self.roadmap.parent[slots] == slots]
         return [int(r) for r in roots[np.argsort(-self.roadmap.size[roots], kind="stable")]]
 
-    def sizes(self, most: int | None = TOP) -> tuple[int, ...]:
-        """How many cells the largest components cover, the largest first; of all with None."""
+    def sizes(self, most: int | None = None) -> tuple[int, ...]:
+        """How many cells the components cover, the largest ones first."""
         return tuple(int(self.roadmap.size[r]) for r in self.roots()[:most])
 
     def covers(self, component: int) -> NDArray[np.bool_]:

@@ -56,6 +56,12 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
             f"proved uncoverable {problem.within} ({named}{more}); the best motion covers "
             f"{exploration.n_covered} of {total}."
         )
+    if exploration.stopped:
+        return (
+            f"Every cell is reached, but by no single motion that was found (the best covers "
+            f"{exploration.n_covered} of {total}); the search still grew when it was stopped after "
+            f"{exploration.rounds} rounds. Another seed may find a motion."
+        )
     if proving.unable or proving.attempts == 0 or (proving.starved and not proving.alarmed):
         return ""
     kept = [gap for gap in proving.blocked if gap.points > 0]

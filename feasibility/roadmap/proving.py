@@ -53,17 +53,18 @@ class Proving:
             budget: boxes that may be examined; up to `MOST_BOXES` if it looks as if they would do.
 
         Returns:
-            True when there is a proof, or the largest components gained by it.
+            True when there is a proof, or a gain.
         """
-        before = self.exploration.sizes()
+        gained = False
         for _ in range(ATTEMPTS):
             seeded = self._attempt(budget)
+            gained |= seeded
             if self.exploration.cut_tree is not None:
                 return True
             if self.exploration.complete or not (seeded or self._left < MOST_BOXES):
                 break
             budget = max(budget, int(min(2.0 * self._left, MOST_BOXES)) if not seeded else 0)
-        return self.exploration.sizes() != before
+        return gained
 
     def _attempt(self, budget: int) -> bool:
         """One attempt; True when its seeds made the search grow."""
@@ -81,10 +82,10 @@ class Proving:
         exploration.cut_tree, self.blocked = made.tree, made.blocked
         self._left = made.boxes_left
         self.starved = made.boxes >= budget
-        before = exploration.sizes(None)
+        before = exploration.sizes()
         for cell, q in made.seeds:
             exploration.add_seeds(cell, wound(exploration.arrays, q)[None])
-        return exploration.sizes(None) != before
+        return exploration.sizes() != before
 
     def _ready(self) -> Prover | None:
         """The prover, made when it is first needed; None where there is to be none.

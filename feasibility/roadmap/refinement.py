@@ -36,9 +36,9 @@ from surfaces import Finer
 # Each cell is cut into so many by so many, until a motion is found: at first, and in the end.
 COARSE, FINE = (3,), (9, 27)
 MOST_CELLS = 20_000  # finer cells; more are not tried
-MOST_EVALUATIONS = 300_000  # of the arm, over one set of finer cells
+MOST_EVALUATIONS = 400_000  # of the arm, over one set of finer cells
 BRIDGES = 24  # pairs of nodes that a round tries to bridge for each two components
-BRIDGING_ROUNDS, ROUNDS = 4, 2  # without gain: of bridges alone, and of self-motions too
+BRIDGING_ROUNDS, ROUNDS = 4, 3  # without gain: of bridges alone, and of self-motions too
 MOST = 4  # components that a round works on
 
 

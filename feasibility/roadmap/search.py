@@ -23,11 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
-from feasibility.roadmap.exploration import TOP, Exploration
+from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import NODES, root_of
 from feasibility.roadmap.self_motion import margin_shares
 
 PIVOT_SEEDS = 8
+TOP = 5  # components that a round works on
 RESTARTS = 6  # cells seeded anew before a search counts as exhausted
 DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
 SETTLED_ROUNDS = 12  # the same once a proof decides the verdict, and only more cells can be gained
@@ -42,8 +43,8 @@ MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid
 NEWTON_STARTS = 25
 
 
-Between = Callable[[int], bool]
-"""Called after so many rounds without gain, to try something else; True when that gained."""
+Between = Callable[[int], None]
+"""Called after so many rounds without gain, to try something else."""
 
 
 def explore(exploration: Exploration, between: Between | None = None) -> None:
@@ -143,21 +144,30 @@ def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _rounds(exploration: Exploration, between: Between | None) -> None:
-    """Step 3: rounds of seeding and exploring, until some in a row have gained nothing."""
-    dry = 0
+    """Step 3: rounds of seeding and exploring, until some in a row have gained nothing.
+
+    What is gained are cells of the largest components. A small component that is found, joins
+    another, and is found again is no gain, or there would be no end.
+    """
+    dry, most = 0, exploration.sizes(TOP)
     for _ in range(MOST_ROUNDS):
         roots = exploration.roots()
         if not roots or not exploration.apart:
             return  # the best component covers every cell that any component covers
-        before = exploration.sizes()
         if exploration.improvable:
             _round(exploration, roots[:TOP])
         exploration.rounds += 1
-        dry = dry + 1 if exploration.sizes() == before else 0
+        dry += 1
+        if exploration.sizes(TOP) > most:
+            dry, most = 0, exploration.sizes(TOP)
         if exploration.complete or dry >= _enough(exploration):
             return
-        if exploration.cut_tree is None and between is not None and between(dry):
-            dry = 0
+        if exploration.cut_tree is not None or between is None:
+            continue
+        between(dry)
+        if exploration.cut_tree is not None or exploration.sizes(TOP) > most:
+            dry, most = 0, max(most, exploration.sizes(TOP))
+    exploration.stopped = True
 
 
 def _enough(exploration: Exploration) -> int:
