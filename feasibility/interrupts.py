@@ -186,21 +186,26 @@ def _again(number: int, frame: FrameType | None) -> None:
         _wake()
     elif _state.due:
         _state.due = False
+        _wake()
         raise KeyboardInterrupt
     elif _state.limit is not None:
         error, _state.limit.reached = _state.limit.error, True
         _state.limit = None
+        _wake()
         raise error
 
 
 def _wake() -> None:
-    """See that `_again` is called in time."""
+    """See that `_again` is called in time, and again until it has done its work.
+
+    Python may miss a single signal that comes while another thread runs.
+    """
     seconds = 0.0
     if _state.limit is not None:
         seconds = min(max(_state.limit.left(), AGAIN), LONGEST)
     if _state.due:
         seconds = AGAIN
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
 
 
 def _later() -> None:
