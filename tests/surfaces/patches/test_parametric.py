@@ -297,7 +297,7 @@ NAN, INF = math.nan, math.inf
             {"flare": 1e9},
             r"flare must be within a factor of 1e\+06 of .*waist.*cylinder",
         ),
-        (hyperboloid, {"waist": 1e300, "flare": 1e-300}, "flare must be within a factor"),
+        (hyperboloid, {"waist": 1e9, "flare": 1e-9}, "flare must be within a factor"),
         (hyperboloid, {"angle_deg": (0, 0)}, "angle_deg must be"),
         (hyperboloid, {"height": (0, INF)}, "height must be"),
         (plane, {"width": (0, 0)}, "plane: width"),
