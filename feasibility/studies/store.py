@@ -11,6 +11,7 @@ import math
 import os
 import sqlite3
 import stat
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
@@ -27,6 +28,7 @@ LARGEST = 2**62  # [byte] no limit
 LARGEST_ROW = 64 << 20  # [byte]
 BESIDE = ("-wal", "-shm", "-journal")  # files that SQLite keeps with a store
 PATIENCE = 5.0  # [s] that another process may hold the file
+RETRY = 0.01  # [s] between two tries to open a file that is busy
 
 TABLE = """
 CREATE TABLE tasks (
@@ -141,31 +143,20 @@ class Store(AbstractContextManager["Store"]):
         """A pipe where SQLite expects a file of its own would be waited for without end."""
         for end in BESIDE:
             beside = os.path.realpath(self.path) + end
-            if os.path.lexists(beside) and not stat.S_ISREG(os.lstat(beside).st_mode):
+            try:
+                mode = os.lstat(beside).st_mode
+            except FileNotFoundError:
+                continue
+            if not stat.S_ISREG(mode):
                 raise self._refused(f"{shown_path(beside)} is not a regular file; remove it")
 
     def _prepare(self, fresh: bool) -> None:
         """Make the table, or see that it is there and whole."""
         if not fresh:
-            # Before anything is written: another program's file stays as it is.
-            (application,) = self._base.execute("PRAGMA application_id").fetchone()
-            (written,) = self._base.execute("PRAGMA user_version").fetchone()
-            empty = application == 0 and written == 0 and not self._tables()
-            if application != APPLICATION and not empty:
-                raise self._refused(
-                    "is an SQLite file of another program; give another name for the study, or "
-                    "remove the file"
-                )
-            if application == APPLICATION and written != FORMAT:
-                raise self._refused(
-                    f"is a study of format {written}, and this program writes format {FORMAT}; "
-                    "give another name, and its cases are decided anew"
-                )
-            (state,) = self._base.execute("PRAGMA quick_check(1)").fetchone()
-            if state != "ok":
-                raise self._refused(DAMAGED.format(" ".join(str(state).split())))
-            self._refuse_other_contents()
-        self._base.execute("PRAGMA journal_mode = WAL").fetchone()
+            # In one transaction: another run may be making the table right now.
+            with self._transaction("DEFERRED"):
+                self._refuse_strangers()
+        self._write_ahead()
         self._base.execute("PRAGMA synchronous = NORMAL")
         # Two runs may open a new file at the same time: one of them makes the table.
         with self._transaction():
@@ -173,6 +164,43 @@ class Store(AbstractContextManager["Store"]):
                 self._base.execute(TABLE)
                 self._base.execute(f"PRAGMA application_id = {APPLICATION}")
                 self._base.execute(f"PRAGMA user_version = {FORMAT}")
+
+    def _refuse_strangers(self) -> None:
+        """See that the file is a whole study file; another program's file stays as it is."""
+        (application,) = self._base.execute("PRAGMA application_id").fetchone()
+        (written,) = self._base.execute("PRAGMA user_version").fetchone()
+        empty = application == 0 and written == 0 and not self._tables()
+        if application != APPLICATION and not empty:
+            raise self._refused(
+                "is an SQLite file of another program; give another name for the study, or "
+                "remove the file"
+            )
+        if application == APPLICATION and written != FORMAT:
+            raise self._refused(
+                f"is a study of format {written}, and this program writes format {FORMAT}; "
+                "give another name, and its cases are decided anew"
+            )
+        (state,) = self._base.execute("PRAGMA quick_check(1)").fetchone()
+        if state != "ok":
+            raise self._refused(DAMAGED.format(" ".join(str(state).split())))
+        self._refuse_other_contents()
+
+    def _write_ahead(self) -> None:
+        """Let readers and a writer work side by side.
+
+        SQLite does not wait for another process that opens the file at the same moment: it says at
+        once that the file is busy, whatever its patience.
+        """
+        end = time.monotonic() + PATIENCE
+        while True:
+            try:
+                self._base.execute("PRAGMA journal_mode = WAL").fetchone()
+                return
+            except sqlite3.OperationalError as error:
+                busy = error.sqlite_errorcode & 0xFF == sqlite3.SQLITE_BUSY
+                if not busy or time.monotonic() > end:
+                    raise
+            time.sleep(RETRY)
 
     def _refuse_other_contents(self) -> None:
         """A view or a trigger in the file would be a program that runs when rows are read."""
@@ -186,9 +214,9 @@ class Store(AbstractContextManager["Store"]):
         return [str(name) for (name,) in rows]
 
     @contextmanager
-    def _transaction(self) -> Iterator[None]:
-        """All or nothing of what is written inside."""
-        self._base.execute("BEGIN IMMEDIATE")
+    def _transaction(self, kind: str = "IMMEDIATE") -> Iterator[None]:
+        """All or nothing of what is written inside; what is read is of one moment."""
+        self._base.execute(f"BEGIN {kind}")
         try:
             yield
             self._base.execute("COMMIT")
