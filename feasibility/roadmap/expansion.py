@@ -1,7 +1,6 @@
 """How the roadmap grows: seeding a cell, spreading over the surface, self-motions, closing pairs.
 
-Steps 2 to 5 and 10 to 12 of the complete search. Each kernel connects nodes by motions certified by
-`feasibility.roadmap.segment_bound`.
+Each kernel connects nodes by motions that `feasibility.roadmap.segment_bound` certifies.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Newton's method, each step the least one that corrects tool point and cone inside the limits: joints
 that would pass a limit are held at it. The first step follows a secondary objective in the free
-directions. (Steps 2 and 6 of the complete search.)
+directions.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 The tool point stays at one target, the axis stays inside the cone, and the free directions (roll,
 tilt, redundancy) move. A motion that `connect` returns is certified as it is made, see
-`feasibility.roadmap.segment_bound`. (Steps 3, 4, 7 and 13 of the complete search.)
+`feasibility.roadmap.segment_bound`.
 """
 
 from __future__ import annotations

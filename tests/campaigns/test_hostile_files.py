@@ -24,7 +24,6 @@ import pytest
 
 from coverable_errors import CoverableError
 from feasibility.cases import CaseError, load_case
-from feasibility.cli.main import main
 from feasibility.studies import Store, load_study, open_workers, run_tasks
 from feasibility.viewer.robot import draw
 from robots import load_robot
@@ -155,11 +154,7 @@ def test_texts(seed: int, tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study of two cases, with its store."""
-    folder = tmp_path_factory.mktemp("study")
-    (folder / "study.toml").write_text(hostile_stores.STUDY)
-    asked = ["study", str(folder / "study.toml"), "--out", str(folder / "out.study")]
-    assert main([*asked, "--workers", "0"]) == 0
-    return folder
+    return hostile_stores.study_with_store(tmp_path_factory.mktemp("study"))
 
 
 @pytest.mark.parametrize("seed", range(100, 160))

@@ -10,6 +10,8 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from feasibility.cli.main import main
+
 STUDY = """
 base.case = "paper/4a"
 base.surface = { cells = [2, 3] }
@@ -20,6 +22,14 @@ ODD: tuple[Any, ...] = (5, None, True, "", SCRIPT, "maybe", [], {}, -1, 1e300, 1
 TEXTS = ("{}", "[]", "null", "NaN", "{", "[" * 100_000, '{"a": Infinity}', '{"share": 1e999}', "")
 
 Row = tuple[Any, ...]
+
+
+def study_with_store(folder: Path) -> Path:
+    """Run a study of two cases in a folder, with its store `out.study`; returns the folder."""
+    (folder / "study.toml").write_text(STUDY)
+    asked = ["study", str(folder / "study.toml"), "--out", str(folder / "out.study")]
+    assert main([*asked, "--workers", "0"]) == 0
+    return folder
 
 
 def rows(path: Path) -> list[Row]:

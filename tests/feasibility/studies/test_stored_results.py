@@ -26,11 +26,7 @@ from feasibility.studies.stored import STAGES
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A study of two cases, with its store."""
-    folder = tmp_path_factory.mktemp("study")
-    (folder / "study.toml").write_text(hostile.STUDY)
-    asked = ["study", str(folder / "study.toml"), "--out", str(folder / "out.study")]
-    assert main([*asked, "--workers", "0"]) == 0
-    return folder
+    return hostile.study_with_store(tmp_path_factory.mktemp("study"))
 
 
 @pytest.mark.parametrize("seed", range(40))
