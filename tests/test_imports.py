@@ -24,7 +24,8 @@ coverable_files
 robots: errors arguments chain reach robot kinematics
 robots.urdf
 robots: joint_selection pinocchio_model library
-surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments
+robots.shapes
+surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments sheet
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.piecewise
@@ -34,7 +35,9 @@ surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
 surfaces.places
-feasibility: cell_graph clock compiled cone cut_tree cut_words found interrupts notices problem read_only safe_files search target_curves target_parts task verdict version
+feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only safe_files search target_curves target_parts task version
+feasibility.collisions
+feasibility: found problem verdict
 feasibility.certification
 feasibility.paper
 feasibility.cases

@@ -1,0 +1,70 @@
+"""Bodies that a joint carries: exact ones as the URDF gives them, and convex ones around them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.errors import RobotError
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Triangles:
+    """A body, or a sheet, bounded by triangles; checked: finite, and every index is a vertex."""
+
+    vertices: NDArray[np.float64]
+    """(k, 3) m."""
+    faces: NDArray[np.int64]
+    """(m, 3) indices of vertices."""
+    closed: bool
+    """True where they bound a solid: every edge has two triangles. Else it is a sheet."""
+
+
+Geometry = Box | Cylinder | Capsule | Sphere | Triangles
+"""Primitives are about their frame's origin, round ones along z, as in URDF."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Solid:
+    """One exact shape of a link: what the judge sees, and what pictures show."""
+
+    owner: str
+    """The link's name."""
+    joint: int
+    """Which joint of the robot's model carries it, 1 .. n; 0 where none does."""
+    placement: NDArray[np.float64]
+    """(4, 4) the shape's frame in that joint's frame (Pinocchio's), m; in the root frame for 0."""
+    geometry: Geometry
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Polytope:
+    """A convex body that holds a shape: all points within `radius` of the hull of `vertices`.
+
+    A ball is one vertex and its radius, a capsule two.
+    """
+
+    owner: str
+    """The link's name, or that of the object in the scene."""
+    joint: int
+    """See `Solid.joint`."""
+    vertices: NDArray[np.float64]
+    """(k, 3) m, k >= 1, in the frame of the joint (Pinocchio's), or in the root frame."""
+    radius: float
+    """m, >= 0."""
+
+    def __post_init__(self) -> None:
+        """Copy and write-protect the vertices.
+
+        Raises:
+            RobotError: they are no points, or not finite.
+        """
+        vertices = np.array(self.vertices, dtype=float)
+        good = vertices.ndim == 2 and vertices.shape[1:] == (3,) and len(vertices) > 0
+        if not (good and np.isfinite(vertices).all() and 0.0 <= self.radius < np.inf):
+            raise RobotError(f"a shape of {self.owner!r} is no finite body")
+        vertices.flags.writeable = False
+        object.__setattr__(self, "vertices", vertices)
