@@ -30,7 +30,7 @@ from feasibility.cases import Case, builtin_cases
 from feasibility.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("robots", "surfaces", "feasibility")
+PACKAGES = ("coverable_meshes", "robots", "surfaces", "feasibility")
 PAGES = ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 README = (ROOT / "README.md").read_text("utf-8")

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("robots", "surfaces", "feasibility")
+PACKAGES = ("coverable_meshes", "robots", "surfaces", "feasibility")
 MOST_MODULES = 20  # of one folder
 
 # A line a room, two for a room split round its subrooms: each may import from its own line and from
@@ -21,6 +21,7 @@ MOST_MODULES = 20  # of one folder
 ORDER = """
 coverable_errors
 coverable_files
+coverable_meshes
 robots: errors arguments chain reach robot kinematics
 robots.urdf
 robots: joint_selection pinocchio_model library

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_meshes import FilePart
 from feasibility.viewer.threejs import Colour
 
 Array = NDArray[np.float64]
@@ -91,6 +92,16 @@ def split_at_creases(corners: Ints, normals: Array) -> tuple[Ints, Ints]:
     key = (((corners << 7) + rounded[:, 0] << 7) + rounded[:, 1] << 7) + rounded[:, 2]
     _, first, faces = np.unique(key, return_index=True, return_inverse=True)
     return first, faces.reshape(-1, 3).astype(np.int64)
+
+
+def drawn(part: FilePart, scale: Array, colour: Colour | None) -> Mesh:
+    """A part of a mesh file, scaled by (3,) factors, in its own colour or else in the one given."""
+    if part.rgba is None:
+        return Mesh(part.vertices * scale, part.faces, colour or GREY)
+    red, green, blue, alpha = part.rgba
+    # An alpha of zero is a file's way of saying that it left transparency unset.
+    alpha = alpha if alpha > 0.05 else 1.0
+    return Mesh(part.vertices * scale, part.faces, (red, green, blue), alpha)
 
 
 def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:

@@ -13,10 +13,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_meshes import MeshError, MeshFiles
 from feasibility.viewer import threejs
-from feasibility.viewer.collada_limits import MeshError
-from feasibility.viewer.mesh_files import MeshFiles
-from feasibility.viewer.meshes import GREY, Mesh, moved, shaded, thinned
+from feasibility.viewer.meshes import GREY, Mesh, drawn, moved, shaded, thinned
 from robots import Kinematics, Robot, RobotError
 from robots.urdf import Box, Capsule, Cylinder, MeshFile, Sphere, Visual
 
@@ -150,7 +149,7 @@ def _meshes(visual: Visual, files: MeshFiles) -> list[Mesh]:
     colour = None if visual.rgba is None else (red, green, blue)
     match visual.geometry:
         case MeshFile(path, scale):
-            return files.meshes(path, np.asarray(scale), colour)
+            return [drawn(part, np.asarray(scale), colour) for part in files.parts(path)]
         case Box(size):
             body = trimesh.creation.box(size)
         case Cylinder(radius, length):

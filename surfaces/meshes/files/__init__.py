@@ -1,4 +1,4 @@
-"""Mesh files, which are not trusted, into arrays."""
+"""Mesh files into surfaces, in metres."""
 
 from lazy_loader import attach_stub
 

@@ -1,5 +1,3 @@
-from .glb import GlbPart as GlbPart
 from .mesh_file import metres_per_unit as metres_per_unit
 from .mesh_file import read_mesh as read_mesh
-from .mesh_file import read_parts as read_parts
 from .mesh_file import with_likely_unit as with_likely_unit

@@ -1,68 +1,21 @@
-"""Meshes from untrusted files: STL, OBJ, PLY, OFF and GLB, each read by its own strict reader.
-
-Every count is checked against the size of the file and a cap before memory is taken for it, every
-number and index before it is used, and only the one file is opened, whatever it names.
-"""
+"""A mesh file into a clean surface, in metres."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import BinaryIO, TypeVar
 
 import numpy as np
 
-from coverable_files import FileFault, open_regular, reason
+from coverable_meshes import MeshError, read_raw
 from surfaces.arguments import Checks
-from surfaces.meshes.files.glb import GlbPart, read_glb, read_glb_parts
-from surfaces.meshes.files.obj_and_off import read_obj, read_off
-from surfaces.meshes.files.ply import read_ply
-from surfaces.meshes.files.raw_mesh import RawMesh
-from surfaces.meshes.files.stl import read_stl
 from surfaces.meshes.repair import clean
 from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.surface import SurfaceError
 
-LARGEST_FILE = 512 << 20  # bytes
 # [m] Parts outside are taken only where the scale was given: no arm reaches around them.
 LARGEST_PART, SMALLEST_PART = 20.0, 1e-3
 WIDE_PART = 5.0  # [m]: worth a note
-
-Found = TypeVar("Found")
-Reader = Callable[[BinaryIO, int], Found]
-
-_READERS: dict[str, Reader[RawMesh]] = {
-    ".stl": read_stl,
-    ".obj": read_obj,
-    ".ply": read_ply,
-    ".off": read_off,
-    ".glb": read_glb,
-}
-_PART_READERS: dict[str, Reader[RawMesh | list[GlbPart]]] = {**_READERS, ".glb": read_glb_parts}
-FORMATS = "STL, OBJ, PLY, OFF or GLB"
-# How files begin that are something else than their name says.
-_STARTS = {
-    b"PK\x03\x04": "a zip archive; unpack it first",
-    b"PK\x05\x06": "an empty zip archive",
-    b"\x1f\x8b": "packed with gzip; unpack it first",
-    b"BZh": "packed with bzip2; unpack it first",
-    b"\xfd7zXZ": "packed with xz; unpack it first",
-    b"7z\xbc\xaf": "a 7z archive; unpack it first",
-    b"\x28\xb5\x2f\xfd": "packed with zstd; unpack it first",
-    b"Rar!": "a rar archive; unpack it first",
-    b"ISO-10303-21": "a STEP file (CAD); export it as STL",
-    b"version https://git-lfs": "only a Git LFS pointer to the mesh; fetch it with 'git lfs pull'",
-    b"<": "XML or a web page, not a mesh",
-    b"{": "JSON (glTF as text?); export it as one .glb",
-    b"%PDF": "a PDF",
-}
-# With what follows the word, for a binary STL may begin with any text.
-_OWN_STARTS = {
-    b"glTF\2\0\0\0": ".glb",
-    **dict.fromkeys((b"ply\n", b"ply\r"), ".ply"),
-    **dict.fromkeys((b"OFF\n", b"OFF\r"), ".off"),
-}
 
 
 def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> TriangleMesh:
@@ -82,39 +35,15 @@ def read_mesh(path: str | os.PathLike[str], scale: float | None = None) -> Trian
     name = repr(Path(os.fsdecode(path)).name[:100])
     try:
         unit = metres_per_unit(scale)
-        raw = _read(path, _READERS)
+        raw = read_raw(path)
         with np.errstate(over="ignore"):  # infinite coordinates are refused next
             vertices = raw.vertices * unit
         mesh = clean(vertices, raw.faces, history=raw.notes)
         if scale is not None:
             return mesh
         return with_likely_unit(mesh)
-    except (FileFault, SurfaceError) as error:
+    except (MeshError, SurfaceError) as error:
         raise SurfaceError(error.faults, name) from error
-
-
-def read_parts(path: str | os.PathLike[str], largest: int = LARGEST_FILE) -> list[GlbPart]:
-    """Read a mesh file as it is, part by part and with colours, to be drawn: nothing is repaired.
-
-    Coordinates may be infinite or NaN; indices are those of vertices.
-
-    Args:
-        path: a file of one of the formats.
-        largest: bytes that it may have.
-
-    Raises:
-        SurfaceError: no such file, not a mesh, damaged, too large, or without triangles.
-    """
-    try:
-        found = _read(path, _PART_READERS, largest)
-    except FileFault as error:
-        raise SurfaceError(error.faults) from error
-    parts = found if isinstance(found, list) else [GlbPart(found, None)]
-    for part in parts:
-        faces, vertices = part.mesh.faces, part.mesh.vertices
-        if len(faces) and not 0 <= faces.min() <= faces.max() < len(vertices):
-            raise SurfaceError("names a vertex that it does not have; it is damaged")
-    return parts
 
 
 def metres_per_unit(scale: float | None, name: str = "") -> float:
@@ -130,41 +59,6 @@ def metres_per_unit(scale: float | None, name: str = "") -> float:
     unit = checks.number("scale", scale, expected, 1e-9, 1e9)
     checks.done()
     return unit
-
-
-def _read(
-    path: str | os.PathLike[str], readers: Mapping[str, Reader[Found]], largest: int = LARGEST_FILE
-) -> Found:
-    """Open a regular file, look at how it begins, and read it."""
-    advice = "thin the mesh, or save it as binary STL"
-    with open_regular(path, largest, f"a mesh as {FORMATS}", advice) as stream:
-        suffix = Path(os.fsdecode(path)).suffix.lower()
-        try:
-            _check_start(stream.read(80), suffix)
-            stream.seek(0)
-            return readers[suffix](stream, os.fstat(stream.fileno()).st_size)
-        except OSError as error:
-            raise SurfaceError(f"cannot be read: {reason(error)}") from error
-
-
-def _check_start(head: bytes, suffix: str) -> None:
-    """The file's name and its first bytes must agree."""
-    if not head:
-        raise SurfaceError(f"is empty; expected a mesh as {FORMATS}")
-    text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
-    for start, what in _STARTS.items():
-        if head.startswith(start) or (start[0] < 0x7F and text.startswith(start)):
-            if start in (b"<", b"{") and b"\0" in head:
-                continue  # the free text at the head of a binary STL
-            raise SurfaceError(f"is {what}")
-    if suffix not in _READERS:
-        raise SurfaceError(
-            f"{'ends in ' + repr(suffix[:20]) if suffix else 'has no extension'}, where a mesh as "
-            f"{FORMATS} is expected; export the surface in one of these"
-        )
-    for start, own in _OWN_STARTS.items():
-        if head.startswith(start) and suffix != own:
-            raise SurfaceError(f"is {own[1:].upper()} by its first bytes; name it {own}")
 
 
 def with_likely_unit(mesh: TriangleMesh, what: str = "the file", unit: float = 1.0) -> TriangleMesh:

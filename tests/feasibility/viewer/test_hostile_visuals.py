@@ -14,9 +14,8 @@ import hostile_visuals as hostile
 import pytest
 from hostile_parts import Maker, urdf, visual, write
 
-from feasibility.viewer import mesh_files
-from feasibility.viewer.collada_limits import MeshError
-from feasibility.viewer.mesh_files import MOST_SECONDS, MOST_TRIANGLES, MeshFiles
+from coverable_meshes import MeshError, MeshFiles, robot_files
+from coverable_meshes.robot_files import MOST_SECONDS, MOST_TRIANGLES
 from feasibility.viewer.robot import TRIANGLES, draw
 from robots import load_robot
 
@@ -53,8 +52,8 @@ def test_a_mesh_that_is_used_often_is_read_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     files: list[Path] = []
-    real = mesh_files.read_parts_of
-    monkeypatch.setattr(mesh_files, "read_parts_of", lambda f: files.append(f) or real(f))
+    real = robot_files.read_parts_of
+    monkeypatch.setattr(robot_files, "read_parts_of", lambda f: files.append(f) or real(f))
     names = [write(tmp_path, f"{k}.stl", hostile.stl(k + 1)) for k in range(3)]
     broken = write(tmp_path, "broken.stl", b"")
     shapes = "".join(visual(name) for name in (*names, broken) * 300)
@@ -89,8 +88,8 @@ def test_no_other_file_is_opened_after_the_time_is_up(tmp_path: Path) -> None:
     now = [0.0]
     files = MeshFiles(clock=lambda: now[0])
     paths = [str(tmp_path / write(tmp_path, f"{k}.stl", hostile.stl(1))) for k in range(2)]
-    assert len(files.meshes(paths[0], [1.0, 1.0, 1.0], None)) == 1
+    assert len(files.parts(paths[0])) == 1
     now[0] = MOST_SECONDS + 0.1
-    assert len(files.meshes(paths[0], [1.0, 1.0, 1.0], None)) == 1, "it was read before"
+    assert len(files.parts(paths[0])) == 1, "it was read before"
     with pytest.raises(MeshError, match=r"reading took more than 8 s; thin the robot's meshes"):
-        files.meshes(paths[1], [1.0, 1.0, 1.0], None)
+        files.parts(paths[1])

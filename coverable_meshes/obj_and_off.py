@@ -7,7 +7,8 @@ from typing import BinaryIO
 
 import numpy as np
 
-from surfaces.meshes.files.raw_mesh import (
+from coverable_meshes.errors import MeshError
+from coverable_meshes.raw_mesh import (
     MOST_SIDES,
     Lines,
     Polygons,
@@ -15,7 +16,6 @@ from surfaces.meshes.files.raw_mesh import (
     refuse_large,
     shown,
 )
-from surfaces.surface import SurfaceError
 
 _FREEFORM = {b"cstype", b"deg", b"surf", b"curv", b"curv2", b"parm", b"trim", b"hole", b"end"}
 _IGNORED = {
@@ -29,7 +29,7 @@ def read_obj(stream: BinaryIO, size: int) -> RawMesh:
     """Read an OBJ; its objects and groups are joined.
 
     Raises:
-        SurfaceError: not an OBJ, damaged, too large, or of curved patches.
+        MeshError: not an OBJ, damaged, too large, or of curved patches.
     """
     lines = Lines(stream, b"#")
     numbers, polygons = array("d"), Polygons()
@@ -82,7 +82,7 @@ def read_off(stream: BinaryIO, size: int) -> RawMesh:
     """Read an OFF of `size` bytes.
 
     Raises:
-        SurfaceError: not an OFF, damaged, or too large.
+        MeshError: not an OFF, damaged, or too large.
     """
     lines = Lines(stream, b"#")
     words = lines.next("'OFF'")
@@ -96,7 +96,7 @@ def read_off(stream: BinaryIO, size: int) -> RawMesh:
         raise lines.error(f"holds negative counts: {vertex_count} vertices, {face_count} faces")
     refuse_large(face_count, vertex_count)
     if 6 * vertex_count + 4 * face_count > size + 2:  # "0 0 0" and "1 0", each with its line's end
-        raise SurfaceError(
+        raise MeshError(
             f"announces {vertex_count} vertices and {face_count} faces, which {size} bytes cannot "
             "hold; it was cut short"
         )

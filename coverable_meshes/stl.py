@@ -7,16 +7,16 @@ from typing import BinaryIO
 
 import numpy as np
 
-from surfaces.meshes.files.raw_mesh import (
+from coverable_meshes.errors import MeshError
+from coverable_meshes.raw_mesh import (
     BYTE_ORDER_MARK,
+    Floats,
     Lines,
     RawMesh,
     no_triangles,
     refuse_large,
     shown,
 )
-from surfaces.meshes.triangle_mesh import Floats, doubled_areas
-from surfaces.surface import SurfaceError
 
 _HEADER = 84  # bytes
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -27,7 +27,7 @@ def read_stl(stream: BinaryIO, size: int) -> RawMesh:
     """Read an STL of `size` bytes; which kind it is, its size tells.
 
     Raises:
-        SurfaceError: neither kind, damaged, or too large.
+        MeshError: neither kind, damaged, or too large.
     """
     head = stream.read(_HEADER)
     count = int.from_bytes(head[80:84], "little")
@@ -41,11 +41,11 @@ def read_stl(stream: BinaryIO, size: int) -> RawMesh:
         stream.seek(0)
         return _read_text(stream)
     if len(head) < _HEADER:
-        raise SurfaceError(
+        raise MeshError(
             f"is {size} bytes long, too short for a binary STL, and does not start with 'solid' "
             "as a text STL does"
         )
-    raise SurfaceError(
+    raise MeshError(
         f"is no STL: it does not start with 'solid' as a text STL does, and as a binary STL of "
         f"{count:,} faces it would have {_HEADER + count * _FACET.itemsize:,} bytes, but has "
         f"{size:,}; it is damaged or cut short, export it again"
@@ -75,7 +75,7 @@ def _read_text(stream: BinaryIO) -> RawMesh:
             refuse_large(len(normals) // 3)
         step = (step + 1) % len(_GRAMMAR)
     if inside or step:
-        raise SurfaceError(f"ends after line {lines.number} without 'endsolid'; it was cut short")
+        raise MeshError(f"ends after line {lines.number} without 'endsolid'; it was cut short")
     if not numbers:
         raise no_triangles()
     mesh = _soup(np.array(numbers).reshape(-1, 3), np.array(normals).reshape(-1, 3))
@@ -97,7 +97,8 @@ def _soup(corners: Floats, normals: Floats) -> RawMesh:
     faces = number.reshape(-1, 3)
     vertices = vertices[order[fresh]]
     with np.errstate(all="ignore"):  # numbers that are not finite are refused later
-        along = np.einsum("fi,fi->f", doubled_areas(vertices, faces), normals)
+        a, b, c = (vertices[faces[:, k]] for k in range(3))
+        along = np.einsum("fi,fi->f", np.cross(b - a, c - a), normals)
     against = int((along < 0.0).sum())
     note = (
         f"the file's own normals of {against} of {len(faces)} faces contradict the order of their "

@@ -15,9 +15,12 @@ from typing import BinaryIO
 
 import numpy as np
 
-from surfaces.meshes.files.raw_mesh import (
+from coverable_meshes.errors import MeshError
+from coverable_meshes.raw_mesh import (
     MOST_SIDES,
     MOST_VERTICES,
+    Floats,
+    Ints,
     Lines,
     Polygons,
     RawMesh,
@@ -27,8 +30,6 @@ from surfaces.meshes.files.raw_mesh import (
     shown,
     triangulated,
 )
-from surfaces.meshes.triangle_mesh import Floats, Ints
-from surfaces.surface import SurfaceError
 
 TYPES = {
     **dict.fromkeys((b"char", b"int8"), "i1"),
@@ -69,19 +70,19 @@ class Element:
         """Which properties are read: x, y and z of a vertex, the list of corners of a face.
 
         Raises:
-            SurfaceError: they are missing, or of a type that they cannot have.
+            MeshError: they are missing, or of a type that they cannot have.
         """
         names = [item.name for item in self.properties]
         if self.name == "vertex":
             if {"x", "y", "z"} <= set(names) and not any(i.count_type for i in self.properties):
                 return tuple(names.index(name) for name in ("x", "y", "z"))
-            raise SurfaceError(f"its vertices need x, y and z, and no lists; they have {names}")
+            raise MeshError(f"its vertices need x, y and z, and no lists; they have {names}")
         if self.name != "face":
             return ()
         for k, item in enumerate(self.properties):
             if item.name in _FACE_LISTS and item.count_type and item.type[0] != "f":
                 return (k,)
-        raise SurfaceError(
+        raise MeshError(
             f"its faces need a list 'vertex_indices' of whole numbers; they have {names}"
         )
 
@@ -90,7 +91,7 @@ def read_ply(stream: BinaryIO, size: int) -> RawMesh:
     """Read a PLY of `size` bytes; only positions and faces are taken.
 
     Raises:
-        SurfaceError: not a PLY, damaged, or too large.
+        MeshError: not a PLY, damaged, or too large.
     """
     lines = Lines(stream)
     order, elements = _header(lines, size)
@@ -125,7 +126,7 @@ def _header(lines: Lines, size: int) -> tuple[str, tuple[Element, ...]]:
         else:
             raise lines.error(f"belongs in no PLY header: {shown(b' '.join(words))}")
     else:
-        raise SurfaceError(f"ends after line {lines.number}, inside the header; it was cut short")
+        raise MeshError(f"ends after line {lines.number}, inside the header; it was cut short")
     elements = tuple(Element(name, count, tuple(items)) for name, count, items in tables)
     return order, _checked(elements, order, size - lines.stream.tell())
 
@@ -147,30 +148,30 @@ def _checked(elements: tuple[Element, ...], order: str, left: int) -> tuple[Elem
     names = [element.name for element in elements]
     for name in ("vertex", "face"):
         if names.count(name) > 1:
-            raise SurfaceError(f"its header announces '{name}' twice")
+            raise MeshError(f"its header announces '{name}' twice")
     if "face" not in names or "vertex" not in names:
         if "tristrips" in names:
-            raise SurfaceError("holds strips of triangles; export it with single faces")
+            raise MeshError("holds strips of triangles; export it with single faces")
         raise no_triangles()
     elements = elements[: max(names.index("vertex"), names.index("face")) + 1]
     for element in elements:
         repeated = len({item.name for item in element.properties}) < len(element.properties)
         if repeated or not element.properties:
-            raise SurfaceError(f"its header gives '{element.name}' no properties, or one twice")
+            raise MeshError(f"its header gives '{element.name}' no properties, or one twice")
         if element.count < 0:
-            raise SurfaceError(f"its header announces {element.count} of '{element.name}'")
+            raise MeshError(f"its header announces {element.count} of '{element.name}'")
         if element.name == "face":
             refuse_large(element.count)
         elif element.name == "vertex":
             refuse_large(0, element.count)
         elif element.count > MOST_VERTICES:
-            raise SurfaceError(f"its header announces {element.count:,} of '{element.name}'")
+            raise MeshError(f"its header announces {element.count:,} of '{element.name}'")
     for element in elements:
         # Text needs a digit and a space or the line's end for each number.
         binary = sum(int((item.count_type or item.type)[1]) for item in element.properties)
         row = binary if order else 2 * len(element.properties)
         if element.count * row > left + 2:
-            raise SurfaceError(
+            raise MeshError(
                 f"its header announces {element.count:,} of '{element.name}', which the "
                 f"{left:,} bytes after it cannot hold; it was cut short"
             )
@@ -284,5 +285,5 @@ def _rows(
         raise _cut_short(element) from error
 
 
-def _cut_short(element: Element) -> SurfaceError:
-    return SurfaceError(f"ends within its {element.count:,} of '{element.name}'; it was cut short")
+def _cut_short(element: Element) -> MeshError:
+    return MeshError(f"ends within its {element.count:,} of '{element.name}'; it was cut short")

@@ -1,4 +1,4 @@
-"""The mesh files of a robot's visuals: each read once, within caps on bytes, triangles and time.
+"""The mesh files of a robot's links: each read once, within caps on bytes, triangles and time.
 
 They are not trusted. Only the file itself is opened: textures and materials that it names are not.
 """
@@ -16,10 +16,10 @@ import numpy as np
 
 from coverable_errors import CoverableError
 from coverable_files import read_regular, reason
-from feasibility.viewer.collada_limits import MeshError, check_collada
-from feasibility.viewer.meshes import GREY, Array, Ints, Mesh
-from feasibility.viewer.threejs import Colour
-from surfaces.meshes.files import read_parts
+from coverable_meshes.collada_limits import check_collada
+from coverable_meshes.errors import MeshError
+from coverable_meshes.mesh_file import read_parts
+from coverable_meshes.raw_mesh import Floats, Ints
 
 LARGEST_FILES = {".stl": 64 << 20, ".glb": 64 << 20, ".dae": 64 << 20}  # bytes
 LARGEST_TEXT = 12 << 20  # bytes, of the other formats, which take longer
@@ -30,25 +30,16 @@ MOST_SECONDS = 8.0  # of processor time, after which no other file is opened
 class FilePart(NamedTuple):
     """One mesh of a file."""
 
-    vertices: Array
+    vertices: Floats
     """(V, 3) in the file's unit."""
     faces: Ints
     """(F, 3) indices of vertices."""
     rgba: tuple[float, ...] | None
     """Red, green, blue, opacity in 0 .. 1; None where it brings no colour of its own."""
 
-    def drawn(self, scale: Array, colour: Colour | None) -> Mesh:
-        """The mesh, scaled, in its own colour or else in the one given."""
-        if self.rgba is None:
-            return Mesh(self.vertices * scale, self.faces, colour or GREY)
-        red, green, blue, alpha = self.rgba
-        # An alpha of zero is a file's way of saying that it left transparency unset.
-        alpha = alpha if alpha > 0.05 else 1.0
-        return Mesh(self.vertices * scale, self.faces, (red, green, blue), alpha)
-
 
 class MeshFiles:
-    """Reads mesh files for one drawing."""
+    """Reads the mesh files of one robot."""
 
     def __init__(self, clock: Callable[[], float] = time.thread_time) -> None:
         """Start with nothing read.
@@ -61,16 +52,14 @@ class MeshFiles:
         self._read: dict[str, list[FilePart] | MeshError] = {}
         self._triangles = 0
 
-    def meshes(self, path: str, scale: Array, colour: Colour | None) -> list[Mesh]:
-        """The parts of a mesh file, scaled.
+    def parts(self, path: str) -> list[FilePart]:
+        """The parts of a mesh file.
 
         Args:
             path: of a file that may be opened.
-            scale: (3,) factors along x, y and z.
-            colour: for parts that bring no colour of their own; grey where None.
 
         Raises:
-            MeshError: it is no mesh, or there is too much to draw.
+            MeshError: it is no mesh, or with it the robot has too many triangles.
         """
         if path not in self._read:
             self._read[path] = self._first_read(Path(path))
@@ -78,13 +67,13 @@ class MeshFiles:
         if isinstance(found, MeshError):
             raise MeshError(found.faults)
         self.count(sum(len(part.faces) for part in found))
-        return [part.drawn(scale, colour) for part in found]
+        return found
 
     def count(self, triangles: int) -> None:
-        """Count triangles that will be drawn.
+        """Count triangles that will be used.
 
         Raises:
-            MeshError: they are more than can be drawn.
+            MeshError: they are too many.
         """
         if self._triangles + triangles > MOST_TRIANGLES:
             raise MeshError(
@@ -115,7 +104,7 @@ def read_parts_of(file: Path) -> list[FilePart]:
     largest = LARGEST_FILES.get(suffix, LARGEST_TEXT)
     try:
         if suffix == ".dae":
-            parts = _collada(read_regular(file, largest, "a mesh to draw"))
+            parts = _collada(read_regular(file, largest, "a mesh of a robot"))
         else:
             parts = [
                 FilePart(part.mesh.vertices, part.mesh.faces, part.rgba)

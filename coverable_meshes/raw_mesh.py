@@ -12,9 +12,12 @@ from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
-from surfaces.meshes.triangle_mesh import Floats, Ints
-from surfaces.surface import SurfaceError
+from coverable_meshes.errors import MeshError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 MOST_FACES = 2_000_000
 MOST_VERTICES = 3 * MOST_FACES
@@ -38,21 +41,21 @@ def refuse_large(faces: int, vertices: int = 0) -> None:
     """Refuse counts above what is taken.
 
     Raises:
-        SurfaceError: more than `MOST_FACES` faces, or thrice as many vertices.
+        MeshError: more than `MOST_FACES` faces, or thrice as many vertices.
     """
     caps = ((faces, MOST_FACES, "faces"), (vertices, MOST_VERTICES, "vertices"))
     for count, most, what in caps:
         if count > most:
-            raise SurfaceError(
+            raise MeshError(
                 f"has {count:,} {what}, more than the {most:,} that are taken; thin it first, "
                 "for instance with MeshLab's Quadric Edge Collapse Decimation or Blender's "
                 "Decimate: a cell of the surface needs about a hundred faces, not thousands"
             )
 
 
-def no_triangles() -> SurfaceError:
+def no_triangles() -> MeshError:
     """The error for a file that is well formed, but empty."""
-    return SurfaceError(
+    return MeshError(
         "holds no faces (points and lines alone are no surface); export it as triangles"
     )
 
@@ -70,7 +73,7 @@ class Polygons:
         """One face more.
 
         Raises:
-            SurfaceError: its corners are too few or too many, or the faces are too many.
+            MeshError: its corners are too few or too many, or the faces are too many.
         """
         refuse_sides(len(self.sides), len(corners))
         self.triangles += len(corners) - 2
@@ -88,10 +91,10 @@ def refuse_sides(face: int, count: int) -> None:
     """Refuse a face that is no polygon, or one of too many corners.
 
     Raises:
-        SurfaceError: `count` is not in 3 .. `MOST_SIDES`.
+        MeshError: `count` is not in 3 .. `MOST_SIDES`.
     """
     if not 3 <= count <= MOST_SIDES:
-        raise SurfaceError(
+        raise MeshError(
             f"face {face} (counted from 0) has {count} corners, where 3 .. {MOST_SIDES} are "
             "taken; export the mesh as triangles"
         )
@@ -109,7 +112,7 @@ def triangulated(vertices: Floats, corners: Ints, sides: Ints) -> RawMesh:
         sides: (N,) how many corners each polygon has, 3 .. `MOST_SIDES`.
 
     Raises:
-        SurfaceError: no polygon at all, too many, or one without such a fan.
+        MeshError: no polygon at all, too many, or one without such a fan.
     """
     if not len(sides):
         raise no_triangles()
@@ -146,7 +149,7 @@ def _turned_to_fan(vertices: Floats, polygons: Ints, names: Ints) -> Ints:
         open_ones = open_ones[backwards]
         if not len(open_ones):
             return result
-    raise SurfaceError(
+    raise MeshError(
         f"{len(open_ones)} faces with {polygons.shape[1]} corners are not convex, the first is "
         f"face {names[open_ones[0]]} (counted from 0); export the mesh as triangles"
     )
@@ -190,21 +193,21 @@ class Lines:
         """The words of the next line.
 
         Raises:
-            SurfaceError: the file ends; `expected` says before what.
+            MeshError: the file ends; `expected` says before what.
         """
         for words in self:
             return words
-        raise SurfaceError(f"ends after line {self.number}, before {expected}; it was cut short")
+        raise MeshError(f"ends after line {self.number}, before {expected}; it was cut short")
 
-    def error(self, fault: str) -> SurfaceError:
+    def error(self, fault: str) -> MeshError:
         """What is wrong with the line read last."""
-        return SurfaceError(f"line {self.number} {fault}")
+        return MeshError(f"line {self.number} {fault}")
 
     def floats(self, words: list[bytes]) -> list[float]:
         """Numbers; NaN and infinities are let through, for what uses them to judge.
 
         Raises:
-            SurfaceError: a word is not a number.
+            MeshError: a word is not a number.
         """
         try:
             values = [float(word) for word in words]
@@ -218,7 +221,7 @@ class Lines:
         """A whole number of at most 18 digits.
 
         Raises:
-            SurfaceError: the word is something else.
+            MeshError: the word is something else.
         """
         if len(word) <= 19 and word.removeprefix(b"-").isdigit():
             value = int(word)

@@ -12,7 +12,7 @@ from collections import defaultdict
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from coverable_errors import CoverableError
+from coverable_meshes.errors import MeshError
 
 MOST_CORNERS = 3_000_000  # of triangles, each instance counted
 MOST_PARTS = 10_000  # primitives, each instance counted
@@ -21,10 +21,6 @@ MOST_REFERENCES = 200  # nodes by reference; the file is searched anew for each
 DEEPEST = 64  # elements, and instances, inside each other
 _PRIMITIVES = ("triangles", "polylist", "polygons", "trifans", "tristrips")
 _MESH = ["library_geometries", "geometry", "mesh"]  # what they lie in, below the root
-
-
-class MeshError(CoverableError):
-    """A mesh file that cannot be drawn, and why."""
 
 
 @dataclass(slots=True)
@@ -61,7 +57,7 @@ class _Node:
 
 
 def check_collada(data: bytes) -> None:
-    """Refuse a file that is no plain XML, or whose instances are more than can be drawn.
+    """Refuse a file that is no plain XML, or whose instances are too many.
 
     Raises:
         MeshError: what it is instead, or of what there is too much.

@@ -20,9 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from surfaces.meshes.files.raw_mesh import RawMesh, joined, no_triangles, refuse_large
-from surfaces.meshes.triangle_mesh import Floats
-from surfaces.surface import SurfaceError
+from coverable_meshes.errors import MeshError
+from coverable_meshes.raw_mesh import Floats, RawMesh, joined, no_triangles, refuse_large
 
 LARGEST_JSON = 8 << 20  # bytes; numbers lie in the other chunk
 MOST_PARTS = 10_000
@@ -75,7 +74,7 @@ def read_glb(stream: BinaryIO, size: int) -> RawMesh:
     """Read a GLB of `size` bytes: the triangles of its scene, placed as its nodes say.
 
     Raises:
-        SurfaceError: not a GLB, damaged, too large, or with what we do not read.
+        MeshError: not a GLB, damaged, too large, or with what we do not read.
     """
     scene, data = _scene(stream, size)
     parts, others = _parts(scene, data)
@@ -99,7 +98,7 @@ def _scene(stream: BinaryIO, size: int) -> tuple[Json, bytes]:
     scene = _checked(content)
     for name in scene.get("extensionsRequired", []):
         if not name.startswith(_HARMLESS):
-            raise SurfaceError(
+            raise MeshError(
                 f"needs the glTF extension {name!r}, which is not read; export it without "
                 "compression and extensions"
             )
@@ -113,14 +112,14 @@ def _parts(scene: Json, data: bytes) -> tuple[list[GlbPart], int]:
     for placed in _placed_primitives(scene):
         # A small file can show one mesh many times, so all is counted before it is made.
         if len(parts) + others >= MOST_PARTS:
-            raise SurfaceError(f"has more than {MOST_PARTS} meshes; join them before exporting")
+            raise MeshError(f"has more than {MOST_PARTS} meshes; join them before exporting")
         mode = placed.primitive.get("mode", _TRIANGLES)
         if mode < _TRIANGLES:
             others += 1
             continue
         attributes, where = placed.primitive.get("attributes", {}), placed.where
         if "POSITION" not in attributes:
-            raise SurfaceError(f"{where} has no 'POSITION'")
+            raise MeshError(f"{where} has no 'POSITION'")
         position = _item(scene, "accessors", attributes["POSITION"], where)
         listed = placed.primitive.get("indices", attributes["POSITION"])
         corners = _item(scene, "accessors", listed, where).get("count", 0)
@@ -139,7 +138,7 @@ def _rgba(scene: Json, placed: _Placed) -> tuple[float, ...] | None:
         material = scene["materials"][placed.primitive["material"]]
         factors = material.get("pbrMetallicRoughness", {}).get("baseColorFactor", [1.0] * 4)
         rgba = tuple(_checked(factors, [float] * 4))
-    except (KeyError, IndexError, TypeError, AttributeError, SurfaceError):
+    except (KeyError, IndexError, TypeError, AttributeError, MeshError):
         return None
     return tuple(min(max(part, 0.0), 1.0) for part in rgba)
 
@@ -148,35 +147,33 @@ def _chunks(stream: BinaryIO, size: int) -> tuple[Any, bytes]:
     """The scene as decoded JSON, and the bytes of the numbers."""
     head = stream.read(20)
     if len(head) < 20:
-        raise SurfaceError(f"is {size} bytes long, too short for a GLB; it was cut short")
+        raise MeshError(f"is {size} bytes long, too short for a GLB; it was cut short")
     magic, version, length, json_length, kind = struct.unpack("<4sIIII", head)
     if magic != b"glTF" or version != 2:
-        raise SurfaceError(f"is no GLB of version 2 (it starts with {magic!r}, {version})")
+        raise MeshError(f"is no GLB of version 2 (it starts with {magic!r}, {version})")
     if length != size:
-        raise SurfaceError(
+        raise MeshError(
             f"has {size:,} bytes, but its header gives {length:,}; it is damaged or cut short"
         )
     if kind != _JSON or json_length > size - 20:
-        raise SurfaceError("does not start with its scene (a JSON chunk); it is damaged")
+        raise MeshError("does not start with its scene (a JSON chunk); it is damaged")
     if json_length > LARGEST_JSON:
-        raise SurfaceError(
+        raise MeshError(
             f"describes its scene in {json_length:,} bytes, where {LARGEST_JSON:,} are read; "
             "export it with fewer parts"
         )
     try:
         content = json.loads(stream.read(json_length).decode("utf-8"))
     except RecursionError as error:
-        raise SurfaceError(
-            "describes its scene in no valid JSON: it is nested too deeply"
-        ) from error
+        raise MeshError("describes its scene in no valid JSON: it is nested too deeply") from error
     except ValueError as error:  # UnicodeDecodeError is one
-        raise SurfaceError(f"describes its scene in no valid JSON: {error}"[:200]) from error
+        raise MeshError(f"describes its scene in no valid JSON: {error}"[:200]) from error
     head = stream.read(8)
     if not head:
         return content, b""
     data_length, kind = struct.unpack("<II", head.ljust(8, b"\0"))
     if kind != _BIN or data_length > size - 28 - json_length:
-        raise SurfaceError("has no complete chunk of numbers (BIN) after its scene; it is damaged")
+        raise MeshError("has no complete chunk of numbers (BIN) after its scene; it is damaged")
     return content, stream.read(data_length)
 
 
@@ -192,7 +189,7 @@ def _checked(value: Any, schema: Any = _SCENE, where: str = "") -> Any:
         if isinstance(value, list) and len(schema) in (1, len(value)):
             if len(value) <= MOST_ENTRIES:
                 return [_checked(item, schema[0], f"{where}[{k}]") for k, item in enumerate(value)]
-            raise SurfaceError(
+            raise MeshError(
                 f"lists {len(value)} {where}, more than {MOST_ENTRIES}; join its parts before "
                 "exporting"
             )
@@ -204,7 +201,7 @@ def _checked(value: Any, schema: Any = _SCENE, where: str = "") -> Any:
     elif schema in (str, bool) and not isinstance(value, schema):
         fault = "a text" if schema is str else "a truth value"
     if fault:
-        raise SurfaceError(f"{where or 'its scene'} must be {fault}")
+        raise MeshError(f"{where or 'its scene'} must be {fault}")
     return value
 
 
@@ -212,7 +209,7 @@ def _item(scene: Json, key: str, k: int | None, owner: str) -> Json:
     """Entry k of a list of the scene, which `owner` names; refuses one that is not there."""
     entries = scene.get(key, [])
     if k is None or k >= len(entries):
-        raise SurfaceError(f"{owner} names {key}[{k}], of {len(entries)}; the file is damaged")
+        raise MeshError(f"{owner} names {key}[{k}], of {len(entries)}; the file is damaged")
     return entries[k]
 
 
@@ -222,7 +219,7 @@ def _placed_primitives(scene: Json) -> Iterator[_Placed]:
     Without a scene, all nodes are shown; without nodes, all meshes as they are.
 
     Raises:
-        SurfaceError: nodes that form no tree, are damaged, or bend their mesh with a skeleton.
+        MeshError: nodes that form no tree, are damaged, or bend their mesh with a skeleton.
     """
     nodes = scene.get("nodes") or [{"mesh": k} for k in range(len(scene.get("meshes", [])))]
     if scene.get("nodes") and scene.get("scenes"):
@@ -237,14 +234,14 @@ def _placed_primitives(scene: Json) -> Iterator[_Placed]:
         where = f"nodes[{k}]"
         node = _item({"nodes": nodes}, "nodes", k, owner)
         if k in seen:
-            raise SurfaceError(f"{where} is reached twice; the nodes of a scene must form a tree")
+            raise MeshError(f"{where} is reached twice; the nodes of a scene must form a tree")
         seen.add(k)
         matrix = above @ _matrix(node, where)
         if not np.isfinite(matrix).all() or np.abs(matrix).max() > 1e12:
-            raise SurfaceError(f"{where} is moved or scaled beyond 1e12")
+            raise MeshError(f"{where} is moved or scaled beyond 1e12")
         if "mesh" in node:
             if "skin" in node:
-                raise SurfaceError(
+                raise MeshError(
                     f"{where} bends its mesh with a skeleton (skin); export the shape itself"
                 )
             mesh = _item(scene, "meshes", node["mesh"], where)
@@ -259,11 +256,11 @@ def _matrix(node: Json, where: str) -> Floats:
     if "matrix" in node:
         matrix = np.array(node["matrix"], float).reshape(4, 4).T  # written column by column
         if not np.array_equal(matrix[3], [0.0, 0.0, 0.0, 1.0]):
-            raise SurfaceError(f"{where} has a 'matrix' whose last row is not 0 0 0 1")
+            raise MeshError(f"{where} has a 'matrix' whose last row is not 0 0 0 1")
         return matrix
     quaternion = node.get("rotation", [0.0, 0.0, 0.0, 1.0])
     if not 0.98 < sum(part * part for part in quaternion) < 1.02:
-        raise SurfaceError(f"{where} has a 'rotation' that is no unit quaternion")
+        raise MeshError(f"{where} has a 'rotation' that is no unit quaternion")
     matrix = np.eye(4)
     if "rotation" in node:
         matrix[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
@@ -279,15 +276,13 @@ def _primitive(scene: Json, data: bytes, placed: _Placed, mode: int) -> RawMesh:
     if "indices" in primitive:
         indices = _numbers(scene, data, primitive["indices"], "SCALAR")
         if indices.dtype.kind != "u":
-            raise SurfaceError(f"{placed.where} has indices that are not whole numbers >= 0")
+            raise MeshError(f"{placed.where} has indices that are not whole numbers >= 0")
         order = indices[:, 0].astype(np.int64)
     else:
         order = np.arange(len(points), dtype=np.int64)
     if mode == _TRIANGLES:
         if len(order) % 3:
-            raise SurfaceError(
-                f"{placed.where} has {len(order)} corners, which is no multiple of 3"
-            )
+            raise MeshError(f"{placed.where} has {len(order)} corners, which is no multiple of 3")
         faces = order.reshape(-1, 3)
     elif mode in (_STRIP, _FAN):
         k = np.arange(max(len(order) - 2, 0))
@@ -296,7 +291,7 @@ def _primitive(scene: Json, data: bytes, placed: _Placed, mode: int) -> RawMesh:
         # A strip repeats corners to jump; such steps are no faces.
         faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     else:
-        raise SurfaceError(f"{placed.where}.mode must be in 0 .. {_FAN}, got {mode}")
+        raise MeshError(f"{placed.where}.mode must be in 0 .. {_FAN}, got {mode}")
     notes = ("shapes that the mesh could be morphed into were left out",)
     with np.errstate(all="ignore"):  # numbers that are not finite are refused later
         points = points.astype(float) @ matrix[:, :3].T + matrix[:, 3]
@@ -310,16 +305,16 @@ def _numbers(scene: Json, data: bytes, k: int, kind: str) -> NDArray[Any]:
     accessor, where = scene["accessors"][k], f"accessors[{k}]"
     width = {"SCALAR": 1, "VEC3": 3}[kind]
     if accessor.get("type") != kind:
-        raise SurfaceError(f"{where} must be of type {kind}")
+        raise MeshError(f"{where} must be of type {kind}")
     if "sparse" in accessor:
-        raise SurfaceError(f"{where} is sparse, which is not read; export it without")
+        raise MeshError(f"{where} is sparse, which is not read; export it without")
     if accessor.get("componentType") not in _TYPES:
-        raise SurfaceError(f"{where} has no component type of glTF")
+        raise MeshError(f"{where} has no component type of glTF")
     number = np.dtype(_TYPES[accessor["componentType"]])
     view = _item(scene, "bufferViews", accessor.get("bufferView"), where)
     buffer = view.get("buffer", 0)
     if "uri" in _item(scene, "buffers", buffer, where) or buffer != 0:
-        raise SurfaceError(
+        raise MeshError(
             f"buffers[{buffer}] lies outside the file; export it as one .glb that holds everything"
         )
     count, row = accessor.get("count", 0), width * number.itemsize
@@ -328,7 +323,7 @@ def _numbers(scene: Json, data: bytes, k: int, kind: str) -> NDArray[Any]:
     needed = offset + (count - 1) * stride + row if count else 0
     length = view.get("byteLength", 0)
     if needed > length or start + length > len(data) or not row <= stride <= 252:
-        raise SurfaceError(
+        raise MeshError(
             f"{where} needs {needed} bytes in steps of {stride}, where its view has {length} at "
             f"{start} of {len(data)}; the file is damaged"
         )
