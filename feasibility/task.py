@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import Checks
+from feasibility.collisions import Collision
 from feasibility.cone import chord_of
 from surfaces import Cells
 
@@ -27,7 +28,7 @@ class Targets(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """Hold the tool point at a standoff from the surface, and the tool axis within a cone.
+    """Hold the tool point at a standoff from the surface, the axis within a cone, the arm clear.
 
     Example:
         >>> task = Task(standoff=0.005, cone_deg=45)
@@ -49,6 +50,8 @@ class Task:
     """How far the tool point may deviate from its target surface, metres. None leaves it to the
     method: `DEFAULT_TOLERANCE` for the complete search, step times reach for the greedy one; the
     verdict states what was used."""
+    collision: Collision | None = None
+    """What the arm has to stay clear of; None where collisions are not checked."""
 
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task; keep them as plain floats."""
@@ -64,6 +67,9 @@ class Task:
             if self.tolerance is None
             else checks.positive("tolerance", self.tolerance),
         }
+        if not isinstance(self.collision, Collision | None):
+            expected = "must be a Collision, such as Collision(clearance=0.005), or None"
+            checks.wrong("collision", self.collision, expected)
         checks.done()
         for name, value in kept.items():
             object.__setattr__(self, name, value)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.task import Task
 from robots import Robot
@@ -107,9 +108,6 @@ class Replay:
         return not self.accepted and math.isfinite(self.certificate.max_position_error)
 
 
-UNCHECKED = "collisions are not checked"
-"""What every answer, page and trajectory says."""
-
 DEFERRED = ("graph", "causes", "tree")
 
 
@@ -200,9 +198,10 @@ class Verdict:
     def __repr__(self) -> str:
         """The verdict in one line."""
         pairs = len(self.cells.pairs)
+        said = checked_words(self.task.collision).capitalize()
         return (
             f"{self.answer} ({self.evidence}): {self.n_covered} of {len(self.cells)} cells, "
-            f"{self.n_edges} of {pairs} edges. {self.message} {UNCHECKED.capitalize()}."
+            f"{self.n_edges} of {pairs} edges. {self.message} {said}."
         )
 
 

@@ -20,12 +20,13 @@ from feasibility.certification import (
     replay_over_surface,
     verify_proof,
 )
+from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.problem import Problem
 from feasibility.results import Result
 from feasibility.search import Search
 from feasibility.task import Task
-from feasibility.verdict import UNCHECKED, Answer, Certificate, Evidence, Verdict, Walk
+from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
@@ -70,7 +71,8 @@ class Verification:
         """One line."""
         what = f"{len(self.cells)} cells by {self.robot.name}"
         said = f"{self.claim} {'holds' if self.holds else 'does not hold'}: {what}."
-        return " ".join(filter(None, [said, self.refusal, f"{UNCHECKED.capitalize()}."]))
+        checked = f"{checked_words(self.task.collision).capitalize()}."
+        return " ".join(filter(None, [said, self.refusal, checked]))
 
 
 @overload

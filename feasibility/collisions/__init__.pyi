@@ -6,3 +6,8 @@ from .scene import HalfSpace as HalfSpace
 from .scene import Obstacle as Obstacle
 from .scene import ToolShape as ToolShape
 from .settings import Collision as Collision
+from .words import CHECKABLE as CHECKABLE
+from .words import UNCHECKED as UNCHECKED
+from .words import checked as checked
+from .words import checked_words as checked_words
+from .words import listed_words as listed_words

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from feasibility.collisions.scene import Obstacle, ToolShape
+if TYPE_CHECKING:
+    from feasibility.collisions.scene import Obstacle, ToolShape
 
 Fineness = Literal["hulls", "pieces", "meshes"]
 
@@ -37,3 +38,9 @@ class Collision:
     """m, of the sheet, away from the working side."""
     scene: tuple[Obstacle, ...] = ()
     tool: tuple[ToolShape, ...] = ()
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """What is asked for: some of 'self', 'surface' and 'scene'."""
+        asked = {"self": self.self_, "surface": self.surface, "scene": bool(self.scene)}
+        return tuple(name for name, wanted in asked.items() if wanted)

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
-from feasibility.verdict import UNCHECKED, Cause, Certificate, Walk
+from feasibility.verdict import Cause, Certificate, Walk
 from robots import Robot
 from surfaces import Cells
 
@@ -155,5 +156,5 @@ class Division(ReadOnlyArrays):
         number = len(self.patches)
         return (
             f"{number} patch{'' if number == 1 else 'es'}, {self.n_covered} of {len(self.cells)} "
-            f"cells. {self.message} {UNCHECKED.capitalize()}."
+            f"cells. {self.message} {checked_words(self.task.collision).capitalize()}."
         )

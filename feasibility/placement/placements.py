@@ -25,6 +25,7 @@ from typing import Any
 import numpy as np
 
 from feasibility.clock import Clock
+from feasibility.collisions import checked_words
 from feasibility.notices import compiling_notice
 from feasibility.placement.evaluator import LocalEvaluator, Stage, Trial
 from feasibility.placement.reach_bound import Beyond, Reach
@@ -34,7 +35,7 @@ from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
 from feasibility.target_curves import blocked_curves
 from feasibility.task import Task
-from feasibility.verdict import UNCHECKED, Answer, CauseKind, Evidence
+from feasibility.verdict import Answer, CauseKind, Evidence
 from robots import Robot
 from surfaces import Cells
 
@@ -95,7 +96,7 @@ class Placements:
     def __repr__(self) -> str:
         """One line."""
         said = f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
-        return f"{said} {UNCHECKED.capitalize()}."
+        return f"{said} {checked_words(self.task.collision).capitalize()}."
 
 
 def place(

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
+from feasibility.collisions import UNCHECKED
 from feasibility.reports.parts import COLOURS, MARGINS, aligned, csv_text, page, percent, table
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies import Arm, Comparison
-from feasibility.verdict import UNCHECKED
 from feasibility.version import version
 
 Column = tuple[str, Callable[[Arm], str]]
@@ -113,7 +113,7 @@ def as_html(comparison: Comparison) -> str:
     lines = [[html.escape(text(arm)) for _, text in heads] for arm in comparison.ranked]
     body = f"<p>{html.escape(headline(comparison))}.</p>\n{chart(comparison)}\n"
     body += table((html.escape(name) for name, _ in heads), lines)
-    return page(f"Robots compared: {comparison.case}", body, NOTE)
+    return page(f"Robots compared: {comparison.case}", body, NOTE, None)
 
 
 def chart(comparison: Comparison) -> str:

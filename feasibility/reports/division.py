@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from feasibility.collisions import checked
 from feasibility.cut_words import lines as proof_lines
 from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatch
 from feasibility.reports.parts import (
@@ -64,7 +65,7 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         "connected": None if connected is fewest else _plan_json(connected, division),
         "left_out": causes_json(division.left_out, cells),
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
-        "collisions": [],
+        "collisions": checked(division.task.collision),
         "message": division.message,
         "timing": seconds(division.timing, PHASES, before_s),
         "robot": division.robot.name,
@@ -136,7 +137,7 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
         ("found", division.message),
         ("time", seconds_text(division.timing, PHASES, before_s)),
     ]
-    lines = summary(head, rows)
+    lines = summary(head, rows, division.task.collision)
     if division.patches:
         lines += ["", "In this order:", *_steps(division.fewest, division)]
     if division.connected is not division.fewest:

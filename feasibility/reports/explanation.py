@@ -8,6 +8,7 @@ import re
 import shlex
 from typing import TYPE_CHECKING, Any
 
+from feasibility.collisions import checked, checked_words
 from feasibility.reports.changes import key, settings, worded
 from feasibility.reports.explanation_words import (
     SEEDED,
@@ -23,7 +24,7 @@ from feasibility.reports.explanation_words import (
 )
 from feasibility.reports.parts import aligned, csv_text, filled, page, table
 from feasibility.sensitivity import Change, Dropped, Explanation, Finding, Quantity, Threshold
-from feasibility.verdict import UNCHECKED, Answer, Verdict, Walk
+from feasibility.verdict import Answer, Verdict, Walk
 from feasibility.version import version
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def as_text(explanation: Explanation, case_name: str, case: Case | None = None) 
     verdict = explanation.verdict
     lines = [filled("", f"{case_name}: {headline(explanation)}")]
     if len(verdict.cells) == 0:
-        return "\n".join([*lines, f"  {UNCHECKED}"])
+        return "\n".join([*lines, f"  {checked_words(verdict.task.collision)}"])
     command = to_try(explanation, case_name, case)
     lines += [f"  try  {command}"] if command else []
     lines += ["", *(filled("  ", text) for text in _findings(explanation))]
@@ -57,7 +58,7 @@ def as_text(explanation: Explanation, case_name: str, case: Case | None = None) 
     if joints:
         lines += ["", *_table([(*JOINTS[:2], f"used by {what}"), *joints])]
     lines += [filled("  ", text) for text in _remarks(explanation)]
-    return "\n".join([*lines, "", f"  {UNCHECKED}"])
+    return "\n".join([*lines, "", f"  {checked_words(verdict.task.collision)}"])
 
 
 def as_html(explanation: Explanation, case_name: str, view: View, case: Case | None = None) -> str:
@@ -78,7 +79,9 @@ def as_html(explanation: Explanation, case_name: str, view: View, case: Case | N
     inner = html.escape(view.html(), quote=True)
     frame = f'<iframe srcdoc="{inner}" title="the case as given"></iframe>'
     body = f'<div class="beside">{frame}<div>{"".join(parts)}</div></div>\n'
-    return page(f"{case_name}: {headline(explanation)}", body, "")
+    return page(
+        f"{case_name}: {headline(explanation)}", body, "", explanation.verdict.task.collision
+    )
 
 
 def to_try(explanation: Explanation, case_name: str, case: Case | None = None) -> str:
@@ -229,7 +232,7 @@ def as_json(explanation: Explanation, case_name: str, case: Case | None = None) 
             "share": dropped.share,
             "waypoints": dropped.waypoints,
         },
-        "collisions": [],
+        "collisions": checked(verdict.task.collision),
         "evaluations": explanation.evaluations,
         "seconds": round(explanation.seconds, 6),
         "robot": verdict.robot.name,

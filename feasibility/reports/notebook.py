@@ -6,9 +6,10 @@ import base64
 import html
 from collections import Counter
 
+from feasibility.collisions import checked_words
 from feasibility.reports.parts import counted, table
 from feasibility.reports.verdict import CAUSES, SENTENCES, rows_of
-from feasibility.verdict import UNCHECKED, Verdict
+from feasibility.verdict import Verdict
 from feasibility.viewer import view
 
 
@@ -33,7 +34,7 @@ def _page(verdict: Verdict, picture: str) -> str:
     for (kind, proved), number in causes.most_common():
         text = f"{counted(number, 'cell')}: {CAUSES[kind]}{', proved' if proved else ''}"
         rows.append(("not covered", html.escape(text)))
-    rows.append(("note", UNCHECKED))
+    rows.append(("note", html.escape(checked_words(verdict.task.collision))))
     body = table(("", html.escape(SENTENCES[verdict.answer])), rows)
     for cell in ("<th>", "<td>"):  # Jupyter's own style is for numbers
         body = body.replace(cell, f'{cell[:-1]} style="text-align: left">')

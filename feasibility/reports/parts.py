@@ -11,8 +11,9 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from feasibility.collisions import Collision, checked_words
 from feasibility.results import plain
-from feasibility.verdict import UNCHECKED, Cause, Certificate
+from feasibility.verdict import Cause, Certificate
 from feasibility.version import version
 from surfaces import Cells
 
@@ -43,12 +44,14 @@ def filled(head: str, text: str) -> str:
     return wrapped.replace(_UNBROKEN, " ")
 
 
-def summary(head: str, rows: Iterable[tuple[str, str]], width: int = 12) -> list[str]:
+def summary(
+    head: str, rows: Iterable[tuple[str, str]], collision: Collision | None, width: int = 12
+) -> list[str]:
     """The answer in one line, an empty line, and named rows; rows without text are left out.
 
-    The last row says what is not checked.
+    The last row says whether collisions are checked.
     """
-    rows = [*rows, ("note", UNCHECKED)]
+    rows = [*rows, ("note", checked_words(collision))]
     return [head, "", *(filled(f"  {name:<{width}}", text) for name, text in rows if text)]
 
 
@@ -127,17 +130,18 @@ def seconds_text(timing: Mapping[str, float], phases: Mapping[str, str], before_
     return f"{times['total_s']:.2f} s (loading {times['load_s']:.2f}, {parts})"
 
 
-def page(title: str, body: str, note: str) -> str:
+def page(title: str, body: str, note: str, collision: Collision | None) -> str:
     """One page that fetches nothing.
 
     Args:
         title: plain text.
         body: HTML.
         note: plain text at the end; the program's version follows.
+        collision: what was checked.
     """
     return _PAGE.format(
         title=html.escape(title),
-        unchecked=UNCHECKED,
+        unchecked=html.escape(checked_words(collision)),
         body=body,
         note=html.escape(f"{note} coverable {version()}"),
     )

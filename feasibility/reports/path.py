@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from feasibility.collisions import checked
 from feasibility.paths import CoveragePath, PathFigures
 from feasibility.reports.parts import certificate_json, counted, summary
 from feasibility.reports.verdict import as_json as verdict_json
@@ -57,7 +58,7 @@ def as_json(
         },
         "certificate": certificate_json(path.certificate),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
-        "collisions": [],
+        "collisions": checked(path.task.collision),
         "robot": path.robot.name,
         "version": version(),
     }
@@ -155,7 +156,7 @@ def as_text(
             ("limits", _limits_text(path.robot, trajectory, limits)),
         ]
     head = f"path: one continuous motion over {counted(count, 'cell')}."
-    return "\n".join(summary(head, rows, 14))
+    return "\n".join(summary(head, rows, path.task.collision, 14))
 
 
 def _length_text(figures: PathFigures) -> str:

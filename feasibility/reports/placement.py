@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from feasibility.collisions import checked
 from feasibility.placement import (
     AXES,
     Array,
@@ -55,7 +56,7 @@ def as_json(
         "placements": [_found_json(trial) for trial in placements.found],
         "best": None if best is None else _found_json(best),
         "share": placements.share if _searched(best) else None,
-        "collisions": [],
+        "collisions": checked(placements.task.collision),
         "cause": None if placements.cause is None else str(placements.cause),
         "causes": dict(placements.causes),
         "stations": None if plan is None else _stations_json(plan),
@@ -143,7 +144,9 @@ def as_text(placements: Placements, case: str = "", plan: StationPlan | None = N
         ("check", "" if placements.found or not checked else f"of the best: {checked}"),
         ("time", _time_text(placements)),
     ]
-    lines = summary(PROVED if proved else SENTENCES[placements.answer], rows, 10)
+    lines = summary(
+        PROVED if proved else SENTENCES[placements.answer], rows, placements.task.collision, 10
+    )
     if placements.found:
         lines += ["", *_table(placements.found)]
         put = " ".join(f"--set '{setting}'" for setting in settings_of(placements.found[0].pose))

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from feasibility.collisions import UNCHECKED
 from feasibility.reports.parts import (
     COLOURS,
     MARGINS,
@@ -20,7 +21,6 @@ from feasibility.reports.parts import (
 )
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
 from feasibility.studies import Row, Study, merit
-from feasibility.verdict import UNCHECKED
 from feasibility.version import version
 
 if TYPE_CHECKING:
@@ -126,7 +126,7 @@ def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str
     if poses is not None:
         inner = html.escape(poses.html(), quote=True)
         parts.append(f'<h2>Poses</h2>\n<iframe srcdoc="{inner}" loading="lazy"></iframe>\n')
-    return page(f"Study: {study.name}", "".join(parts), NOTE)
+    return page(f"Study: {study.name}", "".join(parts), NOTE, None)
 
 
 def _verdict_bar(rows: Sequence[Row]) -> str:

@@ -46,4 +46,4 @@ def as_json(case: Case, text: str, seconds: float) -> dict[str, Any]:
 def as_text(case: Case, text: str) -> str:
     """For people."""
     rows = [("case", f"{case.name}  {case.description}".rstrip()), ("found", text), ("hint", MORE)]
-    return "\n".join(summary(HEAD, rows))
+    return "\n".join(summary(HEAD, rows, None))

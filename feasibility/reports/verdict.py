@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from feasibility.cases import OWN_KEYS, Case
+from feasibility.collisions import checked
 from feasibility.cut_words import lines as proof_lines
 from feasibility.paper import tree_walk
 from feasibility.reports.parts import (
@@ -67,7 +68,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "edges": verdict.n_edges,
         "uncovered": causes_json(verdict.causes, verdict.cells),
         "certificate": _certificate(verdict),
-        "collisions": [],
+        "collisions": checked(verdict.task.collision),
         "proof": None
         if verdict.proof is None
         else proof_json(verdict.proof, verdict.robot, verdict.cells),
@@ -118,7 +119,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     """The verdict for people: the answer first, its evidence, why cells are missed."""
     title = ("case", f"{case.name}  {case.description}".rstrip())
     if not len(verdict.cells):
-        return "\n".join(summary(EMPTY, [title]))
+        return "\n".join(summary(EMPTY, [title], verdict.task.collision))
     head = SENTENCES[verdict.answer]
     if verdict.answer is Answer.INFEASIBLE and verdict.method == "greedy":
         head = GREEDY_NO
@@ -131,7 +132,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("certificate", _certificate_text(verdict)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),
     ]
-    lines = summary(head, rows)
+    lines = summary(head, rows, verdict.task.collision)
     if verdict.proof is not None and verdict.proof.n_cuts > 1:
         lines += ["", "Why no single motion covers every cell:"]
         lines += [f"  {line}" for line in proof_lines(verdict.proof, verdict.robot, verdict.cells)]

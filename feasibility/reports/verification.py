@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from feasibility.collisions import checked
 from feasibility.reports.parts import certificate_json, counted, summary
 from feasibility.reports.proof import proof_json
 from feasibility.results import plain
@@ -57,7 +58,7 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
         "certificate": certificate,
         "proof": None if found.proof is None else proof_json(found.proof, found.robot, found.cells),
         "boxes": found.boxes if found.proof is not None else None,
-        "collisions": [],
+        "collisions": checked(found.task.collision),
         "notes": list(notes),
         "robot": found.robot.name,
         "version": version(),
@@ -95,7 +96,8 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
         boxes = "1 box" if found.boxes == 1 else f"{found.boxes:,} boxes"
         rows.append(("checked", f"{boxes} of joints and surface"))
     rows += [("note", note) for note in notes]
-    return "\n".join(summary(f"{head}: {WORDS[found.claim][not found.holds]}.", rows))
+    said = f"{head}: {WORDS[found.claim][not found.holds]}."
+    return "\n".join(summary(said, rows, found.task.collision))
 
 
 def _measured(found: Verification) -> str:

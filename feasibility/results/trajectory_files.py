@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, Checks, CoverableError, Fault
+from feasibility.collisions import CHECKABLE, listed_words
 from feasibility.safe_files import FileError, read_regular, shown_path, write_whole
 from feasibility.timing import Trajectory
-from feasibility.verdict import UNCHECKED
 
 MOST_SAMPLES = 1_000_000
 MOST_JOINTS = 64
@@ -90,7 +90,7 @@ def _of_ending(path: str | os.PathLike[str], known: dict[str, Any]) -> Any:
 def as_csv(trajectory: Trajectory) -> str:
     """One row a sample: time (s), joints, their velocities and accelerations, tool speed, cell."""
     text = io.StringIO()
-    text.write(f"{COMMENT} {UNCHECKED}\n")
+    text.write(f"{COMMENT} {listed_words(trajectory.collisions)}\n")
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_columns(trajectory.joint_names))
     table = np.column_stack(
@@ -159,7 +159,7 @@ def from_csv(text: str) -> Trajectory:
 def as_json_text(trajectory: Trajectory) -> str:
     """One object; times in seconds, radians or metres; cell is null between centres."""
     cells = [None if cell < 0 else cell for cell in trajectory.cell.tolist()]
-    record: dict[str, Any] = {"format": FORMAT, "collisions": []}
+    record: dict[str, Any] = {"format": FORMAT, "collisions": list(trajectory.collisions)}
     record["joint_names"] = list(trajectory.joint_names)
     record |= {key: getattr(trajectory, name).tolist() for key, name in ARRAYS.items()}
     return json.dumps({**record, "cell": cells}, allow_nan=False) + "\n"
@@ -201,9 +201,12 @@ def from_json_text(text: str) -> Trajectory:
     if not isinstance(cells, list) or len(cells) != k or not all(map(_is_cell, cells)):
         expected = f"must be a list of {k} whole numbers >= 0, or null between centres"
         checks.wrong("cell", cells, expected)
+    collisions = record.get("collisions", [])
+    if not isinstance(collisions, list) or not all(name in CHECKABLE for name in collisions):
+        checks.wrong("collisions", collisions, f"must be a list of some of {', '.join(CHECKABLE)}")
     checks.done()
     at = np.array([-1 if cell is None else cell for cell in cells], dtype=np.int64)
-    return Trajectory(joint_names=tuple(joints), **arrays, cell=at)
+    return Trajectory(joint_names=tuple(joints), **arrays, cell=at, collisions=tuple(collisions))
 
 
 def _array(checks: Checks, key: str, value: object, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -233,7 +236,7 @@ def as_yaml(trajectory: Trajectory) -> str:
     Tool speed and cells, which the message has no fields for, stand there as comments.
     """
     lines = ["# trajectory_msgs/JointTrajectory, in radians, metres and seconds"]
-    lines += [f"# {UNCHECKED}"]
+    lines += [f"# {listed_words(trajectory.collisions)}"]
     lines += [
         f"joint_names: {json.dumps(list(trajectory.joint_names), ensure_ascii=False)}",
         "points:",

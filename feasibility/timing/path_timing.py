@@ -13,10 +13,13 @@ motion of straight lines, of quintics and of cubics.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from feasibility.certification import replay
+from feasibility.collisions import checked
 from feasibility.paths import CoveragePath, PathError
 from feasibility.timing.sampled_trajectory import (
     KINDS,
@@ -102,7 +105,7 @@ def trajectory(
             run = held_inside(robot, run)
         refusal = _refusal(path, run)
         if not refusal:
-            return run
+            return replace(run, collisions=tuple(checked(task.collision)))
         period *= 0.5
     raise PathError(f"the independent replay refuses the timed motion: {refusal}")
 

@@ -51,6 +51,8 @@ class Trajectory:
     """(k,) m/s."""
     cell: NDArray[np.int64]
     """(k,) flat index of the cell whose centre the tool point passes then; -1 in between."""
+    collisions: tuple[str, ...] = ()
+    """What the replay of the motion checked: some of self, surface and scene."""
 
     def __post_init__(self) -> None:
         """Copy, check and write-protect the arrays."""

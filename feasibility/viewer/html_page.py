@@ -16,7 +16,7 @@ from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
 
-from feasibility.verdict import UNCHECKED
+from feasibility.collisions import UNCHECKED
 from feasibility.viewer.threejs import Colour, Command, hex_colour, pack
 
 
@@ -38,6 +38,8 @@ class Legend:
     title: str
     text: str
     entries: tuple[Entry, ...]
+    checked: str = UNCHECKED
+    """What is said about collisions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +106,7 @@ def _legend(legend: Legend, readout: Readout | None) -> str:
     lines = [
         f"<summary>{title}</summary>",
         f"<p>{text}</p>",
-        f'<p class="unchecked">{UNCHECKED}</p>',
+        f'<p class="unchecked">{html.escape(legend.checked)}</p>',
     ]
     if readout is not None:
         lines.append(_player(readout))

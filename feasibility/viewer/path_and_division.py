@@ -73,7 +73,7 @@ def view_path(
     title = titled(f"feasible, one path over {counted(count)}", case)
     drawn = compose(
         robot, cells, title, text, [*cells_layers(cells), strokes], motion,
-        resting=path.walk.q[0], tracks=tracks,
+        resting=path.walk.q[0], tracks=tracks, collision=path.task.collision,
     )  # fmt: skip
     if trajectory is None or drawn.readout is None:
         return drawn
@@ -107,6 +107,7 @@ def view_division(division: Division, case: str | None = None) -> View:
     return compose(
         robot, cells, titled(title, case), text.rstrip("; "),
         parts, motion, resting=walks[0][0] if walks else robot_visuals.home(robot),
+        collision=division.task.collision,
     )  # fmt: skip
 
 

@@ -193,7 +193,7 @@ def _view(
     drawn = compose(
         setup.robot, cells, title, f"{setup.robot.name}: {text}",
         [*parts, *(layer for layer, _ in stations), *class_layers(lines, tried)], motion,
-        resting=robot_visuals.home(setup.robot), **playing,
+        resting=robot_visuals.home(setup.robot), collision=setup.task.collision, **playing,
     )  # fmt: skip
     points = [placed(lines, one.pose) for one in tried if one.kind is Class.FEASIBLE]
     full_size = [pose for _, pose in stations] or [one.pose for one in tried[:1]]

@@ -6,7 +6,6 @@ import io
 from collections.abc import Mapping
 from typing import Any, Protocol
 
-from feasibility.verdict import UNCHECKED
 from feasibility.viewer.figures import Plot, plain
 from feasibility.viewer.html_page import Legend
 
@@ -30,7 +29,7 @@ def plot_view(view: Drawn) -> Plot:
     axes = figure.add_subplot()
     axes.imshow(view.image(), interpolation="lanczos")
     axes.set_axis_off()
-    figure.suptitle(plain(f"{view.legend.title}\n{UNCHECKED}"), fontsize=11)
+    figure.suptitle(plain(f"{view.legend.title}\n{view.legend.checked}"), fontsize=11)
     shown = [entry for entry in view.legend.entries if entry.shown]
     handles = [Patch(color=entry.colour, label=plain(entry.label)) for entry in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from feasibility.collisions import Collision, checked_words
 from feasibility.cut_words import sentence
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
@@ -141,6 +142,7 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
         resting=_resting(verdict),
         play=play,
         at=at,
+        collision=verdict.task.collision,
     )
 
 
@@ -156,6 +158,7 @@ def compose(
     tracks: Sequence[dict[str, Any]] = (),
     play: bool = True,
     at: float = 0.0,
+    collision: Collision | None = None,
 ) -> View:
     """Put arm, ground and parts into one picture.
 
@@ -170,6 +173,7 @@ def compose(
         tracks: what else moves with it, see `threejs.track`.
         play: start the motion when the page opens.
         at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
+        collision: what was checked.
     """
     drawing = robot_visuals.draw(robot)
     commands = ground(robot, cells, drawing.lowest) + list(drawing.commands)
@@ -183,10 +187,11 @@ def compose(
         commands.append(animate(robot, motion, play=play, tracks=tracks))
         q = motion.at(np.array([start]))[0]
     commands += robot_visuals.pose(robot, q)
+    said = checked_words(collision)
     return View(
         robot=robot,
         commands=tuple(commands),
-        legend=Legend(title, " · ".join([text, *drawing.notes]), tuple(entries)),
+        legend=Legend(title, " · ".join([text, *drawing.notes]), tuple(entries), said),
         camera=camera_on(robot, cells, q, drawing.lowest),
         motion=motion,
         notes=drawing.notes,

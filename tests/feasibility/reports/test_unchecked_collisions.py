@@ -11,9 +11,9 @@ from path_cases import run_of
 from small_cases import TEXTS, small_case, small_verdict
 
 from feasibility.cli.main import main
+from feasibility.collisions import UNCHECKED
 from feasibility.results import load_motion
 from feasibility.results.trajectory_files import as_csv, as_json_text, from_csv, from_json_text
-from feasibility.verdict import UNCHECKED
 
 SMALL = ("--set", "surface.cells=[2,2]")
 PLACE = ("--x", "0", "0.1", "--count", "2", "--workers", "0")
