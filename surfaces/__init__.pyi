@@ -23,6 +23,8 @@ from .patches import sphere as sphere
 from .patches import torus as torus
 from .piecewise import Piecewise as Piecewise
 from .piecewise import piecewise as piecewise
+from .sheet import Sheet as Sheet
+from .sheet import sheet_of as sheet_of
 from .surface import Surface as Surface
 from .surface import SurfaceError as SurfaceError
 from .surface import rotation_from_rpy as rotation_from_rpy

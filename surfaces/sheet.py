@@ -2,22 +2,118 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import Checks
+from surfaces.meshes import MeshSurface
 from surfaces.protected import Protected
+from surfaces.surface import Surface, SurfaceError
+
+Array = NDArray[np.float64]
+
+DEVIATION = 2e-4  # [m]
+MOST_TRIANGLES = 32_768
+MOST_LAYERS = 64
+_CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+_HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Sheet(Protected):
-    """A two-sided sheet of triangles in the root frame, without thickness.
+    """A two-sided sheet of triangles in the root frame.
 
-    The whole surface is meant, margins outside the outermost cell centres included.
+    The whole surface is meant, margins outside the outermost cell centres included. Triangles of a
+    smooth surface need not meet at their edges: only their distance says something, and what stays
+    further than `deviation` from all of them does not touch the surface.
     """
 
     triangles: NDArray[np.float64]
     """(k, 3, 3) m, the corners of each triangle."""
     deviation: float
     """m, no point of the surface is further than this from a triangle."""
+
+
+def sheet_of(
+    surface: Surface,
+    deviation: float = DEVIATION,
+    most: int = MOST_TRIANGLES,
+    thickness: float = 0.0,
+) -> Sheet:
+    """The surface as triangles, with a certified deviation.
+
+    A mesh gives its own triangles. Any other surface is cut into parts (`Surface.parts`), on each
+    of which |f - (c + x_1 e_1 + x_2 e_2)| <= r_f for |x_i| <= 1: each part gives the two triangles
+    of its parallelogram, and the deviation is the largest r_f. Nothing is sampled.
+
+    With a thickness T the sheet is the slab of all points f + t b, 0 <= t <= T, with b the unit
+    normal away from the working side; of a mesh, the normals of its faces, so each face carries a
+    prism. It becomes layers at equal steps s = T / m of t. Of the place at t the nearest layer has
+    one at most s / 2 away, and with the model of the normal, |n - ...| <= r_n, the layer is within
+    r_f + T r_n of its parallelograms. So the inside of the slab is near a triangle too: no side
+    walls are needed, and a slab that folds over itself is held as well.
+
+    Args:
+        surface: any kind.
+        deviation: m > 0, the largest deviation wanted.
+        most: about how many triangles may be made of a smooth surface, or of the layers of any;
+            beyond, they are coarser and their deviation, as stated, is larger.
+        thickness: m >= 0, of the sheet, away from the working side.
+
+    Raises:
+        ArgumentError: a number is not what it must be.
+        SurfaceError: no bounds on the surface are known, so that nothing can be certified.
+
+    Example:
+        >>> from surfaces import plane
+        >>> sheet = sheet_of(plane((0.0, 0.6), (0.0, 0.4)))
+        >>> sheet.triangles.shape, sheet.deviation < 1e-9
+        ((2, 3, 3), True)
+    """
+    checks = Checks("a sheet")
+    wanted = checks.positive("deviation", deviation)
+    checks.whole("most", most, 2)
+    depth = checks.number("thickness", thickness, "must be a finite number >= 0 (metres)", 0.0)
+    checks.done()
+    steps = min(math.ceil(depth / (2.0 * wanted)), MOST_LAYERS)
+    if isinstance(surface, MeshSurface):
+        steps = min(steps, max(1, most // len(surface.mesh.faces) - 1)) if depth else 0
+        triangles, normals, off = _of_mesh(surface)
+    else:
+        triangles, normals, off = _of_parts(surface, wanted, depth, most // (steps + 1))
+    away = -surface.side_sign * normals
+    layers = [triangles + t * away for t in np.linspace(0.0, depth, steps + 1)]
+    between = depth / (2.0 * steps) if steps else 0.0
+    return Sheet(np.concatenate(layers), off + between)
+
+
+def _of_mesh(surface: MeshSurface) -> tuple[Array, Array, float]:
+    """The triangles of a mesh, their outward normals at each corner, and no deviation."""
+    mesh = surface.mesh
+    corners = mesh.vertices[mesh.faces] @ surface.rotation.T + surface.position
+    normals = mesh.face_normals @ surface.rotation.T
+    return corners, np.repeat(normals[:, None], 3, axis=1), 0.0
+
+
+def _of_parts(
+    surface: Surface, deviation: float, depth: float, most: int
+) -> tuple[Array, Array, float]:
+    """The triangles of a smooth surface, the normals at their corners by the models, and
+    r_f + T r_n.
+    """
+    straight = deviation / depth if depth else math.inf
+    parts = surface.parts(deviation, straight, most)
+    finest = parts.children[:, 0] < 0
+    off = float((parts.radius[finest] @ np.array([1.0, depth])).max())
+    if not math.isfinite(off):
+        raise SurfaceError(
+            "no bounds are known on a part of this surface, so nothing can be certified to stay "
+            "clear of it; leave collisions with it out",
+            surface.kind,
+        )
+    corners = parts.centre[finest, None] + _CORNERS @ parts.slopes[finest]
+    halves = corners[:, _HALVES].reshape(-1, 3, 6)
+    return halves[..., :3], halves[..., 3:], off

@@ -26,7 +26,7 @@ robots: errors arguments chain reach robot kinematics
 robots.urdf
 robots: joint_selection pinocchio_model library
 robots.shapes
-surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments sheet
+surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.piecewise
@@ -35,6 +35,7 @@ surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
+surfaces: sheet
 surfaces.places
 feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only safe_files search target_parts version
 feasibility.collisions

@@ -1,0 +1,157 @@
+"""The sheet of a surface: no place of it is further from a triangle than is stated."""
+
+import numpy as np
+import pytest
+from part_walks import size_of, spread
+from random_surfaces import KINDS, random_surface
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from coverable_errors import ArgumentError
+from surfaces import cylinder, plane, sheet_of, sphere
+
+
+def distances(points, triangles):
+    """(k,) m from points (k, 3) to the nearest of triangles (m, 3, 3), by trying all.
+
+    The nearest of a triangle's three sides; and its plane, over its inside.
+    """
+    best = np.full(len(points), np.inf)
+    at = points[:, None]
+    for i in range(3):
+        start, along = triangles[:, i], triangles[:, i - 2] - triangles[:, i]
+        square = np.maximum((along**2).sum(axis=1), 1e-300)
+        share = np.clip(((at - start) * along).sum(axis=2) / square, 0.0, 1.0)
+        off = np.linalg.norm(at - start - share[..., None] * along, axis=2)
+        best = np.minimum(best, off.min(axis=1))
+    one, two = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    flat = np.linalg.pinv(np.stack([one, two], axis=2))
+    share = np.einsum("mcd,kmd->kmc", flat, at - triangles[:, 0])
+    above = at - triangles[:, 0] - share[..., :1] * one - share[..., 1:] * two
+    inside = (share >= 0.0).all(axis=2) & (share.sum(axis=2) <= 1.0)
+    height = np.where(inside, np.linalg.norm(above, axis=2), np.inf)
+    return np.minimum(best, height.min(axis=1))
+
+
+def places(surface, rng, count):
+    """Points and outward normals all over a surface, on its borders and corners too."""
+    if surface.kind == "mesh":
+        face = rng.integers(len(surface.mesh.faces), size=count)
+        weights = rng.dirichlet([0.5, 0.5, 0.5], count)
+        turned = surface.mesh.face_normals[face] @ surface.rotation.T
+        return surface.points_at(face, weights), turned
+    pieces, signs = [surface], [1.0]
+    if surface.kind == "piecewise":
+        pieces, signs = surface.placed, surface.signs
+    found = []
+    for piece, sign in zip(pieces, signs, strict=True):
+        u, v = spread(piece, count, int(rng.integers(2**31)))
+        found.append(np.hstack([piece.point(u, v), sign * piece.normal(u, v)]))
+    both = np.concatenate(found)
+    return both[:, :3], both[:, 3:]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_place_is_further_than_stated(kind):
+    for seed in range(3):
+        rng = np.random.default_rng([seed, 14, *map(ord, kind)])
+        surface = random_surface(kind, rng)
+        size = size_of(surface)
+        sheet = sheet_of(surface, size * 10.0 ** rng.uniform(-4, -1), int(rng.integers(2, 600)))
+        points, _ = places(surface, rng, 60)
+        far = distances(points, sheet.triangles).max()
+        assert far <= sheet.deviation + 1e-14 * size, (seed, surface)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_place_inside_a_thick_sheet_is_further_than_stated(kind):
+    for seed in range(2):
+        rng = np.random.default_rng([seed, 15, *map(ord, kind)])
+        surface = random_surface(kind, rng)
+        size = size_of(surface)
+        depth = size * 10.0 ** rng.uniform(-3, 0)
+        wanted = size * 10.0 ** rng.uniform(-3, -1)
+        sheet = sheet_of(surface, wanted, int(rng.integers(100, 600)), depth)
+        points, normals = places(surface, rng, 40)
+        deep = depth * rng.uniform(size=(len(points), 1))
+        far = distances(points - surface.side_sign * deep * normals, sheet.triangles).max()
+        assert far <= sheet.deviation + 1e-14 * size, (seed, surface)
+
+
+def test_the_deviation_is_used_and_kept():
+    for wanted in (1e-3, 2e-4, 1e-5):
+        surface = cylinder(0.5, (-60, 60), (0.0, 0.9))
+        sheet = sheet_of(surface, wanted, 100_000)
+        far = distances(places(surface, np.random.default_rng(1), 500)[0], sheet.triangles)
+        assert wanted / 8.0 < far.max() <= sheet.deviation <= wanted
+
+
+def test_triangles_stay_near_the_surface():
+    surface = sphere(1.0, (10, 90), (10, 180))
+    sheet = sheet_of(surface, 1e-3)
+    height = np.abs(np.linalg.norm(sheet.triangles.reshape(-1, 3), axis=1) - 1.0)
+    assert height.max() <= sheet.deviation  # so clearances are no larger than they must be
+
+
+def test_a_plane_is_two_triangles():
+    surface = plane((0.0, 0.6), (0.0, 0.4), position=(0.3, -0.2, 0.5), rpy_deg=(20, 30, 40))
+    sheet = sheet_of(surface)
+    assert sheet.triangles.shape == (2, 3, 3)
+    assert sheet.deviation < 1e-9
+    corners = surface.point([0.0, 0.6, 0.6, 0.0], [0.0, 0.0, 0.4, 0.4])
+    away = np.linalg.norm(sheet.triangles.reshape(-1, 1, 3) - corners, axis=2)
+    assert away.min(axis=1).max() < 1e-8
+    assert away.min(axis=0).max() < 1e-8
+
+
+def test_a_metre_sphere_takes_a_few_thousand():
+    sheet = sheet_of(sphere(1.0, (10, 90), (10, 180)))
+    assert len(sheet.triangles) < 15_000
+    assert sheet.deviation <= 2e-4
+
+
+def test_too_many_triangles_are_a_larger_stated_deviation():
+    ball = sphere(1.0, (0, 180), (0, 360))
+    sheet = sheet_of(ball, 1e-6, most=2_000)
+    assert len(sheet.triangles) <= 2_000
+    assert 1e-6 < sheet.deviation < 0.01
+
+
+@pytest.mark.parametrize("kind", ["sphere", "bspline", "piecewise", "mesh"])
+def test_a_rigid_motion_moves_the_sheet_along(kind):
+    rng = np.random.default_rng([3, *map(ord, kind)])
+    surface = random_surface(kind, rng)
+    turn, shift = Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), [0.4, -1.0, 2.0]
+    still, moved = (sheet_of(each, 1e-2, 600) for each in (surface, surface.moved(turn, shift)))
+    carried = still.triangles @ turn.T + shift
+    apart, partner = cKDTree(carried.reshape(-1, 9)).query(moved.triangles.reshape(-1, 9))
+    assert apart.max() < 1e-9
+    assert len(np.unique(partner)) == len(carried)  # the order may be another
+    assert moved.deviation == pytest.approx(still.deviation, abs=1e-9)
+
+
+def test_a_mesh_gives_its_own_triangles():
+    surface = random_surface("mesh", np.random.default_rng(5))
+    sheet = sheet_of(surface)
+    own = surface.mesh.vertices[surface.mesh.faces] @ surface.rotation.T + surface.position
+    assert sheet.deviation == 0.0
+    assert (sheet.triangles == own).all()
+
+
+def test_thickness_lies_away_from_the_working_side():
+    for side, sign in (("outside", -1.0), ("inside", 1.0)):
+        sheet = sheet_of(plane((0, 1), (0, 1), side=side), thickness=0.002)
+        heights = sign * sheet.triangles[..., 2]
+        assert heights.min() == pytest.approx(0.0, abs=1e-12)
+        assert heights.max() == pytest.approx(0.002)
+        assert sheet.deviation <= 4.1e-4
+
+
+@pytest.mark.parametrize(
+    ("bad", "named"),
+    [({"deviation": 0.0}, "deviation"), ({"thickness": -1.0}, "thickness"),
+     ({"thickness": np.nan}, "thickness"), ({"most": 1}, "most")],
+)  # fmt: skip
+def test_numbers_that_make_no_sheet_are_named(bad, named):
+    with pytest.raises(ArgumentError, match=named):
+        sheet_of(plane((0, 1), (0, 1)), **bad)
