@@ -24,7 +24,7 @@ from coverable_meshes.raw_mesh import Floats, Ints
 LARGEST_FILES = {".stl": 64 << 20, ".glb": 64 << 20, ".dae": 64 << 20}  # bytes
 LARGEST_TEXT = 12 << 20  # bytes, of the other formats, which take longer
 MOST_TRIANGLES = 1_500_000  # of a whole robot, each use of a file counted
-MOST_SECONDS = 8.0  # of processor time, after which no other file is opened
+MOST_SECONDS = 8.0  # of processor time, for a picture
 
 
 class FilePart(NamedTuple):
@@ -41,13 +41,19 @@ class FilePart(NamedTuple):
 class MeshFiles:
     """Reads the mesh files of one robot."""
 
-    def __init__(self, clock: Callable[[], float] = time.thread_time) -> None:
+    def __init__(
+        self,
+        clock: Callable[[], float] = time.thread_time,
+        most_seconds: float = MOST_SECONDS,
+    ) -> None:
         """Start with nothing read.
 
         Args:
             clock: processor time, s.
+            most_seconds: processor time after which no other file is opened.
         """
         self._clock = clock
+        self._most_seconds = most_seconds
         self._started = clock()
         self._read: dict[str, list[FilePart] | MeshError] = {}
         self._triangles = 0
@@ -83,8 +89,9 @@ class MeshFiles:
 
     def _first_read(self, file: Path) -> list[FilePart] | MeshError:
         """The parts of a file in its own unit, or what is wrong with it."""
-        if self._clock() - self._started > MOST_SECONDS:
-            return MeshError(f"reading took more than {MOST_SECONDS:g} s; thin the robot's meshes")
+        if self._clock() - self._started > self._most_seconds:
+            took = f"reading took more than {self._most_seconds:g} s"
+            return MeshError(f"{took}; thin the robot's meshes")
         try:
             return read_parts_of(file)
         except MeshError as error:

@@ -1,3 +1,10 @@
 from .bodies import Polytope as Polytope
 from .bodies import Solid as Solid
 from .bodies import Triangles as Triangles
+from .hulls import Hull as Hull
+from .hulls import hull_of as hull_of
+from .hulls import outer_hull as outer_hull
+from .links import LinkShapes as LinkShapes
+from .links import link_shapes as link_shapes
+from .links import outer_bodies as outer_bodies
+from .triangles import checked_triangles as checked_triangles

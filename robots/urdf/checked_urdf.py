@@ -13,9 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.sax.saxutils import quoteattr
 
+from robots.urdf.collisions import CollisionShapes, read_collisions
+from robots.urdf.geometry import ShapeFault
 from robots.urdf.joints import JointInfo
+from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.tree import read_links, read_tree, refuse_other_formats
-from robots.urdf.visuals import MeshFolders, Visual, read_visuals
+from robots.urdf.visuals import Visual, read_visuals
 from robots.urdf.xml import MAX_LENGTH, Faults, Node, UrdfError, parse_xml, read_bytes, shown
 
 MAX_WARNINGS = 100
@@ -43,6 +46,9 @@ class CheckedUrdf:
     leaves: tuple[str, ...]
     """Links without a child."""
     visuals: tuple[Visual, ...]
+    visual_faults: tuple[ShapeFault, ...]
+    """Visuals that cannot be drawn; `warnings` says so in short."""
+    collisions: CollisionShapes
     warnings: tuple[str, ...]
     """What is odd in the file and leaves the robot correct."""
     package_dirs: tuple[str, ...]
@@ -130,7 +136,9 @@ def _check(
     joints = read_tree(robot, links, faults)
     if faults.errors:
         raise UrdfError(faults.errors, path)
-    visuals = read_visuals(robot, MeshFolders(base_dir, folders), faults)
+    mesh_folders = MeshFolders(base_dir, folders)
+    visuals, visual_faults = read_visuals(robot, mesh_folders, faults)
+    collisions = read_collisions(robot, mesh_folders, faults)
     parents = {joint.parent for joint in joints}
     root = next(iter(set(links) - {joint.child for joint in joints}))
     names = (root, *(joint.child for joint in joints))
@@ -146,6 +154,8 @@ def _check(
         joints=joints,
         leaves=tuple(name for name in names if name not in parents),
         visuals=visuals,
+        visual_faults=visual_faults,
+        collisions=collisions,
         warnings=(*faults.warnings[:MAX_WARNINGS], *more),
         package_dirs=folders,
     )

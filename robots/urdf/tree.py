@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from coverable_errors import close_matches
 from robots.urdf.joints import JointInfo, read_joint
-from robots.urdf.visuals import leaves_package
+from robots.urdf.mesh_folders import leaves_package
 from robots.urdf.xml import Faults, Node, UrdfError, name_of, shown
 
 # Native readers recurse along a chain: 4,000 links overflow a stack of 8 MB, 250 one of 0.5 MB.

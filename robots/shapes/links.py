@@ -1,0 +1,184 @@
+"""The bodies of a robot's links, in the frames of the joints that carry them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import pinocchio as pin
+
+from robots.errors import RobotError
+from robots.robot import Robot
+from robots.shapes.bodies import Geometry, Polytope, Solid
+from robots.shapes.hulls import hull_of
+from robots.shapes.triangles import MeshBodies
+from robots.urdf import CheckedUrdf, CollisionShape, MeshFile, Visual, check_urdf
+
+Fineness = Literal["hulls", "pieces", "meshes"]
+MOST_NAMED = 8  # links in one note
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LinkShapes:
+    """What the links of a robot are made of."""
+
+    solids: tuple[Solid, ...]
+    """Exact, as the URDF has them."""
+    polytopes: tuple[Polytope, ...]
+    """Convex bodies that hold them."""
+    unchecked: tuple[str, ...]
+    """Links with a shape that cannot be used and has no stand-in, links that the URDF leaves
+    without collision shapes on purpose, and links between two moving joints without any shape.
+
+    A link without a shape is not listed where others that move with it have some: it is a mere
+    frame, such as tool0 or flange; nor is the root link, which is often just called world.
+    """
+    notes: tuple[str, ...]
+    """What stands in for what, and what is not checked, one sentence each."""
+
+
+def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
+    """The bodies of all links, those on locked joints too.
+
+    A link's <collision> shapes are taken. Where there are none, or one of them cannot be used, its
+    visuals stand in for them; a note says so. Links marked with collision="none" have no bodies.
+
+    Args:
+        robot: with the path of its URDF.
+        fineness: "hulls": one convex body for each shape; "pieces": several where one is crude.
+            "meshes" gives pieces too: the search always works with convex bodies.
+
+    Raises:
+        RobotError: the robot has no URDF, it cannot be read, or no link has a shape that can be
+            used.
+    """
+    if robot.urdf is None:
+        raise RobotError(
+            "has no URDF file, so its links have no shapes for collisions; load it from a file",
+            f"robot {robot.name!r}",
+        )
+    checked = check_urdf(robot.urdf, package_dirs=robot.package_dirs)
+    gathered = _Gathered(robot, checked)
+    for link in checked.links:
+        gathered.add(link)
+    solids = tuple(gathered.solids)
+    unchecked, notes = gathered.unchecked(), gathered.notes()
+    if not solids:
+        why = "; ".join(notes) or "its links have neither collision shapes nor visuals"
+        raise RobotError(
+            f"no link has a shape that can be used for collisions: {why}", f"robot {robot.name!r}"
+        )
+    polytopes = tuple(body for solid in solids for body in outer_bodies(solid, fineness))
+    return LinkShapes(solids, polytopes, unchecked, notes)
+
+
+def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
+    """Convex bodies that together hold a solid, in the frame of its joint."""
+    place = solid.placement
+    hulls = [hull_of(solid.geometry)]
+    bodies = []
+    for hull in hulls:
+        vertices = hull.vertices @ place[:3, :3].T + place[:3, 3]
+        bodies.append(Polytope(solid.owner, solid.joint, vertices, hull.radius))
+    return bodies
+
+
+class _Gathered:
+    """Solids link by link, and what is to be said about them."""
+
+    def __init__(self, robot: Robot, checked: CheckedUrdf) -> None:
+        self.robot = robot
+        self.meshes = MeshBodies()
+        self.solids: list[Solid] = []
+        self.collisions: dict[str, list[CollisionShape]] = {}
+        self.visuals: dict[str, list[Visual]] = {}
+        for shape in checked.collisions.shapes:
+            self.collisions.setdefault(shape.link, []).append(shape)
+        for visual in checked.visuals:
+            self.visuals.setdefault(visual.link, []).append(visual)
+        self.collision_faults = {fault.link: fault.why for fault in checked.collisions.faults}
+        self.visual_faults = {fault.link: fault.why for fault in checked.visual_faults}
+        self.without = [link for link in checked.collisions.without if link in self.visuals]
+        self.bare = set(checked.collisions.without)
+        self.stand_ins: list[str] = []
+        self.replaced: dict[str, list[str]] = {}  # what is wrong -> links
+        self.lost: dict[str, list[str]] = {}  # what is wrong -> links
+        self.carriers: dict[int, str] = {}  # the first link of each joint
+        self.bodies = {f.name for f in robot.model.frames if f.type == pin.FrameType.BODY}
+
+    def add(self, link: str) -> None:
+        """Take the shapes of one link."""
+        if link not in self.bodies:  # the file has changed since it was loaded
+            return
+        frame = self.robot.model.frames[self.robot.model.getFrameId(link, pin.FrameType.BODY)]
+        joint, place = int(frame.parentJoint), frame.placement.homogeneous
+        self.carriers.setdefault(joint, link)
+        if link in self.bare:
+            return
+        found, fault = self._read(self.collisions.get(link, []))
+        fault = fault or self.collision_faults.get(link, "")
+        if fault or not found:
+            shown, visual_fault = self._read(self.visuals.get(link, []))
+            visual_fault = visual_fault or self.visual_faults.get(link, "")
+            if visual_fault or (fault and not shown):
+                self.lost.setdefault(visual_fault or fault, []).append(link)
+            elif fault:
+                self.replaced.setdefault(fault, []).append(link)
+            elif shown:
+                self.stand_ins.append(link)
+            found += shown  # those that can be read are kept: more is safe
+        for origin, geometry in found:
+            placement = place @ origin
+            placement.flags.writeable = False
+            self.solids.append(Solid(link, joint, placement, geometry))
+
+    def _read(
+        self, shapes: Iterable[CollisionShape | Visual]
+    ) -> tuple[list[tuple[np.ndarray, Geometry]], str]:
+        """The shapes that can be used, and what is wrong with the first of the others."""
+        found: list[tuple[np.ndarray, Geometry]] = []
+        fault = ""
+        for shape in shapes:
+            given = shape.geometry
+            try:
+                geometry = self.meshes.read(given) if isinstance(given, MeshFile) else given
+            except RobotError as error:
+                fault = fault or str(error)
+                continue
+            found.append((shape.origin, geometry))
+        return found, fault
+
+    def unchecked(self) -> tuple[str, ...]:
+        """See `LinkShapes.unchecked`."""
+        carrying = {solid.joint for solid in self.solids}
+        lost = [link for links in self.lost.values() for link in links]
+        gaps = [link for joint, link in self.carriers.items() if joint and joint not in carrying]
+        return tuple(dict.fromkeys([*lost, *self.without, *gaps]))
+
+    def notes(self) -> tuple[str, ...]:
+        """See `LinkShapes.notes`."""
+        notes = [
+            f"a shape of {_named(links)} cannot be used, {'those' if len(links) > 1 else 'it'} "
+            f"{'are' if len(links) > 1 else 'is'} not checked: {why}"
+            for why, links in self.lost.items()
+        ]
+        notes += [
+            f"a collision shape of {_named(links)} cannot be used, so visuals stand in: {why}"
+            for why, links in self.replaced.items()
+        ]
+        if self.stand_ins:
+            notes.append(f"no collision shapes, so visuals stand in: {_named(self.stand_ins)}")
+        if self.without:
+            notes.append(
+                f"left without collision shapes by the URDF, so not checked: {_named(self.without)}"
+            )
+        return tuple(notes)
+
+
+def _named(links: list[str]) -> str:
+    """Links by name, in short."""
+    names = ", ".join(links[:MOST_NAMED])
+    more = f" and {len(links) - MOST_NAMED} more" if len(links) > MOST_NAMED else ""
+    return f"link{'s' if len(links) > 1 else ''} {names}{more}"

@@ -1,0 +1,99 @@
+"""Which mesh files a URDF may name: those that are safe to open.
+
+A mesh is taken only when it is a regular file of a known mesh format whose real path, symbolic
+links followed, lies inside one of the allowed folders: the URDF's own, the ROS package around it,
+and `package_dirs`.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Sequence
+from itertools import accumulate
+from pathlib import Path
+
+from robots.urdf.xml import BadValue
+
+# .gltf and the like pull in other files.
+MESH_SUFFIXES = (".stl", ".dae", ".obj", ".ply", ".off", ".glb")
+MAX_MESH_BYTES = 256 * 2**20
+MAX_PATH = 500  # characters; following a path takes time for each of its parts
+PACKAGE_LEVELS = 5  # how far above the URDF a package.xml is looked for
+
+
+class MeshFolders:
+    """Where meshes may come from, and how a mesh name in the file becomes a path."""
+
+    def __init__(self, base_dir: str | None, package_dirs: Sequence[str]) -> None:
+        """Collect the allowed folders; none are opened."""
+        self.base = Path(base_dir) if base_dir is not None else None
+        self.packages = [Path(folder) for folder in package_dirs]
+        self.own_package = _package_around(self.base) if self.base else None
+        allowed = [self.base, self.own_package, *self.packages]
+        self.allowed = [Path(os.path.realpath(folder)) for folder in allowed if folder is not None]
+
+    def candidates(self, name: str) -> list[Path]:
+        """Paths that a mesh name may refer to, best first; they need not exist."""
+        if name.startswith(("package://", "model://")):
+            inner = name.split("://", 1)[1].lstrip("/")
+            package, _, rest = inner.partition("/")
+            paths = [folder / inner for folder in self.packages]
+            roots = [*self.packages, self.own_package, self.base]
+            paths += [root / rest for root in roots if root is not None and root.name == package]
+            if self.base is not None:
+                paths.append(self.base / inner)
+            return paths
+        if name.startswith("file://"):
+            name = name.removeprefix("file://")
+        if os.path.isabs(name):
+            return [Path(name)]
+        return [folder / name for folder in [self.base, *self.packages] if folder is not None]
+
+    def resolve(self, name: str) -> str:
+        """The file that a mesh name refers to.
+
+        Raises:
+            BadValue: there is none that may be opened, and why.
+        """
+        if not name or not name.isprintable() or len(name) > MAX_PATH:
+            raise BadValue("has no usable name")
+        if "://" in name and not name.startswith(("package://", "model://", "file://")):
+            raise BadValue("is not a file; download it and name the file")
+        if not name.lower().endswith(MESH_SUFFIXES):
+            raise BadValue(f"is not one of {' '.join(MESH_SUFFIXES)}")
+        outside = None
+        for candidate in self.candidates(name):
+            real = Path(os.path.realpath(candidate))
+            if not any(real.is_relative_to(folder) for folder in self.allowed):
+                outside = outside or real
+                continue
+            try:
+                status = os.stat(real)
+            except (OSError, ValueError):
+                continue
+            if not stat.S_ISREG(status.st_mode):
+                raise BadValue("is not a regular file")
+            if status.st_size > MAX_MESH_BYTES:
+                raise BadValue(f"has {status.st_size:,} bytes, over {MAX_MESH_BYTES:,}")
+            return str(real)
+        if outside is not None:
+            raise BadValue(
+                "lies outside the folders that meshes may come from; add its folder to package_dirs"
+            )
+        raise BadValue("is not found; add the folder above its package to package_dirs")
+
+
+def _package_around(folder: Path) -> Path | None:
+    """The nearest folder at or above `folder` that is a ROS package, so ../meshes works in one."""
+    folder = Path(os.path.abspath(folder))
+    around = [folder, *folder.parents][:PACKAGE_LEVELS]
+    return next((here for here in around if os.path.isfile(here / "package.xml")), None)
+
+
+def leaves_package(name: str) -> bool:
+    """True for a package:// name that climbs out of its package with '..'."""
+    if not name.startswith(("package://", "model://")):
+        return False
+    parts = name.split("://", 1)[1].replace("\\", "/").split("/")
+    return min(accumulate({"": 0, ".": 0, "..": -1}.get(part, 1) for part in parts)) < 0
