@@ -2,12 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import ArgumentError
 from robots.robot import Robot
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class JointFrames:
+    """Where the frames of all joints are, m times; index 0 is the root frame itself."""
+
+    rotations: NDArray[np.float64]
+    """(m, n + 1, 3, 3)"""
+    points: NDArray[np.float64]
+    """(m, n + 1, 3) m."""
 
 
 class Kinematics:
@@ -35,6 +47,7 @@ class Kinematics:
         placement = self._data.oMf[self._frame]
         self._translation = placement.translation  # live views: looked up once, copied when kept
         self._rotation = placement.rotation
+        self._joints = [(frame.rotation, frame.translation) for frame in self._data.oMi]
 
     def configuration(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pinocchio's configuration vector (nq,) for n real joint values (rad or m)."""
@@ -66,6 +79,24 @@ class Kinematics:
             points[k] = self._translation
             rotations[k] = self._rotation
         return points, rotations @ self._approach
+
+    def joints(self, q: ArrayLike) -> JointFrames:
+        """Frames of the joints in the root frame at configurations q (m, n).
+
+        Example:
+            >>> from robots import load_robot
+            >>> Kinematics(load_robot("puma560")).joints(np.zeros((4, 6))).points.shape
+            (4, 7, 3)
+        """
+        rows = self._configurations(q)
+        count = self.robot.n + 1
+        frames = JointFrames(np.empty((len(rows), count, 3, 3)), np.empty((len(rows), count, 3)))
+        for k, row in enumerate(rows):
+            pin.forwardKinematics(self._model, self._data, row)
+            for j, (rotation, translation) in enumerate(self._joints):
+                frames.rotations[k, j] = rotation
+                frames.points[k, j] = translation
+        return frames
 
     def twists(self, q: ArrayLike) -> NDArray[np.float64]:
         """Unit twists (m, 6, n) of the joints at configurations q (m, n), in the root frame.

@@ -1,3 +1,6 @@
+from .collisions import CollisionFault as CollisionFault
+from .collisions import CollisionReplay as CollisionReplay
+from .collisions import collision_replay as collision_replay
 from .kinematic_bounds import placements as placements
 from .kinematic_bounds import second_derivatives as second_derivatives
 from .motion_replay import Replay as Replay

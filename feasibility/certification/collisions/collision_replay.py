@@ -1,0 +1,208 @@
+"""The replay of a motion among bodies: does everything stay clear that has to?
+
+It uses Pinocchio's placements, coal's geometry and the bodies as the URDF and the scene give them,
+and shares no code with the search (`feasibility.collisions` holds its kernels).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import ArgumentError
+from feasibility.certification.collisions.pieces import Below, Piece, piece_of, sheet_piece
+from feasibility.certification.collisions.planes import Pairing, Place
+from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.collisions import Bodies, Pair
+from robots import Robot
+
+Array = NDArray[np.float64]
+
+NEAR = 0.9  # [1] share of the least distance that is aimed at where it costs little
+KEPT = 8  # bodies of so many problems are kept ready, for motions replayed one after another
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionFault:
+    """Two owners of bodies that come too near, and where."""
+
+    row: int
+    """Index of the row, or of the row before; -1 where the whole motion is meant."""
+    share: float
+    """How far the motion has come from there to the next row, 0..1."""
+    pair: tuple[str, str]
+    distance: float
+    """m, between them; negative where they overlap, as deep as that; NaN where not decided."""
+    text: str
+
+    def __str__(self) -> str:
+        """Place and fault; rows are counted from 1."""
+        if self.row < 0:
+            return self.text
+        if self.share == 0.0:
+            return f"row {self.row + 1}: {self.text}"
+        way = f"row {self.row + 1} to {self.row + 2}, {self.share:.3g} of the way"
+        return f"{way}: {self.text}"
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionReplay:
+    """What the replay found."""
+
+    min_clearance: float
+    """m, certified: no pair comes nearer along an accepted motion; inf where there is no pair. Of a
+    refused one, the least distance that was met."""
+    nearest_pair: tuple[str, str] | None
+    """The pair that it is of."""
+    faults: tuple[CollisionFault, ...]
+    """One for each pair that comes too near, the nearest first; none when it is accepted."""
+    calls: int
+    """How often coal was asked."""
+
+    @property
+    def accepted(self) -> bool:
+        """True where every pair keeps its clearance along the whole motion."""
+        return not self.faults
+
+    @property
+    def refusal(self) -> str:
+        """All faults in words; empty when the motion is accepted."""
+        return "; ".join(map(str, self.faults))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Body:
+    """One body with its owner's joint."""
+
+    joint: int
+    piece: Piece
+    deviation: float
+
+
+class BodiesOfOwners:
+    """The bodies of one problem, ready for coal; not to be pickled."""
+
+    def __init__(self, bodies: Bodies) -> None:
+        """Build what coal needs of every owner that a pair names.
+
+        Raises:
+            ArgumentError: a pair names what has no body, or a body is malformed.
+        """
+        named = {name for pair in bodies.pairs for name in (pair.first, pair.second)}
+        self._of: dict[str, list[_Body]] = {name: [] for name in named}
+        for solid in bodies.solids:
+            if solid.owner in named:
+                piece = piece_of(solid.geometry, solid.placement)
+                self._of[solid.owner].append(_Body(solid.joint, piece, 0.0))
+        scene = {thing.name for thing in bodies.scene}
+        for thing in bodies.scene:
+            if thing.name in named:
+                piece = piece_of(thing.geometry, thing.placement)
+                self._of[thing.name].append(_Body(0, piece, 0.0))
+        for soup in bodies.soups:
+            if soup.owner in named and soup.owner not in scene:
+                piece = sheet_piece(soup.triangles, soup.closed)
+                self._of[soup.owner].append(_Body(0, piece, soup.deviation))
+        empty = sorted(name for name, parts in self._of.items() if not parts)
+        if empty:
+            raise ArgumentError(f"pairs name what has no body: {', '.join(empty)}")
+
+    def couples(self, pair: Pair) -> list[tuple[_Body, _Body]]:
+        """Each body of one owner with each of the other, the one nearer to the root first."""
+        found = []
+        for one in self._of[pair.first]:
+            for other in self._of[pair.second]:
+                swapped = other.joint < one.joint or isinstance(other.piece, Below)
+                found.append((other, one) if swapped else (one, other))
+        return found
+
+
+@lru_cache(maxsize=KEPT)
+def _ready(bodies: Bodies) -> BodiesOfOwners:
+    """The bodies of a problem, kept for the next motion among them."""
+    return BodiesOfOwners(bodies)
+
+
+def collision_replay(
+    robot: Robot, bodies: Bodies, q: Array, strays: Array | None = None
+) -> CollisionReplay:
+    """Judge a motion that is straight in joint space between its rows.
+
+    Args:
+        robot: the arm.
+        bodies: everything that can collide, and the pairs that are asked for.
+        q: (m, n) rows, rad or m, unwrapped. Values that are not finite refuse.
+        strays: (m - 1, n) bounds on how far each joint is from the straight lines, for motions that
+            are bent between rows; none by default.
+
+    Raises:
+        ArgumentError: the bodies are malformed, or q or strays do not have that shape.
+    """
+    rows = np.ascontiguousarray(q, dtype=float)
+    if rows.ndim != 2 or rows.shape[1] != robot.n:
+        raise ArgumentError(f"q must have shape (m, {robot.n}), got {rows.shape}")
+    if strays is not None and np.shape(strays) != (max(len(rows) - 1, 0), robot.n):
+        raise ArgumentError(f"strays must have a row for each segment, got {np.shape(strays)}")
+    finite = np.isfinite(rows).all(axis=1)
+    if strays is not None:
+        finite[:-1] &= np.isfinite(strays).all(axis=1)
+    if not finite.all():
+        row = int(np.argmin(finite))
+        fault = CollisionFault(row, 0.0, ("", ""), np.nan, "a joint value is not finite")
+        return CollisionReplay(np.nan, None, (fault,), 0)
+    ready = _ready(bodies)
+    if not len(rows) or not bodies.pairs:
+        return CollisionReplay(np.inf, None, (), 0)
+    if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
+        rows, strays = np.repeat(rows, 2, axis=0), None
+    motion = Motion(robot, rows, None if strays is None else np.abs(strays))
+    return _judged(bodies, ready, motion)
+
+
+def _judged(bodies: Bodies, ready: BodiesOfOwners, motion: Motion) -> CollisionReplay:
+    """All pairs, first at a glance: how near they come sets what is aimed at."""
+    open_pairs: list[tuple[Pair, float, Pairing]] = []
+    nearest = np.inf
+    for pair in bodies.pairs:
+        for a, b in ready.couples(pair):
+            pairing = Pairing(a.piece, b.piece, (a.joint, b.joint), motion)
+            deviation = a.deviation + b.deviation
+            open_pairs.append((pair, deviation, pairing))
+            if pairing.stretches.bound.min() < nearest + deviation:
+                nearest = min(nearest, pairing.glance() - deviation)
+    least, of, calls = np.inf, None, 0
+    faults: dict[tuple[str, str], CollisionFault] = {}
+    for pair, deviation, pairing in open_pairs:
+        needed = pair.clearance + deviation
+        pairing.certify(needed, max(needed, NEAR * nearest + deviation))
+        calls += pairing.calls
+        distance = pairing.bound - deviation
+        names = (pair.first, pair.second)
+        if pairing.place is not None:
+            distance = pairing.place.distance - deviation
+            fault = _fault(pair, pairing.place, distance)
+            known = faults.get(names)
+            if known is None or not fault.distance >= known.distance:
+                faults[names] = fault
+        if distance < least:
+            least, of = distance, names
+    ordered = sorted(faults.values(), key=lambda fault: np.nan_to_num(fault.distance, nan=np.inf))
+    return CollisionReplay(float(least), of, tuple(ordered), calls)
+
+
+def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:
+    """A pair that is refused, in words."""
+    names = f"{pair.first} and {pair.second}"
+    wanted = f"{1e3 * pair.clearance:g} mm are needed"
+    if np.isnan(distance):
+        text = f"not certified: {names} may come nearer than {1e3 * pair.clearance:g} mm"
+    elif place.inside:
+        text = f"{names} overlap, one is inside the other"
+    elif distance <= 0.0:
+        text = f"{names} overlap by {-1e3 * distance:.3g} mm"
+    else:
+        text = f"{names} are {1e3 * distance:.4g} mm apart, {wanted}"
+    return CollisionFault(place.row, place.share, (pair.first, pair.second), distance, text)

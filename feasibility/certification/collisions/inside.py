@@ -1,0 +1,72 @@
+"""Is one body inside another? Meshes are only their triangles to coal, and have no inside there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.collisions.pieces import MeshPart, Piece
+
+Array = NDArray[np.float64]
+
+
+def one_inside_other(a: Piece, b: Piece, rotation: Array, point: Array) -> bool:
+    """Is a shell of one body inside the other, b at a pose (3, 3), (3,) m in the frame of a?
+
+    Their boundaries must not touch. Only closed meshes are asked; coal knows of the inside of
+    primitives.
+    """
+    there = _points(b) @ rotation.T + point
+    back = (_points(a) - point) @ rotation
+    return _any_inside(a, there) or _any_inside(b, back)
+
+
+def _any_inside(body: Piece, points: Array) -> bool:
+    """Is one of the points (k, 3) inside the mesh, if it is a closed one?"""
+    if not (isinstance(body, MeshPart) and body.closed):
+        return False
+    triangles = _outward(body)
+    return any(abs(winding(triangles, point)) > 0.5 for point in points)
+
+
+def winding(triangles: Array, point: Array) -> float:
+    """How often triangles (k, 3, 3) wind around a point (3,): their solid angles over 4 pi.
+
+    Van Oosterom and Strackee, 1983: tan(w / 2) = det[a b c] / (abc + (a.b) c + (b.c) a + (c.a) b).
+    """
+    a, b, c = (triangles[:, k] - point for k in range(3))
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    above = np.einsum("ki,ki->k", a, np.cross(b, c))
+    below = la * lb * lc
+    below += (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    return float(2.0 * np.arctan2(above, below).sum() / (4.0 * np.pi))
+
+
+def _outward(mesh: MeshPart) -> Array:
+    """Its triangles (k, 3, 3), each shell with one orientation."""
+    faces = mesh.faces
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    ways = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    along = np.where(ways[:, 0] < ways[:, 1], 1, -1)
+    _, which = np.unique(edges, axis=0, return_inverse=True)
+    if np.bincount(which.ravel(), weights=along).any():  # an edge run through twice the same way
+        import trimesh
+
+        whole = trimesh.Trimesh(mesh.vertices, faces, process=False)
+        trimesh.repair.fix_normals(whole, multibody=True)
+        faces = np.asarray(whole.faces)
+    return mesh.vertices[faces]
+
+
+def _points(body: Piece) -> Array:
+    """(k, 3) a point of each shell of a mesh; of a primitive its centre."""
+    if not isinstance(body, MeshPart):
+        return body.centre[None]
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    faces, count = body.faces, len(body.vertices)
+    links = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
+    graph = coo_array((np.ones(len(links)), (links[:, 0], links[:, 1])), shape=(count, count))
+    shells = connected_components(graph, directed=False)[1]
+    return body.vertices[np.unique(shells, return_index=True)[1]]

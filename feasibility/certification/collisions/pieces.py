@@ -1,0 +1,278 @@
+"""Bodies as the judge of collisions sees them: coal's geometry, and how far they reach.
+
+A piece is a convex body, or some triangles of a mesh. What a plane certificate needs of it is its
+support h(n) = max n . x over its points x, which is computed here from corners and radii. Coal is
+only asked for distances and nearest points, from which directions n are taken. A mesh begins as
+its convex hull, which is larger than the mesh; its pieces are ever smaller parts of its triangles.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import ArgumentError
+from feasibility.collisions import HalfSpace
+from robots.shapes import Triangles
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+
+Array = NDArray[np.float64]
+
+FLAT = (
+    1e-6  # [1] least thickness of a hull relative to its length; qhull and coal fail on flat ones
+)
+MANY = 64  # corners of a part of a mesh, above which only those on its hull are kept
+
+
+class Piece:
+    """Part of a body, in the frame of the joint that carries it."""
+
+    def __init__(self, geometry: Any, placement: Array, corners: Array, radius: float) -> None:
+        """A convex body.
+
+        Args:
+            geometry: coal's; None where coal is never asked.
+            placement: (4, 4) the geometry's frame in the joint's frame, m.
+            corners: (k, 3) m, in the joint's frame.
+            radius: m; the body lies within this distance of the hull of the corners.
+        """
+        self.geometry, self.placement = geometry, placement
+        self.corners, self.radius = corners, radius
+        self.exact = True
+        """Is the body itself meant, and not something around it?"""
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        self.centre: Array = 0.5 * (low + high)
+        reach = np.linalg.norm(corners - self.centre, axis=1).max()
+        self.ball = float(reach) + radius
+        """m, radius of a ball about `centre` around the piece."""
+
+    @property
+    def parts(self) -> tuple[Piece, ...]:
+        """What it is made of, where that may be less than it is; nothing for convex bodies."""
+        return ()
+
+    @property
+    def thin(self) -> Array | None:
+        """(3,) unit vector across a part of a mesh, along which it is thinnest; or None."""
+        return None
+
+    def support(self, n: Array) -> Array:
+        """(k,) m, h(n) for unit vectors n (k, 3) in the joint's frame."""
+        return np.asarray((n @ self.corners.T).max(axis=1)) + self.radius
+
+    @cached_property
+    def truth(self) -> Piece:
+        """The body itself."""
+        return self
+
+
+class Round(Piece):
+    """A cylinder, whose support has a closed form."""
+
+    def __init__(self, geometry: Any, placement: Array, shape: Cylinder) -> None:
+        """See `Piece`."""
+        r, h = shape.radius, 0.5 * shape.length
+        box = np.array([[x, y, z] for x in (-r, r) for y in (-r, r) for z in (-h, h)])
+        super().__init__(geometry, placement, _moved(placement, box), 0.0)
+        self.ball = float(np.hypot(r, h))
+        self.shape = shape
+
+    def support(self, n: Array) -> Array:
+        """(k,) m: n . c + |n_z| l / 2 + r sqrt(1 - n_z^2), z along the axis."""
+        along = n @ self.placement[:3, 2]
+        across = np.sqrt(np.maximum((n**2).sum(axis=1) - along**2, 0.0))
+        own = 0.5 * self.shape.length * np.abs(along) + self.shape.radius * across
+        return np.asarray(n @ self.placement[:3, 3] + own)
+
+
+class Below(Piece):
+    """A half space: its plane is the only one that can part it from anything."""
+
+    def __init__(self, placement: Array) -> None:
+        """See `Piece`."""
+        super().__init__(None, placement, placement[None, :3, 3], 0.0)
+        self.ball = np.inf
+
+    @property
+    def thin(self) -> Array:
+        """(3,) its normal."""
+        return np.asarray(self.placement[:3, 2])
+
+
+class MeshPart(Piece):
+    """Some triangles of a mesh, the surface of a body or a sheet."""
+
+    def __init__(self, vertices: Array, faces: NDArray[np.int64], closed: bool) -> None:
+        """Faces (m, 3) of vertices (k, 3) m in the joint's frame, m >= 1."""
+        used, renumbered = np.unique(faces, return_inverse=True)
+        self.vertices, self.faces = vertices[used], renumbered.reshape(-1, 3)
+        self.closed = closed
+        super().__init__(None, np.eye(4), _outermost(self.vertices), 0.0)
+        self.__dict__.pop("geometry")  # made when coal is asked
+
+    @cached_property
+    def geometry(self) -> Any:
+        """Coal's tree over the triangles."""
+        import coal
+
+        model = coal.BVHModelOBBRSS()
+        model.beginModel(len(self.faces), len(self.vertices))
+        model.addSubModel(*_coal_triangles(self.vertices, self.faces))
+        model.endModel()
+        return model
+
+    @cached_property
+    def parts(self) -> tuple[Piece, ...]:
+        """Two halves of its triangles, across their longest side; none where it is one triangle."""
+        if len(self.faces) == 1:
+            return ()
+        middles = self.vertices[self.faces].mean(axis=1)
+        side = int(np.argmax(np.ptp(middles, axis=0)))
+        order = np.argsort(middles[:, side], kind="stable")
+        halves = np.array_split(order, 2)
+        return tuple(MeshPart(self.vertices, self.faces[half], False) for half in halves)
+
+    @cached_property
+    def thin(self) -> Array:
+        """(3,) direction in which the corners spread least."""
+        spread = self.corners - self.corners.mean(axis=0)
+        return np.asarray(np.linalg.eigh(spread.T @ spread)[1][:, 0])
+
+
+class MeshHull(Piece):
+    """The convex hull of a mesh: what is tried first, because it is fast."""
+
+    def __init__(self, mesh: MeshPart, hull: Any) -> None:
+        """`hull` is scipy's, of the mesh's vertices."""
+        import coal
+
+        used, renumbered = np.unique(hull.simplices, return_inverse=True)
+        corners = mesh.vertices[used]
+        geometry = coal.Convex(*_coal_triangles(corners, renumbered.reshape(-1, 3)))
+        # What qhull merged may stand out a little from the corners that it kept.
+        outside = float((mesh.vertices @ hull.equations[:, :3].T + hull.equations[:, 3]).max())
+        super().__init__(geometry, np.eye(4), corners, max(outside, 0.0))
+        self.exact, self.mesh = False, mesh
+
+    @property
+    def parts(self) -> tuple[Piece, ...]:
+        """The mesh itself."""
+        return (self.mesh,)
+
+    @cached_property
+    def truth(self) -> Piece:
+        """The mesh."""
+        return self.mesh
+
+
+def piece_of(geometry: object, placement: Array) -> Piece:
+    """A body of the arm or of the scene as the judge sees it.
+
+    Args:
+        geometry: a primitive, `Triangles` or a `HalfSpace`.
+        placement: (4, 4) its frame in the joint's frame (or the root frame), m.
+
+    Raises:
+        ArgumentError: it is none of these, empty, or not finite.
+    """
+    import coal
+
+    sizes = np.concatenate([np.ravel(placement), _sizes(geometry)])
+    if not np.isfinite(sizes).all():
+        raise ArgumentError(f"a shape for the replay is not finite: {geometry!r:.80}")
+    origin = placement[None, :3, 3]
+    match geometry:
+        case Box(size):
+            signs = np.array(np.meshgrid(*[(-0.5, 0.5)] * 3)).reshape(3, 8).T
+            corners = _moved(placement, signs * np.array(size))
+            return Piece(coal.Box(*size), placement, corners, 0.0)
+        case Sphere(radius):
+            return Piece(coal.Sphere(radius), placement, origin, radius)
+        case Capsule(radius, length):
+            ends = _moved(placement, np.array([[0.0, 0.0, -0.5 * length], [0, 0, 0.5 * length]]))
+            return Piece(coal.Capsule(radius, length), placement, ends, radius)
+        case Cylinder(radius, length):
+            return Round(coal.Cylinder(radius, length), placement, geometry)
+        case HalfSpace():
+            return Below(placement)
+        case Triangles(vertices, faces, closed) if len(faces):
+            return _mesh(_moved(placement, vertices), faces, closed)
+    raise ArgumentError(f"the replay knows no shape like {geometry!r:.80}")
+
+
+def sheet_piece(triangles: Array, closed: bool) -> Piece:
+    """Triangles (k, 3, 3) m at rest in the root frame, k >= 1, as one piece.
+
+    Raises:
+        ArgumentError: there are none, or they are not finite.
+    """
+    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
+    return piece_of(Triangles(triangles.reshape(-1, 3), faces, closed), np.eye(4)).truth
+
+
+def _mesh(vertices: Array, faces: NDArray[np.int64], closed: bool) -> Piece:
+    """A mesh behind its hull, or the mesh alone where it is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise ArgumentError("a mesh for the replay has a triangle without its vertices")
+    mesh = MeshPart(vertices, faces, closed)
+    if _is_flat(mesh.vertices):
+        return mesh
+    try:
+        return MeshHull(mesh, ConvexHull(mesh.vertices))
+    except QhullError:
+        return mesh
+
+
+def _is_flat(points: Array) -> bool:
+    """Are they so nearly in one plane that no hull of them may be made?"""
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return len(spread) < 3 or not spread[2] > FLAT * spread[0]
+
+
+def _outermost(points: Array) -> Array:
+    """Few points with the same hull: all of them where they are few or flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(points) <= MANY or _is_flat(points):
+        return points
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return points
+    outside = (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max()
+    kept: Array = points[hull.vertices]
+    return kept if outside <= 1e-12 * (1.0 + np.abs(points).max()) else points
+
+
+def _moved(placement: Array, points: Array) -> Array:
+    """Points (k, 3) of a shape's frame in the joint's frame."""
+    return np.asarray(points @ placement[:3, :3].T + placement[:3, 3])
+
+
+def _coal_triangles(vertices: Array, faces: NDArray[np.int64]) -> tuple[Any, Any]:
+    """Coal's lists of points and triangles."""
+    import coal
+
+    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    points.extend(list(np.ascontiguousarray(vertices)))
+    triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
+    return points, triangles
+
+
+def _sizes(geometry: object) -> Array:
+    """The numbers of a shape, flat."""
+    match geometry:
+        case Triangles(vertices):
+            return np.ravel(vertices)
+        case Box(size):
+            return np.array(size, dtype=float)
+        case Sphere(radius):
+            return np.array([radius])
+        case Capsule(radius, length) | Cylinder(radius, length):
+            return np.array([radius, length])
+    return np.empty(0)

@@ -1,0 +1,279 @@
+"""Certified clearance of two bodies along a motion, by planes between them.
+
+Seen from body a, the points of body b move nearly along chords (`relative_motion`). So, for any
+unit vector n, their distance along a stretch is at least
+
+    min(low(0), low(1)) - h_a(n) - delta - stray,    low(s) = n . t(s) - h_b(-R(s)^T n),
+
+with h the supports of `pieces`, and R, t the pose of b at an end of the stretch. That n parts them
+is checked by this formula alone; it does not matter where n is from. First comes the line between
+the centres, then coal's nearest points at the stretch with the lowest bound, each tried on all
+stretches at once. What they do not certify is cut: a hull into the mesh within, a mesh into halves
+of it, and last the stretch in time.
+
+A plane certifies bodies with all that is inside them. Triangles of a closed mesh have no inside:
+where they are used, neither body may begin inside the other. As their distance never vanishes,
+neither gets there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.collisions.inside import one_inside_other
+from feasibility.certification.collisions.pieces import Below, Piece
+from feasibility.certification.collisions.relative_motion import (
+    Motion,
+    Poses,
+    Stretches,
+    joined,
+)
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
+FAILURES = 3  # of coal's directions in a row, after which a mesh is rather cut
+SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
+CALLS = (2000, 40)  # most coal calls for two bodies: so many, and so many for each segment
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An instant at which two bodies are too near, or where that was not decided."""
+
+    row: int
+    share: float
+    """How far the motion has come from that row to the next, 0..1."""
+    distance: float
+    """m, between them; as deep as they overlap where it is negative; NaN where not decided."""
+    inside: bool = False
+    """Is one of them wholly within the other?"""
+
+
+class Pairing:
+    """Two bodies, the stretches of one motion, and what is known of their distance."""
+
+    def __init__(self, a: Piece, b: Piece, joints: tuple[int, int], motion: Motion) -> None:
+        """Bodies a and b, carried by `joints` (i, j), i <= j."""
+        self.a, self.b, self.joints, self.motion = a, b, joints, motion
+        self.stretches = motion.stretches(*joints, b.centre, b.ball)
+        self.calls = 0
+        self.bound = np.inf
+        """m, certified lower bound of their distance along what is accepted so far."""
+        self.place: Place | None = None
+        """Why it is refused."""
+        bound = _by_balls(a, b, self.stretches)
+        self.stretches = replace(self.stretches, bound=bound)
+
+    def glance(self) -> float:
+        """Improve the bounds by two directions; a distance (m) at the row that seems worst.
+
+        The distance is that of the hulls, a hint of how near the bodies are at all.
+        """
+        s = self.stretches
+        if not len(s.row):
+            return np.inf
+        bound = s.bound
+        for guess in _guesses(self.a, self.b, s):
+            bound = np.maximum(bound, _parted(self.a, self.b, s, guess))
+        distance, n = self._asked(self.a, self.b, s, int(np.argmin(bound)), False)
+        if n is not None:
+            bound = np.maximum(bound, _parted(self.a, self.b, s, n))
+        self.stretches = replace(s, bound=bound)
+        return distance
+
+    def certify(self, needed: float, aim: float) -> None:
+        """Certify `needed` (m) everywhere, and `aim` >= needed where that takes little.
+
+        Sets `bound` and, where it is refused, `place`.
+        """
+        needed, aim = needed + ROUNDING, aim + ROUNDING
+        most = CALLS[0] + CALLS[1] * len(self.stretches.row)
+        tasks = [(self.a, self.b, self._accepted(self.stretches, aim))]
+        while tasks and self.place is None:
+            a, b, s = tasks.pop()
+            if not len(s.row):
+                continue
+            if a is not self.a or b is not self.b:
+                s = self._cheaply(a, b, s, aim)
+            s = self._by_coal(a, b, s, needed, aim)
+            if self.place is not None or not len(s.row):
+                continue
+            if (a is self.a and b is self.b) and self._begins_inside(s, needed):
+                return
+            if _can_be_cut(a, b):
+                tasks += _cut(a, b, s)
+                continue
+            s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
+            if len(s.row) and (s.length.min() < SHORTEST or self.calls > most):
+                self.place = _middle(s)
+                return
+            tasks.append((a, b, self.motion.halves(s, *self.joints)))
+
+    def _accepted(
+        self, s: Stretches, wanted: float, also: NDArray[np.bool_] | None = None
+    ) -> Stretches:
+        """Keep the lowest of the bounds that will do; the stretches that are left."""
+        good = s.bound >= wanted if also is None else also
+        self.bound = min(self.bound, float(np.min(s.bound[good], initial=np.inf)))
+        return s.of(~good)
+
+    def _cheaply(self, a: Piece, b: Piece, s: Stretches, aim: float) -> Stretches:
+        """Certify by balls and by guessed directions."""
+        s = self._accepted(replace(s, bound=np.maximum(s.bound, _by_balls(a, b, s))), aim)
+        for n in _guesses(a, b, s) if len(s.row) else ():
+            s = replace(s, bound=np.maximum(s.bound, _parted(a, b, s, n)))
+        return self._accepted(s, aim)
+
+    def _by_coal(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> Stretches:
+        """Certify by directions from coal; what is left, with its bounds. May set `place`."""
+        left, failures = [s.of(np.zeros(len(s.row), dtype=bool))], 0
+        while len(s.row) and not (failures >= FAILURES and _can_be_cut(a, b)):
+            worst = int(np.argmin(s.bound))
+            for end in (False, True):
+                distance, n = self._asked(a, b, s, worst, end)
+                if distance < needed and self._refuses(a, b, s, worst, end, distance, needed):
+                    return s
+                if n is not None:
+                    s = replace(s, bound=np.maximum(s.bound, _parted(a, b, s, n)))
+                if n is None or s.bound[worst] >= aim or s.delta[worst] < ROUNDING:
+                    break
+            if s.bound[worst] < aim:
+                failures += 1
+                left.append(s.of(np.array([worst])))
+                s = s.of(np.arange(len(s.row)) != worst)
+            else:
+                failures = 0
+            s = self._accepted(s, aim)
+        return _all_of([*left, s])
+
+    def _asked(
+        self, a: Piece, b: Piece, s: Stretches, k: int, end: bool
+    ) -> tuple[float, Array | None]:
+        """Coal's distance (m) at an end of stretch k, and the direction from a to b as (m, 3)."""
+        poses = s.last if end else s.first
+        rotation, point = poses.rotations[k], poses.points[k]
+        if isinstance(a, Below):
+            low = _lows(b, Poses(rotation[None], point[None]), a.thin[None])
+            return float(low[0] - a.support(a.thin[None])[0]), a.thin[None].repeat(len(s.row), 0)
+        self.calls += 1
+        distance, near_a, near_b = coal_distance(a, b, rotation, point)
+        apart = near_b - near_a
+        length = float(np.linalg.norm(apart))
+        if not (distance > 0.0 and length > 0.0):
+            return distance, None
+        return distance, (apart / length)[None].repeat(len(s.row), 0)
+
+    def _refuses(
+        self, a: Piece, b: Piece, s: Stretches, k: int, end: bool, distance: float, needed: float
+    ) -> bool:
+        """Are the bodies themselves nearer than `needed` there? Sets `place` if so."""
+        exact = (a.exact and b.exact) or isinstance(a, Below)
+        if not exact and a is self.a and b is self.b:
+            poses = s.last if end else s.first
+            self.calls += 1
+            true = coal_distance(a.truth, b.truth, poses.rotations[k], poses.points[k])[0]
+            exact = true < needed
+            distance = true if true > 0.0 else min(distance, 0.0)
+        if not exact:
+            return False
+        row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if end else 0.0))
+        self.place = Place(row + 1, 0.0, distance) if share == 1.0 else Place(row, share, distance)
+        return True
+
+    def _begins_inside(self, s: Stretches, needed: float) -> bool:
+        """Is one body inside the other at the first row? Sets `place` if so."""
+        at = np.flatnonzero((s.row == 0) & (s.share == 0.0) & (s.bound < needed))
+        if not len(at) or not (self.a.parts or self.b.parts):
+            return False
+        pose = s.first.of(at[:1])
+        if one_inside_other(self.a.truth, self.b.truth, pose.rotations[0], pose.points[0]):
+            distance = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
+            self.place = Place(0, 0.0, min(distance, 0.0), inside=True)
+        return self.place is not None
+
+
+def _can_be_cut(a: Piece, b: Piece) -> bool:
+    """May smaller pieces be clear where these are not? For a half space, a hull is the mesh."""
+    return not isinstance(a, Below) and bool(a.parts or b.parts)
+
+
+def _cut(a: Piece, b: Piece, s: Stretches) -> list[tuple[Piece, Piece, Stretches]]:
+    """The larger of two pieces that have parts, cut into them."""
+    if a.parts and (a.ball >= b.ball or not b.parts):
+        return [(part, b, s) for part in a.parts]
+    return [(a, part, s) for part in b.parts]
+
+
+def _all_of(parts: list[Stretches]) -> Stretches:
+    """Several sets of stretches as one."""
+    whole = parts[0]
+    for part in parts[1:]:
+        whole = joined(whole, part)
+    return whole
+
+
+def _middle(s: Stretches) -> Place:
+    """Where the shortest of stretches is, which could not be certified."""
+    k = int(np.argmin(s.length))
+    return Place(int(s.row[k]), float(s.share[k] + 0.5 * s.length[k]), np.nan)
+
+
+def _lows(b: Piece, poses: Poses, n: Array) -> Array:
+    """(k,) m, least n . x over the points of b, for directions (k, 3)."""
+    turned = np.einsum("kji,kj->ki", poses.rotations, n)
+    return np.einsum("ki,ki->k", n, poses.points) - b.support(-turned)
+
+
+def _parted(a: Piece, b: Piece, s: Stretches, n: Array) -> Array:
+    """(k,) m, how far the planes across n (k, 3) part a and b along stretches, see the module."""
+    if isinstance(a, Below):
+        n = np.broadcast_to(a.thin, n.shape)
+    low = np.minimum(_lows(b, s.first, n), _lows(b, s.last, n))
+    return np.asarray(low - a.support(n) - s.delta - s.stray)
+
+
+def _guesses(a: Piece, b: Piece, s: Stretches) -> list[Array]:
+    """Directions (k, 3) that cost nothing: between the centres, and across thin parts of a mesh."""
+    ahead = 0.5 * (s.first.moved(b.centre) + s.last.moved(b.centre)) - a.centre
+    away = np.linalg.norm(ahead, axis=1, keepdims=True)
+    found = [np.where(away > 0.0, ahead / np.where(away > 0.0, away, 1.0), [0.0, 0.0, 1.0])]
+    if a.thin is not None:
+        found.append(np.where(ahead @ a.thin >= 0.0, 1.0, -1.0)[:, None] * a.thin)
+    return found
+
+
+def _by_balls(a: Piece, b: Piece, s: Stretches) -> Array:
+    """(k,) m, distances of balls around a and b along stretches, at least."""
+    start = s.first.moved(b.centre) - a.centre
+    way = s.last.moved(b.centre) - a.centre - start
+    square = np.maximum((way**2).sum(axis=1), np.finfo(float).tiny)
+    nearest = np.clip(-(start * way).sum(axis=1) / square, 0.0, 1.0)
+    away = np.linalg.norm(start + nearest[:, None] * way, axis=1)
+    return np.asarray(away - a.ball - b.ball - s.delta - s.stray)
+
+
+@cache
+def _coal() -> tuple[Any, Any, Any]:
+    """Coal's module, and a request that keeps to its tolerances."""
+    import coal
+
+    request = coal.DistanceRequest()
+    request.enable_nearest_points = request.enable_signed_distance = True
+    return coal, request, coal.DistanceResult
+
+
+def coal_distance(a: Piece, b: Piece, rotation: Array, point: Array) -> tuple[float, Array, Array]:
+    """Coal's distance (m) of two pieces, b at a pose in the frame of a, and its nearest points."""
+    coal, request, result_of = _coal()
+    result = result_of()
+    pose_a = coal.Transform3s(a.placement[:3, :3], a.placement[:3, 3])
+    turned = rotation @ b.placement[:3, :3]
+    pose_b = coal.Transform3s(turned, rotation @ b.placement[:3, 3] + point)
+    distance = coal.distance(a.geometry, pose_a, b.geometry, pose_b, request, result)
+    return float(distance), result.getNearestPoint1(), result.getNearestPoint2()
