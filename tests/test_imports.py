@@ -284,7 +284,15 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
         f"feasibility.{word}"
         for word in ("cone", "cut_tree", "target_curves", "target_parts", "task", "verdict")
     }
-    values = ("bodies", "scene", "settings", "words")  # of collisions: no bound, no kernel
+    values = (
+        "bodies",
+        "pairs",
+        "scene",
+        "settings",
+        "shapes",
+        "triangles",
+        "words",
+    )  # of collisions: no bound, no kernel
     words |= {f"feasibility.collisions.{word}" for word in values}
     rooms = {"feasibility.certification", "feasibility.certification.collisions"}
     assert {n for n in feasibility if room_of(n) not in rooms} <= words

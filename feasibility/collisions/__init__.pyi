@@ -2,10 +2,16 @@ from .bodies import Bodies as Bodies
 from .bodies import LeftOut as LeftOut
 from .bodies import Pair as Pair
 from .bodies import Soup as Soup
-from .scene import HalfSpace as HalfSpace
+from .outer_bodies import polytopes_of as polytopes_of
+from .outer_bodies import soup_of as soup_of
+from .outer_bodies import tool_polytopes as tool_polytopes
+from .outer_bodies import tool_solids as tool_solids
+from .scene import SHAPES as SHAPES
 from .scene import Obstacle as Obstacle
 from .scene import ToolShape as ToolShape
 from .settings import Collision as Collision
+from .shapes import HalfSpace as HalfSpace
+from .triangles import read_triangles as read_triangles
 from .words import CHECKABLE as CHECKABLE
 from .words import UNCHECKED as UNCHECKED
 from .words import checked as checked

@@ -2,27 +2,54 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import ArgumentError, Checks, Fault
+from feasibility.collisions.pairs import checked_distance
+from feasibility.collisions.shapes import (
+    ORIGIN,
+    HalfSpace,
+    Shape,
+    checked_placement,
+    checked_shape,
+    placement_of,
+)
+from feasibility.collisions.triangles import PLACEHOLDER, read_triangles
+from feasibility.collisions.words import SURFACE, TOOL
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
-
-@dataclass(frozen=True, slots=True)
-class HalfSpace:
-    """All points with z <= 0 in the object's frame: a floor, or turned, a wall or a ceiling."""
-
-
-Shape = Box | Cylinder | Capsule | Sphere | Triangles
-"""Primitives are about their frame's origin, round ones along z, as in URDF."""
+Point = Sequence[float]
+Path = str | os.PathLike[str]
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Obstacle:
-    """One object of the scene, at rest in the root frame."""
+    """One object of the scene, at rest in the root frame.
+
+    Raises:
+        ArgumentError: it has no name, or its numbers are no body at no place; all that is wrong is
+            named. Boxes without thickness, NaN and the like never get further than this.
+
+    Example:
+        >>> shelf = Obstacle.box("shelf", (0.5, 0.6, 0.02), position=(0.55, 0.0, 0.5))
+        >>> shelf.geometry
+        Box(size=(0.5, 0.6, 0.02))
+        >>> floor = Obstacle.halfspace("floor", clearance=0.02)
+        >>> Obstacle.sphere("ball", radius=0.0, position=(0.0, float("nan"), 0.0))
+        Traceback (most recent call last):
+        coverable_errors.ArgumentError: obstacle 'ball': 2 faults:
+          position must be three finite numbers (metres), got (0.0, nan, 0.0)
+          radius must be a finite number > 0 (metres), got 0.0
+    """
 
     name: str
     geometry: Shape | HalfSpace
@@ -31,11 +58,226 @@ class Obstacle:
     clearance: float | None = None
     """m, in place of `Collision.clearance` for every pair with it."""
 
+    def __post_init__(self) -> None:
+        """Refuse what is no body, and keep plain numbers."""
+        checks = Checks(f"obstacle {self.name!r}" if isinstance(self.name, str) else "an obstacle")
+        if not (isinstance(self.name, str) and self.name.strip() and self.name.isprintable()):
+            checks.wrong("name", self.name, "must be a word that answers can call it by")
+        elif self.name in (SURFACE, TOOL):
+            checks.wrong(
+                "name", self.name, "must be another: pairs call the surface and the tool so"
+            )
+        clearance = self.clearance
+        _keep(
+            self,
+            geometry=checked_shape(checks, self.geometry),
+            placement=checked_placement(checks, self.placement),
+            clearance=None
+            if clearance is None
+            else checked_distance(checks, "clearance", clearance),
+        )
+        checks.done()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know about it, one sentence each."""
+        if isinstance(self.geometry, Triangles) and not self.geometry.closed:
+            return (
+                f"The mesh of {self.name!r} is not closed, so it is taken as a sheet: its faces "
+                "are kept clear of, but it has no inside.",
+            )
+        return ()
+
+    @staticmethod
+    def box(
+        name: str,
+        size: Point,
+        position: Point = ORIGIN,
+        rpy_deg: Point = ORIGIN,
+        clearance: float | None = None,
+    ) -> Obstacle:
+        """A box about its position, with full edge lengths `size` (m).
+
+        Args:
+            name: what pairs and answers call it.
+            size: (3,) m, along x, y and z of its own frame.
+            position: (3,) m, of its middle in the root frame, as for the other kinds.
+            rpy_deg: (3,) fixed-axis roll, pitch, yaw of its frame.
+            clearance: m, in place of `Collision.clearance` for every pair with it.
+        """
+        return _placed(Obstacle, Box(cast("Any", size)), position, rpy_deg, name, clearance)
+
+    @staticmethod
+    def cylinder(
+        name: str,
+        radius: float,
+        length: float,
+        position: Point = ORIGIN,
+        rpy_deg: Point = ORIGIN,
+        clearance: float | None = None,
+    ) -> Obstacle:
+        """A cylinder along z of its own frame, about its position; lengths in m."""
+        return _placed(Obstacle, Cylinder(radius, length), position, rpy_deg, name, clearance)
+
+    @staticmethod
+    def sphere(
+        name: str, radius: float, position: Point = ORIGIN, clearance: float | None = None
+    ) -> Obstacle:
+        """A ball, m."""
+        return _placed(Obstacle, Sphere(radius), position, ORIGIN, name, clearance)
+
+    @staticmethod
+    def capsule(
+        name: str,
+        radius: float,
+        length: float,
+        position: Point = ORIGIN,
+        rpy_deg: Point = ORIGIN,
+        clearance: float | None = None,
+    ) -> Obstacle:
+        """A cylinder along z of that length (m), with a half ball on each end."""
+        return _placed(Obstacle, Capsule(radius, length), position, rpy_deg, name, clearance)
+
+    @staticmethod
+    def halfspace(
+        name: str,
+        position: Point = ORIGIN,
+        rpy_deg: Point = ORIGIN,
+        clearance: float | None = None,
+    ) -> Obstacle:
+        """All that is below the xy plane of its own frame: a floor at `position` (m)."""
+        return _placed(Obstacle, HalfSpace(), position, rpy_deg, name, clearance)
+
+    @staticmethod
+    def mesh(
+        name: str,
+        file: Path,
+        scale: float | None = None,
+        position: Point = ORIGIN,
+        rpy_deg: Point = ORIGIN,
+        clearance: float | None = None,
+    ) -> Obstacle:
+        """The triangles of a file; see `read_triangles` for its formats and its unit."""
+        return _from_file(Obstacle, file, scale, position, rpy_deg, name, clearance)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ToolShape:
-    """A shape mounted on the tool frame, for a URDF that ends at the flange."""
+    """A shape mounted on the tool frame, for a URDF that ends at the flange.
+
+    Raises:
+        ArgumentError: its numbers are no body; all that is wrong is named.
+
+    Example:
+        >>> nozzle = ToolShape.cylinder(radius=0.01, length=0.1, position=(0.0, 0.0, -0.05))
+    """
 
     geometry: Shape
     placement: NDArray[np.float64]
     """(4, 4) the shape's frame in the tool frame, m."""
+
+    def __post_init__(self) -> None:
+        """Refuse what is no body, and keep plain numbers."""
+        checks = Checks("a tool shape")
+        if isinstance(self.geometry, HalfSpace):
+            checks.wrong("geometry", self.geometry, "must be a shape that an arm can carry")
+        _keep(
+            self,
+            geometry=checked_shape(checks, self.geometry),
+            placement=checked_placement(checks, self.placement),
+        )
+        checks.done()
+
+    @staticmethod
+    def box(size: Point, position: Point = ORIGIN, rpy_deg: Point = ORIGIN) -> ToolShape:
+        """A box; see `Obstacle.box`, with position and rpy_deg in the tool frame."""
+        return _placed(ToolShape, Box(cast("Any", size)), position, rpy_deg)
+
+    @staticmethod
+    def cylinder(
+        radius: float, length: float, position: Point = ORIGIN, rpy_deg: Point = ORIGIN
+    ) -> ToolShape:
+        """A cylinder along z of its own frame, m."""
+        return _placed(ToolShape, Cylinder(radius, length), position, rpy_deg)
+
+    @staticmethod
+    def sphere(radius: float, position: Point = ORIGIN) -> ToolShape:
+        """A ball, m."""
+        return _placed(ToolShape, Sphere(radius), position, ORIGIN)
+
+    @staticmethod
+    def capsule(
+        radius: float, length: float, position: Point = ORIGIN, rpy_deg: Point = ORIGIN
+    ) -> ToolShape:
+        """A cylinder along z of that length (m), with a half ball on each end."""
+        return _placed(ToolShape, Capsule(radius, length), position, rpy_deg)
+
+    @staticmethod
+    def mesh(
+        file: Path, scale: float | None = None, position: Point = ORIGIN, rpy_deg: Point = ORIGIN
+    ) -> ToolShape:
+        """The triangles of a file; see `read_triangles`."""
+        return _from_file(ToolShape, file, scale, position, rpy_deg)
+
+
+SHAPES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "box": ("size",),
+        "cylinder": ("radius", "length"),
+        "sphere": ("radius",),
+        "capsule": ("radius", "length"),
+        "halfspace": (),
+        "mesh": ("file", "scale"),
+    }
+)
+"""The kinds of objects, and what describes each: the arguments of the function of that name."""
+
+
+def _keep(value: object, **plain: object) -> None:
+    """Set fields of a frozen value; arrays are write-protected."""
+    for name, kept in plain.items():
+        if isinstance(kept, np.ndarray):
+            kept.flags.writeable = False
+        object.__setattr__(value, name, kept)
+
+
+def _placed(
+    make: Callable[..., Made],
+    geometry: object,
+    position: Any,
+    rpy_deg: Any,
+    name: str | None = None,
+    clearance: float | None = None,
+    faults: Sequence[Fault] = (),
+) -> Made:
+    """An object or a tool shape at a place; all faults together, with those found before."""
+    checks = Checks("a tool shape" if name is None else f"obstacle {name!r}")
+    checks.faults += faults
+    placement = placement_of(checks, position, rpy_deg)
+    try:
+        if name is None:
+            made = make(geometry, placement)
+        else:
+            made = make(name, geometry, placement, clearance)
+    except ArgumentError as error:
+        checks.faults += error.faults
+    checks.done()
+    return made
+
+
+def _from_file(
+    make: Callable[..., Made],
+    file: Path,
+    scale: float | None,
+    position: Any,
+    rpy_deg: Any,
+    name: str | None = None,
+    clearance: float | None = None,
+) -> Made:
+    """The same with the triangles of a file."""
+    shape, faults = PLACEHOLDER, tuple[Fault, ...]()
+    try:
+        shape = read_triangles(file, scale)
+    except ArgumentError as error:
+        faults = error.faults
+    return _placed(make, shape, position, rpy_deg, name, clearance, faults)

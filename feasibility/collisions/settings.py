@@ -2,18 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal, get_args
 
-if TYPE_CHECKING:
-    from feasibility.collisions.scene import Obstacle, ToolShape
+from coverable_errors import Checks, Fault
+from feasibility.collisions.pairs import (
+    checked_distance,
+    clearances_of,
+    names_of,
+    pairs_of,
+    refuse_repeated,
+    sequence,
+    stranger,
+)
+from feasibility.collisions.scene import Obstacle, ToolShape
+from feasibility.collisions.words import SURFACE, TOOL
 
 Fineness = Literal["hulls", "pieces", "meshes"]
+MOST_OBJECTS = 1000
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Collision:
-    """What the arm has to stay clear of, in `check(..., collision=Collision())`."""
+    """What the arm has to stay clear of: `Task(..., collision=Collision(clearance=0.005))`.
+
+    Raises:
+        ArgumentError: a number is no clearance, two objects have one name, or pairs contradict each
+            other; all that is wrong is named. Whether the links exist is judged with the arm, see
+            `unknown_names`.
+
+    Example:
+        >>> from feasibility.collisions import Obstacle
+        >>> shelf = Obstacle.box("shelf", (0.5, 0.6, 0.02), position=(0.55, 0.0, 0.5))
+        >>> Collision(clearance=0.005, scene=(shelf,)).checked
+        ('self', 'surface', 'scene')
+        >>> Collision(clearance=-1.0, shapes="x")
+        Traceback (most recent call last):
+        coverable_errors.ArgumentError: collision: 2 faults:
+          clearance must be a number in 0 .. 10 (metres), got -1.0
+          shapes must be 'hulls', 'pieces' or 'meshes', got 'x'
+    """
 
     self_: bool = True
     """Links against each other."""
@@ -39,8 +68,97 @@ class Collision:
     scene: tuple[Obstacle, ...] = ()
     tool: tuple[ToolShape, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Refuse what cannot be asked; keep plain numbers, and tuples."""
+        checks = Checks("collision")
+        kept: dict[str, Any] = {
+            name: checked_distance(checks, name, getattr(self, name))
+            for name in ("clearance", "tool_clearance", "thickness")
+        }
+        for name in ("self_", "surface"):
+            if not isinstance(getattr(self, name), bool):
+                checks.wrong(name, getattr(self, name), "must be True or False")
+        kept["shapes"] = checks.choice("shapes", self.shapes, get_args(Fineness))
+        kept["tool_links"] = names_of(checks, "tool_links", self.tool_links)
+        kept["allow"] = pairs_of(checks, "allow", self.allow)
+        kept["clearances"] = clearances_of(checks, self.clearances)
+        kept |= _objects(checks, self.scene, self.tool)
+        if self.srdf is not None and not (isinstance(self.srdf, str) and self.srdf.strip()):
+            checks.wrong("srdf", self.srdf, "must be the path of an SRDF file, or None")
+        allowed = {frozenset(pair) for pair in kept["allow"]}
+        for k, (first, second, _) in enumerate(kept["clearances"]):
+            if frozenset((first, second)) in allowed:
+                pair = f"{first!r} and {second!r} are also in allow; leave one of the two out"
+                checks.keep(Fault(f"clearances[{k}]", pair))
+        checks.done()
+        for name, value in kept.items():
+            object.__setattr__(self, name, value)
+
     @property
     def checked(self) -> tuple[str, ...]:
         """What is asked for: some of 'self', 'surface' and 'scene'."""
         asked = {"self": self.self_, "surface": self.surface, "scene": bool(self.scene)}
         return tuple(name for name, wanted in asked.items() if wanted)
+
+    def unknown_names(self, links: Sequence[str]) -> list[Fault]:
+        """Faults of names that are neither links of the arm nor objects, to be raised with others.
+
+        Args:
+            links: all links of the arm, those without shapes too.
+        """
+        objects = [obstacle.name for obstacle in self.scene]
+        known = [*links, *objects, *([SURFACE] if self.surface else []), TOOL]
+        faults = [
+            Fault(f"scene[{k}].name", f"{name!r} is also a link of the arm; call it otherwise")
+            for k, name in enumerate(objects)
+            if name in links
+        ]
+        faults += [
+            fault
+            for k, name in enumerate(self.tool_links)
+            for fault in stranger(f"tool_links[{k}]", name, links, "a link of the arm")
+        ]
+        pairs = [(f"allow[{k}]", pair) for k, pair in enumerate(self.allow)]
+        pairs += [(f"clearances[{k}].pair", row[:2]) for k, row in enumerate(self.clearances)]
+        what = "a link, an object of the scene, 'surface' or 'tool'"
+        for key, pair in pairs:
+            for name in pair:
+                if name == SURFACE and not self.surface:
+                    text = "names the surface, which is not asked for; write surface = true"
+                    faults.append(Fault(key, text))
+                else:
+                    faults += stranger(key, name, known, what)
+        return faults
+
+    def notes_on(self, standoff: float) -> tuple[str, ...]:
+        """What a user should know about these numbers under a task, one sentence each.
+
+        Args:
+            standoff: m, between surface and tool point.
+        """
+        if not self.surface or self.tool_clearance <= standoff:
+            return ()
+        return (
+            f"tool_clearance ({1e3 * self.tool_clearance:g} mm) is larger than the standoff "
+            f"({1e3 * standoff:g} mm): no shape of the tool may be nearer than "
+            f"{1e3 * (self.tool_clearance - standoff):g} mm to the tool point.",
+        )
+
+
+def _objects(checks: Checks, scene: Any, tool: Any) -> dict[str, tuple[Any, ...]]:
+    """The objects of the scene, each with a name of its own, and the shapes of the tool."""
+    kept: dict[str, tuple[Any, ...]] = {}
+    for key, given, kind in (("scene", scene, Obstacle), ("tool", tool, ToolShape)):
+        expected = f"must be a list of {kind.__name__}, such as {kind.__name__}.box makes"
+        rows = sequence(checks, key, given, expected)
+        if len(rows) > MOST_OBJECTS:
+            got = (
+                f"has {len(rows):,} objects; at most {MOST_OBJECTS:,} will do: join them as a mesh"
+            )
+            checks.keep(Fault(key, got))
+        for k, row in enumerate(rows):
+            if not isinstance(row, kind):
+                checks.wrong(f"{key}[{k}]", row, f"must be made by {kind.__name__}")
+        kept[key] = tuple(row for row in rows if isinstance(row, kind))
+    refuse_repeated(checks, "scene", [obstacle.name for obstacle in kept["scene"]])
+    return kept

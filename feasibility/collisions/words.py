@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+SURFACE, TOOL = "surface", "tool"
+"""What pairs call the surface, and the tool."""
 UNCHECKED = "collisions are not checked"
 CHECKABLE = {"self": "the arm itself", "surface": "the surface", "scene": "the scene"}
 

@@ -73,6 +73,27 @@ def with_likely_unit(mesh: TriangleMesh, what: str = "the file", unit: float = 1
         SurfaceError: the part is wider than 20 m, or narrower than 1 mm.
     """
     wide = float(mesh.extent.max())
+    refuse_unlikely_unit(wide, what, unit)
+    if wide <= WIDE_PART:
+        return mesh
+    note = (
+        f"the part is {wide:.4g} m wide, wider than most arms reach; if its unit is not the metre, "
+        "give scale"
+    )
+    return TriangleMesh(mesh.vertices, mesh.faces, (*mesh.history, note))
+
+
+def refuse_unlikely_unit(wide: float, what: str = "the file", unit: float = 1.0) -> None:
+    """Refuse a part of unlikely size.
+
+    Args:
+        wide: m, its longest side, if the unit is right.
+        what: has the triangles, for the message.
+        unit: metres per unit that was assumed.
+
+    Raises:
+        SurfaceError: the part is wider than 20 m, or narrower than 1 mm.
+    """
     if wide > LARGEST_PART:
         others = (
             f"if {what} is in millimetres give scale = 0.001 ({wide * 0.001:.3g} m), if in inches "
@@ -88,10 +109,3 @@ def with_likely_unit(mesh: TriangleMesh, what: str = "the file", unit: float = 1
             f"the part is {wide:.3g} m wide; if {reason} give scale = {larger:g} "
             f"({wide / unit * larger:.3g} m), and if it is that small scale = {unit}"
         )
-    if wide <= WIDE_PART:
-        return mesh
-    note = (
-        f"the part is {wide:.4g} m wide, wider than most arms reach; if its unit is not the metre, "
-        "give scale"
-    )
-    return TriangleMesh(mesh.vertices, mesh.faces, (*mesh.history, note))

@@ -1,0 +1,128 @@
+"""Convex bodies around the objects of the scene and the shapes of the tool, for the search.
+
+Each holds the exact shape, so what stays clear of it stays clear of the shape. Boxes, balls and
+capsules are exact, a cylinder gets a prism around it, and a mesh that is not convex stays
+triangles.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.collisions.bodies import Soup
+from feasibility.collisions.scene import Obstacle, ToolShape
+from feasibility.collisions.shapes import HalfSpace, Shape
+from feasibility.collisions.words import TOOL
+from robots import Robot
+from robots.shapes import Polytope, Solid, Triangles
+from robots.urdf import Box, Cylinder, Sphere
+
+Points = NDArray[np.float64]
+
+SIDES = 24  # of the prism around a cylinder: 0.9 % wider at its edges
+MOST_VERTICES = 128  # of a convex mesh; one with more stays triangles
+_CONVEX = 1e-9  # [1], of the widest side: a vertex may stand out of a face's plane as far
+_CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
+
+
+def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | None:
+    """Convex bodies that together hold an object; None where it is a mesh that is not convex.
+
+    A half space becomes a box from its plane downwards. Every point x of the arm is within `reach`
+    of the root's origin. The box begins beneath the origin, at its projection onto the plane, and
+    is `reach` wide to each side and reach + |height of the origin| deep, so the place of the half
+    space that is nearest to x, which is x itself or its projection onto the plane, lies in the box:
+    their distances to x are one.
+
+    Args:
+        obstacle: of the scene.
+        reach: m, no point of the arm is ever further from the origin of the root frame.
+    """
+    geometry, placement = obstacle.geometry, obstacle.placement
+    if isinstance(geometry, HalfSpace):
+        vertices = _below(placement, reach)
+        return (Polytope(obstacle.name, 0, vertices, 0.0),)
+    if isinstance(geometry, Triangles) and not is_convex(geometry):
+        return None
+    vertices, radius = _outer(geometry)
+    return (Polytope(obstacle.name, 0, _moved(placement, vertices), radius),)
+
+
+def soup_of(obstacle: Obstacle) -> Soup | None:
+    """The triangles of an object that is a mesh and not convex; None for any other."""
+    geometry = obstacle.geometry
+    if not isinstance(geometry, Triangles) or is_convex(geometry):
+        return None
+    corners = _moved(obstacle.placement, geometry.vertices)[geometry.faces]
+    return Soup(obstacle.name, corners, 0.0, geometry.closed)
+
+
+def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:
+    """The shapes of the tool as they are, on the last joint; their owner is 'tool'."""
+    frame = robot.model.frames[robot.tool_frame_id]
+    mount = frame.placement.homogeneous
+    return tuple(
+        Solid(TOOL, int(frame.parentJoint), mount @ shape.placement, shape.geometry)
+        for shape in tool
+    )
+
+
+def tool_polytopes(tool: Sequence[ToolShape], robot: Robot) -> tuple[Polytope, ...]:
+    """Convex bodies around the shapes of the tool, on the last joint; a mesh gets its hull."""
+    found = []
+    for solid in tool_solids(tool, robot):
+        vertices, radius = _outer(solid.geometry)
+        found.append(Polytope(TOOL, solid.joint, _moved(solid.placement, vertices), radius))
+    return tuple(found)
+
+
+def is_convex(mesh: Triangles) -> bool:
+    """Do the triangles bound a convex solid? False for one of more than 128 vertices.
+
+    They do where they are closed, in one piece, and no vertex is above the plane of a face.
+    """
+    vertices, faces = mesh.vertices, mesh.faces
+    if not mesh.closed or len(vertices) > MOST_VERTICES:
+        return False
+    corner = vertices[faces]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normals = across / np.linalg.norm(across, axis=1, keepdims=True)
+    heights = normals @ vertices.T - np.einsum("ki,ki->k", normals, corner[:, 0])[:, None]
+    wide = np.ptp(vertices, axis=0).max()
+    # Euler's formula: one piece without handles has 2 vertices more than half its faces.
+    return bool(heights.max() <= _CONVEX * wide and 2 * len(vertices) == len(faces) + 4)
+
+
+def _outer(geometry: Shape) -> tuple[Points, float]:
+    """Vertices (k, 3) m, and the radius around their hull, that hold a shape, in its frame."""
+    if isinstance(geometry, Triangles):
+        return geometry.vertices, 0.0
+    if isinstance(geometry, Box):
+        return _CUBE * (np.array(geometry.size) / 2.0), 0.0
+    if isinstance(geometry, Sphere):
+        return np.zeros((1, 3)), geometry.radius
+    top = np.array([0.0, 0.0, geometry.length / 2.0])
+    if not isinstance(geometry, Cylinder):
+        return np.stack([-top, top]), geometry.radius
+    angles = np.arange(SIDES) * (math.tau / SIDES)
+    round_about = geometry.radius / math.cos(math.pi / SIDES)
+    ring = round_about * np.stack([np.cos(angles), np.sin(angles), np.zeros(SIDES)], axis=1)
+    return np.concatenate([ring - top, ring + top]), 0.0
+
+
+def _below(placement: Points, reach: float) -> Points:
+    """(8, 3) m, the box that stands for a half space; see `polytopes_of`."""
+    own = np.linalg.inv(placement)[:3, 3]  # the origin of the root frame, seen from the plane
+    deep = reach + abs(own[2])
+    middle = np.array([own[0], own[1], -deep / 2.0])
+    return _moved(placement, middle + _CUBE * np.array([reach, reach, deep / 2.0]))
+
+
+def _moved(placement: Points, points: Points) -> Points:
+    """Points after the rigid motion of a (4, 4) matrix."""
+    return points @ placement[:3, :3].T + placement[:3, 3]

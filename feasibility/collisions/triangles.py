@@ -1,0 +1,132 @@
+"""Triangles of scene and tool: from files and arrays that are not trusted, checked and welded."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import Checks, CoverableError, Fault
+from robots.shapes import Triangles
+
+MOST_FACES = 500_000
+SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e4  # [m], of the widest side
+_AREA = 1e-14  # [1], of the widest side squared: a face below is none
+_VOLUME = 1e-9  # [1], of the widest side cubed: triangles around less bound no solid
+
+Points = NDArray[np.float64]
+Faces = NDArray[np.int64]
+PLACEHOLDER = Triangles(
+    np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), np.array([[0, 1, 2]]), False
+)
+
+
+def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> Triangles:
+    """The triangles of a mesh file, in metres.
+
+    Unlike a surface that is to be covered, an object may have edges with any number of faces, holes
+    and faces that disagree about the outer side: then it is no solid, but a sheet.
+
+    Args:
+        path: STL, OBJ, PLY, OFF or GLB, of at most 500,000 faces.
+        scale: metres per unit of the file; None for metres, where a width above 20 m or below 1 mm
+            is refused as a likely wrong unit. Any given scale is taken.
+
+    Raises:
+        ArgumentError: no such file, not a mesh, damaged, too large, flat to a line, or of an
+            unlikely size.
+    """
+    from coverable_meshes import read_raw
+    from surfaces.meshes.files import metres_per_unit, refuse_unlikely_unit
+
+    checks = Checks()
+    name = repr(Path(os.fsdecode(path)).name[:100])
+    made = PLACEHOLDER
+    try:
+        unit = metres_per_unit(scale)
+        raw = read_raw(path)
+        with np.errstate(over="ignore"):  # infinite coordinates are refused next
+            made = checked_triangles(checks, raw.vertices * unit, raw.faces)
+        if scale is None and not checks.faults:
+            refuse_unlikely_unit(float(np.ptp(made.vertices, axis=0).max()))
+    except CoverableError as error:
+        checks.faults += error.faults
+    checks.faults = [
+        Fault("scale" if fault.key == "scale" else "file", fault.fault, name, fault.expected)
+        for fault in checks.faults
+    ]
+    checks.done()
+    return made
+
+
+def checked_triangles(checks: Checks, vertices: Any, faces: Any) -> Triangles:
+    """Triangles that nothing chokes on: welded, without faces that have no area.
+
+    They are `closed` where every edge has two faces that agree about the outer side, and they
+    bound a volume; faces that look inwards are then turned over.
+    """
+    before = len(checks.faults)
+    points, corners = _arrays(checks, vertices, faces)
+    if len(checks.faults) > before:
+        return PLACEHOLDER
+    points, same = np.unique(points, axis=0, return_inverse=True)
+    corners = same.reshape(-1)[corners]
+    with np.errstate(over="ignore"):
+        wide = float(np.ptp(points[corners].reshape(-1, 3), axis=0).max())
+    if not SMALLEST_EXTENT <= wide <= LARGEST_EXTENT:
+        expected = f"must be {SMALLEST_EXTENT:g} .. {LARGEST_EXTENT:g} m wide"
+        checks.keep(Fault("faces", f"are {wide:.3g} m wide", expected=expected))
+        return PLACEHOLDER
+    sides = points[corners[:, 1:]] - points[corners[:, :1]]
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    corners = corners[areas > _AREA * wide**2]
+    if not len(corners):
+        expected = "must be triangles with an area"
+        checks.keep(Fault("faces", "all of them are flat to a line", expected=expected))
+        return PLACEHOLDER
+    used, corners = np.unique(corners, return_inverse=True)
+    points, corners = points[used], corners.reshape(-1, 3)
+    volume = _volume(points, corners)
+    closed = abs(volume) > _VOLUME * wide**3 and _is_closed(corners)
+    return Triangles(points, corners[:, ::-1] if closed and volume < 0.0 else corners, closed)
+
+
+def _arrays(checks: Checks, vertices: Any, faces: Any) -> tuple[Points, Faces]:
+    """Both as arrays; anything after a fault."""
+    before = len(checks.faults)
+    points, corners = PLACEHOLDER.vertices, PLACEHOLDER.faces
+    try:
+        points = np.asarray(vertices, dtype=float)
+        if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():
+            checks.keep(Fault("vertices", "are not k x 3 finite numbers (metres)"))
+    except (TypeError, ValueError):
+        checks.keep(Fault("vertices", "are not k x 3 finite numbers (metres)"))
+    given = np.asarray(faces)
+    if given.ndim != 2 or given.shape[1] != 3 or given.dtype.kind not in "iu":
+        checks.keep(Fault("faces", "are not m x 3 whole numbers, the indices of vertices"))
+    elif not 1 <= len(given) <= MOST_FACES:
+        expected = f"must be 1 .. {MOST_FACES:,}"
+        checks.keep(Fault("faces", f"are {len(given):,}; thin the mesh", expected=expected))
+    elif len(checks.faults) == before and not 0 <= given.min() <= given.max() < len(points):
+        checks.keep(Fault("faces", f"name a vertex that is not among the {len(points):,}"))
+    else:
+        corners = given.astype(np.int64)
+    return points, corners
+
+
+def _volume(points: Points, corners: Faces) -> float:
+    """m^3, that the faces enclose; negative where they look inwards."""
+    a, b, c = (points[corners[:, k]] - points[0] for k in range(3))
+    return float(np.einsum("ki,ki->", a, np.cross(b, c)) / 6.0)
+
+
+def _is_closed(corners: Faces) -> bool:
+    """Does each edge have two faces, which run along it in opposite directions?"""
+    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
+    count = int(corners.max()) + 1
+    there, back = ends[:, 0] * count + ends[:, 1], ends[:, 1] * count + ends[:, 0]
+    there.sort()
+    return bool((np.diff(there) > 0).all() and (there == np.sort(back)).all())
