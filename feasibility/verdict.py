@@ -87,6 +87,11 @@ class Certificate:
     """rad, bound on the angle between tool axis and approach direction along the walk."""
     min_limit_margin: float
     """rad or m, smallest distance of a joint from a limit."""
+    min_clearance: float | None = None
+    """m, bound on the distance of any pair of bodies along the walk; None where collisions are not
+    checked, or there is no pair."""
+    nearest_pair: tuple[str, str] | None = None
+    """Links, objects of the scene, 'tool' or 'surface': the two that this bound is of."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,17 +3,22 @@
 It shares no code with the search but the curves between cell centres, and compares these with the
 surface's own closest points and normals (`feasibility.certification.curve_matching`). Besides, it
 uses Pinocchio's frame placements and joint Jacobians, and the bound between samples
-(`kinematic_bounds`); it sees only the walk, not how it was found.
+(`kinematic_bounds`); it sees only the walk, not how it was found. Whether bodies collide is judged
+by `feasibility.certification.collisions`.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.collisions import collision_replay
 from feasibility.certification.curve_matching import CurveMatch, match_to_curves
 from feasibility.certification.kinematic_bounds import peaks, placements, second_derivatives
 from feasibility.certification.surface_replay import replay_over_surface
+from feasibility.collisions import Bodies
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
@@ -37,7 +42,14 @@ def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
     return ""
 
 
-def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]) -> Replay:
+def replay(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    walk: Walk,
+    needed: NDArray[np.bool_],
+    bodies: Bodies | None = None,
+) -> Replay:
     """Check a walk: limits, tool point and cone at and between waypoints, and the cells it visits.
 
     A walk that the curves between cell centres do not show to be right, because it leaves them or
@@ -50,10 +62,26 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
         task: the task; its tolerance and cone are used exactly.
         walk: the motion.
         needed: (N,) cells that must be visited.
+        bodies: what has to stay clear of what; None where collisions are not checked. Asked only
+            of walks that are right in everything else.
 
     Returns:
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
     """
+    found = _replay_of_tool(robot, cells, task, walk, needed)
+    if bodies is None or not found.accepted:
+        return found
+    clear = collision_replay(robot, bodies, walk.q)
+    certificate = replace(
+        found.certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
+    )
+    return Replay(certificate, clear.refusal)
+
+
+def _replay_of_tool(
+    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
+) -> Replay:
+    """`replay` of limits, tool and cells alone."""
     along_curves = replay_along_curves(robot, cells, task, walk, needed)
     if along_curves.accepted or _malformed(robot, cells, walk):
         return along_curves

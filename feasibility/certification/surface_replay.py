@@ -9,18 +9,22 @@ asked for, nor where the motion says that it is.
 Between rows, bounds are used (`stretches`). A stretch that they do not accept is halved: they fall
 to a quarter, and one exact configuration is added. What is wrong at an exact configuration is
 refused, and so is what is still open after many halvings.
+
+Where bodies are given, they have to stay clear of each other too (`collisions`).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
+from feasibility.certification.collisions import collision_replay
 from feasibility.certification.kinematic_bounds import placements
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
+from feasibility.collisions import Bodies
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
@@ -79,7 +83,12 @@ class MotionReplay:
 
 
 def replay_over_surface(
-    robot: Robot, cells: Cells, task: Task, q: NDArray[np.float64], needed: Mask | None = None
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    q: NDArray[np.float64],
+    needed: Mask | None = None,
+    bodies: Bodies | None = None,
 ) -> MotionReplay:
     """Judge a motion by the module's rules.
 
@@ -89,6 +98,7 @@ def replay_over_surface(
         task: its tolerance and cone are used exactly.
         q: (m, n) rows, rad or m, unwrapped.
         needed: (N,) cells that have to be reached; all by default.
+        bodies: what has to stay clear of what; None where collisions are not checked.
     """
     rows = np.asarray(q, dtype=float)
     nowhere = np.zeros(len(cells), dtype=bool)
@@ -115,6 +125,12 @@ def replay_over_surface(
     error = max(looked.error, float(np.max(samples.error, initial=0.0)))
     chord = max(looked.chord, float(np.max(samples.chord, initial=0.0)))
     certificate = Certificate(len(rows), error, angle_of(chord), margin)
+    if bodies is not None:
+        clear = collision_replay(robot, bodies, rows)
+        faults += [MotionFault(fault.row, fault.share, fault.text) for fault in clear.faults]
+        certificate = replace(
+            certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
+        )
     return MotionReplay(certificate, tuple(faults), reached)
 
 

@@ -52,9 +52,9 @@ class CollisionFault:
 class CollisionReplay:
     """What the replay found."""
 
-    min_clearance: float
-    """m, certified: no pair comes nearer along an accepted motion; inf where there is no pair. Of a
-    refused one, the least distance that was met."""
+    min_clearance: float | None
+    """m, certified: no pair comes nearer along an accepted motion; None where there is no pair. Of
+    a refused one, the least distance that was met."""
     nearest_pair: tuple[str, str] | None
     """The pair that it is of."""
     faults: tuple[CollisionFault, ...]
@@ -152,10 +152,10 @@ def collision_replay(
     if not finite.all():
         row = int(np.argmin(finite))
         fault = CollisionFault(row, 0.0, ("", ""), np.nan, "a joint value is not finite")
-        return CollisionReplay(np.nan, None, (fault,), 0)
+        return CollisionReplay(None, None, (fault,), 0)
     ready = _ready(bodies)
     if not len(rows) or not bodies.pairs:
-        return CollisionReplay(np.inf, None, (), 0)
+        return CollisionReplay(None, None, (), 0)
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
         rows, strays = np.repeat(rows, 2, axis=0), None
     motion = Motion(robot, rows, None if strays is None else np.abs(strays))
@@ -190,7 +190,8 @@ def _judged(bodies: Bodies, ready: BodiesOfOwners, motion: Motion) -> CollisionR
         if distance < least:
             least, of = distance, names
     ordered = sorted(faults.values(), key=lambda fault: np.nan_to_num(fault.distance, nan=np.inf))
-    return CollisionReplay(float(least), of, tuple(ordered), calls)
+    clearance = None if of is None else float(least)
+    return CollisionReplay(clearance, of, tuple(ordered), calls)
 
 
 def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:
