@@ -8,7 +8,6 @@ triangles.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -16,16 +15,14 @@ from numpy.typing import NDArray
 
 from feasibility.collisions.bodies import Soup
 from feasibility.collisions.scene import Obstacle, ToolShape
-from feasibility.collisions.shapes import HalfSpace, Shape
+from feasibility.collisions.shapes import HalfSpace
 from feasibility.collisions.words import TOOL
 from robots import Robot
-from robots.shapes import Polytope, Solid, Triangles
-from robots.urdf import Box, Cylinder, Sphere
+from robots.shapes import Polytope, Solid, Triangles, hull_of
 
 Points = NDArray[np.float64]
 
-SIDES = 24  # of the prism around a cylinder: 0.9 % wider at its edges
-MOST_VERTICES = 128  # of a convex mesh; one with more stays triangles
+MOST_VERTICES = 64  # of a convex mesh: its hull would be thinned, so one with more stays triangles
 _CONVEX = 1e-9  # [1], of the widest side: a vertex may stand out of a face's plane as far
 _CUBE = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 
@@ -49,7 +46,7 @@ def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | Non
         return (Polytope(obstacle.name, 0, vertices, 0.0),)
     if isinstance(geometry, Triangles) and not is_convex(geometry):
         return None
-    vertices, radius = _outer(geometry)
+    vertices, radius = hull_of(geometry)
     return (Polytope(obstacle.name, 0, _moved(placement, vertices), radius),)
 
 
@@ -76,13 +73,13 @@ def tool_polytopes(tool: Sequence[ToolShape], robot: Robot) -> tuple[Polytope, .
     """Convex bodies around the shapes of the tool, on the last joint; a mesh gets its hull."""
     found = []
     for solid in tool_solids(tool, robot):
-        vertices, radius = _outer(solid.geometry)
+        vertices, radius = hull_of(solid.geometry)
         found.append(Polytope(TOOL, solid.joint, _moved(solid.placement, vertices), radius))
     return tuple(found)
 
 
 def is_convex(mesh: Triangles) -> bool:
-    """Do the triangles bound a convex solid? False for one of more than 128 vertices.
+    """Do the triangles bound a convex solid? False for one of more than 64 vertices.
 
     They do where they are closed, in one piece, and no vertex is above the plane of a face.
     """
@@ -96,23 +93,6 @@ def is_convex(mesh: Triangles) -> bool:
     wide = np.ptp(vertices, axis=0).max()
     # Euler's formula: one piece without handles has 2 vertices more than half its faces.
     return bool(heights.max() <= _CONVEX * wide and 2 * len(vertices) == len(faces) + 4)
-
-
-def _outer(geometry: Shape) -> tuple[Points, float]:
-    """Vertices (k, 3) m, and the radius around their hull, that hold a shape, in its frame."""
-    if isinstance(geometry, Triangles):
-        return geometry.vertices, 0.0
-    if isinstance(geometry, Box):
-        return _CUBE * (np.array(geometry.size) / 2.0), 0.0
-    if isinstance(geometry, Sphere):
-        return np.zeros((1, 3)), geometry.radius
-    top = np.array([0.0, 0.0, geometry.length / 2.0])
-    if not isinstance(geometry, Cylinder):
-        return np.stack([-top, top]), geometry.radius
-    angles = np.arange(SIDES) * (math.tau / SIDES)
-    round_about = geometry.radius / math.cos(math.pi / SIDES)
-    ring = round_about * np.stack([np.cos(angles), np.sin(angles), np.zeros(SIDES)], axis=1)
-    return np.concatenate([ring - top, ring + top]), 0.0
 
 
 def _below(placement: Points, reach: float) -> Points:
