@@ -75,10 +75,15 @@ def test_commands_of_the_readme_run(
     for _, *arguments in commands:
         if arguments[0] == "show":  # without it, a browser window
             arguments += ["--html", "shown.html"]
-        if arguments[0] == "place":  # fewer, to save time
-            arguments += ["--count", "4"]
-        if arguments[:2] == ["place", "case.toml"]:
+        # Fewer cells and placements, and no processes but for the study, to save time.
+        if arguments[0] == "path":
             arguments += ["--set", "surface.cells=[3, 4]"]
+        if arguments[:2] == ["place", "case.toml"]:
+            arguments += ["--set", "surface.cells=[2, 2]"]
+        if arguments[0] == "place":
+            arguments += ["--count", "4"]
+        if arguments[0] in ("place", "compare"):
+            arguments += ["--workers", "0"]
         expected = 1 if arguments[1:2] == ["paper/4d"] else 0
         assert main(arguments) == expected, arguments
         assert "usage" not in capsys.readouterr().err

@@ -114,7 +114,7 @@ def test_none_in_a_region_within_reach() -> None:
         Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), {"x": (-0.05, 0.05), "y": (-0.05, 0.05)}
     )
     narrow = type(setup.task)(standoff=0.02, cone_deg=5)
-    placements = place(setup.robot, setup.cells, narrow, region, count=8, around=1)
+    placements = place(setup.robot, setup.cells, narrow, region, count=3, around=0)
     assert placements.answer is Answer.INFEASIBLE
     assert placements.evidence is Evidence.EXHAUSTED
     best = placements.best
@@ -168,10 +168,10 @@ def test_a_verdict_decides_not_the_search() -> None:
 def test_the_bound_on_a_region_holds_for_its_placements() -> None:
     """Against hundreds of placements in each of 60 regions, some near the edge of reach."""
     proved = several = 0
+    setups = [placement_case(name).build() for name in TEXTS]
+    reaches = [Reach.of(setup.robot, setup.cells, setup.task) for setup in setups]
     for k in range(60):
-        name = list(TEXTS)[k % len(TEXTS)]
-        setup = placement_case(name).build()
-        reach = Reach.of(setup.robot, setup.cells, setup.task)
+        reach = reaches[k % len(reaches)]
         rng = np.random.default_rng([21, k])
         far = rng.normal(size=3)
         far *= rng.uniform(0.8, 1.6) * (reach.reach + 0.3) / np.linalg.norm(far)
@@ -576,15 +576,15 @@ def test_progress_estimates_the_end() -> None:
 def test_stations_where_no_single_placement_will_do() -> None:
     """A sphere's shell around the tool is too much at once, but not from several placements."""
     setup = placement_case("ur5 plate").build()
-    shell = sphere(0.35, polar_deg=(20, 160), azimuth_deg=(0, 360), side="outside").cells(4, 8)
+    shell = sphere(0.35, polar_deg=(20, 160), azimuth_deg=(0, 360), side="outside").cells(3, 6)
     region = Region.around(
         Pose((0.6, 0.0, 0.3), (0.0, 0.0, 0.0)),
         {"x": (0.5, 0.9), "z": (0.2, 0.5), "yaw_deg": (-180, 180)},
     )
-    placements = place(setup.robot, shell, setup.task, region, count=24, around=1)
+    placements = place(setup.robot, shell, setup.task, region, count=8, around=0)
     assert placements.answer is Answer.INFEASIBLE
     evaluator = LocalEvaluator(setup.robot, shell, setup.task, Search())
-    plan = station_plan(placements, evaluator, count=32)
+    plan = station_plan(placements, evaluator, count=8)
     stations = plan.stations
     assert stations.optimal
     assert len(stations) >= 2

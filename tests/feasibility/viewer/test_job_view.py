@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from path_cases import path_of
 
 from feasibility import check
 from feasibility.cases import load_case
@@ -71,12 +72,13 @@ def test_the_arm_plays_the_walk():
 
 def test_the_slider_shows_the_time_of_a_trajectory():
     """Not that of the view, which shows long ones in a minute."""
-    run = trajectory(path(), 0.1)
+    few = path_of("4a, coarse")
+    run = trajectory(few, 0.05)
     assert run.duration > LONGEST
-    drawn = view_path(path(), run)
+    drawn = view_path(few, run)
     assert drawn.readout.duration == run.duration
     assert drawn.readout.times[-1] <= LONGEST + 1e-9
-    assert view_path(path()).readout.duration is None
+    assert view_path(few).readout.duration is None
 
 
 def test_patches_and_what_is_left_out_are_coloured():
