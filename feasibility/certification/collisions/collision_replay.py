@@ -100,7 +100,7 @@ class BodiesOfOwners:
         scene = {thing.name for thing in bodies.scene}
         for thing in bodies.scene:
             if thing.name in named:
-                piece = piece_of(thing.geometry, thing.placement)
+                piece = piece_of(thing.geometry, thing.placement, at_rest=True)
                 self._of[thing.name].append(_Body(0, piece, 0.0))
         for soup in bodies.soups:
             if soup.owner in named and soup.owner not in scene:

@@ -43,6 +43,8 @@ class Piece:
         self.corners, self.radius = corners, radius
         self.exact = True
         """Is the body itself meant, and not something around it?"""
+        self.triangles = 0
+        """How many there are; 0 of convex bodies."""
         low, high = corners.min(axis=0), corners.max(axis=0)
         self.centre: Array = 0.5 * (low + high)
         reach = np.linalg.norm(corners - self.centre, axis=1).max()
@@ -112,6 +114,7 @@ class MeshPart(Piece):
         self.closed = closed
         super().__init__(None, np.eye(4), _outermost(self.vertices), 0.0)
         self.__dict__.pop("geometry")  # made when coal is asked
+        self.triangles = len(faces)
 
     @cached_property
     def geometry(self) -> Any:
@@ -145,7 +148,7 @@ class MeshPart(Piece):
 class MeshHull(Piece):
     """The convex hull of a mesh: what is tried first, because it is fast."""
 
-    def __init__(self, mesh: MeshPart, hull: Any) -> None:
+    def __init__(self, mesh: MeshPart, hull: Any, at_rest: bool) -> None:
         """`hull` is scipy's, of the mesh's vertices."""
         import coal
 
@@ -155,12 +158,12 @@ class MeshHull(Piece):
         # What qhull merged may stand out a little from the corners that it kept.
         outside = float((mesh.vertices @ hull.equations[:, :3].T + hull.equations[:, 3]).max())
         super().__init__(geometry, np.eye(4), corners, max(outside, 0.0))
-        self.exact, self.mesh = False, mesh
+        self.exact, self.mesh, self.at_rest = False, mesh, at_rest
 
     @property
     def parts(self) -> tuple[Piece, ...]:
-        """The mesh itself."""
-        return (self.mesh,)
+        """The mesh itself where it is at rest: what the arm is among may be hollow."""
+        return (self.mesh,) if self.at_rest else ()
 
     @cached_property
     def truth(self) -> Piece:
@@ -168,12 +171,13 @@ class MeshHull(Piece):
         return self.mesh
 
 
-def piece_of(geometry: object, placement: Array) -> Piece:
+def piece_of(geometry: object, placement: Array, at_rest: bool = False) -> Piece:
     """A body of the arm or of the scene as the judge sees it.
 
     Args:
         geometry: a primitive, `Triangles` or a `HalfSpace`.
         placement: (4, 4) its frame in the joint's frame (or the root frame), m.
+        at_rest: does it belong to the scene?
 
     Raises:
         ArgumentError: it is none of these, empty, or not finite.
@@ -199,7 +203,7 @@ def piece_of(geometry: object, placement: Array) -> Piece:
         case HalfSpace():
             return Below(placement)
         case Triangles(vertices, faces, closed) if len(faces):
-            return _mesh(_moved(placement, vertices), faces, closed)
+            return _mesh(_moved(placement, vertices), faces, closed, at_rest)
     raise ArgumentError(f"the replay knows no shape like {geometry!r:.80}")
 
 
@@ -213,7 +217,7 @@ def sheet_piece(triangles: Array, closed: bool) -> Piece:
     return piece_of(Triangles(triangles.reshape(-1, 3), faces, closed), np.eye(4)).truth
 
 
-def _mesh(vertices: Array, faces: NDArray[np.int64], closed: bool) -> Piece:
+def _mesh(vertices: Array, faces: NDArray[np.int64], closed: bool, at_rest: bool) -> Piece:
     """A mesh behind its hull, or the mesh alone where it is flat."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -223,7 +227,7 @@ def _mesh(vertices: Array, faces: NDArray[np.int64], closed: bool) -> Piece:
     if _is_flat(mesh.vertices):
         return mesh
     try:
-        return MeshHull(mesh, ConvexHull(mesh.vertices))
+        return MeshHull(mesh, ConvexHull(mesh.vertices), at_rest)
     except QhullError:
         return mesh
 

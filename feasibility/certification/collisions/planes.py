@@ -8,8 +8,9 @@ unit vector n, their distance along a stretch is at least
 with h the supports of `pieces`, and R, t the pose of b at an end of the stretch. That n parts them
 is checked by this formula alone; it does not matter where n is from. First comes the line between
 the centres, then coal's nearest points at the stretch with the lowest bound, each tried on all
-stretches at once. What they do not certify is cut: a hull into the mesh within, a mesh into halves
-of it, and last the stretch in time.
+stretches at once. What they do not certify is cut: sheets and meshes of the scene into ever smaller
+parts, and last the stretch in time. Where the hull of a link's mesh is too large, the distances of
+the mesh itself decide (`budgets`).
 
 A plane certifies bodies with all that is inside them. Triangles of a closed mesh have no inside:
 where they are used, neither body may begin inside the other. As their distance never vanishes,
@@ -25,6 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.collisions.budgets import Budget, TooNear
 from feasibility.certification.collisions.inside import one_inside_other
 from feasibility.certification.collisions.pieces import Below, Piece
 from feasibility.certification.collisions.relative_motion import (
@@ -37,7 +39,8 @@ from feasibility.certification.collisions.relative_motion import (
 Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
-FAILURES = 3  # of coal's directions in a row, after which a mesh is rather cut
+FAILURES = 3  # of coal's directions in a row, after which another way is taken
+FEW = 8  # triangles, into no less of which a sheet is cut for a hull, which is larger than its mesh
 SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
 CALLS = (2000, 40)  # most coal calls for two bodies: so many, and so many for each segment
 
@@ -93,7 +96,6 @@ class Pairing:
         Sets `bound` and, where it is refused, `place`.
         """
         needed, aim = needed + ROUNDING, aim + ROUNDING
-        most = CALLS[0] + CALLS[1] * len(self.stretches.row)
         tasks = [(self.a, self.b, self._accepted(self.stretches, aim))]
         while tasks and self.place is None:
             a, b, s = tasks.pop()
@@ -109,8 +111,11 @@ class Pairing:
             if _can_be_cut(a, b):
                 tasks += _cut(a, b, s)
                 continue
+            if not _is_exact(a, b):
+                self._by_budget(a.truth, b.truth, s, needed, aim)
+                continue
             s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
-            if len(s.row) and (s.length.min() < SHORTEST or self.calls > most):
+            if len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most()):
                 self.place = _middle(s)
                 return
             tasks.append((a, b, self.motion.halves(s, *self.joints)))
@@ -133,11 +138,14 @@ class Pairing:
     def _by_coal(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> Stretches:
         """Certify by directions from coal; what is left, with its bounds. May set `place`."""
         left, failures = [s.of(np.zeros(len(s.row), dtype=bool))], 0
-        while len(s.row) and not (failures >= FAILURES and _can_be_cut(a, b)):
+        while len(s.row) and not (
+            failures >= FAILURES and (_can_be_cut(a, b) or not _is_exact(a, b))
+        ):
             worst = int(np.argmin(s.bound))
             for end in (False, True):
                 distance, n = self._asked(a, b, s, worst, end)
-                if distance < needed and self._refuses(a, b, s, worst, end, distance, needed):
+                if distance < needed and _is_exact(a, b):
+                    self.place = _place(s, worst, end, distance)
                     return s
                 if n is not None:
                     s = replace(s, bound=np.maximum(s.bound, _parted(a, b, s, n)))
@@ -169,27 +177,35 @@ class Pairing:
             return distance, None
         return distance, (apart / length)[None].repeat(len(s.row), 0)
 
-    def _refuses(
-        self, a: Piece, b: Piece, s: Stretches, k: int, end: bool, distance: float, needed: float
-    ) -> bool:
-        """Are the bodies themselves nearer than `needed` there? Sets `place` if so."""
-        exact = (a.exact and b.exact) or isinstance(a, Below)
-        if not exact and a is self.a and b is self.b:
-            poses = s.last if end else s.first
+    def _by_budget(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> None:
+        """Certify meshes by their distances alone; sets `bound`, or `place`."""
+        whole = self.stretches
+
+        def distance(row: int, share: float) -> float:
             self.calls += 1
-            true = coal_distance(a.truth, b.truth, poses.rotations[k], poses.points[k])[0]
-            exact = true < needed
-            distance = true if true > 0.0 else min(distance, 0.0)
-        if not exact:
-            return False
-        row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if end else 0.0))
-        self.place = Place(row + 1, 0.0, distance) if share == 1.0 else Place(row, share, distance)
-        return True
+            pose = self.motion.pose(*self.joints, row, share)
+            return coal_distance(a, b, pose.rotations[0], pose.points[0])[0]
+
+        moved = np.zeros(len(self.motion.q) - 1)
+        moved[whole.row] = whole.moved
+        budget = Budget(distance, moved, self._most() - self.calls)
+        try:
+            bound = budget.certify(s.row, needed + s.stray, aim)
+            self.bound = min(self.bound, bound - float(s.stray.max()))
+        except TooNear as met:
+            pose = self.motion.pose(*self.joints, met.row, met.share)
+            depth = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
+            overlap = met.distance <= 0.0
+            self.place = Place(met.row, met.share, min(depth, 0.0) if overlap else met.distance)
+
+    def _most(self) -> int:
+        """How often coal may be asked."""
+        return CALLS[0] + CALLS[1] * len(self.motion.q)
 
     def _begins_inside(self, s: Stretches, needed: float) -> bool:
         """Is one body inside the other at the first row? Sets `place` if so."""
         at = np.flatnonzero((s.row == 0) & (s.share == 0.0) & (s.bound < needed))
-        if not len(at) or not (self.a.parts or self.b.parts):
+        if not len(at):
             return False
         pose = s.first.of(at[:1])
         if one_inside_other(self.a.truth, self.b.truth, pose.rotations[0], pose.points[0]):
@@ -198,14 +214,24 @@ class Pairing:
         return self.place is not None
 
 
+def _is_exact(a: Piece, b: Piece) -> bool:
+    """Are they no larger than the bodies? For a half space, a hull is its mesh."""
+    return isinstance(a, Below) or (a.exact and b.exact)
+
+
 def _can_be_cut(a: Piece, b: Piece) -> bool:
-    """May smaller pieces be clear where these are not? For a half space, a hull is the mesh."""
-    return not isinstance(a, Below) and bool(a.parts or b.parts)
+    """May smaller pieces be clear where these are not?"""
+    return not isinstance(a, Below) and (_worth_cutting(a, b) or _worth_cutting(b, a))
+
+
+def _worth_cutting(piece: Piece, other: Piece) -> bool:
+    """Has it parts, and not so few triangles that the other's hull is what hinders?"""
+    return bool(piece.parts) and (other.exact or not piece.exact or piece.triangles > FEW)
 
 
 def _cut(a: Piece, b: Piece, s: Stretches) -> list[tuple[Piece, Piece, Stretches]]:
-    """The larger of two pieces that have parts, cut into them."""
-    if a.parts and (a.ball >= b.ball or not b.parts):
+    """The larger of two pieces that are worth it, cut into its parts."""
+    if _worth_cutting(a, b) and (a.ball >= b.ball or not _worth_cutting(b, a)):
         return [(part, b, s) for part in a.parts]
     return [(a, part, s) for part in b.parts]
 
@@ -216,6 +242,12 @@ def _all_of(parts: list[Stretches]) -> Stretches:
     for part in parts[1:]:
         whole = joined(whole, part)
     return whole
+
+
+def _place(s: Stretches, k: int, end: bool, distance: float) -> Place:
+    """An end of stretch k."""
+    row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if end else 0.0))
+    return Place(row + 1, 0.0, distance) if share == 1.0 else Place(row, share, distance)
 
 
 def _middle(s: Stretches) -> Place:

@@ -10,6 +10,8 @@ revolute joints; a prismatic joint j adds 2 |d_j| sum_i |d_i|. r_j is the distan
 of a ball around the body, plus its radius. Along the segment only the joints behind j change it, so
 with their rate L of motion it is at most (r_j(0) + r_j(1) + L) / 2.
 
+No point moves further than M = sum_j r_j |d_j|.
+
 A motion that is not straight, but strays at most e_j from the segment in each joint, moves each
 point by another sum_j r_j e_j at most, with r_j enlarged by what the joints behind j stray.
 """
@@ -64,8 +66,10 @@ class Stretches:
     last: Poses
     delta: Array
     """(k,) m, how far a point may leave its chord."""
+    moved: Array
+    """(k,) m, how far a point may move."""
     stray: Array
-    """(k,) m, how far the motion may move it besides."""
+    """(k,) m, how far straying from straight joint motion may move it besides."""
     bound: Array
     """(k,) m, a lower bound of the distance along each that is known already."""
 
@@ -78,6 +82,7 @@ class Stretches:
             self.first.of(chosen),
             self.last.of(chosen),
             self.delta[chosen],
+            self.moved[chosen],
             self.stray[chosen],
             self.bound[chosen],
         )
@@ -119,15 +124,14 @@ class Motion:
         levers = self.levers(b, centre, ball)
         count = len(self.q) - 1
         steps = np.abs(np.diff(self.q, axis=0))
-        delta, stray = chord_bounds(steps, levers, self.prismatic, self.strays, a, b)
+        bounds = chord_bounds(steps, levers, self.prismatic, self.strays, a, b)
         return Stretches(
             np.arange(count),
             np.zeros(count),
             np.ones(count),
             poses.of(np.arange(count)),
             poses.of(np.arange(1, count + 1)),
-            delta,
-            stray,
+            *bounds,
             np.full(count, -np.inf),
         )
 
@@ -138,10 +142,18 @@ class Motion:
         ahead = self.q[stretches.row + 1] - self.q[stretches.row]
         frames = self._kinematics.joints(self.q[stretches.row] + share[:, None] * ahead)
         middle = _seen_from(frames.rotations, frames.points, a, b)
-        delta = 0.25 * stretches.delta
-        before = replace(stretches, length=half, last=middle, delta=delta)
+        delta, moved = 0.25 * stretches.delta, 0.5 * stretches.moved
+        before = replace(stretches, length=half, last=middle, delta=delta, moved=moved)
         behind = replace(before, share=share, first=middle, last=stretches.last)
         return joined(before, behind)
+
+    def pose(self, a: int, b: int, row: int, share: float) -> Poses:
+        """Pose of joint b as seen from joint a at one instant."""
+        if share == 0.0:
+            return self._poses(a, b).of(np.array([row]))
+        q = self.q[row] + share * (self.q[row + 1] - self.q[row])
+        frames = self._kinematics.joints(q[None])
+        return _seen_from(frames.rotations, frames.points, a, b)
 
     def _poses(self, a: int, b: int) -> Poses:
         """Poses of joint b as seen from joint a at the rows."""
@@ -158,8 +170,8 @@ def chord_bounds(
     strays: Array,
     a: int,
     b: int,
-) -> tuple[Array, Array]:
-    """How far points of a body on joint b may be from their chords, as seen from joint a.
+) -> tuple[Array, Array, Array]:
+    """How far points of a body on joint b may be from their chords, and move, seen from joint a.
 
     Args:
         steps: (m - 1, n) |d_j|.
@@ -169,7 +181,8 @@ def chord_bounds(
         a, b: joints, 0 <= a <= b <= n; 0 is the root.
 
     Returns:
-        (m - 1,) m for straight segments; and (m - 1,) m that straying adds.
+        (m - 1,) m from the chords, for straight segments; (m - 1,) m that they move; and (m - 1,)
+        m that straying adds.
     """
     turns = np.where(prismatic, 0.0, steps)
     second, rate, stray = (np.zeros(len(steps)) for _ in range(3))
@@ -184,7 +197,7 @@ def chord_bounds(
         second += lever * d * (d + 2.0 * before)
         rate += lever * d
         stray += (lever + stray) * strays[:, j]
-    return second / 8.0, stray
+    return second / 8.0, rate, stray
 
 
 def joined(one: Stretches, other: Stretches) -> Stretches:
@@ -196,6 +209,7 @@ def joined(one: Stretches, other: Stretches) -> Stretches:
         one.first.and_(other.first),
         one.last.and_(other.last),
         np.concatenate([one.delta, other.delta]),
+        np.concatenate([one.moved, other.moved]),
         np.concatenate([one.stray, other.stray]),
         np.concatenate([one.bound, other.bound]),
     )
