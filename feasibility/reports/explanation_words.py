@@ -126,11 +126,13 @@ def idle_limits(explanation: Explanation) -> str:
 
 
 def helpless(explanation: Explanation) -> list[str]:
-    """What was found not to help, a line for what is proved and one for what is not."""
+    """What was found not to help: a line for what is proved, for values proved, for the rest."""
     others = [t for t in explanation.thresholds if t.feasible is None]
+    rest = [t for t in others if not t.ruled_out]
     groups = {
         "Proved not to help alone": [t for t in others if t.ruled_out],
-        "Not found to help alone": [t for t in others if not t.ruled_out],
+        "Proved infeasible at each value tried": [t for t in rest if t.each_proved],
+        "Not found to help alone": [t for t in rest if not t.each_proved],
     }
     return [
         f"{head}: {'; '.join(_in_short(explanation.verdict, group))}."

@@ -162,10 +162,10 @@ class ThresholdSearch:
                 return Threshold(self.quantity, None, reported)
             self.good = good
             return Threshold(self.quantity, reported, other or known, self._span(entry))
-        tried = ""
-        if not self.quantity.monotone:
-            tried = f"{looked} of {count} values tried, {proved} of them proved infeasible"
-        return Threshold(self.quantity, None, known, None, tried)
+        if self.quantity.monotone:
+            return Threshold(self.quantity, None, known)
+        tried = f"{looked} of {count} values tried, {proved} of them proved infeasible"
+        return Threshold(self.quantity, None, known, None, tried, each_proved=proved == count)
 
     def _span(self, entry: Probe) -> Span | None:
         """How far on a standoff stays feasible; None for other quantities."""

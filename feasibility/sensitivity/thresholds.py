@@ -225,6 +225,9 @@ class Threshold:
     """The far end of the feasible range, for the standoff of a case that is not feasible."""
     tried: str = ""
     """What was tried, where no value helps or not every value was tried."""
+    each_proved: bool = False
+    """Of a quantity that is not monotone: is each value on its way to the end proved infeasible?
+    Values between those that were tried remain open."""
 
     @property
     def resolution(self) -> float | None:

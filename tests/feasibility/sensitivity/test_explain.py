@@ -243,7 +243,10 @@ def test_nothing_helps_a_plate_that_leaves_the_room() -> None:
         assert found.resolution is None
         assert found.other is not None
         assert (found.other.answer, found.other.evidence) == (Answer.INFEASIBLE, Evidence.PROOF)
+        assert found.quantity.monotone or found.each_proved
     text = as_text(explanation, "long plate")
+    assert "Proved infeasible at each value tried: task.standoff" in text
+    assert "Not found to help" not in text
     assert "No single change that was tried was found to make it feasible." in text
     dropped = explanation.dropped
     assert dropped is not None
