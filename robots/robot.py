@@ -145,6 +145,13 @@ class Robot:
         return int(self.model.getFrameId(self.tool_frame, kind))
 
     @property
+    def link_names(self) -> tuple[str, ...]:
+        """All links of the model, those on held joints too, from the root on."""
+        import pinocchio as pin
+
+        return tuple(f.name for f in self.model.frames if f.type == pin.FrameType.BODY)
+
+    @property
     def base_point(self) -> NDArray[np.float64]:
         """(3,) m, origin of the first joint in the root frame, from which `reach` is measured."""
         return np.array(self.model.jointPlacements[1].translation)

@@ -5,6 +5,7 @@ from .case import Setup as Setup
 from .case import builtin_cases as builtin_cases
 from .case import load_case as load_case
 from .case import read_document as read_document
+from .collision_table import CollisionPart as CollisionPart
 from .keys import Key as Key
 from .keys import all_keys as all_keys
 from .robot_table import in_robot_table as in_robot_table

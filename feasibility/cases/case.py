@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coverable_errors import MISSING, Fault, alternatives, close, printable
+from feasibility.cases.collision_table import CollisionPart, faults_of_meshes, read_collision
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
 from feasibility.cases.surface_keys import CLOSED_FORM_KINDS
 from feasibility.cases.surface_table import (
@@ -37,14 +38,14 @@ if TYPE_CHECKING:
 
 BUILT_IN = Path(__file__).with_name("built_in.toml")
 LARGEST_FILE = 256 * 1024  # bytes
-TABLES = ("robot", "surface", "task", "search")
+TABLES = ("robot", "surface", "task", "collision", "search")
 ROLL = "is not supported yet; leave it out: the roll about the approach direction is free"
 
 Tables = dict[str, Any]
 
 
 class Setup(NamedTuple):
-    """What `feasibility.check` is called with."""
+    """What `feasibility.check` is called with; the task has what the arm must stay clear of."""
 
     robot: Robot
     cells: Cells
@@ -54,7 +55,7 @@ class Setup(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A robot, a surface, a task and a search, as plain checked numbers.
+    """A robot, a surface, a task, collisions and a search, as plain checked numbers.
 
     Example:
         >>> case = load_case("paper/4a").with_overrides(["task.cone_deg=10"])
@@ -67,20 +68,37 @@ class Case:
     robot: RobotPart
     surface: SurfacePart
     task: Task
+    """Without what the arm must stay clear of: see `built_task`."""
     search: Search = field(default_factory=Search)
     name: str = field(default="case", compare=False)
     """What it is called in reports: the built-in name, or the file's."""
     description: str = field(default="", compare=False)
+    collision: CollisionPart | None = None
+    """None where collisions are not checked."""
 
-    def build(self) -> Setup:
-        """Load the arm and cut the surface.
+    def built_task(self) -> Task:
+        """The task with what the arm must stay clear of; meshes of the scene are read.
 
         Raises:
-            CaseError: the robot cannot be loaded, or the surface cannot be read or cut.
+            CaseError: a mesh cannot be used.
+        """
+        if self.collision is None:
+            return self.task
+        try:
+            return replace(self.task, collision=self.collision.build())
+        except CaseError as error:
+            raise CaseError(error.faults, self.name) from error
+
+    def build(self) -> Setup:
+        """Load the arm, cut the surface and read the meshes of the scene.
+
+        Raises:
+            CaseError: the robot cannot be loaded, the surface cannot be read or cut, a mesh of the
+                scene cannot be read, or a pair names what is not there.
         """
         from robots import RobotError
 
-        faults, robot, cells = list[Fault](), None, None
+        faults, robot, cells, task = list[Fault](), None, None, None
         try:
             robot = self.robot.build()
         except RobotError as error:
@@ -89,9 +107,16 @@ class Case:
             cells = self.surface.cut()
         except CaseError as error:
             faults += error.faults
-        if robot is None or cells is None:
+        try:
+            task = self.built_task()
+        except CaseError as error:
+            faults += error.faults
+        if robot is not None and task is not None and task.collision is not None:
+            unknown = task.collision.unknown_names(robot.link_names)
+            faults += [fault.renamed({}, "collision") for fault in unknown]
+        if robot is None or cells is None or task is None or faults:
             raise CaseError(faults, self.name)
-        return Setup(robot, cells, self.task, self.search)
+        return Setup(robot, cells, task, self.search)
 
     def to_tables(self) -> Tables:
         """The case as the tables of its TOML; what is None is left out."""
@@ -101,11 +126,13 @@ class Case:
             "robot": self.robot.table(),
             "surface": self.surface.table(),
             "task": task,
+            "collision": {} if self.collision is None else self.collision.table(),
             "search": search,
         }
         return {
             title: {key: value for key, value in table.items() if value is not None}
             for title, table in tables.items()
+            if title != "collision" or self.collision is not None
         }
 
     def to_toml(self) -> str:
@@ -223,6 +250,7 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     robot = read_robot(tables["robot"], faults) if "robot" in tables else None
     surface = read_surface(tables["surface"], faults) if "surface" in tables else None
     task = _read_task(tables["task"], faults) if "task" in tables else None
+    collision = read_collision(tables["collision"], faults) if "collision" in tables else None
     search = _read_search(tables.get("search", {}), faults)
     if surface and search and search.method == "greedy" and surface.kind not in CLOSED_FORM_KINDS:
         kinds = alternatives(CLOSED_FORM_KINDS)
@@ -233,9 +261,11 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     if faults and "surface" in tables:
         part = surface or named_file(tables["surface"])
         faults += faults_of_building(part) if part is not None else []
+    if faults:
+        faults += faults_of_meshes(tables.get("collision"))
     if faults or robot is None or surface is None or task is None or search is None:
         raise CaseError(faults, name)
-    return Case(robot, surface, task, search, name)
+    return Case(robot, surface, task, search, name, collision=collision)
 
 
 def _read_task(table: Any, faults: list[Fault]) -> Task | None:

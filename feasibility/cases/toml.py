@@ -156,6 +156,14 @@ def make_absolute(tables: dict[str, Any], base_dir: str | os.PathLike[str] | Non
         for piece in (surface, *(pieces if isinstance(pieces, list) else ())):
             if isinstance(piece, dict) and "file" in piece:
                 piece["file"] = absolute(piece["file"])
+    collision = tables.get("collision")
+    if isinstance(collision, dict):
+        if "srdf" in collision:
+            collision["srdf"] = absolute(collision["srdf"])
+        for objects in (collision.get("scene"), collision.get("tool")):
+            for entry in objects if isinstance(objects, list) else ():
+                if isinstance(entry, dict) and "file" in entry:
+                    entry["file"] = absolute(entry["file"])
 
 
 def as_read(value: Any) -> Any:

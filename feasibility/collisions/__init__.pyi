@@ -6,6 +6,8 @@ from .outer_bodies import polytopes_of as polytopes_of
 from .outer_bodies import soup_of as soup_of
 from .outer_bodies import tool_polytopes as tool_polytopes
 from .outer_bodies import tool_solids as tool_solids
+from .pairs import checked_distance as checked_distance
+from .pairs import checked_pair as checked_pair
 from .scene import SHAPES as SHAPES
 from .scene import Obstacle as Obstacle
 from .scene import ToolShape as ToolShape

@@ -45,7 +45,7 @@ def names_of(checks: Checks, key: str, value: Any) -> tuple[str, ...]:
     return tuple(names)
 
 
-def _pair(checks: Checks, key: str, value: Any) -> tuple[str, str] | None:
+def checked_pair(checks: Checks, key: str, value: Any) -> tuple[str, str] | None:
     """Two different names."""
     expected = 'must be two different names, such as ["link5", "link7"]'
     if isinstance(value, (list, tuple)) and len(value) == 2:
@@ -60,7 +60,7 @@ def pairs_of(checks: Checks, key: str, value: Any) -> tuple[tuple[str, str], ...
     """Pairs of names; the same twice does no harm."""
     expected = 'must be a list of pairs of names, such as [["link5", "link7"]]'
     rows = sequence(checks, key, value, expected)
-    found = [_pair(checks, f"{key}[{k}]", row) for k, row in enumerate(rows)]
+    found = [checked_pair(checks, f"{key}[{k}]", row) for k, row in enumerate(rows)]
     return tuple(pair for pair in found if pair is not None)
 
 
@@ -72,7 +72,7 @@ def clearances_of(checks: Checks, value: Any) -> tuple[tuple[str, str, float], .
         if not isinstance(row, (list, tuple)) or len(row) != 3:
             checks.wrong(f"{key}[{k}]", row, "must be (name, name, metres)")
             continue
-        pair = _pair(checks, f"{key}[{k}].pair", row[:2])
+        pair = checked_pair(checks, f"{key}[{k}].pair", row[:2])
         distance = checked_distance(checks, f"{key}[{k}].value", row[2])
         if pair is not None:
             found.append((*pair, distance))

@@ -121,10 +121,14 @@ class Obstacle:
 
     @staticmethod
     def sphere(
-        name: str, radius: float, position: Point = ORIGIN, clearance: float | None = None
+        name: str,
+        radius: float,
+        position: Point = ORIGIN,
+        rpy_deg: Point = ORIGIN,
+        clearance: float | None = None,
     ) -> Obstacle:
         """A ball, m."""
-        return _placed(Obstacle, Sphere(radius), position, ORIGIN, name, clearance)
+        return _placed(Obstacle, Sphere(radius), position, rpy_deg, name, clearance)
 
     @staticmethod
     def capsule(
@@ -201,9 +205,9 @@ class ToolShape:
         return _placed(ToolShape, Cylinder(radius, length), position, rpy_deg)
 
     @staticmethod
-    def sphere(radius: float, position: Point = ORIGIN) -> ToolShape:
+    def sphere(radius: float, position: Point = ORIGIN, rpy_deg: Point = ORIGIN) -> ToolShape:
         """A ball, m."""
-        return _placed(ToolShape, Sphere(radius), position, ORIGIN)
+        return _placed(ToolShape, Sphere(radius), position, rpy_deg)
 
     @staticmethod
     def capsule(

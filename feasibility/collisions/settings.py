@@ -77,7 +77,7 @@ class Collision:
         }
         for name in ("self_", "surface"):
             if not isinstance(getattr(self, name), bool):
-                checks.wrong(name, getattr(self, name), "must be True or False")
+                checks.wrong(name, getattr(self, name), "must be true or false")
         kept["shapes"] = checks.choice("shapes", self.shapes, get_args(Fineness))
         kept["tool_links"] = names_of(checks, "tool_links", self.tool_links)
         kept["allow"] = pairs_of(checks, "allow", self.allow)

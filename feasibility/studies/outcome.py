@@ -98,7 +98,7 @@ def evaluate(tables: Tables) -> Outcome:
     from feasibility.checking import check
 
     case = case_of(tables)
-    verdict = check(arm_of(case), cut_of(case), case.task, case.search)
+    verdict = check(arm_of(case), cut_of(case), case.built_task(), case.search)
     return outcome_of(verdict)
 
 

@@ -168,7 +168,7 @@ def assess(tables: Tables) -> dict[str, Any]:
     request = tables["compare"]
     case = case_of(tables)
     robot, cells = arm_of(case), cut_of(case)
-    verdict = check(robot, cells, case.task, case.search)
+    verdict = check(robot, cells, case.built_task(), case.search)
     outcome = outcome_of(verdict)
     patches, patches_share = (1, 1.0) if request["divide"] and verdict.feasible else (None, None)
     if request["divide"] and not verdict.feasible and 0 < len(cells) <= MOST_DIVIDED:
@@ -192,7 +192,7 @@ def _patches(robot: Robot, cells: Cells, case: Case) -> tuple[int, float]:
     """How many motions there have to be, and the share of the area that they cover."""
     from feasibility.division import divide
 
-    division = divide(robot, cells, case.task, case.search)
+    division = divide(robot, cells, case.built_task(), case.search)
     accepted = [patch for patch in division.patches if patch.accepted]
     whole = float(cells.areas.sum())
     return len(accepted), sum(patch.area for patch in accepted) / whole if whole > 0.0 else 1.0
@@ -213,8 +213,10 @@ def critical_cone(robot: Robot, cells: Cells, case: Case, feasible: bool) -> flo
     from feasibility.checking import check
     from feasibility.sensitivity import last_true
 
+    own = case.built_task()
+
     def holds(step: int) -> bool:
-        task: Task = replace(case.task, cone_deg=step * CONE_STEP_DEG)
+        task: Task = replace(own, cone_deg=step * CONE_STEP_DEG)
         return check(robot, cells, task, case.search).feasible
 
     # Steps below the first one tested count as failed; the case's own cone may lie between two.

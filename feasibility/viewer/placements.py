@@ -114,7 +114,7 @@ def view_study(
     best = min(range(len(rows)), key=lambda k: merit(rows[k].result))
     drawn = sorted(same_frame(tasks, best), key=lambda k: merit(rows[k].result))
     case = case_of(dict(tasks[best].tables))
-    setup = Setup(arm_of(case), cut_of(case), case.task, case.search)
+    setup = Setup(arm_of(case), cut_of(case), case.built_task(), case.search)
     tried = []
     for k in drawn:
         bits = (rows[k].result.get("components") or [None])[0]

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import BadValue, Node, Triple, numbers, shown, triple
@@ -77,6 +76,8 @@ def read_shape(node: Node, folders: MeshFolders) -> tuple[NDArray[np.float64], G
     Raises:
         BadValue: "what :: why", where there is no shape that can be used.
     """
+    from scipy.spatial.transform import Rotation
+
     shapes = [shape for holder in node.all("geometry") for shape in holder.children]
     if len(shapes) != 1:
         raise BadValue(f"a <{node.tag}> :: must hold one <geometry> with one shape")

@@ -12,10 +12,11 @@ from bad_cases import GOOD, SURFACES
 
 from coverable_errors import MISSING
 from feasibility import Search
-from feasibility.cases import Case, CaseError, all_keys
+from feasibility.cases import Case, CaseError, CollisionPart, all_keys
 from feasibility.cases.keys import keys_of, kinds
 from feasibility.cases.robot_table import RobotPart
 from feasibility.cases.surface_table import SurfacePart
+from feasibility.collisions import Collision
 
 WRONG = datetime.date(2026, 1, 1)  # no key takes a date
 ALTERNATIVES = {"name": "urdf", "urdf": "name", "points": "file", "file": "points",
@@ -23,6 +24,7 @@ ALTERNATIVES = {"name": "urdf", "urdf": "name", "points": "file", "file": "point
                 "lock": "limits"}  # fmt: skip
 UNITS = {"degrees": "deg", "metres": "m", "seconds": "s"}
 GRID = {"cells": [3, 4]}
+TABLES = ("robot", "surface", "task", "collision", "search")
 PAPER = {
     "sphere": {"radius": 1.0, "u_deg": [10, 90], "v_deg": [0, 90], **GRID},
     "cylinder": {"radius": 1.0, "u_deg": [10, 90], "v": [0, 1], **GRID},
@@ -33,7 +35,14 @@ OTHERS = {
     "surface.cut": ("mesh", ("cut",), {"point": [0, 0, 0], "normal": [0, 0, 1]}),
     "surface.facing": ("mesh", ("facing",), {"direction": [0, 0, 1], "within_deg": 30}),
     "surface.pieces": ("piecewise", ("pieces", 0), {"kind": "plane", **PAPER["plane"]}),
-}
+    "collision.clearances": ("", ("clearances", 0), {"pair": ["a", "b"], "value": 0.1}),
+    "collision.scene": ("", ("scene", 0), {"name": "post", "kind": "capsule", "radius": 0.1,
+                                           "length": 1.0}),
+    "collision.tool": ("", ("tool", 0), {"kind": "capsule", "radius": 0.1, "length": 1.0}),
+}  # fmt: skip
+OF_SHAPES = {"size": {"kind": "box", "size": [1, 1, 1]}, "file": {"kind": "mesh", "file": "a.stl"}}
+OF_SHAPES["scale"] = OF_SHAPES["file"]
+"""What an object is that has a key which a capsule has not."""
 
 
 def tables_of(kind):
@@ -44,19 +53,24 @@ def tables_of(kind):
     else:
         tables["surface"] = tomllib.loads(SURFACES[kind])
     tables["search"] = {}
+    tables["collision"] = {}
     return tables
 
 
 def place_of(key):
     """A good case in which the key may stand, its table there, and what messages call the table."""
     kind, path, inner = copy.deepcopy(OTHERS.get(key.table, (key.kind or "sphere", (), {})))
-    tables = tables_of(kind)
+    tables = tables_of(kind or "sphere")
+    outer = key.table.split(".")[0]
     if key.table != "robot":
         del tables["robot"]  # no arm is loaded for it
     if not path:
         return tables, tables[key.table], key.table
-    tables["surface"][path[0]] = [inner] if path[1:] else inner
-    return tables, inner, "surface.pieces[0]" if path[1:] else key.table
+    if outer == "collision" and key.name in OF_SHAPES:
+        inner = {"name": "post"} if "name" in inner else {}
+        inner |= copy.deepcopy(OF_SHAPES[key.name])
+    tables[outer][path[0]] = [inner] if path[1:] else inner
+    return tables, inner, key.table + "[0]" * len(path[1:])
 
 
 def faults_of(tables):
@@ -118,7 +132,7 @@ def test_a_key_is_judged(key):
 @every_key
 def test_a_key_that_is_needed_is_missed_and_no_other(key):
     faults, name = with_value(key, MISSING)
-    if key.default is None:
+    if key.default is None or key.default.startswith("needed by "):
         fault = faults[name]
         assert fault.message.startswith("is missing")
         assert "such as" in fault.message
@@ -131,7 +145,7 @@ def test_a_key_that_is_needed_is_missed_and_no_other(key):
         assert not faults
 
 
-@pytest.mark.parametrize("table", ["robot", "surface", "task", "search", *OTHERS])
+@pytest.mark.parametrize("table", [*TABLES, *OTHERS])
 def test_an_unknown_key_is_answered_with_those_of_the_table_each_once(table):
     key = next(key for key in all_keys() if key.table == table)
     tables, inner, name = place_of(key)
@@ -146,7 +160,14 @@ def test_an_unknown_key_is_answered_with_those_of_the_table_each_once(table):
     ("table", "line", "words"),
     [
         ("surface", "standoff", "it belongs to [task]"),
-        ("robot", "kind", "it belongs to [surface] or [surface.pieces]"),
+        (
+            "robot",
+            "kind",
+            "it belongs to [surface], [surface.pieces], [collision.scene] or [collision.tool]",
+        ),
+        ("task", "clearance", "it belongs to [collision] or [collision.scene]"),
+        ("collision", "name", "it belongs to [robot] or [collision.scene]"),
+        ("collision", "cone_deg", "it belongs to [task]"),
         ("task", "time_limit", "it belongs to [search]"),
         ("task", "search", "it belongs to [search]"),
         ("surface", "within_deg", "it belongs to [surface.facing]"),
@@ -185,7 +206,9 @@ def edges_of(said):
         return [[0, 0, -1e-3]], [[0, 0, 0], [0, 0], [0, 0, 0, 1], *NOTHING]
     if said.startswith("a pair [low, high]"):
         return [], [[0.5, 0.5], [0.6, 0.4], [0.1], [0.1, 0.2, 0.3], 0.1, *NOTHING]
-    if re.fullmatch(r"'\w+' or '\w+'", said):
+    if said == "true or false":
+        return [True, False], [0, 1, "true", None, [], {}]
+    if re.fullmatch(r"('\w+', )*'\w+' or '\w+'", said):
         return re.findall(r"'(\w+)'", said), ["inward", 0, *NOTHING]
     return None
 
@@ -208,11 +231,11 @@ def test_most_keys_have_such_a_type():
     assert len(RANGES) > 0.6 * len(all_keys())
 
 
-@pytest.mark.parametrize("table", ["robot", "surface", "task", "search", *OTHERS])
+@pytest.mark.parametrize("table", [*TABLES, *OTHERS])
 def test_a_table_that_is_none_names_its_keys(table):
     kind, path, _ = OTHERS.get(table, ("sphere", (table,), {}))
-    tables = tables_of(kind)
-    place = tables["surface"] if table in OTHERS else tables
+    tables = tables_of(kind or "sphere")
+    place = tables[table.split(".")[0]] if table in OTHERS else tables
     place[path[0]] = [5] if path[1:] else 5
     said = str(faults_of(tables)[table + "[0]" * len(path[1:])].message)
     assert said.startswith("must be a table")
@@ -228,6 +251,11 @@ def test_a_missing_table_names_its_keys():
 def test_the_reference_has_every_field_and_its_default():
     assert set(keys_of("robot")) == {*RobotPart.__dataclass_fields__}
     assert set(keys_of("search")) == {*Search.__dataclass_fields__}
+    own = {"self" if name == "self_" else name for name in CollisionPart.__dataclass_fields__}
+    assert set(keys_of("collision")) == own
+    for name in ("clearance", "tool_clearance", "thickness", "shapes", "surface"):
+        value = tomllib.loads(f"x = {keys_of('collision')[name].default}")["x"]
+        assert value == getattr(CollisionPart(), name) == getattr(Collision(), name)
     for key in keys_of("search").values():
         value = getattr(Search(), key.name)
         if value is None:

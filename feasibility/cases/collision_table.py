@@ -1,0 +1,220 @@
+"""The [collision] table of a case: what the arm has to stay clear of, and by how much."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Any, NamedTuple, cast
+
+from coverable_errors import MISSING, CoverableError, Fault, is_number
+from feasibility.cases.table_reader import CaseError, Section, frozen, is_text
+from feasibility.collisions import (
+    SHAPES,
+    Collision,
+    Obstacle,
+    ToolShape,
+    checked_distance,
+    checked_pair,
+    read_triangles,
+)
+
+MAKERS = {"scene": Obstacle, "tool": ToolShape}
+KINDS = {"scene": tuple(SHAPES), "tool": tuple(kind for kind in SHAPES if kind != "halfspace")}
+COMMON = {"scene": ("name", "position", "rpy_deg", "clearance"), "tool": ("position", "rpy_deg")}
+"""Keys of every object."""
+NAMES = {"self_": "self"}
+"""Keys of arguments that are called otherwise in Python."""
+STILL = (
+    "is not supported yet; leave it out: objects of the scene stand still, in the frame of the "
+    "robot's root link"
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ObjectPart:
+    """One entry of `collision.scene` or `collision.tool`."""
+
+    kind: str
+    values: Mapping[str, Any]
+    """Its other keys; arrays as tuples, paths absolute."""
+
+    def table(self) -> dict[str, Any]:
+        """The entry as a table."""
+        return {"kind": self.kind, **self.values}
+
+
+@dataclass(frozen=True, slots=True)
+class CollisionPart:
+    """The [collision] table of a case; its fields are those of `Collision`."""
+
+    self_: bool = True
+    surface: bool = True
+    clearance: float = 0.0
+    """m"""
+    tool_clearance: float = 0.0
+    """m"""
+    tool_links: tuple[str, ...] = ()
+    allow: tuple[tuple[str, str], ...] = ()
+    clearances: tuple[tuple[str, str, float], ...] = ()
+    """Two names, and m."""
+    srdf: str | None = None
+    """Absolute path."""
+    shapes: str = "hulls"
+    thickness: float = 0.0
+    """m"""
+    scene: tuple[ObjectPart, ...] = ()
+    tool: tuple[ObjectPart, ...] = ()
+
+    def table(self) -> dict[str, Any]:
+        """The keys of the [collision] table that say something."""
+        values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        values["clearances"] = tuple(
+            {"pair": (first, second), "value": value} for first, second, value in self.clearances
+        )
+        for key in MAKERS:
+            values[key] = tuple(part.table() for part in values[key])
+        return {
+            NAMES.get(key, key): value for key, value in values.items() if value not in (None, ())
+        }
+
+    def build(self) -> Collision:
+        """Make the objects; their meshes are read.
+
+        Raises:
+            CaseError: a mesh cannot be used; the faults of all are named.
+        """
+        faults: list[Fault] = []
+        values: dict[str, Any] = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        for key, make in MAKERS.items():
+            made = []
+            for k, part in enumerate(values[key]):
+                try:
+                    made.append(getattr(make, part.kind)(**part.values))
+                except CoverableError as error:
+                    place = f"collision.{key}[{k}]"
+                    faults += [fault.renamed({}, place) for fault in error.faults]
+            values[key] = made
+        if faults:
+            raise CaseError(faults)
+        return Collision(**values)
+
+
+class _Entry(NamedTuple):
+    """One object, as it is written and as it is checked."""
+
+    part: ObjectPart
+    stand_in: Obstacle | ToolShape
+    """The object; where it is a mesh, another in its place."""
+
+
+def read_collision(table: Any, faults: list[Fault]) -> CollisionPart | None:
+    """Read the [collision] table; None where it has faults.
+
+    Meshes are read by `CollisionPart.build` only.
+    """
+    before = len(faults)
+    section = Section("collision", table, faults)
+    values: dict[str, Any] = section.take(
+        *("surface", "clearance", "tool_clearance", "tool_links", "allow", "shapes", "thickness")
+    )
+    if section.has("self"):
+        values["self_"] = section.table["self"]
+    srdf = section.text("srdf")
+    if srdf is not None:
+        values["srdf"] = os.path.abspath(os.path.expanduser(srdf))
+    if section.has("clearances"):
+        values["clearances"] = _clearances(section)
+    objects = {key: _objects(section, key) for key in MAKERS}
+    section.refuse_others()
+    stand_ins = {key: [entry.stand_in for entry in found] for key, found in objects.items()}
+    section.make(Collision, {**values, **stand_ins}, NAMES)
+    if len(faults) > before:
+        return None
+    for key, found in objects.items():
+        values[key] = tuple(entry.part for entry in found)
+    return CollisionPart(**frozen(values))
+
+
+def faults_of_meshes(table: Any) -> list[Fault]:
+    """What is wrong with the mesh files that a table names, whatever else is wrong with it."""
+    faults = []
+    for key, k, entry in _meshes(table):
+        scale = entry.get("scale", 1.0)  # the likely size is nothing to go by beside other faults
+        known = is_number(scale) and 1e-9 <= scale <= 1e9
+        try:
+            read_triangles(entry["file"], scale if known else 1.0)
+        except CoverableError as error:
+            faults += [fault.renamed({}, f"collision.{key}[{k}]") for fault in error.faults]
+    return faults
+
+
+def _meshes(table: Any) -> Iterator[tuple[str, int, Mapping[str, Any]]]:
+    """The entries of a table that name a mesh file: where, and which."""
+    for key in MAKERS if isinstance(table, Mapping) else ():
+        entries = table.get(key)
+        for k, entry in enumerate(entries if isinstance(entries, list) else ()):
+            named = isinstance(entry, Mapping) and is_text(entry.get("file"))
+            if named and entry.get("kind") == "mesh":
+                yield key, k, entry
+
+
+def _clearances(section: Section) -> list[tuple[str, str, float]]:
+    """The rows of `clearances` without faults."""
+    rows, found = section.table["clearances"], []
+    if not isinstance(rows, list):
+        section.wrong_type("clearances", rows)
+        return []
+    for k, row in enumerate(rows):
+        entry = Section(f"collision.clearances[{k}]", row, section.faults)
+        if entry.is_table:
+            values = {"pair": MISSING, "value": MISSING} | entry.take("pair", "value")
+            pair = checked_pair(entry, "pair", values["pair"])
+            distance = checked_distance(entry, "value", values["value"])
+            entry.refuse_others()
+            found += [] if pair is None else [(*pair, distance)]
+    return found
+
+
+def _objects(section: Section, key: str) -> list[_Entry]:
+    """The objects of `scene` or `tool` that have no faults."""
+    entries = section.take(key).get(key, [])
+    if not isinstance(entries, list):
+        section.wrong_type(key, entries)
+        return []
+    found = [_object(section, key, k, entry) for k, entry in enumerate(entries)]
+    return [entry for entry in found if entry is not None]
+
+
+def _object(section: Section, key: str, k: int, entry: Any) -> _Entry | None:
+    """One object; None where it has faults."""
+    from surfaces.meshes.files import metres_per_unit
+
+    before = len(section.faults)
+    found = Section(f"collision.{key}[{k}]", entry, section.faults)
+    kind = found.word("kind", KINDS[key], required=True)
+    if kind is None:  # which other keys belong here is not known
+        return None
+    own, make = SHAPES[kind], MAKERS[key]
+    values = found.take(*own, *COMMON[key])
+    if kind == "mesh":
+        file = found.text("file", required=True)
+        if file is not None:
+            values["file"] = os.path.abspath(os.path.expanduser(file))
+        if "scale" in values:
+            found.make(metres_per_unit, {"scale": values["scale"]})
+    others = {other for keys in SHAPES.values() for other in keys} - set(own)
+    says = f"is no key of a {kind}; it has {', '.join((*own, *COMMON[key]))}"
+    found.refuse_others(dict.fromkeys(sorted(others), says) | {"frame": STILL})
+    pose = {name: values[name] for name in COMMON[key] if name in values}
+    if key == "scene":
+        pose = {"name": MISSING} | pose
+    if kind == "mesh":
+        make_it = Obstacle.halfspace if key == "scene" else lambda **at: ToolShape.sphere(1.0, **at)
+        stand_in = found.make(make_it, pose)
+    else:
+        needed = dict.fromkeys(own, MISSING)
+        stand_in = found.make(getattr(make, kind), needed | values | pose)
+    if stand_in is None or len(section.faults) > before:
+        return None
+    return _Entry(ObjectPart(kind, frozen(values)), cast("Obstacle | ToolShape", stand_in))
