@@ -165,7 +165,7 @@ def test_an_unknown_key_is_answered_with_those_of_the_table_each_once(table):
             "kind",
             "it belongs to [surface], [surface.pieces], [collision.scene] or [collision.tool]",
         ),
-        ("task", "clearance", "it belongs to [collision] or [collision.scene]"),
+        ("task", "thickness", "it belongs to [collision]"),
         ("collision", "name", "it belongs to [robot] or [collision.scene]"),
         ("collision", "cone_deg", "it belongs to [task]"),
         ("task", "time_limit", "it belongs to [search]"),
