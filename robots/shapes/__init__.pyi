@@ -7,4 +7,7 @@ from .hulls import outer_hull as outer_hull
 from .links import LinkShapes as LinkShapes
 from .links import link_shapes as link_shapes
 from .links import outer_bodies as outer_bodies
+from .pairs import LinkPairs as LinkPairs
+from .pairs import PairLeftOut as PairLeftOut
+from .pairs import link_pairs as link_pairs
 from .triangles import checked_triangles as checked_triangles

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -37,6 +37,12 @@ class LinkShapes:
     """
     notes: tuple[str, ...]
     """What stands in for what, and what is not checked, one sentence each."""
+    root: str
+    """The link that no joint moves."""
+    tool: str
+    """The link whose origin is the tool point."""
+    parents: Mapping[str, str]
+    """The link that each other link hangs on."""
 
 
 def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
@@ -71,7 +77,8 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
             f"no link has a shape that can be used for collisions: {why}", f"robot {robot.name!r}"
         )
     polytopes = tuple(body for solid in solids for body in outer_bodies(solid, fineness))
-    return LinkShapes(solids, polytopes, unchecked, notes)
+    parents = {joint.child: joint.parent for joint in checked.joints}
+    return LinkShapes(solids, polytopes, unchecked, notes, checked.root, robot.tool_frame, parents)
 
 
 def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:

@@ -9,5 +9,7 @@ from .geometry import MeshFile as MeshFile
 from .geometry import ShapeFault as ShapeFault
 from .geometry import Sphere as Sphere
 from .joints import JointInfo as JointInfo
+from .srdf import DisabledPairs as DisabledPairs
+from .srdf import read_srdf as read_srdf
 from .visuals import Visual as Visual
 from .xml import UrdfError as UrdfError

@@ -1,0 +1,181 @@
+"""Which pairs of an arm's bodies are asked for, and which are not, each with its reason."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+
+from coverable_errors import Fault
+from robots.errors import RobotError
+from robots.joint_selection import suggestion
+from robots.robot import Robot
+from robots.shapes.bodies import Polytope
+from robots.shapes.links import LinkShapes
+from robots.shapes.sampling import Pair, PairSampling, random_configurations
+from robots.urdf import read_srdf
+
+Why = Literal["rigid", "adjacent", "always", "allowed", "srdf"]
+FIRST_LOOK = 30  # configurations after which most pairs are known not to collide always
+MOST_LISTED = 12  # pairs or links in one note
+
+
+@dataclass(frozen=True, slots=True)
+class PairLeftOut:
+    """Two owners of bodies that are not asked for, and why."""
+
+    first: str
+    second: str
+    why: Why
+    rate: float | None
+    """Share of random configurations in which they collide; None for a rigid pair."""
+
+
+@dataclass(frozen=True, slots=True)
+class LinkPairs:
+    """The pairs of owners of bodies."""
+
+    asked: tuple[Pair, ...]
+    """Base to tip."""
+    left_out: tuple[PairLeftOut, ...]
+    notes: tuple[str, ...]
+    """What a user should know, one sentence each."""
+
+
+def link_pairs(
+    robot: Robot,
+    shapes: LinkShapes,
+    allow: Iterable[Pair] = (),
+    srdf: str | os.PathLike[str] | None = None,
+    tool: Sequence[Polytope] = (),
+    others: Iterable[str] = (),
+) -> LinkPairs:
+    """Sort the pairs of links, and of links and tool, into those that are asked for and others.
+
+    A pair is left out where no motion changes the distance ("rigid"), where nothing with a shape
+    lies between the two along the arm ("adjacent": they meet at their joint, and what keeps them
+    apart otherwise are its limits), where the user says so ("allowed"), where an SRDF does
+    ("srdf"), and where the convex bodies collide in each of 1,000 random configurations and at zero
+    ("always"). A pair that never collided in these is asked for: samples prove nothing.
+
+    Args:
+        robot: the arm.
+        shapes: of its links.
+        allow: pairs of names that the user leaves out; those with one of `others` are passed over.
+        srdf: path of an SRDF.
+        tool: bodies on the last joint that are no link's.
+        others: names that are known besides links and the owner of `tool`.
+
+    Raises:
+        RobotError: `allow` names what does not exist, or the SRDF is of another robot.
+    """
+    bodies = (*shapes.polytopes, *tool)
+    joint = {body.owner: body.joint for body in bodies}
+    known = {*shapes.parents, *shapes.parents.values(), *joint}
+    outside = set(others)
+    faults, allowed, notes = [], set[frozenset[str]](), list[str]()
+    for pair in allow:
+        allowed.add(frozenset(pair))
+        for name in pair:
+            if name not in known | outside:
+                hint = suggestion(name, [*joint, *sorted(outside)])
+                faults.append(Fault("allow", f"names {name!r}, which is nothing here; {hint}"))
+    disabled = set[frozenset[str]]()
+    if srdf is not None:
+        disabled, said, fault = _of_srdf(srdf, known, robot.name)
+        notes += said
+        faults += fault
+    if faults:
+        raise RobotError(faults, f"robot {robot.name!r}")
+
+    def reason(first: str, second: str) -> Why | None:
+        pair = frozenset((first, second))
+        if joint[first] == joint[second]:
+            return "rigid"
+        if _nothing_between(first, second, shapes, joint):
+            return "adjacent"
+        if pair in allowed:
+            return "allowed"
+        return "srdf" if pair in disabled else None
+
+    order = sorted(joint, key=lambda owner: joint[owner])
+    reasons = {pair: reason(*pair) for pair in combinations(order, 2)}
+    return _measured(robot, bodies, reasons, notes)
+
+
+def _measured(
+    robot: Robot, bodies: Sequence[Polytope], reasons: dict[Pair, Why | None], notes: list[str]
+) -> LinkPairs:
+    """Find the pairs that always collide, and how often the others that are left out do."""
+    sampling = PairSampling(robot, bodies)
+    q = random_configurations(robot)
+    q[0] = np.clip(0.0, robot.lower, robot.upper)
+    open_pairs = [pair for pair, why in reasons.items() if why is None]
+    early = np.all(sampling.collisions(open_pairs, q[:FIRST_LOOK]), axis=0).tolist()
+    suspects = [pair for pair, hit in zip(open_pairs, early, strict=True) if hit]
+    moving = [pair for pair, why in reasons.items() if why not in (None, "rigid")] + suspects
+    rates = dict(zip(moving, sampling.collisions(moving, q).mean(axis=0).tolist(), strict=True))
+    found = dict(reasons)
+    for pair in suspects:
+        found[pair] = "always" if rates[pair] == 1.0 else None
+    left_out = [
+        PairLeftOut(*pair, why, rates.get(pair)) for pair, why in found.items() if why is not None
+    ]
+    always = [f"{pair.first} - {pair.second}" for pair in left_out if pair.why == "always"]
+    if always:
+        notes.append(
+            f"not asked for, because their convex bodies collide in each of {len(q):,} random "
+            f"configurations: {_listed(always)}; finer shapes may part them"
+        )
+    asked = tuple(pair for pair, why in found.items() if why is None)
+    return LinkPairs(asked, tuple(left_out), tuple(notes))
+
+
+def _nothing_between(first: str, second: str, shapes: LinkShapes, joint: dict[str, int]) -> bool:
+    """Has no link between two owners a shape? What is no link hangs on the tool's link."""
+    a, b = (_upwards(owner, shapes) for owner in (first, second))
+    shared = set(a) & set(b)
+    between = [link for link in (*a, *b) if link not in shared]
+    nearest = next((link for link in a if link in shared), None)  # where the two paths meet
+    between += [] if nearest is None else [nearest]
+    return not any(link in joint and link not in (first, second) for link in between)
+
+
+def _upwards(owner: str, shapes: LinkShapes) -> list[str]:
+    """A link and those that carry it, up to the root."""
+    links = [owner if owner in shapes.parents or owner == shapes.root else shapes.tool]
+    while links[-1] in shapes.parents:
+        links.append(shapes.parents[links[-1]])
+    return links
+
+
+def _of_srdf(
+    path: str | os.PathLike[str], known: set[str], name: str
+) -> tuple[set[frozenset[str]], list[str], list[Fault]]:
+    """The pairs that an SRDF leaves out, what is to be said, and what is wrong."""
+    pairs = read_srdf(path)
+    unknown = sorted(pairs.named - known)
+    if unknown:
+        links = ", ".join(sorted(known)[:MOST_LISTED])
+        what = f"names links that this robot does not have: {_listed(unknown)}"
+        return (
+            set(),
+            [],
+            [Fault("", what, os.fspath(path), f"is it of another robot? It has {links}")],
+        )
+    notes = []
+    for reason, count in pairs.ignored:
+        why = f"the reason {reason!r}" if reason else "no reason"
+        plural = "s are" if count > 1 else " is"
+        notes.append(f"{count} pair{plural} not taken from the SRDF, which gives {why}")
+    return {frozenset(pair) for pair in pairs.taken}, notes, []
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Some names, the first ones if there are many."""
+    more = f" and {len(names) - MOST_LISTED} more" if len(names) > MOST_LISTED else ""
+    return ", ".join(names[:MOST_LISTED]) + more

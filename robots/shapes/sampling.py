@@ -1,0 +1,98 @@
+"""How often pairs of convex bodies collide in random configurations of an arm, by coal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from robots.kinematics import Kinematics
+from robots.robot import Robot
+from robots.shapes.bodies import Polytope
+
+SAMPLES = 1000
+SEED = 0
+WITHOUT_LIMITS = {"revolute": np.pi, "continuous": np.pi, "prismatic": 1.0}  # to both sides
+
+Pair = tuple[str, str]
+
+
+def random_configurations(robot: Robot, count: int = SAMPLES) -> NDArray[np.float64]:
+    """(count, n) configurations inside the limits, the same ones each time.
+
+    A joint without limits turns once around, or slides a metre to both sides.
+    """
+    wide = np.array([WITHOUT_LIMITS[kind] for kind in robot.joint_kinds])
+    lower = np.where(np.isfinite(robot.lower), robot.lower, np.minimum(-wide, robot.upper - wide))
+    upper = np.where(np.isfinite(robot.upper), robot.upper, np.maximum(wide, lower + wide))
+    return np.random.default_rng(SEED).uniform(lower, upper, (count, robot.n))
+
+
+class PairSampling:
+    """Asks coal which pairs of owners collide."""
+
+    def __init__(self, robot: Robot, bodies: Sequence[Polytope]) -> None:
+        """Build coal's shapes.
+
+        Args:
+            robot: whose joints carry the bodies.
+            bodies: of links and tool; those of one owner count as one.
+        """
+        self._robot = robot
+        self._kinematics = Kinematics(robot)
+        self._geometry = pin.GeometryModel()
+        self._of_owner: dict[str, list[int]] = {}
+        for number, body in enumerate(bodies):
+            shape, placement = _coal_shape(body)
+            title = f"{number} {body.owner}"
+            entry = pin.GeometryObject(title, body.joint, 0, placement, shape)
+            index = int(self._geometry.addGeometryObject(entry))
+            self._of_owner.setdefault(body.owner, []).append(index)
+
+    def collisions(
+        self, pairs: Sequence[Pair], configurations: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
+        """(k, p) which of p pairs collide in which of k configurations (k, n)."""
+        self._geometry.removeAllCollisionPairs()
+        pair_of: list[int] = []
+        for number, (first, second) in enumerate(pairs):
+            for i in self._of_owner[first]:
+                for j in self._of_owner[second]:
+                    self._geometry.addCollisionPair(pin.CollisionPair(i, j))
+                    pair_of.append(number)
+        model, data = self._robot.model, self._robot.model.createData()
+        scratch = self._geometry.createData()
+        found = np.zeros((len(configurations), len(pairs)), dtype=bool)
+        for row, q in enumerate(configurations):
+            configuration = self._kinematics.configuration(q)
+            pin.computeCollisions(model, data, self._geometry, scratch, configuration, False)
+            hits = [k for k, result in enumerate(scratch.collisionResults) if result.isCollision()]
+            found[row, [pair_of[k] for k in hits]] = True
+        return found
+
+
+def _coal_shape(body: Polytope) -> tuple[Any, pin.SE3]:
+    """A body as coal has it, and where it is in the frame of its joint."""
+    import coal
+    from scipy.spatial import ConvexHull
+
+    vertices, place = body.vertices, pin.SE3.Identity()
+    if len(vertices) == 1:
+        place.translation = np.array(vertices[0])
+        return coal.Sphere(max(body.radius, 1e-9)), place
+    if len(vertices) == 2:
+        along = vertices[1] - vertices[0]
+        place.translation = vertices.mean(axis=0)
+        place.rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
+        return coal.Capsule(max(body.radius, 1e-9), float(np.linalg.norm(along))), place
+    # Not coal's own hull: it crashes where points are flat; Qhull raises.
+    hull = ConvexHull(vertices)
+    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    points.extend(list(np.array(vertices)))
+    faces.extend([coal.Triangle(*map(int, face)) for face in hull.simplices])
+    shape = coal.Convex(points, faces)
+    shape.setSweptSphereRadius(body.radius)
+    return shape, place
