@@ -14,6 +14,7 @@ from feasibility.collisions import (
     Collision,
     Obstacle,
     ToolShape,
+    asked_for,
     checked_distance,
     checked_pair,
     read_triangles,
@@ -65,6 +66,11 @@ class CollisionPart:
     """m"""
     scene: tuple[ObjectPart, ...] = ()
     tool: tuple[ObjectPart, ...] = ()
+
+    @property
+    def checked(self) -> tuple[str, ...]:
+        """As `Collision.checked`."""
+        return asked_for(self.self_, self.surface, bool(self.scene))
 
     def table(self) -> dict[str, Any]:
         """The keys of the [collision] table that say something."""

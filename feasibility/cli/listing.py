@@ -21,7 +21,7 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     parser = add_command(subcommands, "keys", keys, help="print the reference of the case file")
     parser.add_argument(
         "table", metavar="TABLE", nargs="?",
-        help="robot, surface, task or search; or a kind of surface, such as mesh",
+        help="robot, surface, task, collision or search; or a kind of surface, such as mesh",
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from .shapes import HalfSpace as HalfSpace
 from .triangles import read_triangles as read_triangles
 from .words import CHECKABLE as CHECKABLE
 from .words import UNCHECKED as UNCHECKED
+from .words import asked_for as asked_for
 from .words import checked as checked
 from .words import checked_words as checked_words
 from .words import listed_words as listed_words

@@ -17,7 +17,7 @@ from feasibility.collisions.pairs import (
     stranger,
 )
 from feasibility.collisions.scene import Obstacle, ToolShape
-from feasibility.collisions.words import SURFACE, TOOL
+from feasibility.collisions.words import SURFACE, TOOL, asked_for
 
 Fineness = Literal["hulls", "pieces", "meshes"]
 MOST_OBJECTS = 1000
@@ -97,8 +97,7 @@ class Collision:
     @property
     def checked(self) -> tuple[str, ...]:
         """What is asked for: some of 'self', 'surface' and 'scene'."""
-        asked = {"self": self.self_, "surface": self.surface, "scene": bool(self.scene)}
-        return tuple(name for name, wanted in asked.items() if wanted)
+        return asked_for(self.self_, self.surface, bool(self.scene))
 
     def unknown_names(self, links: Sequence[str]) -> list[Fault]:
         """Faults of names that are neither links of the arm nor objects, to be raised with others.

@@ -27,6 +27,12 @@ class Asked(Protocol):
         """m, the tool against the surface."""
 
 
+def asked_for(self_: bool, surface: bool, scene: bool) -> tuple[str, ...]:
+    """What is to be checked, in the words of JSON."""
+    wanted = {"self": self_, "surface": surface, "scene": scene}
+    return tuple(name for name in CHECKABLE if wanted[name])
+
+
 def checked(asked: Asked | None) -> list[str]:
     """What is checked, in the words of JSON."""
     return [] if asked is None else list(asked.checked)

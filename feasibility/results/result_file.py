@@ -11,13 +11,13 @@ import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, CoverableError, shown, worded
-from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError
+from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, Setup
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
 from feasibility.results.proof_arrays import pack_proof, unpack_proof
 from feasibility.results.result_arrays import (
@@ -36,10 +36,8 @@ from feasibility.task import Task
 from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
 from feasibility.version import version
 
-if TYPE_CHECKING:
-    from robots import Robot
-
 FORMAT = "coverable-result"
+TASK = ("standoff", "cone_deg", "tolerance")  # what is stored of it; the rest is the case's
 FORMAT_VERSION = 3  # 2 had no proofs; 1 no `places`, and the kinds `CLOSED_FORM_KINDS` alone
 
 
@@ -82,7 +80,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
             "tool_frame": verdict.robot.tool_frame,
             "joints": list(verdict.robot.joint_names),
         },
-        "task": asdict(verdict.task),
+        "task": {key: getattr(verdict.task, key) for key in TASK},
         "answer": str(verdict.answer),
         "evidence": str(verdict.evidence),
         "message": verdict.message,
@@ -146,7 +144,7 @@ def load_result(path: str | os.PathLike[str]) -> Result:
         check_robot(setup.robot, fields.table("robot"), archive)
         if found > 1 or case.surface.kind not in CLOSED_FORM_KINDS:
             check_cells(setup.cells, case.surface.label, archive)
-        verdict = _verdict(fields, archive, setup.robot, setup.cells)
+        verdict = _verdict(fields, archive, setup)
     except CaseError as error:
         raise ResultError(f"{os.fspath(path)!r}: its case cannot be used: {error}") from error
     except ArchiveError as error:
@@ -184,10 +182,11 @@ def _format(fields: Fields) -> int:
     return int(found)
 
 
-def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verdict:
+def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
     """The verdict, every index and number checked."""
     from feasibility.cell_graph import cell_graph
 
+    robot, cells = setup.robot, setup.cells
     count, n = len(cells), robot.n
     covered = np.zeros(count, dtype=bool)
     covered[read_cells(archive, "covered", count)] = True
@@ -209,7 +208,7 @@ def _verdict(fields: Fields, archive: Archive, robot: Robot, cells: Any) -> Verd
         message=fields.text("message"),
         robot=robot,
         cells=cells,
-        task=_task(fields.table("task")),
+        task=replace(_task(fields.table("task")), collision=setup.task.collision),
         method=fields.text("method"),
         seed=int(fields.get("seed", int, "a whole number")),
         graph=graph,

@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from coverable_errors import LARGEST_WHOLE, Fault, alternatives, close, is_number, printable, shown
-from feasibility.cases import Section, is_text
+from feasibility.cases import TABLES, Section, is_text
 
 POSES = {"position": ("x", "y", "z"), "rpy_deg": ("roll", "pitch", "yaw")}
-TITLES = ("robot", "surface", "task", "search")
 SAMPLERS = ("sobol",)
 MOST_VALUES = 100_000  # of one key, and samples
 FORMS = "an array of values, { from = a, to = b, steps = n }, or { range = [a, b] } for samples"
@@ -113,12 +112,12 @@ def _flattened(section: Section) -> list[tuple[str, str, Any]]:
         title, dot, rest = key.partition(".")
         if key in own:
             continue
-        if dot and title in TITLES and rest:
+        if dot and title in TABLES and rest:
             name, _, inner = rest.partition(".")
             found.append((title, name, {inner: value} if inner else value))
-        elif key in TITLES and isinstance(value, Mapping):
+        elif key in TABLES and isinstance(value, Mapping):
             found += [(key, name, inner) for name, inner in value.items()]
-        elif key in TITLES:
+        elif key in TABLES:
             section.fault(key, f"must be a table [vary.{key}], got {shown(value)}")
         else:
             guess = close(key, own)

@@ -29,6 +29,7 @@ from typing import Any
 
 from coverable_errors import Fault, close, printable, shown
 from feasibility.cases import (
+    TABLES,
     CaseError,
     Section,
     TomlError,
@@ -40,7 +41,7 @@ from feasibility.cases import (
     toml_key,
 )
 from feasibility.safe_files import shown_path
-from feasibility.studies.axes import TITLES, Axis, Range, Variation, read_variation
+from feasibility.studies.axes import Axis, Range, Variation, read_variation
 from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
 from feasibility.studies.run import StudyTask
 
@@ -168,7 +169,7 @@ def _read_base(
         except CaseError as error:
             faults += [fault._replace(key=_join("base.case", fault.key)) for fault in error.faults]
     own = {}
-    for title in TITLES:
+    for title in TABLES:
         if section.has(title) and isinstance(section.table[title], Mapping):
             own[title] = dict(section.table[title])
         elif title in section.table:
@@ -199,7 +200,7 @@ def _absolute(varied: Variation, base_dir: str | os.PathLike[str] | None) -> Var
             made.append(reduce(getitem, axis.path, tables))
         return tuple(made)
 
-    files = ("urdf", "package_dirs", "file", "pieces")
+    files = ("urdf", "package_dirs", "file", "pieces", "srdf", "scene", "tool")
     axes = tuple(
         replace(axis, values=values(axis))
         if axis.path == ("robot",) or axis.path[-1] in files

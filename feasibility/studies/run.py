@@ -171,13 +171,14 @@ def _record(task: StudyTask, answer: Answer) -> Record:
 
 def _files_of(tables: Mapping[str, Any]) -> list[tuple[str, float, int]]:
     """The files that a case names, with time and size, by which a change is noticed."""
-    robot, surface = (tables.get(title) for title in ("robot", "surface"))
-    parts = [robot, surface]
-    if isinstance(surface, Mapping) and isinstance(surface.get("pieces"), Sequence):
-        parts += surface["pieces"]
+    parts = [tables.get(title) for title in ("robot", "surface", "collision")]
+    for part, key in zip((*parts[1:], parts[2]), ("pieces", "scene", "tool"), strict=True):
+        if isinstance(part, Mapping) and isinstance(part.get(key), Sequence):
+            parts += part[key]
     found = []
     for part in parts:
-        name = part.get("urdf", part.get("file")) if isinstance(part, Mapping) else None
+        written = part if isinstance(part, Mapping) else {}
+        name = written.get("urdf", written.get("file", written.get("srdf")))
         if isinstance(name, str):
             try:
                 status = os.stat(name)

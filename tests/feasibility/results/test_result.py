@@ -6,6 +6,7 @@ import os
 import pickle
 import random
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,6 +37,17 @@ def saved(request, tmp_path_factory):
     name = request.param
     assert save_result(small_verdict(name), small_case(name), path) == path
     return small_case(name), small_verdict(name), path
+
+
+def test_what_the_arm_stays_clear_of_comes_back_with_the_case(tmp_path):
+    floor = '{ name = "floor", kind = "halfspace", position = [0, 0, -0.5] }'
+    case = small_case("plate").with_overrides([f"collision.scene=[{floor}]"])
+    verdict = replace(small_verdict("plate"), task=case.built_task())
+    loaded = load_result(save_result(verdict, case, tmp_path / "a.result"))
+    assert loaded.case == case
+    assert loaded.verdict.task.standoff == verdict.task.standoff
+    assert loaded.verdict.task.collision.checked == ("self", "surface", "scene")
+    assert loaded.verdict.task.collision.scene[0].placement[2, 3] == -0.5
 
 
 def test_a_result_comes_back_exactly(saved):

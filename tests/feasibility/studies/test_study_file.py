@@ -78,6 +78,40 @@ def test_the_key_says_what_a_task_is_and_nothing_else() -> None:
     assert not set(other) & set(plain)
 
 
+COLLISION = """
+base.case = "paper/4a"
+base.collision.scene = [{ name = "part", kind = "mesh", file = "a.stl" }]
+base.collision.srdf = "a.srdf"
+[vary]
+"collision.clearance" = [0.0, 0.01]
+[vary.collision]
+tool = [[], [{ kind = "mesh", file = "b.stl" }]]
+"""
+
+
+def test_collisions_vary_and_their_files_count(tmp_path) -> None:
+    files = [tmp_path / name for name in ("a.stl", "a.srdf", "b.stl")]
+
+    def tasks(changed: int | None = None):
+        for k, file in enumerate(files):
+            file.write_text("new content" if k == changed else "old")
+        return read_study(COLLISION, tmp_path).tasks
+
+    first = tasks()
+    tables = [task.tables["collision"] for task in first]
+    assert [(table["clearance"], len(table.get("tool", []))) for table in tables] == [
+        (0.0, 0), (0.0, 1), (0.01, 0), (0.01, 1)
+    ]  # fmt: skip
+    assert tables[0]["scene"][0]["file"] == str(files[0])
+    assert tables[0]["srdf"] == str(files[1])
+    assert tables[1]["tool"][0]["file"] == str(files[2])
+    keys = [task.key for task in first]
+    assert len(set(keys)) == 4
+    for changed, same in ((0, []), (1, []), (2, [0, 2])):
+        after = [task.key for task in tasks(changed)]
+        assert [k for k in range(4) if after[k] == keys[k]] == same, changed
+
+
 def test_a_changed_file_is_another_task(tmp_path) -> None:
     solid = "solid a\n{}endsolid a\n"
     facet = (
