@@ -2,6 +2,7 @@ from .arguments import check_arguments as check_arguments
 from .chain import Chain as Chain
 from .chain import frames as frames
 from .chain import jacobians as jacobians
+from .chain import joint_alignments as joint_alignments
 from .errors import RobotError as RobotError
 from .kinematics import Kinematics as Kinematics
 from .library import GROUPS as GROUPS

@@ -92,25 +92,42 @@ def checked_chain(
 
 def _constants(model: pin.Model, tool_frame: int, approach_axis: NDArray[np.float64]) -> Chain:
     """Every joint's frame in that of the joint before it, turned so that its axis is z."""
-    n, frame, data = model.nv, model.frames[tool_frame], model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
+    n, frame = model.nv, model.frames[tool_frame]
     rotations, translations = np.empty((n, 3, 3)), np.empty((n + 1, 3))
-    prismatic = np.empty(n, dtype=bool)
+    prismatic, alignments = _turns_onto_z(model)
     align = np.eye(3)  # brings z onto the axis of the previous joint
+    for i in range(n):
+        placement = model.jointPlacements[i + 1]
+        rotations[i] = align.T @ placement.rotation @ alignments[i]
+        translations[i] = align.T @ placement.translation
+        align = alignments[i]
+    translations[n] = align.T @ frame.placement.translation
+    approach = align.T @ frame.placement.rotation @ approach_axis
+    return Chain(rotations, translations, prismatic, approach)
+
+
+def joint_alignments(model: pin.Model) -> NDArray[np.float64]:
+    """(n, 3, 3) the frames of `Chain` in those of Pinocchio's joints: the same origins, z the axis.
+
+    A point p in Pinocchio's frame of joint i, counted from 1, is alignments[i - 1].T @ p in that
+    of the chain.
+    """
+    return _turns_onto_z(model)[1]
+
+
+def _turns_onto_z(model: pin.Model) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Which joints slide, and the rotation that brings z onto each joint's axis."""
+    n, data = model.nv, model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    prismatic, alignments = np.empty(n, dtype=bool), np.empty((n, 3, 3))
     for i in range(n):
         # The joint's motion subspace, in its own frame: (linear, angular).
         jacobian = pin.getJointJacobian(model, data, i + 1, pin.ReferenceFrame.LOCAL)
         subspace = jacobian.reshape(6, n)[:, i]  # Pinocchio flattens a single column
         linear, angular = subspace[:3], subspace[3:]
         prismatic[i] = np.linalg.norm(angular) < 0.5
-        placement = model.jointPlacements[i + 1]
-        next_align = _rotation_onto(linear if prismatic[i] else angular)
-        rotations[i] = align.T @ placement.rotation @ next_align
-        translations[i] = align.T @ placement.translation
-        align = next_align
-    translations[n] = align.T @ frame.placement.translation
-    approach = align.T @ frame.placement.rotation @ approach_axis
-    return Chain(rotations, translations, prismatic, approach)
+        alignments[i] = _rotation_onto(linear if prismatic[i] else angular)
+    return prismatic, alignments
 
 
 def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -39,6 +39,7 @@ surfaces: sheet
 surfaces.places
 feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only safe_files search target_parts version
 feasibility.collisions
+feasibility.collisions.kernels
 feasibility: found problem target_curves task verdict
 feasibility.certification.collisions
 feasibility.certification

@@ -1,0 +1,177 @@
+"""The certified clearance, for the search kernels and for Python.
+
+`collision_buffer` makes the memory that the others work on; for one thread of one process. How a
+segment is certified: `segments.py`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from feasibility.collisions import Bodies
+from feasibility.collisions.kernels.calls import MEASURE, PUSH, SEGMENT, call, with_address
+from feasibility.collisions.kernels.packing import packed
+from feasibility.collisions.kernels.separation import COUNT
+from feasibility.collisions.kernels.tables import (
+    BLAMED,
+    BOUNDS,
+    BY_BUDGET,
+    CALLS,
+    DECIDED,
+    FRAMES,
+    NAMES,
+    PAIR,
+    SIZE,
+    SWEPT,
+    WISH,
+    Array,
+    Tables,
+    views,
+)
+from feasibility.compiled import kernel
+from robots import Robot
+
+INFLUENCE = 0.05  # m beyond its clearance: nearer pairs push
+
+_ASKED_AT = np.int64(1 + 3 * NAMES.index("asked"))
+_STATE_AT = np.int64(1 + 3 * NAMES.index("state"))
+
+
+def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
+    """The memory of the compiled clearance of an arm's bodies.
+
+    It holds an address of this process: never send it to another one; make it there anew.
+
+    Args:
+        bodies: what can collide, and the pairs that are asked for.
+        robot: the arm whose joints carry them.
+
+    Raises:
+        RobotError: the arm is no serial chain.
+    """
+    memory = packed(bodies, robot)
+    views(memory).state[0, [BLAMED, WISH]] = -1.0, INFLUENCE
+    return with_address(memory)
+
+
+@kernel
+def segment_clear(buffer, q0, q1):  # type: ignore[no-untyped-def]
+    """Is every pair further apart than its clearance all along a straight joint segment?
+
+    Bounds are kept for both ends of the last segment: ask for the next one from either, bit by bit,
+    and they are used again. Which pair was to blame: `blamed`.
+
+    Args:
+        buffer: see `collision_buffer`; not empty.
+        q0, q1: (n,) rad or m, the ends; twice the same for a single configuration.
+
+    Returns:
+        m, positive where that is certain, end points included: at q1 no pair is nearer to its
+        clearance than this. 0 or less where it is not, as for NaN.
+    """
+    at = np.int64(buffer[_ASKED_AT])
+    n = q0.shape[0]
+    for j in range(n):
+        buffer[at + j] = q0[j]
+        buffer[at + n + j] = q1[j]
+    return call(buffer, SEGMENT)
+
+
+@kernel
+def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
+    """Add a push of at most `size` away from what is within `INFLUENCE` of its clearance.
+
+    Args:
+        buffer: see `collision_buffer`; not empty.
+        q: (n,) rad or m.
+        step: (n,) what the push is added to.
+        size: the largest Euclidean length of the push.
+
+    Returns:
+        0 where nothing is near; 1 where the nearest pair is at its clearance; more below it.
+    """
+    at, state = np.int64(buffer[_ASKED_AT]), np.int64(buffer[_STATE_AT])
+    n = q.shape[0]
+    for j in range(n):
+        buffer[at + j] = q[j]
+    buffer[state + SIZE] = size
+    share = call(buffer, PUSH)
+    for j in range(n):
+        step[j] += buffer[at + 2 * n + j]
+    return share
+
+
+@kernel
+def blamed(buffer):  # type: ignore[no-untyped-def]
+    """Which of `Bodies.pairs` the last segment that was not certified failed at; -1 before."""
+    return np.int64(buffer[np.int64(buffer[_STATE_AT]) + BLAMED])
+
+
+class Counts(NamedTuple):
+    """What a buffer has done since it was made."""
+
+    segments: int
+    items: int
+    """Pairs of groups asked for, over all segments."""
+    by_budget: int
+    """Those decided by the bounds that were there already."""
+    swept: int
+    """Swept tests."""
+    bounds: int
+    """Bounds of single configurations."""
+    iterations: int
+    """Directions tried."""
+    frames: int
+    """Configurations evaluated."""
+
+
+def counts(buffer: Array) -> Counts:
+    """What a buffer has done since it was made."""
+    t = views(buffer)
+    state = t.state[0, [CALLS, DECIDED, BY_BUDGET, SWEPT, BOUNDS]].astype(int)
+    return Counts(*map(int, [*state, t.simplex[COUNT, 1], t.state[0, FRAMES]]))
+
+
+class Nearest(NamedTuple):
+    """The pair that is nearest to its clearance, or furthest below it."""
+
+    pair: int
+    """Row of `Bodies.pairs`."""
+    distance: float
+    """m, between the bodies of the search; where they overlap, negative: a depth."""
+    point_first: Array
+    """(3,) m in the root frame, on one of the two bodies."""
+    point_second: Array
+    """(3,) m, on the other."""
+
+
+def configuration_bounds(buffer: Array, q: ArrayLike) -> Array:
+    """(P,) m, lower bounds of the distances of all pairs at q; inf for a pair without shapes.
+
+    They are sharp to about 1e-6 of the distance. Where two bodies overlap a bound is negative, by
+    at least the depth. What may stand out from a surface's triangles is taken off.
+    """
+    t, slot = _measured(buffer, q)
+    pairs = t.items[:, PAIR].astype(int)
+    result = np.full(int(pairs.max(initial=-1)) + 1, np.inf)
+    np.minimum.at(result, pairs, t.bounds[slot])
+    return result
+
+
+def nearest(buffer: Array, q: ArrayLike) -> Nearest | None:
+    """Which pair is nearest to its clearance at q, and where; None where there are no pairs."""
+    t, _ = _measured(buffer, q)
+    if not len(t.items):
+        return None
+    found = t.found[0]
+    return Nearest(int(t.state[0, BLAMED]), float(found[0]), found[4:7].copy(), found[7:10].copy())
+
+
+def _measured(buffer: Array, q: ArrayLike) -> tuple[Tables, int]:
+    """The tables after measuring all items at q, and the slot with the bounds."""
+    t = views(buffer)
+    t.asked[0] = q
+    return t, int(call(buffer, MEASURE))

@@ -1,0 +1,161 @@
+"""Bodies and an arm as the tables of the compiled clearance."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feasibility.collisions import Bodies
+from feasibility.collisions.kernels.box_tree import box_tree
+from feasibility.collisions.kernels.tables import (
+    GROUP_COLUMNS,
+    ITEM_COLUMNS,
+    JOINT_COLUMNS,
+    NODE_COLUMNS,
+    POLYTOPE_COLUMNS,
+    SLOTS,
+    STACK,
+    STATE_COLUMNS,
+    Array,
+    Tables,
+    flat,
+)
+from robots import Robot, joint_alignments
+from robots.shapes import Polytope
+
+OUTWARD = 1e-12  # m for each metre: balls and capsules hold their vertices in spite of rounding
+
+
+def packed(bodies: Bodies, robot: Robot) -> Array:
+    """All tables in one array, without the function's address.
+
+    Args:
+        bodies: what can collide, and the pairs that are asked for.
+        robot: the arm whose joints carry them.
+    """
+    n = robot.n
+    turned = [np.eye(3), *joint_alignments(robot.model)]
+    owners: dict[tuple[str, int], list[Polytope]] = {}
+    for body in bodies.polytopes:
+        owners.setdefault((body.owner, body.joint), []).append(body)
+    vertices, groups = [np.empty((0, 3))], []
+    polytopes: list[list[float]] = []
+    for (_, joint), parts in owners.items():
+        clouds = [part.vertices @ turned[joint] for part in parts]
+        start = len(polytopes)
+        for part, cloud in zip(parts, clouds, strict=True):
+            first = sum(map(len, vertices))
+            polytopes.append(
+                [0, first, first + len(cloud), part.radius, *_ball(cloud, part.radius)]
+            )
+            vertices.append(cloud)
+        levers = [
+            np.hypot(c[:, 0], c[:, 1]).max() + p.radius for c, p in zip(clouds, parts, strict=True)
+        ]
+        radius = max(part.radius for part in parts)
+        capsule = _capsule(np.vstack(clouds), radius)
+        groups.append([joint, start, len(polytopes), *capsule, max(levers)])
+    roots, nodes, corners = _trees(bodies, sum(map(len, vertices)))
+    items, directions = _items(bodies, list(owners), groups, roots)
+    count = len(items)
+    return flat(
+        Tables(
+            joints=_joints(robot),
+            groups=_table(groups, GROUP_COLUMNS),
+            polytopes=_table(polytopes, POLYTOPE_COLUMNS),
+            vertices=np.vstack([*vertices, corners]),
+            nodes=nodes,
+            items=_table(items, ITEM_COLUMNS),
+            directions=np.zeros((directions, 3)),
+            state=np.zeros((1, STATE_COLUMNS)),
+            asked=np.zeros((3, n)),
+            configurations=np.zeros((SLOTS, n)),
+            poses=np.zeros((SLOTS * (n + 1), 12)),
+            levers=np.zeros((SLOTS * len(groups), n)),
+            largest=np.zeros((len(groups), n)),
+            reach=np.zeros((len(groups), n + 1)),
+            bounds=np.full((2, count), -np.inf),
+            relative=np.zeros((2, 12)),
+            simplex=np.zeros((7, 8)),
+            stack=np.zeros((1, STACK)),
+            found=np.zeros((1, 10)),
+        )
+    )
+
+
+def _table(rows: list[list[float]], columns: int) -> Array:
+    """Rows as an array, also where there are none."""
+    return np.array(rows, dtype=float).reshape(len(rows), columns)
+
+
+def _joints(robot: Robot) -> Array:
+    """(n, JOINT_COLUMNS) constants of the chain."""
+    chain, n = robot.chain, robot.n
+    table = np.empty((n, JOINT_COLUMNS))
+    table[:, :9] = chain.rotations.reshape(n, 9)
+    table[:, 9:12] = chain.translations[:n]
+    table[:, 12] = chain.prismatic
+    return table
+
+
+def _ball(cloud: Array, radius: float) -> list[float]:
+    """Centre and radius of a ball around points with a radius."""
+    centre = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
+    far = np.linalg.norm(cloud - centre, axis=1).max() + radius
+    return [*centre, float(far + OUTWARD * (1.0 + far))]
+
+
+def _capsule(cloud: Array, radius: float) -> list[float]:
+    """Both ends and the radius of a capsule around points with a radius."""
+    mean = cloud.mean(axis=0)
+    axis = np.linalg.svd(cloud - mean, full_matrices=False)[2][0]
+    along = (cloud - mean) @ axis
+    aside = np.linalg.norm(cloud - mean - along[:, None] * axis, axis=1)
+    round_end = np.sqrt(np.maximum(aside.max() ** 2 - aside**2, 0.0))
+    low, high = (along + round_end).min(), (along - round_end).max()
+    if low > high:
+        low = high = 0.5 * (low + high)
+    ends = mean + np.outer([low, high], axis)
+    nearest = mean + np.clip(along, low, high)[:, None] * axis
+    far = np.linalg.norm(cloud - nearest, axis=1).max() + radius
+    return [*ends.ravel(), float(far + OUTWARD * (1.0 + far))]
+
+
+def _trees(bodies: Bodies, above: int) -> tuple[list[int], Array, Array]:
+    """The root of each soup's tree, all nodes, and all corners (their rows begin at `above`)."""
+    roots, nodes, corners = [], [np.empty((0, NODE_COLUMNS))], [np.empty((0, 3))]
+    for soup in bodies.soups:
+        tree = box_tree(soup.triangles)
+        root = sum(map(len, nodes))
+        shifted = tree.nodes.copy()
+        shifted[:, [1, 2]] += above + sum(map(len, corners))
+        shifted[:, [3, 4]] += np.where(shifted[:, [3, 4]] >= 0, root, 0)
+        roots.append(root)
+        nodes.append(shifted)
+        corners.append(tree.corners)
+    return roots, np.vstack(nodes), np.vstack(corners)
+
+
+def _items(
+    bodies: Bodies, owners: list[tuple[str, int]], groups: list[list[float]], roots: list[int]
+) -> tuple[list[list[float]], int]:
+    """What is asked for, by pairs of groups and of a soup and a group; how many directions."""
+    items: list[list[float]] = []
+    directions = 0
+    for index, pair in enumerate(bodies.pairs):
+        first, second = (
+            [k for k, (owner, _) in enumerate(owners) if owner == name]
+            for name in (pair.first, pair.second)
+        )
+        for a, b in ((a, b) for a in first for b in second):
+            if owners[a][1] > owners[b][1]:
+                a, b = b, a
+            joints = owners[a][1], owners[b][1]
+            items.append([a, b, -1, *joints, pair.clearance, index, directions, 0])
+            directions += int((groups[a][2] - groups[a][1]) * (groups[b][2] - groups[b][1]))
+        for soup, root in zip(bodies.soups, roots, strict=True):
+            if soup.owner in (pair.first, pair.second):
+                clearance = pair.clearance + soup.deviation
+                for b in first if soup.owner == pair.second else second:
+                    joints = 0, owners[b][1]
+                    items.append([-1, b, root, *joints, clearance, index, 0, soup.closed])
+    return items, directions
