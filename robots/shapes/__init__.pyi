@@ -10,4 +10,6 @@ from .links import outer_bodies as outer_bodies
 from .pairs import LinkPairs as LinkPairs
 from .pairs import PairLeftOut as PairLeftOut
 from .pairs import link_pairs as link_pairs
+from .tool import Reach as Reach
+from .tool import tool_reach as tool_reach
 from .triangles import checked_triangles as checked_triangles

@@ -37,6 +37,8 @@ class LinkShapes:
     """
     notes: tuple[str, ...]
     """What stands in for what, and what is not checked, one sentence each."""
+    embodied: frozenset[str]
+    """Links that are more than a frame, whether they are checked or not."""
     root: str
     """The link that no joint moves."""
     tool: str
@@ -78,7 +80,10 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
         )
     polytopes = tuple(body for solid in solids for body in outer_bodies(solid, fineness))
     parents = {joint.child: joint.parent for joint in checked.joints}
-    return LinkShapes(solids, polytopes, unchecked, notes, checked.root, robot.tool_frame, parents)
+    embodied = gathered.embodied()
+    return LinkShapes(
+        solids, polytopes, unchecked, notes, embodied, checked.root, robot.tool_frame, parents
+    )
 
 
 def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
@@ -157,12 +162,18 @@ class _Gathered:
             found.append((shape.origin, geometry))
         return found, fault
 
+    def embodied(self) -> frozenset[str]:
+        """See `LinkShapes.embodied`."""
+        return frozenset(solid.owner for solid in self.solids) | {*self._lost(), *self.without}
+
+    def _lost(self) -> list[str]:
+        return [link for links in self.lost.values() for link in links]
+
     def unchecked(self) -> tuple[str, ...]:
         """See `LinkShapes.unchecked`."""
         carrying = {solid.joint for solid in self.solids}
-        lost = [link for links in self.lost.values() for link in links]
         gaps = [link for joint, link in self.carriers.items() if joint and joint not in carrying]
-        return tuple(dict.fromkeys([*lost, *self.without, *gaps]))
+        return tuple(dict.fromkeys([*self._lost(), *self.without, *gaps]))
 
     def notes(self) -> tuple[str, ...]:
         """See `LinkShapes.notes`."""

@@ -96,7 +96,7 @@ def link_pairs(
         pair = frozenset((first, second))
         if joint[first] == joint[second]:
             return "rigid"
-        if _nothing_between(first, second, shapes, joint):
+        if _nothing_between(first, second, shapes):
             return "adjacent"
         if pair in allowed:
             return "allowed"
@@ -135,14 +135,14 @@ def _measured(
     return LinkPairs(asked, tuple(left_out), tuple(notes))
 
 
-def _nothing_between(first: str, second: str, shapes: LinkShapes, joint: dict[str, int]) -> bool:
-    """Has no link between two owners a shape? What is no link hangs on the tool's link."""
+def _nothing_between(first: str, second: str, shapes: LinkShapes) -> bool:
+    """Is every link between two owners a mere frame? What is no link hangs on the tool's link."""
     a, b = (_upwards(owner, shapes) for owner in (first, second))
     shared = set(a) & set(b)
     between = [link for link in (*a, *b) if link not in shared]
     nearest = next((link for link in a if link in shared), None)  # where the two paths meet
     between += [] if nearest is None else [nearest]
-    return not any(link in joint and link not in (first, second) for link in between)
+    return not any(link in shapes.embodied and link not in (first, second) for link in between)
 
 
 def _upwards(owner: str, shapes: LinkShapes) -> list[str]:

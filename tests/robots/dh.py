@@ -38,7 +38,7 @@ class DHRow:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """One coloured solid of a link's picture; it has no part in the kinematics."""
+    """One solid of a link, drawn or for collisions; it has no part in the kinematics."""
 
     link: int
     """Index of the DH frame that carries the shape; 0 is the root link."""
@@ -49,7 +49,7 @@ class Shape:
     rpy: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """rad, fixed-axis roll, pitch and yaw of the shape."""
     colour: str = "body"
-    """One of the keys of the table of colours handed to `dh_urdf`."""
+    """One of the keys of the table of colours handed to `dh_urdf`; of no use in collisions."""
 
 
 def dh_urdf(
@@ -58,6 +58,9 @@ def dh_urdf(
     limits_deg: Sequence[tuple[float, float]],
     shapes: Sequence[Shape] = (),
     colours: dict[str, tuple[float, float, float, float]] | None = None,
+    collisions: Sequence[Shape] = (),
+    without_collisions: Sequence[int] = (),
+    comment: str = "",
 ) -> str:
     """Return the URDF text of a serial arm of revolute joints given by DH rows.
 
@@ -69,6 +72,9 @@ def dh_urdf(
         limits_deg: n pairs (lower, upper), degrees.
         shapes: solids to draw.
         colours: red, green, blue and alpha in 0 .. 1 of each colour that `shapes` names.
+        collisions: solids that can collide.
+        without_collisions: links whose drawn solids are none that collide.
+        comment: what the file says about them.
 
     Raises:
         ArgumentError: the number of limits is not the number of rows, or a shape names a link or
@@ -85,23 +91,28 @@ def dh_urdf(
     lines = [
         '<?xml version="1.0"?>',
         "<!-- Written by `python -m robots.dh`; change that file, not this one. -->",
+        *([f"<!-- {comment} -->"] if comment else []),
         f"<robot name={quoteattr(name)}>",
     ]
     for key, rgba in palette.items():
         lines.append(f'  <material name={quoteattr(key)}><color rgba="{_text(rgba)}"/></material>')
     for i in range(len(rows) + 1):
-        lines += _link(i, [shape for shape in shapes if shape.link == i])
+        mine = ([shape for shape in group if shape.link == i] for group in (shapes, collisions))
+        lines += _link(i, *mine, i in without_collisions)
     for i, (row, limits) in enumerate(zip(rows, limits_deg, strict=True), start=1):
         lines += _joint(i, row, limits)
     lines.append("</robot>")
     return "\n".join(lines) + "\n"
 
 
-def _link(index: int, shapes: Sequence[Shape]) -> list[str]:
-    """URDF lines of one link and its pictures."""
-    if not shapes:
-        return [f'  <link name="{_link_name(index)}"/>']
-    lines = [f'  <link name="{_link_name(index)}">']
+def _link(
+    index: int, shapes: Sequence[Shape], collisions: Sequence[Shape], without: bool
+) -> list[str]:
+    """URDF lines of one link and its shapes."""
+    start = f'  <link name="{_link_name(index)}"' + (' collision="none"' if without else "")
+    if not shapes and not collisions:
+        return [f"{start}/>"]
+    lines = [f"{start}>"]
     for shape in shapes:
         lines += [
             "    <visual>",
@@ -109,6 +120,13 @@ def _link(index: int, shapes: Sequence[Shape]) -> list[str]:
             f"      <geometry>{_geometry(shape.size)}</geometry>",
             f"      <material name={quoteattr(shape.colour)}/>",
             "    </visual>",
+        ]
+    for shape in collisions:
+        lines += [
+            "    <collision>",
+            f'      <origin xyz="{_text(shape.xyz)}" rpy="{_text(shape.rpy)}"/>',
+            f"      <geometry>{_geometry(shape.size)}</geometry>",
+            "    </collision>",
         ]
     return [*lines, "  </link>"]
 
@@ -216,11 +234,41 @@ PUMA560_SHAPES = (
 )
 """What the arm is drawn as."""
 
+PUMA560_COLLISIONS = (
+    *(shape for shape in PUMA560_SHAPES if shape.link <= 3),
+    # As drawn, but the tip ends as far behind the tool point as it is wide: at a tilt of 45 degrees
+    # no point of it is ahead of the tool point, so that a standoff of 5 mm is free.
+    Shape(6, (0.032, 0.045), (0.0, 0.0, -0.112)),
+    Shape(6, (0.020, 0.07), (0.0, 0.0, -0.060)),
+    Shape(6, (0.008, 0.02), (0.0, 0.0, -0.018)),
+)
+"""What can collide: base to forearm as drawn, and a nozzle."""
+
+PUMA560_WITHOUT = (4, 5)
+"""Fork and bow: no real wrist has its tool point between its pivots, 28 mm wide; those of the
+drawing would be inside every surface that is treated."""
+
+PUMA560_COMMENT = (
+    "The paper gives the kinematics alone. Shapes, drawn and for collisions, are ours: base to "
+    "link3 collide as drawn, link6 as a nozzle that ends 8 mm behind the tool point. The fork and "
+    "the bow (link4, link5) are drawn around the tool point, where no tool could work, and are "
+    'without collision shapes on purpose: collision="none".'
+)
+
 
 def puma560_urdf() -> str:
     """Return the text of `robots/puma560/puma560.urdf`; limits are those of the paper's set 1."""
     limits = [(-180.0, 180.0)] * len(PUMA560_ROWS)
-    return dh_urdf("puma560", PUMA560_ROWS, limits, PUMA560_SHAPES, PUMA560_COLOURS)
+    return dh_urdf(
+        "puma560",
+        PUMA560_ROWS,
+        limits,
+        PUMA560_SHAPES,
+        PUMA560_COLOURS,
+        PUMA560_COLLISIONS,
+        PUMA560_WITHOUT,
+        PUMA560_COMMENT,
+    )
 
 
 if __name__ == "__main__":
