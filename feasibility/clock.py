@@ -13,10 +13,8 @@ from typing import Any
 from feasibility.interrupts import limited
 from feasibility.search import Progress
 
-GRACE, GRACE_SHARE = (
-    0.7,
-    0.05,
-)  # [s] and [1] of the limit: what does not look at the clock may go on
+GRACE = 0.4  # [s] past the limit that is left to what looks at the clock itself ...
+GRACE_SHARE = 0.05  # [1] ... and this share of the limit; starting and answering take some too
 
 
 class OutOfTime(Exception):

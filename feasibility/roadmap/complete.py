@@ -50,7 +50,7 @@ def complete_search(
     """
     if seeds is not None:
         _check_seeds(problem, seeds)
-    with compiling_notice():
+    with compiling_notice(), clock.enforced():  # loading kernels takes a second or two
         warm_up()
     with clock.enforced():
         problem.cells.curves  # noqa: B018 - part of the cells, made once

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import time
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
+from feasibility.clock import Clock
 from feasibility.division import undominated
 from feasibility.verdict import CauseKind, Verdict
 
@@ -84,7 +86,8 @@ Outcome = dict[str, Any]
 def evaluate(tables: Tables) -> Outcome:
     """Decide one case.
 
-    The outcome depends on the tables alone, as long as the search has no time limit.
+    The outcome depends on the tables alone, as long as the search has no time limit; a limit
+    counts from here on, for loading and cutting too.
 
     Args:
         tables: a case, as `Case.to_tables` gives it.
@@ -98,8 +101,15 @@ def evaluate(tables: Tables) -> Outcome:
     from feasibility.checking import check
 
     case = case_of(tables)
-    verdict = check(arm_of(case), cut_of(case), case.built_task(), case.search)
-    return outcome_of(verdict)
+    clock = clock_of(case)
+    return outcome_of(
+        check(arm_of(case), cut_of(case), case.built_task(), case.search, clock=clock)
+    )
+
+
+def clock_of(case: Case) -> Clock:
+    """The time limit of a case, from now on; kernels are loaded before, like everywhere."""
+    return Clock(case.search.time_limit).begin(time.monotonic())
 
 
 def case_of(tables: Tables) -> Case:

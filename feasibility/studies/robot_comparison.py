@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from coverable_errors import Fault
 from feasibility.cases import Case, CaseError, as_read
+from feasibility.clock import Clock, OutOfTime
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
-from feasibility.studies.outcome import arm_of, case_of, cut_of, finite, merit, outcome_of
+from feasibility.studies.outcome import arm_of, case_of, clock_of, cut_of, finite, merit, outcome_of
 from feasibility.studies.run import StudyTask, run_tasks
 from feasibility.studies.stored import arm_fault
 
@@ -160,6 +161,8 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
 def assess(tables: Tables) -> dict[str, Any]:
     """In a worker: everything in the row of one arm, but for the time that it took.
 
+    A time limit is for all of it; patches and cone are None where it has run out before.
+
     Args:
         tables: of a case, and `compare`: what is requested.
     """
@@ -167,14 +170,16 @@ def assess(tables: Tables) -> dict[str, Any]:
 
     request = tables["compare"]
     case = case_of(tables)
+    clock = clock_of(case)
     robot, cells = arm_of(case), cut_of(case)
-    verdict = check(robot, cells, case.built_task(), case.search)
+    verdict = check(robot, cells, case.built_task(), case.search, clock=clock)
     outcome = outcome_of(verdict)
     patches, patches_share = (1, 1.0) if request["divide"] and verdict.feasible else (None, None)
     if request["divide"] and not verdict.feasible and 0 < len(cells) <= MOST_DIVIDED:
-        patches, patches_share = _patches(robot, cells, case)
-    feasible = verdict.feasible
-    cone = critical_cone(robot, cells, case, feasible) if request["critical"] else None
+        patches, patches_share = _patches(robot, cells, case, clock)
+    cone = None
+    if request["critical"] and not clock.out_of_time:
+        cone = critical_cone(robot, cells, case, verdict.feasible, clock)
     kept = ("verdict", "evidence", "message", "share", "covered", "cells", "margins")
     return {
         "robot": robot.name,
@@ -188,17 +193,26 @@ def assess(tables: Tables) -> dict[str, Any]:
     }
 
 
-def _patches(robot: Robot, cells: Cells, case: Case) -> tuple[int, float]:
+def _patches(
+    robot: Robot, cells: Cells, case: Case, clock: Clock
+) -> tuple[int, float] | tuple[None, None]:
     """How many motions there have to be, and the share of the area that they cover."""
     from feasibility.division import divide
 
-    division = divide(robot, cells, case.built_task(), case.search)
+    if clock.out_of_time:
+        return None, None
+    try:
+        division = divide(robot, cells, case.built_task(), case.search, clock=clock)
+    except OutOfTime:
+        return None, None
     accepted = [patch for patch in division.patches if patch.accepted]
     whole = float(cells.areas.sum())
     return len(accepted), sum(patch.area for patch in accepted) / whole if whole > 0.0 else 1.0
 
 
-def critical_cone(robot: Robot, cells: Cells, case: Case, feasible: bool) -> float | None:
+def critical_cone(
+    robot: Robot, cells: Cells, case: Case, feasible: bool, clock: Clock | None = None
+) -> float | None:
     """The smallest cone, deg, with which a covering motion is found; None where none is.
 
     A wider cone allows all that a narrower one does, so halving finds it. What a search cannot
@@ -209,6 +223,7 @@ def critical_cone(robot: Robot, cells: Cells, case: Case, feasible: bool) -> flo
         cells: of the surface.
         case: its task and search.
         feasible: is the case, with its own cone?
+        clock: of all that is done for this arm, if there is one.
     """
     from feasibility.checking import check
     from feasibility.sensitivity import last_true
@@ -217,7 +232,7 @@ def critical_cone(robot: Robot, cells: Cells, case: Case, feasible: bool) -> flo
 
     def holds(step: int) -> bool:
         task: Task = replace(own, cone_deg=step * CONE_STEP_DEG)
-        return check(robot, cells, task, case.search).feasible
+        return check(robot, cells, task, case.search, clock=clock).feasible
 
     # Steps below the first one tested count as failed; the case's own cone may lie between two.
     below = round(LEAST_CONE_DEG / CONE_STEP_DEG) - 1

@@ -7,15 +7,17 @@ from __future__ import annotations
 
 import json
 import signal
+import sys
 import time
 
 import pytest
 from schema import CHECK, conforms
-from small_cases import TEXTS, small_verdict
+from small_cases import TEXTS, small_case, small_verdict
 
 import feasibility.cases.robot_table
 import feasibility.cases.surface_table
 import feasibility.checking
+import feasibility.division
 import feasibility.division.fewest_patches
 import feasibility.paths
 import feasibility.placement
@@ -30,6 +32,8 @@ from feasibility.clock import Clock, OutOfTime, compiling
 from feasibility.interrupts import interruptible
 from feasibility.placement import StudyEvaluator
 from feasibility.roadmap import warm_up
+from feasibility.studies.outcome import evaluate
+from feasibility.studies.robot_comparison import assess
 
 LIMIT = 3600.0  # [s]
 
@@ -111,10 +115,11 @@ def test_files_that_are_not_written_are_named(ask, clock, monkeypatch, tmp_path)
     assert not (tmp_path / "a.html").exists()
 
 
+@pytest.mark.parametrize("name", ["arrays_of", "warm_up"])
 @pytest.mark.parametrize("command", ["check", "path"])
-def test_preparing_the_search(command, ask, clock, monkeypatch):
-    """Curves between 90,001 cells, say."""
-    monkeypatch.setattr(feasibility.roadmap.complete, "arrays_of", clock.endless)
+def test_preparing_the_search(command, name, ask, clock, monkeypatch):
+    """Curves between 90,001 cells, say, or kernels that are loaded from a slow disk."""
+    monkeypatch.setattr(feasibility.roadmap.complete, name, clock.endless)
     status, out, _ = ask("plate", command, "--json")
     found = json.loads(out)
     assert (status, found["verdict"], found["covered"]) == (3, "undecided", 0)
@@ -203,6 +208,30 @@ def test_stations_and_map(ask, clock, monkeypatch, tmp_path):
     assert not picture.exists()
 
 
+@pytest.mark.parametrize("work", [evaluate, assess])
+def test_one_limit_for_all_that_is_done_for_a_case_of_a_study(work, clock, monkeypatch):
+    """Cutting, verdict, patches and critical cone together: here the cutting takes too long."""
+    small_verdict("plate")  # kernels
+    module = sys.modules[work.__module__]
+    cut = module.cut_of
+
+    def slow(case):
+        clock.ahead += 2 * LIMIT
+        return cut(case)
+
+    def refuse(*_, **__):
+        raise AssertionError("this is begun after the end of the time")
+
+    monkeypatch.setattr(module, "cut_of", slow)
+    monkeypatch.setattr(feasibility.division, "divide", refuse)
+    case = small_case("plate").with_overrides([f"search.time_limit={LIMIT}"])
+    request = {"compare": {"divide": True, "critical": True}} if work is assess else {}
+    found = work({**case.to_tables(), **request})
+    assert (found["verdict"], found["evidence"]) == ("undecided", "budget")
+    if work is assess:
+        assert (found["patches"], found["critical_cone_deg"]) == (None, None)
+
+
 # the clock itself
 
 
@@ -255,7 +284,7 @@ def test_work_ends_within_a_tenth_and_a_second_of_the_limit(limit, clock):
         with made.enforced():
             clock.ahead += limit + 0.05 * limit
         with pytest.raises(OutOfTime), made.enforced():
-            clock.over(0.05 * limit + 1.0)
+            clock.over(0.05 * limit + 0.5)
 
 
 def test_a_library_that_drops_the_end_of_time_changes_nothing(clock):
