@@ -37,6 +37,7 @@ from surfaces import Cells
 Array = NDArray[np.float64]
 
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
+THICKNESS = 0.12  # [1] of the reach: by how much links may stand out beyond their joints
 FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
 
 
@@ -284,7 +285,11 @@ def camera_on(robot: Robot, cells: Cells, q: Array, floor: float) -> Camera:
         q: (n,) its configuration.
         floor: m, height of the ground.
     """
-    points = np.concatenate([_extent(cells), joint_points(robot, q), [[0.0, 0.0, floor]]])
+    # Links are thick, and reach beyond their joints.
+    thick = THICKNESS * robot.reach if np.isfinite(robot.reach) else 0.0
+    round_joints = np.vstack([np.eye(3), -np.eye(3)]) * thick
+    links = (joint_points(robot, q)[:, None] + round_joints).reshape(-1, 3)
+    points = np.concatenate([_extent(cells), links, [[0.0, 0.0, floor]]])
     toward = np.zeros(3)
     if len(cells):
         toward = cells.surface.side_sign * cells.normals.mean(axis=0)

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from fabricated import DOME, every_cause, verdict_on
 from PIL import Image
-from small_cases import small_verdict
+from small_cases import paper_verdict, small_verdict
 
 from feasibility.viewer import plot_views, threejs, view
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.painter import LENS, painted
+from feasibility.viewer.robot import ROOT
 from robots import load_robot
 
 SIZE = (160, 120)
@@ -72,6 +73,17 @@ def test_what_is_half_transparent_shows_what_is_behind() -> None:
     glass = square("/near", BLUE, 1.0, x=1.0, opacity=0.5)
     image = painted([glass, square("/far", RED)], FRONT, *SIZE)
     assert mask(image, (0.5, 0.0, 0.5)).sum() > 500
+
+
+@pytest.mark.parametrize("name", ["4a", "4f", "5c"])
+@pytest.mark.parametrize("at", [0.0, 0.6])
+def test_no_link_is_cut_off_at_the_edge_of_a_small_picture(name, at) -> None:
+    shown = view(paper_verdict(name), play=False, at=at)
+    arm = [c for c in shown.commands if c.get("path", "").startswith(ROOT)]
+    image = painted(arm, shown.camera, 360, 300)
+    assert (image < 0.9).all(axis=2).sum() > 2000
+    for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
+        assert (edge == 1.0).all()
 
 
 def test_hidden_parts_and_what_is_behind_the_camera_are_not_painted() -> None:
