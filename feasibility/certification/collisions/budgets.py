@@ -1,8 +1,8 @@
 """Certified clearance by distances alone, where no plane parts two bodies.
 
 No point of body b, seen from body a, moves further than M = sum_j r_j |d_j| along a stretch. So
-with the distances d(0) and d(1) at its ends, the bodies are at least (d(0) + d(1) - M) / 2 apart all
-along it (Schwarzer, Saha and Latombe 2005); and a distance at one row bounds those at others.
+with the distances d(0) and d(1) at its ends, the bodies are at least (d(0) + d(1) - M) / 2 apart
+all along it (Schwarzer, Saha and Latombe 2005); and a distance at one row bounds those at others.
 """
 
 from __future__ import annotations

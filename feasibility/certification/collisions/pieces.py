@@ -24,6 +24,7 @@ Array = NDArray[np.float64]
 FLAT = (
     1e-6  # [1] least thickness of a hull relative to its length; qhull and coal fail on flat ones
 )
+MERGED = 1e-12  # [1] of its size, how far what qhull leaves out may stand out of its hull
 MANY = 64  # corners of a part of a mesh, above which only those on its hull are kept
 
 
@@ -112,8 +113,8 @@ class MeshPart(Piece):
         used, renumbered = np.unique(faces, return_inverse=True)
         self.vertices, self.faces = vertices[used], renumbered.reshape(-1, 3)
         self.closed = closed
-        super().__init__(None, np.eye(4), _outermost(self.vertices), 0.0)
-        self.__dict__.pop("geometry")  # made when coal is asked
+        super().__init__(None, np.eye(4), self.vertices, 0.0)
+        del self.geometry  # made when coal is asked
         self.triangles = len(faces)
 
     @cached_property
@@ -126,6 +127,15 @@ class MeshPart(Piece):
         model.addSubModel(*_coal_triangles(self.vertices, self.faces))
         model.endModel()
         return model
+
+    @cached_property
+    def outermost(self) -> Array:
+        """(k, 3) m, corners with the same hull."""
+        return _outermost(self.corners)
+
+    def support(self, n: Array) -> Array:
+        """(k,) m, see `Piece`."""
+        return np.asarray((n @ self.outermost.T).max(axis=1))
 
     @cached_property
     def parts(self) -> tuple[Piece, ...]:
@@ -141,7 +151,7 @@ class MeshPart(Piece):
     @cached_property
     def thin(self) -> Array:
         """(3,) direction in which the corners spread least."""
-        spread = self.corners - self.corners.mean(axis=0)
+        spread = self.outermost - self.outermost.mean(axis=0)
         return np.asarray(np.linalg.eigh(spread.T @ spread)[1][:, 0])
 
 
@@ -155,9 +165,9 @@ class MeshHull(Piece):
         used, renumbered = np.unique(hull.simplices, return_inverse=True)
         corners = mesh.vertices[used]
         geometry = coal.Convex(*_coal_triangles(corners, renumbered.reshape(-1, 3)))
-        # What qhull merged may stand out a little from the corners that it kept.
-        outside = float((mesh.vertices @ hull.equations[:, :3].T + hull.equations[:, 3]).max())
-        super().__init__(geometry, np.eye(4), corners, max(outside, 0.0))
+        super().__init__(
+            geometry, np.eye(4), corners, MERGED * (1.0 + float(np.abs(corners).max()))
+        )
         self.exact, self.mesh, self.at_rest = False, mesh, at_rest
 
     @property
@@ -245,12 +255,9 @@ def _outermost(points: Array) -> Array:
     if len(points) <= MANY or _is_flat(points):
         return points
     try:
-        hull = ConvexHull(points)
+        return np.asarray(points[ConvexHull(points).vertices])
     except QhullError:
         return points
-    outside = (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max()
-    kept: Array = points[hull.vertices]
-    return kept if outside <= 1e-12 * (1.0 + np.abs(points).max()) else points
 
 
 def _moved(placement: Array, points: Array) -> Array:
