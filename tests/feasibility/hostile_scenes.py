@@ -15,14 +15,19 @@ import numpy as np
 
 from coverable_errors import worded
 from feasibility.cases import CaseError
+from feasibility.certification.collisions import collision_replay
 from feasibility.collisions import (
+    Bodies,
     Collision,
+    Pair,
     polytopes_of,
     soup_of,
     tool_polytopes,
     tool_solids,
 )
 from robots import Robot
+from robots.shapes import Solid
+from robots.urdf import Sphere
 
 TAKEN = ""
 """No fault: the object is odd, and can be used."""
@@ -231,7 +236,22 @@ def use(collision: Collision, robot: Robot) -> None:
     for body in tool_polytopes(collision.tool, robot):
         assert 1 <= len(body.vertices) <= 64
         assert np.isfinite(body.vertices).all()
-    assert len(tool_solids(collision.tool, robot)) == len(collision.tool)
+    solids = tool_solids(collision.tool, robot)
+    assert len(solids) == len(collision.tool)
+    judge(collision, solids, robot)
+
+
+def judge(collision: Collision, solids: tuple[Solid, ...], robot: Robot) -> None:
+    """The judge, and coal beneath it, look at the tool and a ball among the objects."""
+    ball = Solid("ball", robot.n, np.eye(4), Sphere(0.05))
+    movers = {"ball", *(solid.owner for solid in solids)}
+    pairs = tuple(Pair(one, thing.name, 0.01) for one in movers for thing in collision.scene)
+    bodies = Bodies((*solids, ball), (), (), collision.scene, pairs)
+    q = np.zeros((2, robot.n))
+    q[1] = 0.2
+    found = collision_replay(robot, bodies, q)
+    assert bool(pairs) == (found.min_clearance is not None)
+    assert found.min_clearance is None or math.isfinite(found.min_clearance)
 
 
 def try_scene(seed: int, folder: Path, first: str, robot: Robot) -> None:

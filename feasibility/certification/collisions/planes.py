@@ -296,7 +296,7 @@ def _coal() -> tuple[Any, Any, Any]:
     import coal
 
     request = coal.DistanceRequest()
-    request.enable_nearest_points = request.enable_signed_distance = True
+    request.enable_signed_distance = True
     return coal, request, coal.DistanceResult
 
 
