@@ -98,6 +98,18 @@ def outer_hull(points: Array, most: int = MOST_VERTICES) -> Hull:
     return Hull(kept, radius + ROUNDING * float(np.ptp(solid, axis=0).max()))
 
 
+def hull_volume(points: Array) -> float:
+    """m^3; 0 for points that span no volume."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    if len(points) < 4:
+        return 0.0
+    try:
+        return float(ConvexHull(points).volume)
+    except QhullError:
+        return 0.0
+
+
 def _box_corners(low: Array, high: Array) -> Array:
     """(8, 3)"""
     return np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)

@@ -13,6 +13,7 @@ from robots.errors import RobotError
 from robots.robot import Robot
 from robots.shapes.bodies import Geometry, Polytope, Solid
 from robots.shapes.hulls import hull_of
+from robots.shapes.pieces import pieces_of
 from robots.shapes.triangles import MeshBodies
 from robots.urdf import CheckedUrdf, CollisionShape, MeshFile, Visual, check_urdf
 
@@ -89,7 +90,7 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
 def outer_bodies(solid: Solid, fineness: Fineness = "hulls") -> list[Polytope]:
     """Convex bodies that together hold a solid, in the frame of its joint."""
     place = solid.placement
-    hulls = [hull_of(solid.geometry)]
+    hulls = [hull_of(solid.geometry)] if fineness == "hulls" else pieces_of(solid.geometry)
     bodies = []
     for hull in hulls:
         vertices = hull.vertices @ place[:3, :3].T + place[:3, 3]
