@@ -36,6 +36,14 @@ def test_sides_are_those_of_every_known_configuration(number: int) -> None:
             assert not found[side, node.cell]
 
 
+@pytest.mark.parametrize("number", [ONE_CUT, TWO_CUTS])
+def test_the_first_side_in_the_legend_names_its_joint(number: int) -> None:
+    """Sides without cells have no entry, so that either may be the first."""
+    parts = [layer.entry.label for layer in layers(cut_verdict(number))]
+    first = next(label for label in parts if label.startswith(("below", "above")))
+    assert "joint" in first
+
+
 def test_the_view_has_both_sides_with_a_legend() -> None:
     verdict = cut_verdict(ONE_CUT)
     parts = {layer.entry.label: layer for layer in layers(verdict)}
