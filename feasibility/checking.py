@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_errors import ArgumentError
+from feasibility.collisions import Collision
 from feasibility.clock import Clock, OutOfTime
 from feasibility.found import Found
 from feasibility.problem import Problem
@@ -40,6 +41,7 @@ def check(
     progress: Progress | None = None,
     seeds: Walk | None = None,
     clock: Clock | None = None,
+    collision: Collision | None = None,
 ) -> Verdict:
     """Can this arm move its tool over all of these cells in one continuous motion?
 
@@ -54,6 +56,8 @@ def check(
             begins from: the `witness` of another verdict, say. Its marks of cells may be missing.
         clock: of the command that this is a part of: its limit and its progress callback count, not
             those given here.
+        collision: what the arm has to stay clear of, in place of `task.collision`; where neither is
+            given, collisions are not checked.
 
     Returns:
         The verdict. An infeasible surface is a result, not an error. The first call on a machine
@@ -63,7 +67,8 @@ def check(
         TypeError: an argument is something else, such as a surface that is not cut into cells.
         RobotError: the arm is no serial chain of one-dof joints.
         SurfaceError: the greedy search does not know this kind of surface.
-        ArgumentError: the seeds fit neither arm nor cells, or the search is the greedy one.
+        ArgumentError: the seeds fit neither arm nor cells; seeds or collisions are given to the
+            greedy search; or a pair names something that is not there.
 
     Example:
         >>> from robots import load_robot
@@ -78,8 +83,12 @@ def check(
 
     search = Search() if search is None else search
     settings = (search, "search", Search, "a Search, such as Search(seed=1)")
+    if collision is not None and isinstance(task, Task):
+        task = replace(task, collision=collision)
     problem = Problem.of(robot, cells, task, settings)
     if search.method == "greedy":
+        if task.collision is not None:
+            raise ArgumentError(GREEDY_KNOWS_NONE)
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
         return _decided(problem, search, progress, greedy_search, clock)
@@ -114,6 +123,10 @@ def greedy_check(
     return _decided(Problem.of(robot, cells, task), search, progress, from_start)
 
 
+GREEDY_KNOWS_NONE = (
+    "the greedy search, which is the paper's, knows no collisions: leave out [collision], or take "
+    "the complete search"
+)
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
 Method = Callable[[Problem, Search, Clock], Found]
 
@@ -177,6 +190,7 @@ def _decided(
     """Search, certify, and make the verdict."""
     called = time.monotonic()
     clock = Clock(search.time_limit, progress) if clock is None else clock
+    bodies = problem.bodies
     tried = [_attempt(problem, search, clock, method)]
     first = tried[0].replayed
     if tried[0].found.motion is not None and first is not None and first.narrowly_refused:
@@ -213,6 +227,8 @@ def _decided(
             "total_s": time.monotonic() - called,
         },
         n_edges=found.n_edges,
+        unchecked_links=() if bodies is None else bodies.unchecked,
+        pairs_left_out=() if bodies is None else bodies.left_out,
         statistics={**found.counts, "fk": sum(one.found.counts["fk"] for one in tried)},
     )
 

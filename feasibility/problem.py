@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from feasibility.collisions import Bodies, gather
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells, Surface
@@ -43,6 +44,16 @@ class Problem:
             *others,
         )
         return cls(robot, cells, task, task)
+
+    @property
+    def bodies(self) -> Bodies | None:
+        """What can collide; None where collisions are not checked.
+
+        Raises:
+            RobotError: the arm has no shapes, or the SRDF is not of this arm.
+            ArgumentError: a pair names something that is not there.
+        """
+        return gather(self.robot, self.cells.surface, self.task.collision, self.task.standoff)
 
     @property
     def narrowed(self) -> Problem:

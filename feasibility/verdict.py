@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.collisions import checked_words
+from feasibility.collisions import LeftOut, checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.task import Task
 from robots import Robot
@@ -64,6 +64,10 @@ class Cause:
     """True where a bound shows it; False where a search ended without finding a motion."""
     detail: str
     """One sentence with the figures: by how much, which joint, which angle."""
+    pair: tuple[str, str] | None = None
+    """What would collide, where that is the cause."""
+    clearance: float | None = None
+    """m, the distance of that pair at best; negative where they overlap."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -173,6 +177,10 @@ class Verdict:
     """Seconds: load_s, search_s, certify_s, total_s."""
     n_edges: int = 0
     """Number of edges of graph G."""
+    unchecked_links: tuple[str, ...] = ()
+    """Links without any shape, where collisions are checked."""
+    pairs_left_out: tuple[LeftOut, ...] = ()
+    """Pairs that are not asked for, and why."""
     statistics: Mapping[str, Any] = field(default_factory=dict)
     """Counts of work done (FK evaluations, calls, proofs), for benchmarks and the curious."""
 

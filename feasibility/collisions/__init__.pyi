@@ -19,6 +19,7 @@ from .outer_bodies import tool_solids as tool_solids
 from .pairs import checked_distance as checked_distance
 from .pairs import checked_pair as checked_pair
 from .scene import SHAPES as SHAPES
+from .gathering import gather as gather
 from .scene import Obstacle as Obstacle
 from .scene import ToolShape as ToolShape
 from .settings import Collision as Collision

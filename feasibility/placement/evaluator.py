@@ -137,6 +137,7 @@ class LocalEvaluator:
             points=np.ascontiguousarray(here.points @ turn.T + shift),
             approaches=np.ascontiguousarray(here.approaches @ turn.T),
             targets=targets,
+            collisions=collisions_of(self.robot, surface.moved(turn, shift), self.task),
         )
 
     def try_at(self, pose: Pose, early: bool = True) -> Trial:

@@ -8,10 +8,11 @@ import io
 import math
 import re
 import textwrap
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from feasibility.collisions import Collision, checked_words
+from feasibility.collisions import Collision, LeftOut, checked_words
 from feasibility.results import plain
 from feasibility.verdict import Cause, Certificate
 from feasibility.version import version
@@ -19,6 +20,7 @@ from surfaces import Cells
 
 WIDTH = 100  # columns
 MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m")
+BUILT = ("adjacent", "rigid")  # reasons that lie in how the arm is built
 _UNIT = re.compile(r"(?<=\d) (?=(?:deg|mm|m2|m/s|m|s)\b|%)")
 _UNBROKEN = "\u00a0"  # textwrap breaks at plain blanks only
 # Colours that most colour-blind people can tell apart.
@@ -94,9 +96,25 @@ def causes_json(causes: Iterable[Cause], cells: Cells) -> list[dict[str, Any]]:
             "cause": str(cause.kind),
             "proved": bool(cause.proved),
             "detail": cause.detail,
+            **({} if cause.pair is None else {"pair": list(cause.pair)}),
+            **({} if cause.clearance is None else {"clearance_m": float(cause.clearance)}),
         }
         for cause in causes
     ]
+
+
+def left_out_json(one: LeftOut) -> dict[str, Any]:
+    """A pair that is not asked for."""
+    found: dict[str, Any] = {"pair": [one.first, one.second], "why": one.why}
+    return found if one.rate is None else {**found, "rate": float(one.rate)}
+
+
+def left_out_text(pairs: Sequence[LeftOut]) -> str:
+    """Pairs that are not asked for in one line: those of the arm's build counted, others named."""
+    built = Counter(one.why for one in pairs if one.why in BUILT)
+    parts = [f"{number} {why}" for why, number in built.items()]
+    parts += [f"{one.first} and {one.second} ({one.why})" for one in pairs if one.why not in BUILT]
+    return "; ".join(parts)
 
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:

@@ -33,6 +33,8 @@ def as_json(case: Case, text: str, seconds: float) -> dict[str, Any]:
         "uncovered": [],
         "certificate": None,
         "collisions": [],
+        "unchecked_links": [],
+        "pairs_left_out": [],
         "proof": None,
         "timing": {"load_s": seconds, "search_s": 0.0, "certify_s": 0.0, "total_s": seconds},
         "robot": case.robot.name or str(case.robot.urdf),

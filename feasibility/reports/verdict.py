@@ -17,6 +17,8 @@ from feasibility.reports.parts import (
     certificate_json,
     counted,
     csv_text,
+    left_out_json,
+    left_out_text,
     seconds,
     seconds_text,
     summary,
@@ -69,6 +71,8 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "uncovered": causes_json(verdict.causes, verdict.cells),
         "certificate": _certificate(verdict),
         "collisions": checked(verdict.task.collision),
+        "unchecked_links": list(verdict.unchecked_links),
+        "pairs_left_out": [left_out_json(one) for one in verdict.pairs_left_out],
         "proof": None
         if verdict.proof is None
         else proof_json(verdict.proof, verdict.robot, verdict.cells),
@@ -130,6 +134,8 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
         ("found", _message(verdict)),
         ("certificate", _certificate_text(verdict)),
+        ("no shape", ", ".join(verdict.unchecked_links)),
+        ("left out", left_out_text(verdict.pairs_left_out)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),
     ]
     lines = summary(head, rows, verdict.task.collision)

@@ -10,11 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.collisions import collision_buffer, gather
 from feasibility.compiled import kernel
 from feasibility.target_curves import target_curves
 from feasibility.task import Task
 from robots import Chain, Robot, frames
-from surfaces import Cells
+from surfaces import Cells, Surface
 
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
 NEWTON_CONE = 1e-4  # [1] share of the cone chord that this may cost, by the surface's curvature
@@ -27,7 +28,7 @@ CENTRE_SHARE = 0.999  # [1] of the tolerance, for self-motions: curves deviate a
 MESH_FACTOR = 1.1  # [1] larger deviation of curves over a mesh at the replay's samples
 
 # Why a motion stopped: the constraint that left no margin.
-NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD = 0, 1, 2, 3, 4, 5
+NOTHING, LIMIT, CONE, SINGULAR, LONG, FOLD, COLLISION = 0, 1, 2, 3, 4, 5, 6
 
 # In place of a number of waypoints: the motion stopped short, or the array of waypoints is full.
 STOPPED, OVERFLOW = -1, -2
@@ -73,6 +74,9 @@ class SearchArrays(NamedTuple):
     at its target, which is all that the task asks."""
     scale: float
     """m, the length that makes metres comparable to radians (the arm's reach)."""
+    collisions: NDArray[np.float64]
+    """Bodies and pairs with the bounds between them, see `feasibility.collisions.buffer`; empty
+    where collisions are not checked."""
 
 
 def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
@@ -108,7 +112,14 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
         off_target_cost=NEAR_COST,
         # A gantry may have no links: any length will do then.
         scale=float(np.linalg.norm(robot.chain.translations, axis=1).sum()) or 1.0,
+        collisions=collisions_of(robot, cells.surface, task),
     )
+
+
+def collisions_of(robot: Robot, surface: Surface, task: Task) -> NDArray[np.float64]:
+    """Bodies and pairs as the compiled search reads them; empty where they are not checked."""
+    bodies = gather(robot, surface, task.collision, task.standoff)
+    return np.zeros(0) if bodies is None else collision_buffer(bodies, robot)
 
 
 def passable(arrays: SearchArrays) -> NDArray[np.bool_]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from feasibility.compiled import inlined, kernel, put
 from feasibility.roadmap.arrays import OVERFLOW, SearchArrays, Work
+from feasibility.roadmap.clear_landings import moved_clear
 from feasibility.roadmap.graph import (
     BUDGET,
     COMPONENTS,
@@ -189,6 +190,8 @@ def seed_cell(
         if not project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
         found += 1
+        if not moved_clear(arrays, work, cell, q):
+            continue
         settle(arrays, work, target, approach, q, SETTLE_STEPS)
         node, _ = join(arrays, work, roadmap, cell, q, -1, 0, 0)
         if node >= 0:

@@ -32,8 +32,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from feasibility.collisions import segment_clear
 from feasibility.compiled import kernel
 from feasibility.roadmap.arrays import HERE, NEXT, cone_used
+
+COLLIDES = np.inf  # in place of the cone bound
 
 
 @kernel
@@ -88,7 +91,8 @@ def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     Slot 0 holds the errors against the target at the start of the segment, slot 1 at its end.
 
     Returns the position bound over the allowance of the tolerance, and the cone bound over that of
-    the cone chord: both must be at most 1. NaN compares false, so it never certifies.
+    the cone chord: both must be at most 1. NaN compares false, so it never certifies. Where both
+    hold, but the arm is not certified clear, the second is COLLIDES.
     """
     total, total_axis = spread(arrays, work, q0, q1)
     # The replay matches the ends to the curve's closest points, up to twice the errors from those
@@ -106,4 +110,8 @@ def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     cone = peak(
         cone_used(arrays, work, HERE), cone_used(arrays, work, NEXT), total_axis + approach + normal
     )
-    return position / work.allowance[0], cone / work.allowance[1]
+    position, cone = position / work.allowance[0], cone / work.allowance[1]
+    if arrays.collisions.shape[0] > 0 and position <= 1.0 and cone <= 1.0:
+        if not segment_clear(arrays.collisions, q0, q1) > 0.0:
+            cone = COLLIDES
+    return position, cone

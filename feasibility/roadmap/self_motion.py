@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.collisions import clearance_gradient
 from feasibility.compiled import inlined, kernel, put
 from feasibility.roadmap.arrays import (
     HERE,
@@ -59,7 +60,10 @@ def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
 
 @kernel
 def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
-    """Set `work.secondary_step` away from limits and the cone's boundary (by slot 1's cone row)."""
+    """Set `work.secondary_step` away from limits, the cone's boundary, and what the arm may hit.
+
+    The cone's row is that of slot 1.
+    """
     n = q.shape[0]
     for j in range(n):
         half = 0.5 * (arrays.upper[j] - arrays.lower[j])
@@ -76,6 +80,8 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
         push = size * min(share, 1.0) ** 5 / np.sqrt(norm)
         for j in range(n):
             work.secondary_step[j] -= push * work.rows[3, j]
+    if arrays.collisions.shape[0] > 0:
+        clearance_gradient(arrays.collisions, q, work.secondary_step, size)
 
 
 @inlined

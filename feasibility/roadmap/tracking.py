@@ -16,6 +16,7 @@ import numpy as np
 
 from feasibility.compiled import inlined, kernel, put
 from feasibility.roadmap.arrays import (
+    COLLISION,
     CONE,
     FOLD,
     HERE,
@@ -32,7 +33,7 @@ from feasibility.roadmap.arrays import (
 )
 from feasibility.roadmap.off_target import STEPS_FROM_NEAR, project_off_target
 from feasibility.roadmap.projection import linearise, project
-from feasibility.roadmap.segment_bound import segment_holds
+from feasibility.roadmap.segment_bound import COLLIDES, segment_holds
 from feasibility.roadmap.self_motion import CONE_SLACK, margin_objective
 
 SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step ends the motion
@@ -132,7 +133,7 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
         else:
             dt *= 0.5
             if position < np.inf:
-                work.stop_reason[0] = CONE
+                work.stop_reason[0] = COLLISION if cone == COLLIDES else CONE
         if dt < SMALLEST_STEP:
             if off_target:
                 return STOPPED

@@ -86,10 +86,9 @@ class Prober:
 
     def arrays_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The arrays with a quantity k steps from the value given, without making it anew."""
-        if quantity.kind in (Kind.CONE, Kind.STANDOFF):
-            if self._latest[0] != (quantity.name, k):
-                self._latest = (quantity.name, k), arrays_of(*quantity.applied(self.given, k))
-            return self._latest[1]
+        shifted = quantity.kind is Kind.SHIFT and self.given.task.collision is not None
+        if quantity.kind in (Kind.CONE, Kind.STANDOFF) or shifted:
+            return self._made_anew(quantity, k)
         arrays = self.centres_at(quantity, k)
         if quantity.kind is Kind.SHIFT:
             targets = self.arrays.targets.copy()
@@ -98,6 +97,12 @@ class Prober:
             targets.flags.writeable = self.arrays.targets.flags.writeable
             return arrays._replace(targets=targets)
         return arrays
+
+    def _made_anew(self, quantity: Quantity, k: int) -> SearchArrays:
+        """All arrays with a quantity k steps from the value given; the latest are kept."""
+        if self._latest[0] != (quantity.name, k):
+            self._latest = (quantity.name, k), arrays_of(*quantity.applied(self.given, k))
+        return self._latest[1]
 
     def centres_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The same over the cells' centres, cheaper: what lies between them may be unchanged."""
@@ -112,6 +117,8 @@ class Prober:
         if quantity.kind is Kind.STANDOFF:
             grown = (value - quantity.given) * self.outwards
             return self.arrays._replace(points=self.arrays.points + grown)
+        if quantity.kind is Kind.SHIFT and self.given.task.collision is not None:
+            return self._made_anew(quantity, k)
         if quantity.kind is Kind.SHIFT:
             shift = value * np.array(quantity.axis)
             return self.arrays._replace(points=self.arrays.points + shift)

@@ -57,6 +57,8 @@ CHECK = {
         }
     ),
     "collisions": [str],
+    "unchecked_links": [str],
+    "pairs_left_out": [{"pair": [str], "why": str}],
     "proof": Maybe({"kind": OneOf("cell", "cut"), "opened": Named(float), "tree": ProofTree()}),
     "timing": SECONDS,
     "robot": str,
