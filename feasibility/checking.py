@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_errors import ArgumentError
-from feasibility.collisions import Collision
 from feasibility.clock import Clock, OutOfTime
+from feasibility.collisions import Collision
 from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search

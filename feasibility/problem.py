@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from feasibility.collisions import Bodies, gather
+from feasibility.collisions import Bodies, Pair, gather
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells, Surface
@@ -54,6 +54,12 @@ class Problem:
             ArgumentError: a pair names something that is not there.
         """
         return gather(self.robot, self.cells.surface, self.task.collision, self.task.standoff)
+
+    @property
+    def pairs(self) -> tuple[Pair, ...]:
+        """What must stay apart; none where collisions are not checked."""
+        bodies = self.bodies
+        return () if bodies is None else bodies.pairs
 
     @property
     def narrowed(self) -> Problem:

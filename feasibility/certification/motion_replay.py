@@ -18,7 +18,7 @@ from feasibility.certification.collisions import collision_replay
 from feasibility.certification.curve_matching import CurveMatch, match_to_curves
 from feasibility.certification.kinematic_bounds import peaks, placements, second_derivatives
 from feasibility.certification.surface_replay import replay_over_surface
-from feasibility.collisions import Bodies
+from feasibility.collisions import gather
 from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Walk
@@ -42,14 +42,7 @@ def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
     return ""
 
 
-def replay(
-    robot: Robot,
-    cells: Cells,
-    task: Task,
-    walk: Walk,
-    needed: NDArray[np.bool_],
-    bodies: Bodies | None = None,
-) -> Replay:
+def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]) -> Replay:
     """Check a walk: limits, tool point and cone at and between waypoints, and the cells it visits.
 
     A walk that the curves between cell centres do not show to be right, because it leaves them or
@@ -59,16 +52,16 @@ def replay(
     Args:
         robot: the arm.
         cells: the cells.
-        task: the task; its tolerance and cone are used exactly.
+        task: the task; its tolerance and cone are used exactly. Whether bodies stay clear is asked
+            only of walks that are right in everything else.
         walk: the motion.
         needed: (N,) cells that must be visited.
-        bodies: what has to stay clear of what; None where collisions are not checked. Asked only
-            of walks that are right in everything else.
 
     Returns:
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
     """
     found = _replay_of_tool(robot, cells, task, walk, needed)
+    bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is None or not found.accepted:
         return found
     clear = collision_replay(robot, bodies, walk.q)

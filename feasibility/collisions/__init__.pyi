@@ -12,6 +12,7 @@ from .kernels import configuration_bounds as configuration_bounds
 from .kernels import counts as counts
 from .kernels import nearest as nearest
 from .kernels import segment_clear as segment_clear
+from .gathering import gather as gather
 from .outer_bodies import polytopes_of as polytopes_of
 from .outer_bodies import soup_of as soup_of
 from .outer_bodies import tool_polytopes as tool_polytopes
@@ -19,7 +20,6 @@ from .outer_bodies import tool_solids as tool_solids
 from .pairs import checked_distance as checked_distance
 from .pairs import checked_pair as checked_pair
 from .scene import SHAPES as SHAPES
-from .gathering import gather as gather
 from .scene import Obstacle as Obstacle
 from .scene import ToolShape as ToolShape
 from .settings import Collision as Collision

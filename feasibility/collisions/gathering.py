@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from coverable_errors import ArgumentError, Fault
+from coverable_errors import ArgumentError
 from feasibility.collisions.bodies import Bodies, LeftOut, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
 from feasibility.collisions.settings import Collision
@@ -142,9 +142,7 @@ def _pairs(
     return pairs, left_out
 
 
-def _why_not(
-    first: str, second: str, collision: Collision, joints: Mapping[str, int]
-) -> str:
+def _why_not(first: str, second: str, collision: Collision, joints: Mapping[str, int]) -> str:
     """Why a body of the arm is not asked for with one at rest; empty where it is."""
     if frozenset((first, second)) in {frozenset(pair) for pair in collision.allow}:
         return "allowed"

@@ -25,7 +25,7 @@ from feasibility.placement.quick_search import (
 )
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
-from feasibility.roadmap import Exploration, SearchArrays, arrays_of
+from feasibility.roadmap import Exploration, SearchArrays, arrays_of, collisions_of
 from feasibility.search import Search
 from feasibility.studies import cause_counts
 from feasibility.task import Task

@@ -126,6 +126,25 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     }
 
 
+def clearance_json(certificate: Certificate) -> dict[str, Any]:
+    """How near which pair came along a motion; no keys where collisions were not checked."""
+    if certificate.min_clearance is None:
+        return {}
+    pair = certificate.nearest_pair
+    return {
+        "min_clearance_m": plain(float(certificate.min_clearance)),
+        "nearest_pair": None if pair is None else list(pair),
+    }
+
+
+def clearance_text(certificate: Certificate) -> str:
+    """How near which pair came along a motion; empty where that was not looked at."""
+    if certificate.min_clearance is None or certificate.nearest_pair is None:
+        return ""
+    nearest = f"{1e3 * certificate.min_clearance:.3g} mm"
+    return f"bodies at least {nearest} apart ({' and '.join(certificate.nearest_pair)})"
+
+
 def seconds(
     timing: Mapping[str, float], middle: Iterable[str], before_s: float
 ) -> dict[str, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from feasibility.collisions import checked
 from feasibility.paths import CoveragePath, PathFigures
-from feasibility.reports.parts import certificate_json, counted, summary
+from feasibility.reports.parts import certificate_json, clearance_json, counted, summary
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results import plain
 from feasibility.timing import MotionLimits, Trajectory, used
@@ -56,7 +56,7 @@ def as_json(
             "cone_deg": plain(math.degrees(figures.cone_margin)),
             "singular_value": plain(figures.singular_value),
         },
-        "certificate": certificate_json(path.certificate),
+        "certificate": certificate_json(path.certificate) | clearance_json(path.certificate),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,

@@ -15,6 +15,8 @@ from feasibility.paper import tree_walk
 from feasibility.reports.parts import (
     causes_json,
     certificate_json,
+    clearance_json,
+    clearance_text,
     counted,
     csv_text,
     left_out_json,
@@ -99,7 +101,8 @@ def _certificate(verdict: Verdict) -> dict[str, Any] | None:
     if verdict.certificate is None:
         return None
     margin = plain(_revolute_margin(verdict))
-    return {**certificate_json(verdict.certificate), "min_limit_margin_deg": margin}
+    clear = clearance_json(verdict.certificate)
+    return {**certificate_json(verdict.certificate), "min_limit_margin_deg": margin, **clear}
 
 
 def _revolute_margin(verdict: Verdict) -> float:
@@ -183,7 +186,7 @@ def _certificate_text(verdict: Verdict) -> str:
     ]
     if found["min_limit_margin_deg"] is not None:
         parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
-    return "; ".join(parts)
+    return "; ".join(filter(None, [*parts, clearance_text(verdict.certificate)]))
 
 
 def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:

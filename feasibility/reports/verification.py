@@ -9,7 +9,13 @@ from typing import Any
 import numpy as np
 
 from feasibility.collisions import checked
-from feasibility.reports.parts import certificate_json, counted, summary
+from feasibility.reports.parts import (
+    certificate_json,
+    clearance_json,
+    clearance_text,
+    counted,
+    summary,
+)
 from feasibility.reports.proof import proof_json
 from feasibility.results import plain
 from feasibility.verifying import Verification
@@ -41,6 +47,7 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
     if found.certificate is not None:
         margin = plain(_margin_deg(found))
         certificate = {**certificate_json(found.certificate), "min_limit_margin_deg": margin}
+        certificate |= clearance_json(found.certificate)
     return {
         "verdict": "holds" if found.holds else "does not hold",
         "claim": found.claim,
@@ -116,4 +123,4 @@ def _measured(found: Verification) -> str:
     margin = _margin_deg(found)
     if math.isfinite(margin) and margin >= 0.0:
         parts.append(f"joints at least {margin:.3g} deg from their limits")
-    return "; ".join(parts)
+    return "; ".join(filter(None, [*parts, clearance_text(found.certificate)]))

@@ -4,6 +4,7 @@ from .arrays import SearchArrays as SearchArrays
 from .arrays import Work as Work
 from .arrays import accept as accept
 from .arrays import arrays_of as arrays_of
+from .arrays import collisions_of as collisions_of
 from .arrays import copy_slot as copy_slot
 from .arrays import look_at as look_at
 from .arrays import place as place

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from feasibility.collisions import clearance_gradient, segment_clear
 from feasibility.compiled import put
-from feasibility.roadmap.arrays import NEXT, SearchArrays, Work, copy_slot, look_at, place
+from feasibility.roadmap.arrays import SearchArrays, Work, copy_slot, look_at, place
 from feasibility.roadmap.projection import project
 from feasibility.roadmap.self_motion import CONE_SLACK, NEWTON_STEPS
 
@@ -15,9 +15,7 @@ PUSHES = 8  # steps that a colliding configuration gets
 PUSH = 0.2  # [rad] or [m] of one step
 
 
-def moved_clear(
-    arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float64]
-) -> bool:
+def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float64]) -> bool:
     """Move q (n,), in place, over its cell until it collides no more; False where it still does.
 
     Each step goes down the gradient of the penetration, and is projected back onto the target. The

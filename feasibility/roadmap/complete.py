@@ -150,7 +150,7 @@ def _found(
         unfinished="" if walk is not None else unfinished_words(problem, proving, in_time),
         exhausted=exhausted_words(problem, exploration, proving),
         make_graph=lambda: graph_of(exploration),
-        make_causes=lambda: causes_of(exploration, proof),
+        make_causes=lambda: causes_of(exploration, proof, problem.pairs),
     )
 
 

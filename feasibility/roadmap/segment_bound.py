@@ -111,7 +111,7 @@ def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
         cone_used(arrays, work, HERE), cone_used(arrays, work, NEXT), total_axis + approach + normal
     )
     position, cone = position / work.allowance[0], cone / work.allowance[1]
-    if arrays.collisions.shape[0] > 0 and position <= 1.0 and cone <= 1.0:
-        if not segment_clear(arrays.collisions, q0, q1) > 0.0:
-            cone = COLLIDES
+    asked = arrays.collisions.shape[0] > 0 and position <= 1.0 and cone <= 1.0
+    if asked and not segment_clear(arrays.collisions, q0, q1) > 0.0:
+        cone = COLLIDES
     return position, cone

@@ -56,6 +56,4 @@ def _worded(cell: int, spare: NDArray[np.float64], pairs: tuple[Pair, ...]) -> C
         f"at best {pair.first} and {pair.second} {how}; of {len(spare)} configurations over the "
         f"cell none is clear: {shares}"
     )
-    return Cause(
-        cell, CauseKind.COLLISION, False, detail, (pair.first, pair.second), distance
-    )
+    return Cause(cell, CauseKind.COLLISION, False, detail, (pair.first, pair.second), distance)

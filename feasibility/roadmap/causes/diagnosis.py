@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.collisions import Pair
 from feasibility.compiled import kernel, put
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.arrays import (
@@ -30,6 +31,7 @@ from feasibility.roadmap.arrays import (
     place,
 )
 from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.causes.collision import colliding
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
@@ -285,11 +287,18 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
     return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
 
 
-def causes_of(exploration: Exploration, proof: CutTree | None = None) -> tuple[Cause, ...]:
+def causes_of(
+    exploration: Exploration, proof: CutTree | None = None, pairs: tuple[Pair, ...] = ()
+) -> tuple[Cause, ...]:
     """One cause for each cell that the best component misses, in order of index.
 
     On fine grids `MOST_EXAMINED` cells, spread evenly, are diagnosed one by one. The others are
     given the cause of the nearest of these, and their details say so.
+
+    Args:
+        exploration: a finished search.
+        proof: that no motion covers every cell.
+        pairs: that had to stay clear of each other.
 
     Raises:
         OutOfTime: the deadline passed.
@@ -298,12 +307,12 @@ def causes_of(exploration: Exploration, proof: CutTree | None = None) -> tuple[C
     missed = np.flatnonzero(~exploration.covered)
     causes: dict[int, Cause] = {}
     for cell in missed[reached[missed]].tolist():
-        causes[cell] = disconnected(exploration, cell, proof)
+        causes[cell] = disconnected(exploration, cell, proof, pairs)
     lost = missed[~reached[missed]]
     examined = evenly(lost)[:MOST_EXAMINED]
     for cell in examined.tolist():
         exploration.tick("finding causes")
-        causes[cell] = diagnose(exploration, cell)
+        causes[cell] = colliding(exploration, cell, pairs) or diagnose(exploration, cell)
     for cell in lost.tolist():
         if cell not in causes:
             near = int(examined[np.argmin(np.linalg.norm(points[examined] - points[cell], axis=1))])
@@ -311,5 +320,5 @@ def causes_of(exploration: Exploration, proof: CutTree | None = None) -> tuple[C
             index = list(exploration.cells.unravel(near))
             alike = causes[near].detail.removesuffix(f"; {UNPROVED}")
             detail = f"like {index}, the nearest cell examined: {alike}"
-            causes[cell] = Cause(cell, causes[near].kind, proved, detail)
+            causes[cell] = replace(causes[near], cell=cell, proved=proved, detail=detail)
     return tuple(causes[cell] for cell in missed.tolist())

@@ -4,21 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
+from feasibility.collisions import Pair
 from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
-from feasibility.roadmap.arrays import CONE, FOLD, LIMIT, LONG, SINGULAR
+from feasibility.roadmap.arrays import COLLISION, CONE, FOLD, LIMIT, LONG, SINGULAR
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import root_of
 from feasibility.verdict import Cause, CauseKind
 
 
-def disconnected(exploration: Exploration, cell: int, proof: CutTree | None = None) -> Cause:
+def disconnected(
+    exploration: Exploration,
+    cell: int,
+    proof: CutTree | None = None,
+    pairs: tuple[Pair, ...] = (),
+) -> Cause:
     """Why the best component misses a cell that another one covers; proved where a cut parts them.
 
     Args:
         exploration: a finished search.
         cell: a cell that a component covers, but not the best one.
         proof: that no motion covers every cell.
+        pairs: that had to stay clear of each other.
     """
     roadmap, robot = exploration.roadmap, exploration.robot
     roots, node = set[int](), int(roadmap.first_node[cell])
@@ -34,16 +41,20 @@ def disconnected(exploration: Exploration, cell: int, proof: CutTree | None = No
     if parted:
         return Cause(cell, CauseKind.DISCONNECTED, True, f"{detail}; {parted}")
     code, joint, stopped = (int(v) for v in roadmap.blocked[cell])
-    name = robot.joint_names[joint]
+    name = robot.joint_names[joint] if joint < robot.n else ""
+    met = pairs[joint] if code == COLLISION and 0 <= joint < len(pairs) else None
     reason = {
         LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
         CONE: "the tool axis stops at the boundary of the cone",
         SINGULAR: "the arm stops at a singularity",
+        COLLISION: f"{met.first} and {met.second} would collide" if met else None,
         LONG: "the motion takes too many steps",
         FOLD: "the surface is creased, or its offset folds",
     }.get(code)
     if reason and stopped >= 0 and root_of(roadmap, stopped) == exploration.best:
         detail += f"; on the way there from the covered cells {reason}"
+        pair = None if met is None else (met.first, met.second)
+        return Cause(cell, CauseKind.DISCONNECTED, False, detail, pair)
     return Cause(cell, CauseKind.DISCONNECTED, False, detail)
 
 
