@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -14,7 +13,7 @@ from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_poly
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
-from robots.shapes import LinkShapes, Polytope, link_pairs, link_shapes
+from robots.shapes import LinkPairs, Polytope, link_pairs, link_shapes
 from surfaces import Surface, sheet_of
 
 KEPT = 16  # problems whose bodies are remembered: `explain` and `place` come back to them
@@ -45,17 +44,14 @@ def gather(
 @lru_cache(maxsize=KEPT)
 def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: float) -> Bodies:
     """`gather`, remembered: its arguments are values that nobody changes."""
-    shapes = link_shapes(robot, collision.shapes)
-    shapes = replace(
-        shapes,
-        solids=(*shapes.solids, *tool_solids(collision.tool, robot)),
-        polytopes=(*shapes.polytopes, *tool_polytopes(collision.tool, robot)),
-    )
-    faults = collision.unknown_names(links_of(robot))
+    faults = collision.unknown_names(robot.link_names)
     if faults:
-        raise ArgumentError([fault._replace(key=f"collision.{fault.key}") for fault in faults])
-    polytopes, soups = list(shapes.polytopes), list[Soup]()
-    reach = _reach(robot, shapes.polytopes)
+        raise ArgumentError([fault.renamed({}, "collision") for fault in faults])
+    shapes = link_shapes(robot, collision.shapes)
+    tool = tool_polytopes(collision.tool, robot)
+    solids = (*shapes.solids, *tool_solids(collision.tool, robot))
+    polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
+    reach = _reach(robot, polytopes)
     for obstacle in collision.scene:
         outer, soup = polytopes_of(obstacle, reach), soup_of(obstacle)
         polytopes += outer or ()
@@ -63,28 +59,29 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
     if collision.surface:
         sheet = sheet_of(surface, thickness=collision.thickness)
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False))
-    pairs, left_out = _pairs(robot, shapes, collision, touching=not standoff > 0.0)
+    found = _Pairs(collision, {solid.owner: solid.joint for solid in solids}, robot.n)
+    if collision.self_:
+        names = [one.name for one in collision.scene]
+        found.add_links(
+            link_pairs(
+                robot, shapes, collision.allow, collision.srdf, tool, [*names, SURFACE, TOOL]
+            )
+        )
+    found.add_objects(touching=not standoff > 0.0)
     return Bodies(
-        solids=shapes.solids,
+        solids=solids,
         polytopes=tuple(polytopes),
         soups=tuple(soups),
         scene=collision.scene,
-        pairs=tuple(pairs),
-        left_out=tuple(left_out),
+        pairs=tuple(found.asked),
+        left_out=tuple(found.left_out),
         unchecked=shapes.unchecked,
         checked=collision.checked,
-        notes=(*shapes.notes, *collision.notes_on(standoff)),
+        notes=(*shapes.notes, *found.notes, *collision.notes_on(standoff)),
     )
 
 
-def links_of(robot: Robot) -> list[str]:
-    """All links of an arm, those without shapes too."""
-    import pinocchio as pin
-
-    return [frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY]
-
-
-def _reach(robot: Robot, polytopes: tuple[Polytope, ...]) -> float:
+def _reach(robot: Robot, polytopes: Sequence[Polytope]) -> float:
     """m, no point of the arm is further from the origin of the root frame.
 
     The steps from joint to joint, the slides, and the furthest point of a body from its joint.
@@ -110,40 +107,45 @@ def tool_owners(collision: Collision, joints: Mapping[str, int], last: int) -> s
     return {owner for owner, joint in joints.items() if joint == last}
 
 
-def _pairs(
-    robot: Robot, shapes: LinkShapes, collision: Collision, touching: bool
-) -> tuple[list[Pair], list[LeftOut]]:
+class _Pairs:
     """Who must stay clear of whom, and who is left out for which reason."""
-    joints = {solid.owner: solid.joint for solid in shapes.solids}
-    own = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
-    tool = tool_owners(collision, joints, robot.n)
-    pairs, left_out = list[Pair](), list[LeftOut]()
 
-    def ask(first: str, second: str, clearance: float, touch: bool = False) -> None:
-        why = _why_not(first, second, collision, joints)
-        if why or touch:
-            left_out.append(LeftOut(first, second, why or "contact"))
-        else:
-            pairs.append(Pair(first, second, own.get(frozenset((first, second)), clearance)))
+    def __init__(self, collision: Collision, joints: Mapping[str, int], last: int) -> None:
+        """`joints`: which joint carries each owner of bodies; `last`: the number of the last one."""
+        self.collision, self.joints = collision, joints
+        self.tool = tool_owners(collision, joints, last)
+        self.own = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
+        self.allowed = {frozenset(pair) for pair in collision.allow}
+        self.asked = list[Pair]()
+        self.left_out = list[LeftOut]()
+        self.notes: tuple[str, ...] = ()
 
-    if collision.self_:
-        links = link_pairs(robot, shapes, collision.allow, collision.srdf)
-        left_out += [LeftOut(*one.pair, one.why, one.rate) for one in links.left_out]
+    def add_links(self, links: LinkPairs) -> None:
+        """Links against each other, and against the tool."""
+        self.notes = links.notes
+        self.left_out += [LeftOut(p.first, p.second, p.why, p.rate) for p in links.left_out]
         for first, second in links.asked:
-            clearance = own.get(frozenset((first, second)), collision.clearance)
-            pairs.append(Pair(first, second, clearance))
-    for owner in joints:
-        for one in collision.scene:
-            ask(owner, one.name, collision.clearance if one.clearance is None else one.clearance)
-        if collision.surface and owner in tool:
-            ask(owner, SURFACE, collision.tool_clearance, touching)
-        elif collision.surface:
-            ask(owner, SURFACE, collision.clearance)
-    return pairs, left_out
+            self._ask(first, second, self.collision.clearance)
 
+    def add_objects(self, touching: bool) -> None:
+        """The arm against scene and surface; the tool may be `touching` the surface."""
+        general = self.collision.clearance
+        for owner, joint in self.joints.items():
+            still = "" if joint else "rigid"
+            for one in self.collision.scene:
+                wanted = general if one.clearance is None else one.clearance
+                self._ask(owner, one.name, wanted, still)
+            if self.collision.surface and owner in self.tool:
+                near = self.collision.tool_clearance
+                self._ask(owner, SURFACE, near, still or ("contact" if touching else ""))
+            elif self.collision.surface:
+                self._ask(owner, SURFACE, general, still)
 
-def _why_not(first: str, second: str, collision: Collision, joints: Mapping[str, int]) -> str:
-    """Why a body of the arm is not asked for with one at rest; empty where it is."""
-    if frozenset((first, second)) in {frozenset(pair) for pair in collision.allow}:
-        return "allowed"
-    return "rigid" if joints[first] == 0 else ""
+    def _ask(self, first: str, second: str, clearance: float, why: str = "") -> None:
+        """Ask for a pair, unless there is a reason why not."""
+        names = frozenset((first, second))
+        why = why or ("allowed" if names in self.allowed else "")
+        if why:
+            self.left_out.append(LeftOut(first, second, why))
+        else:
+            self.asked.append(Pair(first, second, self.own.get(names, clearance)))
