@@ -48,7 +48,7 @@ feasibility.cases
 feasibility.roadmap: arrays graph off_target projection segment_bound self_motion
 feasibility.roadmap.branch_and_bound
 feasibility.roadmap.cuts
-feasibility.roadmap: bridging expansion exploration proving search tracking
+feasibility.roadmap: bridging clear_landings expansion exploration proving search tracking
 feasibility.roadmap.causes
 feasibility.roadmap: between_rounds complete graph_g outcome refinement walk warmup
 feasibility: checking
@@ -287,6 +287,8 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
     }
     values = (
         "bodies",
+        "gathering",
+        "outer_bodies",
         "pairs",
         "scene",
         "settings",

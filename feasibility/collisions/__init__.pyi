@@ -2,6 +2,7 @@ from .bodies import Bodies as Bodies
 from .bodies import LeftOut as LeftOut
 from .bodies import Pair as Pair
 from .bodies import Soup as Soup
+from .gathering import gather as gather
 from .kernels import INFLUENCE as INFLUENCE
 from .kernels import Counts as Counts
 from .kernels import Nearest as Nearest
@@ -12,7 +13,6 @@ from .kernels import configuration_bounds as configuration_bounds
 from .kernels import counts as counts
 from .kernels import nearest as nearest
 from .kernels import segment_clear as segment_clear
-from .gathering import gather as gather
 from .outer_bodies import polytopes_of as polytopes_of
 from .outer_bodies import soup_of as soup_of
 from .outer_bodies import tool_polytopes as tool_polytopes

@@ -111,7 +111,7 @@ class _Pairs:
     """Who must stay clear of whom, and who is left out for which reason."""
 
     def __init__(self, collision: Collision, joints: Mapping[str, int], last: int) -> None:
-        """`joints`: which joint carries each owner of bodies; `last`: the number of the last one."""
+        """`joints`: which joint carries each owner of bodies; `last` is the last one."""
         self.collision, self.joints = collision, joints
         self.tool = tool_owners(collision, joints, last)
         self.own = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from feasibility.collisions import blamed
 from feasibility.compiled import inlined, kernel, put
 from feasibility.roadmap.arrays import (
     COLLISION,
@@ -68,6 +69,15 @@ def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
         return np.inf, np.inf
     # Slot 0's errors are against the previous target: stored when that step was accepted.
     return segment_holds(arrays, work, q, work.trial)
+
+
+@inlined
+def _blame(arrays, work, cone):  # type: ignore[no-untyped-def]
+    """Say what stopped a step that kept to the tolerance: the cone, or a pair that would collide."""
+    work.stop_reason[0] = CONE
+    if cone == COLLIDES:
+        work.stop_reason[0] = COLLISION
+        work.stop_reason[1] = blamed(arrays.collisions)
 
 
 @kernel
@@ -133,7 +143,7 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
         else:
             dt *= 0.5
             if position < np.inf:
-                work.stop_reason[0] = COLLISION if cone == COLLIDES else CONE
+                _blame(arrays, work, cone)
         if dt < SMALLEST_STEP:
             if off_target:
                 return STOPPED
