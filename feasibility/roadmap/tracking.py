@@ -73,7 +73,7 @@ def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
 
 @inlined
 def _blame(arrays, work, cone):  # type: ignore[no-untyped-def]
-    """Say what stopped a step that kept to the tolerance: the cone, or a pair that would collide."""
+    """What stopped a step that kept to the tolerance: the cone, or a pair that would collide."""
     work.stop_reason[0] = CONE
     if cone == COLLIDES:
         work.stop_reason[0] = COLLISION
