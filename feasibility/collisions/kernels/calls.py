@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import carray, cfunc, types
+from numba import cfunc, types
 from numba.extending import intrinsic
 
 from feasibility.collisions.kernels.measuring import measure
 from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear
-from feasibility.collisions.kernels.tables import ADDRESS, HEADER, Array, Tables
+from feasibility.collisions.kernels.tables import ADDRESS, Array
 from feasibility.compiled import kernel
 
 SEGMENT, PUSH, MEASURE = np.int64(0), np.int64(1), np.int64(2)
@@ -42,45 +42,22 @@ def _call(typing: Any, memory: Any, what: Any) -> Any:
     return types.float64(memory, types.int64), generate
 
 
-@intrinsic
-def _pointer(typing: Any, address: Any) -> Any:
-    """A pointer to numbers at an address."""
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        return builder.inttoptr(values[0], ir.DoubleType().as_pointer())
-
-    return types.CPointer(types.float64)(types.int64), generate
-
-
-@kernel
-def _table(memory, number):  # type: ignore[no-untyped-def]
-    """The view of one table, its memory owned by nobody in here."""
-    head = carray(_pointer(memory), HEADER)  # type: ignore[call-arg]
-    start = np.int64(head[1 + 3 * number])
-    shape = (np.int64(head[2 + 3 * number]), np.int64(head[3 + 3 * number]))
-    return carray(_pointer(memory + 8 * start), shape)
-
-
-def _run(memory: int, what: int) -> float:
-    """Compiled: the C function."""
-    t = Tables(
-        _table(memory, 0), _table(memory, 1), _table(memory, 2), _table(memory, 3),
-        _table(memory, 4), _table(memory, 5), _table(memory, 6), _table(memory, 7),
-        _table(memory, 8), _table(memory, 9), _table(memory, 10), _table(memory, 11),
-        _table(memory, 12), _table(memory, 13), _table(memory, 14), _table(memory, 15),
-        _table(memory, 16), _table(memory, 17), _table(memory, 18),
-    )  # fmt: skip
+def _run(memory: Array, what: int) -> float:
+    """The C function: the memory is a plain pointer in there."""
     if what == PUSH:
-        return push(t)
-    if what == MEASURE:
-        return measure(t)
-    return segment_holds_clear(t)
+        result: float = push(memory)
+    elif what == MEASURE:
+        result = measure(memory)
+    else:
+        result = segment_holds_clear(memory)
+    return result
 
 
 @cache
 def _compiled() -> Any:
     """The C function, compiled or loaded; it lives as long as the process."""
-    return cfunc("float64(int64, int64)", cache=True, error_model="numpy")(_run)
+    signature = types.float64(types.CPointer(types.float64), types.int64)
+    return cfunc(signature, cache=True, error_model="numpy")(_run)
 
 
 def with_address(memory: Array) -> Array:

@@ -14,30 +14,30 @@ from numpy.typing import ArrayLike
 from feasibility.collisions import Bodies
 from feasibility.collisions.kernels.calls import MEASURE, PUSH, SEGMENT, call, with_address
 from feasibility.collisions.kernels.packing import packed
-from feasibility.collisions.kernels.separation import COUNT
 from feasibility.collisions.kernels.tables import (
+    ASKED,
     BLAMED,
+    BOUND,
     BOUNDS,
     BY_BUDGET,
     CALLS,
     DECIDED,
     FRAMES,
-    NAMES,
     PAIR,
     SIZE,
+    STATE,
     SWEPT,
+    TRIED,
     WISH,
     Array,
     Tables,
+    row,
     views,
 )
 from feasibility.compiled import kernel
 from robots import Robot
 
 INFLUENCE = 0.05  # m beyond its clearance: nearer pairs push
-
-_ASKED_AT = np.int64(1 + 3 * NAMES.index("asked"))
-_STATE_AT = np.int64(1 + 3 * NAMES.index("state"))
 
 
 def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
@@ -72,7 +72,7 @@ def segment_clear(buffer, q0, q1):  # type: ignore[no-untyped-def]
         m, positive where that is certain, end points included: at q1 no pair is nearer to its
         clearance than this. 0 or less where it is not, as for NaN.
     """
-    at = np.int64(buffer[_ASKED_AT])
+    at = row(buffer, ASKED, np.int64(0))
     n = q0.shape[0]
     for j in range(n):
         buffer[at + j] = q0[j]
@@ -93,11 +93,11 @@ def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
     Returns:
         0 where nothing is near; 1 where the nearest pair is at its clearance; more below it.
     """
-    at, state = np.int64(buffer[_ASKED_AT]), np.int64(buffer[_STATE_AT])
+    at = row(buffer, ASKED, np.int64(0))
     n = q.shape[0]
     for j in range(n):
         buffer[at + j] = q[j]
-    buffer[state + SIZE] = size
+    buffer[STATE + SIZE] = size
     share = call(buffer, PUSH)
     for j in range(n):
         step[j] += buffer[at + 2 * n + j]
@@ -107,7 +107,7 @@ def clearance_gradient(buffer, q, step, size):  # type: ignore[no-untyped-def]
 @kernel
 def blamed(buffer):  # type: ignore[no-untyped-def]
     """Which of `Bodies.pairs` the last segment that was not certified failed at; -1 before."""
-    return np.int64(buffer[np.int64(buffer[_STATE_AT]) + BLAMED])
+    return np.int64(buffer[STATE + BLAMED])
 
 
 class Counts(NamedTuple):
@@ -130,9 +130,8 @@ class Counts(NamedTuple):
 
 def counts(buffer: Array) -> Counts:
     """What a buffer has done since it was made."""
-    t = views(buffer)
-    state = t.state[0, [CALLS, DECIDED, BY_BUDGET, SWEPT, BOUNDS]].astype(int)
-    return Counts(*map(int, [*state, t.simplex[COUNT, 1], t.state[0, FRAMES]]))
+    state = views(buffer).state[0]
+    return Counts(*map(int, state[[CALLS, DECIDED, BY_BUDGET, SWEPT, BOUNDS, TRIED, FRAMES]]))
 
 
 class Nearest(NamedTuple):
@@ -157,7 +156,7 @@ def configuration_bounds(buffer: Array, q: ArrayLike) -> Array:
     t, slot = _measured(buffer, q)
     pairs = t.items[:, PAIR].astype(int)
     result = np.full(int(pairs.max(initial=-1)) + 1, np.inf)
-    np.minimum.at(result, pairs, t.bounds[slot])
+    np.minimum.at(result, pairs, t.items[:, BOUND + slot])
     return result
 
 
@@ -174,4 +173,4 @@ def _measured(buffer: Array, q: ArrayLike) -> tuple[Tables, int]:
     """The tables after measuring all items at q, and the slot with the bounds."""
     t = views(buffer)
     t.asked[0] = q
-    return t, int(call(buffer, MEASURE))
+    return t, int(call(buffer, MEASURE)) if len(t.items) else 0

@@ -8,22 +8,31 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.collisions.kernels.tables import AXES, FIRST, HALF, LEFT, MIDDLE, RIGHT
+from feasibility.collisions.kernels.tables import (
+    AXES,
+    FIRST,
+    HALF,
+    LEFT,
+    MIDDLE,
+    RIGHT,
+    STACK,
+)
 from feasibility.compiled import kernel
 
 # The ray's direction: no simple fractions, so that no edge of a drawn shape is met but by chance.
 DX, DY, DZ = 0.4361758092437, 0.5814733161593, 0.6868015227371
+NEXT_TO = 1e-12  # m, added to boxes for rounding
 
 
 @kernel
-def ray_meets_box(node, x, y, z):  # type: ignore[no-untyped-def]
+def ray_meets_box(m, node, x, y, z):  # type: ignore[no-untyped-def]
     """Does the ray from a point meet a node's box?"""
     low, high = 0.0, np.inf
-    x, y, z = x - node[MIDDLE], y - node[MIDDLE + 1], z - node[MIDDLE + 2]
+    x, y, z = x - m[node + MIDDLE], y - m[node + MIDDLE + 1], z - m[node + MIDDLE + 2]
     for i in range(3):
-        k, half = AXES + 3 * i, node[HALF + i] + 1e-12
-        at = x * node[k] + y * node[k + 1] + z * node[k + 2]
-        rate = DX * node[k] + DY * node[k + 1] + DZ * node[k + 2]
+        k, half = node + AXES + 3 * i, m[node + HALF + i] + NEXT_TO
+        at = x * m[k] + y * m[k + 1] + z * m[k + 2]
+        rate = DX * m[k] + DY * m[k + 1] + DZ * m[k + 2]
         if rate == 0.0:
             if abs(at) > half:
                 return False
@@ -34,16 +43,15 @@ def ray_meets_box(node, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def ray_meets_triangle(corners, first, x, y, z):  # type: ignore[no-untyped-def]
-    """Does the ray meet the triangle in three rows? By Moeller and Trumbore (1997)."""
-    a, b, c = corners[first], corners[first + 1], corners[first + 2]
-    ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-    vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+def ray_meets_triangle(m, a, x, y, z):  # type: ignore[no-untyped-def]
+    """Does the ray meet the triangle with corners from place a? By Moeller and Trumbore (1997)."""
+    ux, uy, uz = m[a + 3] - m[a], m[a + 4] - m[a + 1], m[a + 5] - m[a + 2]
+    vx, vy, vz = m[a + 6] - m[a], m[a + 7] - m[a + 1], m[a + 8] - m[a + 2]
     px, py, pz = DY * vz - DZ * vy, DZ * vx - DX * vz, DX * vy - DY * vx
     volume = ux * px + uy * py + uz * pz
     if volume == 0.0:
         return False
-    x, y, z = x - a[0], y - a[1], z - a[2]
+    x, y, z = x - m[a], y - m[a + 1], z - m[a + 2]
     u = (x * px + y * py + z * pz) / volume
     qx, qy, qz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
     v = (DX * qx + DY * qy + DZ * qz) / volume
@@ -52,18 +60,18 @@ def ray_meets_triangle(corners, first, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def inside_tree(t, root, x, y, z):  # type: ignore[no-untyped-def]
+def inside_tree(m, root, x, y, z):  # type: ignore[no-untyped-def]
     """Is a point (root frame) inside the closed body whose tree begins at a node?"""
-    stack, top, crossed = t.stack[0], 1, False
-    stack[0] = root
+    top, crossed = 1, False
+    m[STACK] = root
     while top > 0:
         top -= 1
-        node = t.nodes[np.int64(stack[top])]
-        if not ray_meets_box(node, x, y, z):
+        node = np.int64(m[STACK + top])
+        if not ray_meets_box(m, node, x, y, z):
             continue
-        if node[LEFT] >= 0.0:
-            stack[top], stack[top + 1] = node[LEFT], node[RIGHT]
+        if m[node + LEFT] >= 0.0:
+            m[STACK + top], m[STACK + top + 1] = m[node + LEFT], m[node + RIGHT]
             top += 2
-        elif ray_meets_triangle(t.vertices, np.int64(node[FIRST]), x, y, z):
+        elif ray_meets_triangle(m, np.int64(m[node + FIRST]), x, y, z):
             crossed = not crossed
     return crossed

@@ -19,119 +19,134 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.collisions.kernels.tables import (
+    CONFIGURATIONS,
     END_0,
     END_1,
     FRAMES,
+    GROUPS,
     JOINT,
+    JOINTS,
+    LARGEST,
+    LEVERS,
+    NUMBER,
     OWN_LEVER,
+    POSES,
+    REACH,
     ROTATION,
     SLIDES,
+    STATE,
     THICKNESS,
     TRANSLATION,
+    row,
+    rows_of,
 )
 from feasibility.compiled import kernel
 
 
 @kernel
-def link_frames(joints, q, poses, root):  # type: ignore[no-untyped-def]
-    """Poses of all joints in the root frame, each turned so that its axis is z.
-
-    Args:
-        joints: (n, 13) constants of the chain.
-        q: (n,)
-        poses: rows `root` to `root + n`, out: rotation (9) and translation (3).
-        root: the row of the root frame.
-    """
-    for k in range(12):
-        poses[root, k] = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
-    for i in range(q.shape[0]):
-        before, now, c = poses[root + i], poses[root + i + 1], joints[i]
-        for row in range(3):
-            x, y, z = before[3 * row], before[3 * row + 1], before[3 * row + 2]
-            place = before[9 + row]
-            for k in range(3):
-                place += before[3 * row + k] * c[TRANSLATION + k]
-                now[3 * row + k] = (
-                    x * c[ROTATION + k] + y * c[ROTATION + 3 + k] + z * c[ROTATION + 6 + k]
-                )
-            now[9 + row] = place
-        if joints[i, SLIDES] > 0.0:
-            for row in range(3):
-                now[9 + row] += now[3 * row + 2] * q[i]
-        else:
-            cos, sin = np.cos(q[i]), np.sin(q[i])
-            for row in range(3):
-                x, y = now[3 * row], now[3 * row + 1]
-                now[3 * row], now[3 * row + 1] = cos * x + sin * y, cos * y - sin * x
+def pose_of(m, slot, joint):  # type: ignore[no-untyped-def]
+    """The place of a joint's pose in a slot; joint 0 is the root."""
+    return row(m, POSES, slot * (rows_of(m, JOINTS) + 1) + joint)
 
 
 @kernel
-def transformed(pose, v, k):  # type: ignore[no-untyped-def]
-    """The point v[k : k + 3], placed by a pose."""
-    x = pose[0] * v[k] + pose[1] * v[k + 1] + pose[2] * v[k + 2] + pose[9]
-    y = pose[3] * v[k] + pose[4] * v[k + 1] + pose[5] * v[k + 2] + pose[10]
-    z = pose[6] * v[k] + pose[7] * v[k + 1] + pose[8] * v[k + 2] + pose[11]
+def link_frames(m, q, root):  # type: ignore[no-untyped-def]
+    """Poses of all joints in the root frame, each turned so that its axis is z.
+
+    Args:
+        m: the memory.
+        q: place of the configuration.
+        root: place of the first pose, the root's; those of the joints follow.
+    """
+    for k in range(12):
+        m[root + k] = 1.0 if k == 0 or k == 4 or k == 8 else 0.0
+    for i in range(rows_of(m, JOINTS)):
+        before, c = root + 12 * i, row(m, JOINTS, i)
+        now, turn, shift = before + 12, c + ROTATION, c + TRANSLATION
+        slides = m[c + SLIDES] > 0.0
+        cos, sin = (1.0, 0.0) if slides else (np.cos(m[q + i]), np.sin(m[q + i]))
+        along = m[q + i] if slides else 0.0
+        for axis in range(3):
+            at, out = before + 3 * axis, now + 3 * axis
+            x, y, z = m[at], m[at + 1], m[at + 2]
+            place = m[before + 9 + axis] + x * m[shift] + y * m[shift + 1] + z * m[shift + 2]
+            u = x * m[turn] + y * m[turn + 3] + z * m[turn + 6]
+            v = x * m[turn + 1] + y * m[turn + 4] + z * m[turn + 7]
+            w = x * m[turn + 2] + y * m[turn + 5] + z * m[turn + 8]
+            m[out], m[out + 1], m[out + 2] = cos * u + sin * v, cos * v - sin * u, w
+            m[now + 9 + axis] = place + along * w
+
+
+@kernel
+def transformed(m, pose, v):  # type: ignore[no-untyped-def]
+    """The point at place v, placed by a pose."""
+    a, b, c, p = m[v], m[v + 1], m[v + 2], pose
+    x = m[p] * a + m[p + 1] * b + m[p + 2] * c + m[p + 9]
+    y = m[p + 3] * a + m[p + 4] * b + m[p + 5] * c + m[p + 10]
+    z = m[p + 6] * a + m[p + 7] * b + m[p + 8] * c + m[p + 11]
     return x, y, z
 
 
 @kernel
-def from_axis(pose, x, y, z):  # type: ignore[no-untyped-def]
+def from_axis(m, pose, x, y, z):  # type: ignore[no-untyped-def]
     """Squared distance of a point from the z axis of a pose."""
-    x, y, z = x - pose[9], y - pose[10], z - pose[11]
-    along = pose[2] * x + pose[5] * y + pose[8] * z
+    x, y, z = x - m[pose + 9], y - m[pose + 10], z - m[pose + 11]
+    along = m[pose + 2] * x + m[pose + 5] * y + m[pose + 8] * z
     return max(x * x + y * y + z * z - along * along, 0.0)
 
 
 @kernel
-def place_bodies(t, slot):  # type: ignore[no-untyped-def]
+def place_bodies(m, slot):  # type: ignore[no-untyped-def]
     """Evaluate the configuration of a slot: poses of joints, and levers of all groups."""
-    n = t.joints.shape[0]
-    root = slot * (n + 1)
-    link_frames(t.joints, t.configurations[slot], t.poses, root)
-    t.state[0, FRAMES] += 1.0
-    for b in range(t.groups.shape[0]):
-        group, levers = t.groups[b], t.levers[slot * t.groups.shape[0] + b]
-        joint = np.int64(group[JOINT])
-        pose = t.poses[root + joint]
-        x0, y0, z0 = transformed(pose, group, END_0)
-        x1, y1, z1 = transformed(pose, group, END_1)
+    root, groups = pose_of(m, slot, np.int64(0)), rows_of(m, GROUPS)
+    link_frames(m, row(m, CONFIGURATIONS, slot), root)
+    m[STATE + FRAMES] += 1.0
+    for b in range(groups):
+        group, levers = row(m, GROUPS, b), row(m, LEVERS, slot * groups + b)
+        joint = np.int64(m[group + JOINT])
+        pose = root + 12 * joint
+        x0, y0, z0 = transformed(m, pose, group + END_0)
+        x1, y1, z1 = transformed(m, pose, group + END_1)
         for j in range(joint):
-            if t.joints[j, SLIDES] > 0.0:
-                levers[j] = 1.0
+            axis = root + 12 * (j + 1)
+            if m[row(m, JOINTS, j) + SLIDES] > 0.0:
+                m[levers + j] = 1.0
             elif j == joint - 1:
-                levers[j] = group[OWN_LEVER]
+                m[levers + j] = m[group + OWN_LEVER]
             else:
-                axis = t.poses[root + j + 1]
-                far = max(from_axis(axis, x0, y0, z0), from_axis(axis, x1, y1, z1))
-                levers[j] = np.sqrt(far) + group[THICKNESS]
+                far = max(from_axis(m, axis, x0, y0, z0), from_axis(m, axis, x1, y1, z1))
+                m[levers + j] = np.sqrt(far) + m[group + THICKNESS]
 
 
 @kernel
-def spread(t, b, here, there):  # type: ignore[no-untyped-def]
+def spread(m, group, here, there):  # type: ignore[no-untyped-def]
     """Set r_j and M of a group for the segment between the configurations of two slots."""
-    groups = t.groups.shape[0]
-    joint = np.int64(t.groups[b, JOINT])
-    behind = 0.0
-    t.reach[b, joint] = 0.0
+    b, groups = np.int64(m[group + NUMBER]), rows_of(m, GROUPS)
+    q0, q1 = row(m, CONFIGURATIONS, here), row(m, CONFIGURATIONS, there)
+    r0, r1 = row(m, LEVERS, here * groups + b), row(m, LEVERS, there * groups + b)
+    largest, reach = row(m, LARGEST, b), row(m, REACH, b)
+    joint, behind = np.int64(m[group + JOINT]), 0.0
+    m[reach + joint] = 0.0
     for j in range(joint - 1, -1, -1):
-        d = abs(t.configurations[there, j] - t.configurations[here, j])
-        lever = 0.5 * (t.levers[here * groups + b, j] + t.levers[there * groups + b, j])
-        if not t.joints[j, SLIDES] > 0.0:
+        lever = 0.5 * (m[r0 + j] + m[r1 + j])
+        if not m[row(m, JOINTS, j) + SLIDES] > 0.0:
             lever += 0.5 * behind
-        t.largest[b, j] = lever
-        behind += lever * d
-        t.reach[b, j] = behind
+        m[largest + j] = lever
+        behind += lever * abs(m[q1 + j] - m[q0 + j])
+        m[reach + j] = behind
 
 
 @kernel
-def chord_deviation(t, b, inner, here, there):  # type: ignore[no-untyped-def]
+def chord_deviation(m, group, inner, here, there):  # type: ignore[no-untyped-def]
     """delta of a group, seen from joint `inner`, between the configurations of two slots."""
+    q0, q1 = row(m, CONFIGURATIONS, here), row(m, CONFIGURATIONS, there)
+    largest = row(m, LARGEST, np.int64(m[group + NUMBER]))
     total, before = 0.0, 0.0
-    for j in range(inner, np.int64(t.groups[b, JOINT])):
-        d = abs(t.configurations[there, j] - t.configurations[here, j])
-        if t.joints[j, SLIDES] > 0.0:
+    for j in range(inner, np.int64(m[group + JOINT])):
+        d = abs(m[q1 + j] - m[q0 + j])
+        if m[row(m, JOINTS, j) + SLIDES] > 0.0:
             total += 2.0 * d * before
         else:
-            total += t.largest[b, j] * d * (d + 2.0 * before)
+            total += m[largest + j] * d * (d + 2.0 * before)
             before += d
     return total / 8.0

@@ -6,27 +6,36 @@ import numpy as np
 
 from feasibility.collisions.kernels.distances import of_item
 from feasibility.collisions.kernels.segments import slot_of_start
-from feasibility.collisions.kernels.tables import BLAMED, BOUNDS, CLEARANCE, PAIR
+from feasibility.collisions.kernels.tables import (
+    BLAMED,
+    BOUND,
+    BOUNDS,
+    CLEARANCE,
+    ITEMS,
+    PAIR,
+    STATE,
+    row,
+    rows_of,
+)
 from feasibility.collisions.kernels.witness import witness
 from feasibility.compiled import kernel
 
 
 @kernel
-def measure(t):  # type: ignore[no-untyped-def]
-    """Bound every item at the configuration in `asked`, from which the slot returned now knows.
+def measure(m):  # type: ignore[no-untyped-def]
+    """Bound every item at the configuration in `asked`, in the slot that is returned.
 
     `found` gets what is nearest to, or furthest below, the clearance that it needs.
     """
-    here = slot_of_start(t)
-    least, worst = np.inf, 0
-    for item in range(t.items.shape[0]):
-        t.state[0, BOUNDS] += 1.0
-        t.bounds[here, item] = of_item(t, item, here, here, np.inf, np.inf, -np.inf)
-        margin = t.bounds[here, item] - t.items[item, CLEARANCE]
+    here, items = slot_of_start(m), rows_of(m, ITEMS)
+    least, worst = np.inf, row(m, ITEMS, np.int64(0))
+    for k in range(items + 1):  # once more for the worst, whose witness is to be left
+        item = row(m, ITEMS, k) if k < items else worst
+        m[STATE + BOUNDS] += 1.0
+        m[item + BOUND + here] = of_item(m, item, here, here, np.inf, np.inf, -np.inf)
+        margin = m[item + BOUND + here] - m[item + CLEARANCE]
         if margin < least:
             least, worst = margin, item
-    if t.items.shape[0] > 0:
-        of_item(t, worst, here, here, np.inf, np.inf, -np.inf)
-        witness(t, worst, here)
-        t.state[0, BLAMED] = t.items[worst, PAIR]
+    witness(m, worst, here)
+    m[STATE + BLAMED] = m[worst + PAIR]
     return np.float64(here)

@@ -7,17 +7,26 @@ import numpy as np
 from feasibility.collisions import Bodies
 from feasibility.collisions.kernels.box_tree import box_tree
 from feasibility.collisions.kernels.tables import (
+    DIRECTION,
+    FIRST,
     GROUP_COLUMNS,
+    ITEM_A,
+    ITEM_B,
     ITEM_COLUMNS,
     JOINT_COLUMNS,
+    LAST,
+    LEFT,
+    NAMES,
     NODE_COLUMNS,
     POLYTOPE_COLUMNS,
+    RIGHT,
     SLOTS,
-    STACK,
     STATE_COLUMNS,
+    TREE,
     Array,
     Tables,
     flat,
+    views,
 )
 from robots import Robot, joint_alignments
 from robots.shapes import Polytope
@@ -37,8 +46,9 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
     owners: dict[tuple[str, int], list[Polytope]] = {}
     for body in bodies.polytopes:
         owners.setdefault((body.owner, body.joint), []).append(body)
-    vertices, groups = [np.empty((0, 3))], []
+    vertices = [np.empty((0, 3))]
     polytopes: list[list[float]] = []
+    groups: list[list[float]] = []
     for (_, joint), parts in owners.items():
         clouds = [part.vertices @ turned[joint] for part in parts]
         start = len(polytopes)
@@ -53,33 +63,53 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
         ]
         radius = max(part.radius for part in parts)
         capsule = _capsule(np.vstack(clouds), radius)
-        groups.append([joint, start, len(polytopes), *capsule, max(levers)])
+        groups.append([joint, start, len(polytopes), *capsule, max(levers), len(groups)])
     roots, nodes, corners = _trees(bodies, sum(map(len, vertices)))
     items, directions = _items(bodies, list(owners), groups, roots)
-    count = len(items)
-    return flat(
-        Tables(
-            joints=_joints(robot),
-            groups=_table(groups, GROUP_COLUMNS),
-            polytopes=_table(polytopes, POLYTOPE_COLUMNS),
-            vertices=np.vstack([*vertices, corners]),
-            nodes=nodes,
-            items=_table(items, ITEM_COLUMNS),
-            directions=np.zeros((directions, 3)),
-            state=np.zeros((1, STATE_COLUMNS)),
-            asked=np.zeros((3, n)),
-            configurations=np.zeros((SLOTS, n)),
-            poses=np.zeros((SLOTS * (n + 1), 12)),
-            levers=np.zeros((SLOTS * len(groups), n)),
-            largest=np.zeros((len(groups), n)),
-            reach=np.zeros((len(groups), n + 1)),
-            bounds=np.full((2, count), -np.inf),
-            relative=np.zeros((2, 12)),
-            simplex=np.zeros((7, 8)),
-            stack=np.zeros((1, STACK)),
-            found=np.zeros((1, 10)),
-        )
+    count = len(groups)
+    tables = Tables(
+        state=np.zeros((1, STATE_COLUMNS)),
+        relative=np.zeros((2, 12)),
+        simplex=np.zeros((7, 8)),
+        found=np.zeros((1, 10)),
+        stack=np.zeros((1, 64)),
+        joints=_joints(robot),
+        groups=_table(groups, GROUP_COLUMNS),
+        polytopes=_table(polytopes, POLYTOPE_COLUMNS),
+        vertices=np.vstack([*vertices, corners]),
+        nodes=nodes,
+        items=_table(items, ITEM_COLUMNS),
+        directions=np.zeros((directions, 3)),
+        asked=np.zeros((3, n)),
+        configurations=np.zeros((SLOTS, n)),
+        poses=np.zeros((SLOTS * (n + 1), 12)),
+        levers=np.zeros((SLOTS * count, n)),
+        largest=np.zeros((count, n)),
+        reach=np.zeros((count, n + 1)),
     )
+    memory = flat(tables)
+    _rows_into_places(memory)
+    return memory
+
+
+def _rows_into_places(memory: Array) -> None:
+    """Turn rows that tables refer to into places in the memory; -1 stays."""
+    t = views(memory)
+
+    def places(column: Array, name: str) -> None:
+        start, _, width = memory[1 + 3 * NAMES.index(name) :][:3]
+        column[column >= 0] = start + width * column[column >= 0]
+
+    for column in (FIRST, LAST):
+        places(t.groups[:, column], "polytopes")
+        places(t.polytopes[:, column], "vertices")
+        places(t.nodes[:, column], "vertices")
+    for column in (LEFT, RIGHT):
+        places(t.nodes[:, column], "nodes")
+    for column in (ITEM_A, ITEM_B):
+        places(t.items[:, column], "groups")
+    places(t.items[:, TREE], "nodes")
+    places(t.items[:, DIRECTION], "directions")
 
 
 def _table(rows: list[list[float]], columns: int) -> Array:
@@ -140,7 +170,7 @@ def _items(
 ) -> tuple[list[list[float]], int]:
     """What is asked for, by pairs of groups and of a soup and a group; how many directions."""
     items: list[list[float]] = []
-    directions = 0
+    directions, unknown = 0, (-np.inf, -np.inf)
     for index, pair in enumerate(bodies.pairs):
         first, second = (
             [k for k, (owner, _) in enumerate(owners) if owner == name]
@@ -150,12 +180,14 @@ def _items(
             if owners[a][1] > owners[b][1]:
                 a, b = b, a
             joints = owners[a][1], owners[b][1]
-            items.append([a, b, -1, *joints, pair.clearance, index, directions, 0])
+            items.append([a, b, -1, *joints, pair.clearance, index, directions, 0, *unknown])
             directions += int((groups[a][2] - groups[a][1]) * (groups[b][2] - groups[b][1]))
         for soup, root in zip(bodies.soups, roots, strict=True):
             if soup.owner in (pair.first, pair.second):
                 clearance = pair.clearance + soup.deviation
                 for b in first if soup.owner == pair.second else second:
                     joints = 0, owners[b][1]
-                    items.append([-1, b, root, *joints, clearance, index, 0, soup.closed])
+                    items.append(
+                        [-1, b, root, *joints, clearance, index, -1, soup.closed, *unknown]
+                    )
     return items, directions

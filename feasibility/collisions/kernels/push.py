@@ -10,65 +10,77 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.collisions.kernels.distances import of_item
+from feasibility.collisions.kernels.link_frames import pose_of
 from feasibility.collisions.kernels.segments import cheap_bound, slot_of_start
 from feasibility.collisions.kernels.tables import (
+    ASKED,
+    BOUND,
     BOUNDS,
     CLEARANCE,
     INNER,
+    ITEMS,
+    JOINTS,
     OUTER,
     SIZE,
     SLIDES,
+    STATE,
     WISH,
+    row,
+    rows_of,
 )
-from feasibility.collisions.kernels.witness import witness
+from feasibility.collisions.kernels.witness import NORMAL, ON_SECOND, witness
 from feasibility.compiled import kernel
+
+MOST = 2.0  # times as much as a pair at its clearance may weigh
 
 
 @kernel
-def push(t):  # type: ignore[no-untyped-def]
+def add_rates(m, item, slot, share):  # type: ignore[no-untyped-def]
+    """Add d distance / dq of an item, times its share, to the push."""
+    witness(m, item, slot)
+    out, n, p = row(m, ASKED, np.int64(2)), NORMAL, ON_SECOND
+    for j in range(np.int64(m[item + INNER]), np.int64(m[item + OUTER])):
+        axis = pose_of(m, slot, j + 1)
+        x, y, z = m[axis + 2], m[axis + 5], m[axis + 8]
+        if not m[row(m, JOINTS, j) + SLIDES] > 0.0:
+            u, v, w = m[p] - m[axis + 9], m[p + 1] - m[axis + 10], m[p + 2] - m[axis + 11]
+            x, y, z = y * w - z * v, z * u - x * w, x * v - y * u
+        m[out + j] += share * (m[n] * x + m[n + 1] * y + m[n + 2] * z)
+
+
+@kernel
+def push(m):  # type: ignore[no-untyped-def]
     """Set row 2 of `asked` to a push of at most SIZE away from what is nearer than WISH.
 
     Returns how much nearer than that the nearest pair is, as a share; 0 where none is.
     """
-    n = t.joints.shape[0]
+    q, out, n = row(m, ASKED, np.int64(0)), row(m, ASKED, np.int64(2)), rows_of(m, JOINTS)
+    finite = True
     for j in range(n):
-        t.asked[2, j] = 0.0
-        if not abs(t.asked[0, j]) < np.inf:
-            return 0.0
-    here, wish, strongest = slot_of_start(t), t.state[0, WISH], 0.0
-    for item in range(t.items.shape[0]):
-        enough = t.items[item, CLEARANCE] + wish
-        if t.bounds[here, item] >= enough:
+        m[out + j] = 0.0
+        finite &= abs(m[q + j]) < np.inf
+    if not finite:
+        return 0.0
+    here, wish, strongest = slot_of_start(m), m[STATE + WISH], 0.0
+    for k in range(rows_of(m, ITEMS)):
+        item = row(m, ITEMS, k)
+        bound, enough = item + BOUND + here, m[item + CLEARANCE] + wish
+        if m[bound] < enough:
+            cheap_bound(m, item, here)
+        if m[bound] >= enough:
             continue
-        cheap_bound(t, item, here)
-        if t.bounds[here, item] >= enough:
-            continue
-        t.state[0, BOUNDS] += 1.0
-        bound = of_item(t, item, here, here, enough, enough, -np.inf)
-        t.bounds[here, item] = max(t.bounds[here, item], bound)
-        if bound >= enough:
-            continue
-        share = min((enough - bound) / wish, 2.0)
-        strongest = max(strongest, share)
-        witness(t, item, here)
-        found = t.found[0]
-        n_x, n_y, n_z, x, y, z = found[1], found[2], found[3], found[7], found[8], found[9]
-        root = here * (n + 1)
-        for j in range(np.int64(t.items[item, INNER]), np.int64(t.items[item, OUTER])):
-            axis = t.poses[root + j + 1]
-            zx, zy, zz = axis[2], axis[5], axis[8]
-            if t.joints[j, SLIDES] > 0.0:
-                rate = n_x * zx + n_y * zy + n_z * zz
-            else:
-                px, py, pz = x - axis[9], y - axis[10], z - axis[11]
-                rate = n_x * (zy * pz - zz * py) + n_y * (zz * px - zx * pz)
-                rate += n_z * (zx * py - zy * px)
-            t.asked[2, j] += share * rate
+        m[STATE + BOUNDS] += 1.0
+        found = of_item(m, item, here, here, enough, enough, -np.inf)
+        m[bound] = max(m[bound], found)
+        if found < enough:
+            share = min((enough - found) / wish, MOST)
+            strongest = max(strongest, share)
+            add_rates(m, item, here, share)
     length = 0.0
     for j in range(n):
-        length += t.asked[2, j] ** 2
+        length += m[out + j] ** 2
     if length > 0.0:
-        factor = min(strongest, 1.0) * t.state[0, SIZE] / np.sqrt(length)
+        factor = min(strongest, 1.0) * m[STATE + SIZE] / np.sqrt(length)
         for j in range(n):
-            t.asked[2, j] *= factor
+            m[out + j] *= factor
     return strongest

@@ -4,51 +4,51 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.collisions.kernels.link_frames import transformed
-from feasibility.collisions.kernels.separation import BEST, COUNT, TOUCHING, UPPER, support
-from feasibility.collisions.kernels.simplex import WEIGHT
-from feasibility.collisions.kernels.tables import FIRST, INNER, LAST, RADIUS
+from feasibility.collisions.kernels.link_frames import pose_of, transformed
+from feasibility.collisions.kernels.separation import BEST, POINTS, TOUCHING, UPPER, support
+from feasibility.collisions.kernels.simplex import WEIGHT, WIDTH
+from feasibility.collisions.kernels.tables import FOUND, INNER, RADIUS, RELATIVE, SIMPLEX
 from feasibility.compiled import kernel
+
+NORMAL, ON_FIRST, ON_SECOND = FOUND + 1, FOUND + 4, FOUND + 7
 
 
 @kernel
-def record(t, radius, b, bound):  # type: ignore[no-untyped-def]
+def record(m, radius, b, bound):  # type: ignore[no-untyped-def]
     """Keep bound, direction and nearest points of a body with a radius and of polytope b.
 
     Where the two overlap, the point of b is the one deepest in the other along the best direction
     that was tried, and the point of the other lies straight above it.
     """
-    s, found, body = t.simplex, t.found[0], t.polytopes[b]
-    found[0] = bound
+    m[FOUND] = bound
     for k in range(3):
-        found[1 + k] = s[BEST, k]
-    apart = s[UPPER, 0] > TOUCHING and s[COUNT, 2] > 0.0
-    if not apart:
-        pose = t.relative[0]
-        x = -(pose[0] * found[1] + pose[3] * found[2] + pose[6] * found[3])
-        y = -(pose[1] * found[1] + pose[4] * found[2] + pose[7] * found[3])
-        z = -(pose[2] * found[1] + pose[5] * found[2] + pose[8] * found[3])
-        vertex, _ = support(t.vertices, np.int64(body[FIRST]), np.int64(body[LAST]), x, y, z)
-        found[7], found[8], found[9] = transformed(pose, t.vertices[vertex], 0)
+        m[NORMAL + k] = m[BEST + k]
+    if m[UPPER] > TOUCHING and m[POINTS] > 0.0:
+        for k in range(3):
+            on_first, between = 0.0, 0.0
+            for i in range(SIMPLEX, SIMPLEX + WIDTH * np.int64(m[POINTS]), WIDTH):
+                on_first += m[i + WEIGHT] * m[i + 3 + k]
+                between += m[i + WEIGHT] * m[i + k]
+            m[ON_FIRST + k] = on_first + radius * m[BEST + k]
+            m[ON_SECOND + k] = on_first + between - m[b + RADIUS] * m[BEST + k]
+        return
+    p, n = RELATIVE, NORMAL
+    x = -(m[p] * m[n] + m[p + 3] * m[n + 1] + m[p + 6] * m[n + 2])
+    y = -(m[p + 1] * m[n] + m[p + 4] * m[n + 1] + m[p + 7] * m[n + 2])
+    z = -(m[p + 2] * m[n] + m[p + 5] * m[n + 1] + m[p + 8] * m[n + 2])
+    vertex, _ = support(m, b, x, y, z)
+    m[ON_SECOND], m[ON_SECOND + 1], m[ON_SECOND + 2] = transformed(m, p, vertex)
     for k in range(3):
-        if apart:
-            on_a, apart_by = 0.0, 0.0
-            for i in range(np.int64(s[COUNT, 2])):
-                on_a += s[i, WEIGHT] * s[i, 3 + k]
-                apart_by += s[i, WEIGHT] * s[i, k]
-            found[4 + k] = on_a + radius * found[1 + k]
-            found[7 + k] = on_a + apart_by - body[RADIUS] * found[1 + k]
-        else:
-            found[7 + k] -= body[RADIUS] * found[1 + k]
-            found[4 + k] = found[7 + k] - bound * found[1 + k]
+        m[ON_SECOND + k] -= m[b + RADIUS] * m[n + k]
+        m[ON_FIRST + k] = m[ON_SECOND + k] - bound * m[n + k]
 
 
 @kernel
-def witness(t, item, slot):  # type: ignore[no-untyped-def]
+def witness(m, item, slot):  # type: ignore[no-untyped-def]
     """Put what was found for an item into the root frame: direction and both points, in place."""
-    found = t.found[0]
-    pose = t.poses[slot * (t.joints.shape[0] + 1) + np.int64(t.items[item, INNER])]
-    found[4], found[5], found[6] = transformed(pose, found, 4)
-    found[7], found[8], found[9] = transformed(pose, found, 7)
-    x, y, z = transformed(pose, found, 1)
-    found[1], found[2], found[3] = x - pose[9], y - pose[10], z - pose[11]
+    pose = pose_of(m, slot, np.int64(m[item + INNER]))
+    for point in range(NORMAL, ON_SECOND + 3, 3):
+        x, y, z = transformed(m, pose, point)
+        if point == NORMAL:
+            x, y, z = x - m[pose + 9], y - m[pose + 10], z - m[pose + 11]
+        m[point], m[point + 1], m[point + 2] = x, y, z

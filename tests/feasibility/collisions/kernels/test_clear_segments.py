@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from random_bodies import CoalScene, all_pairs, hulls, of_polytopes, serial_arm
@@ -112,7 +114,7 @@ def test_what_is_known_of_a_segment_serves_the_next() -> None:
     bodies, _ = wall_and_stick()
     buffer = collision_buffer(bodies, planar_arm(1))
     angles = np.linspace(-2.0, -1.0, 201)
-    for a, b in zip(angles[:-1], angles[1:], strict=True):
+    for a, b in pairwise(angles):
         assert segment_clear(buffer, np.array([a]), np.array([b])) > 0.0
     done = counts(buffer)
     assert done.segments == done.items == 200
