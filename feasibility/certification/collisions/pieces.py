@@ -223,8 +223,10 @@ def sheet_piece(triangles: Array, closed: bool) -> Piece:
     Raises:
         ArgumentError: there are none, or they are not finite.
     """
+    if not len(triangles) or not np.isfinite(triangles).all():
+        raise ArgumentError("a sheet for the replay has no triangles, or they are not finite")
     faces = np.arange(3 * len(triangles)).reshape(-1, 3)
-    return piece_of(Triangles(triangles.reshape(-1, 3), faces, closed), np.eye(4)).truth
+    return MeshPart(triangles.reshape(-1, 3), faces, closed)
 
 
 def _mesh(vertices: Array, faces: NDArray[np.int64], closed: bool, at_rest: bool) -> Piece:
@@ -238,7 +240,7 @@ def _mesh(vertices: Array, faces: NDArray[np.int64], closed: bool, at_rest: bool
         return mesh
     try:
         return MeshHull(mesh, ConvexHull(mesh.vertices), at_rest)
-    except QhullError:
+    except (QhullError, RuntimeError):  # coal takes at most 255 edges at a corner
         return mesh
 
 
