@@ -8,16 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import Checks
+from coverable_errors import LARGEST, Checks
 from surfaces.meshes import MeshSurface
+from surfaces.patches import Patch
+from surfaces.piecewise import Piecewise
 from surfaces.protected import Protected
 from surfaces.surface import Surface, SurfaceError
+from surfaces.tiles import Tiles, tiles
 
 Array = NDArray[np.float64]
 
 DEVIATION = 2e-4  # [m]
 MOST_TRIANGLES = 32_768
 MOST_LAYERS = 64
+COARSER = 1.2  # by which the deviation grows where there would be too many triangles
 _CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 _HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 
@@ -45,9 +49,10 @@ def sheet_of(
 ) -> Sheet:
     """The surface as triangles, with a certified deviation.
 
-    A mesh gives its own triangles. Any other surface is cut into parts (`Surface.parts`), on each
-    of which |f - (c + x_1 e_1 + x_2 e_2)| <= r_f for |x_i| <= 1: each part gives the two triangles
-    of its parallelogram, and the deviation is the largest r_f. Nothing is sampled.
+    A mesh gives its own triangles. Any other surface is cut into tiles, on each of which
+    |f - (c + x_1 e_1 + x_2 e_2 + x_1 x_2 t)| <= r_f for |x_i| <= 1 (see `Tiles`). With t along one
+    of the slopes and no longer, that is a flat convex quadrilateral: its two triangles are taken,
+    and the deviation is the largest r_f. Nothing is sampled.
 
     With a thickness T the sheet is the slab of all points f + t b, 0 <= t <= T, with b the unit
     normal away from the working side; of a mesh, the normals of its faces, so each face carries a
@@ -83,7 +88,7 @@ def sheet_of(
         steps = min(steps, max(1, most // len(surface.mesh.faces) - 1)) if depth else 0
         triangles, normals, off = _of_mesh(surface)
     else:
-        triangles, normals, off = _of_parts(surface, wanted, depth, most // (steps + 1))
+        triangles, normals, off = _of_tiles(surface, wanted, depth, most // (steps + 1))
     away = -surface.side_sign * normals
     layers = [triangles + t * away for t in np.linspace(0.0, depth, steps + 1)]
     between = depth / (2.0 * steps) if steps else 0.0
@@ -98,22 +103,31 @@ def _of_mesh(surface: MeshSurface) -> tuple[Array, Array, float]:
     return corners, np.repeat(normals[:, None], 3, axis=1), 0.0
 
 
-def _of_parts(
+def _of_tiles(
     surface: Surface, deviation: float, depth: float, most: int
 ) -> tuple[Array, Array, float]:
     """The triangles of a smooth surface, the normals at their corners by the models, and
     r_f + T r_n.
     """
-    straight = deviation / depth if depth else math.inf
-    parts = surface.parts(deviation, straight, most)
-    finest = parts.children[:, 0] < 0
-    off = float((parts.radius[finest] @ np.array([1.0, depth])).max())
-    if not math.isfinite(off):
-        raise SurfaceError(
-            "no bounds are known on a part of this surface, so nothing can be certified to stay "
-            "clear of it; leave collisions with it out",
-            surface.kind,
-        )
-    corners = parts.centre[finest, None] + _CORNERS @ parts.slopes[finest]
+    found = _tiles(surface, deviation, depth, most // 2)
+    corners = found.models.centre[:, None] + _CORNERS @ found.models.slopes
+    corners[..., :3] += _CORNERS.prod(axis=1)[:, None] * found.twist[:, None]
     halves = corners[:, _HALVES].reshape(-1, 3, 6)
-    return halves[..., :3], halves[..., 3:], off
+    return halves[..., :3], halves[..., 3:], float(found.deviations(depth).max())
+
+
+def _tiles(surface: Surface, deviation: float, depth: float, most: int) -> Tiles:
+    """Tiles of the surface; coarser where there would be more than `most`."""
+    pieces = [(surface, 1.0)] if isinstance(surface, Patch) else []
+    if isinstance(surface, Piecewise):
+        pieces = list(zip(surface.placed, surface.signs, strict=True))
+    while pieces and deviation <= LARGEST:
+        found = tiles(pieces, deviation, depth, most)
+        if found is not None:
+            return found
+        deviation *= COARSER
+    raise SurfaceError(
+        "no bounds are known on this surface, so nothing can be certified to stay clear of it; "
+        "leave collisions with it out",
+        surface.kind,
+    )

@@ -35,7 +35,7 @@ surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
-surfaces: sheet
+surfaces: sheet tiles
 surfaces.places
 feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only safe_files search target_parts version
 feasibility.collisions

@@ -14,13 +14,16 @@ straight line between these by at most M h^2 k (1 - k) / 2, so
 
 **Turning.** (r cos t, r sin t, z) for r = r_0 + r_1 x + e, |e| <= e_r, z likewise, and the arc
 cos t = C + c, sin t = S y + s. With the model (C (r_0 + r_1 x), r_0 S y, z_0 + z_1 x), what is left
-is (C e + r c, (r - r_0) S y + r s, e_z).
+is (C e + r c, (r - r_0) S y + r s, e_z). Of the second, r_1 S x y is a twist beside the axis;
+without it e S y + r s is left.
 
 **Unit vectors.** N = A + E, A affine, |E| <= e. See `unit_model`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -101,6 +104,20 @@ def straight(low: Array, high: Array) -> CurveModel:
     return CurveModel((low + high) / 2.0, (high - low) / 2.0, np.zeros_like(low))
 
 
+class Twisted(NamedTuple):
+    """A closer model: |f - (centre + x_1 e_1 + x_2 e_2 + x_1 x_2 t)| <= error.
+
+    t lies along one of the slopes and is no longer, so the model fills a flat convex quadrilateral.
+    """
+
+    twist: Array
+    """(k, 3) t; zero where it would be longer than the slope."""
+    error: Array
+    """(k,)"""
+    along: Array
+    """(k, 2) what of the error comes from each axis."""
+
+
 class SpaceModel(NamedTuple):
     """k pieces of a surface, or its normals: |f - (centre + x_1 e_1 + x_2 e_2)| <= error."""
 
@@ -112,6 +129,8 @@ class SpaceModel(NamedTuple):
     """(k,)"""
     along: Array
     """(k, 2) what of the error comes from each axis; see `PartModels`."""
+    twisted: Callable[[], Twisted] | None = None
+    """Makes a closer model, where one is known."""
 
     @staticmethod
     def exact(centre: Array, slopes: Array) -> SpaceModel:
@@ -132,12 +151,31 @@ class Turned(NamedTuple):
     """(k, 3) the largest coordinates along these of what is left."""
     by_axis: Array
     """(k, 2, 3) what of that comes from each parameter."""
+    twist: Array
+    """(k,) the coefficient of x_1 x_2 beside the axis, which is among what is left; 0 where the
+    curve meets the axis inside the piece."""
 
     def model(self, factor: float = 1.0) -> SpaceModel:
         """As a model, times a positive factor."""
         along = np.stack([_length(self.frame, self.by_axis[:, side]) for side in (0, 1)], axis=1)
         error = _length(self.frame, self.left)
-        return SpaceModel(*(factor * each for each in (self.centre, self.slopes, error, along)))
+        return SpaceModel(
+            factor * self.centre,
+            factor * self.slopes,
+            factor * error,
+            factor * along,
+            partial(self._twisted, factor),
+        )
+
+    def _twisted(self, factor: float) -> Twisted:
+        """The model with its twist."""
+        beside = np.array([0.0, 1.0, 0.0])
+        size = np.abs(self.twist)
+        left = self.left - size[:, None] * beside
+        by_axis = self.by_axis - size[:, None, None] / 2.0 * beside
+        along = np.stack([_length(self.frame, by_axis[:, side]) for side in (0, 1)], axis=1)
+        twist = self.twist[:, None] * self.frame[:, 1]
+        return Twisted(*(factor * each for each in (twist, _length(self.frame, left), along)))
 
     def unit(self) -> SpaceModel:
         """The unit vectors along the vectors."""
@@ -191,9 +229,9 @@ def turned(
     if angle == 0:
         slopes, by_axis = slopes[:, ::-1], by_axis[:, ::-1]
     centre = np.stack([about.mean * r, flat, z], axis=1)[:, None]
-    return Turned(
-        (centre @ frame)[:, 0], slopes @ frame, frame, by_curve + by_angle + mixed, by_axis
-    )
+    left = by_curve + by_angle + mixed
+    twist = np.where(np.abs(dr) <= r, dr * about.slope, 0.0)
+    return Turned((centre @ frame)[:, 0], slopes @ frame, frame, left, by_axis, twist)
 
 
 def _direction(vectors: Array) -> Array:

@@ -118,6 +118,24 @@ class Patch(Surface):
         found = part_models(*self.part_models(low, high))
         return found.placed(self.rotation, self.position, sign)
 
+    def twisted_models(
+        self, low: NDArray[np.float64], high: NDArray[np.float64]
+    ) -> tuple[PartModels, NDArray[np.float64]]:
+        """The same with closer points, where they are known: + x_1 x_2 t; see `Twisted`.
+
+        Returns:
+            The models, and t (k, 3) m in the root frame; zero where there is no closer model.
+        """
+        from surfaces.patches.affine_models import part_models
+
+        points, normals = self.part_models(low, high)
+        twist = np.zeros_like(points.centre)
+        if points.twisted is not None:
+            closer = points.twisted()
+            points, twist = points._replace(error=closer.error, along=closer.along), closer.twist
+        found = part_models(points, normals).placed(self.rotation, self.position)
+        return found, twist @ self.rotation.T
+
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """See `Surface.parts`."""
         low, high = self.part_roots

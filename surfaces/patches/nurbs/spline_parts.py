@@ -127,7 +127,12 @@ def spline_models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, 
         for first in range(0, len(low), step)
     ]
     points, normals = (
-        SpaceModel(*(np.concatenate(arrays) for arrays in zip(*models, strict=True)))
+        SpaceModel(
+            np.concatenate([model.centre for model in models]),
+            np.concatenate([model.slopes for model in models]),
+            np.concatenate([model.error for model in models]),
+            np.concatenate([model.along for model in models]),
+        )
         for models in zip(*blocks, strict=True)
     )
     return points._replace(centre=points.centre + nets.origin), normals
