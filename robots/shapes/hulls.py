@@ -87,7 +87,7 @@ def outer_hull(points: Array, most: int = MOST_VERTICES) -> Hull:
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    solid = _thickened(np.unique(points, axis=0))
+    solid = thickened(np.unique(points, axis=0))
     try:
         corners = solid[ConvexHull(solid).vertices]
         kept = corners if len(corners) <= most else _furthest(corners, most)
@@ -115,7 +115,7 @@ def _box_corners(low: Array, high: Array) -> Array:
     return np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
 
 
-def _thickened(points: Array) -> Array:
+def thickened(points: Array) -> Array:
     """The points, moved to both sides along each direction in which they have no extent."""
     centred = points - points.mean(axis=0)
     axes = np.linalg.svd(centred.T @ centred)[0].T  # rows

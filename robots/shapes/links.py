@@ -31,7 +31,7 @@ class LinkShapes:
     """Convex bodies that hold them."""
     unchecked: tuple[str, ...]
     """Links with a shape that cannot be used and has no stand-in, links that the URDF leaves
-    without collision shapes on purpose, and links between two moving joints without any shape.
+    without collision shapes on purpose, and links of moving joints on which nothing has a shape.
 
     A link without a shape is not listed where others that move with it have some: it is a mere
     frame, such as tool0 or flange; nor is the root link, which is often just called world.
@@ -178,11 +178,10 @@ class _Gathered:
 
     def notes(self) -> tuple[str, ...]:
         """See `LinkShapes.notes`."""
-        notes = [
-            f"a shape of {_named(links)} cannot be used, {'those' if len(links) > 1 else 'it'} "
-            f"{'are' if len(links) > 1 else 'is'} not checked: {why}"
-            for why, links in self.lost.items()
-        ]
+        notes = []
+        for why, links in self.lost.items():
+            so = "they are" if len(links) > 1 else "it is"
+            notes.append(f"a shape of {_named(links)} cannot be used, so {so} not checked: {why}")
         notes += [
             f"a collision shape of {_named(links)} cannot be used, so visuals stand in: {why}"
             for why, links in self.replaced.items()

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 MOST_PIECES = 8
 BINS = 16  # planes may lie between any two of them
 WORTH = 0.04  # of the volume of the whole hull: what one more piece has to save
-SAMPLES = 1000  # points on the surface, by which planes are chosen
+SAMPLES = 600  # points on the surface, by which planes are chosen
 
 
 class _Cut(NamedTuple):

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from robots.kinematics import Kinematics
 from robots.robot import Robot
 from robots.shapes.bodies import Polytope
+from robots.shapes.hulls import thickened
 
 SAMPLES = 1000
 SEED = 0
@@ -93,9 +94,9 @@ def _coal_shape(body: Polytope) -> tuple[Any, pin.SE3]:
         place.rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), along).matrix()
         return coal.Capsule(max(body.radius, 1e-9), float(np.linalg.norm(along))), place
     # Not coal's own hull: it crashes where points are flat; Qhull raises.
-    hull = ConvexHull(vertices)
+    hull = ConvexHull(thickened(np.array(vertices)))
     points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    points.extend(list(np.array(vertices)))
+    points.extend(list(hull.points))
     faces.extend([coal.Triangle(*map(int, face)) for face in hull.simplices])
     shape = coal.Convex(points, faces)
     shape.setSweptSphereRadius(body.radius)

@@ -96,6 +96,24 @@ def test_every_link_is_drawn_and_the_nozzle_ends_at_the_tool_point():
     assert max(ends) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_base_to_forearm_collide_as_drawn_and_a_nozzle_behind_the_tool_point():
+    """At a tilt of 45 degrees no point of the nozzle is ahead of the tool point."""
+    checked = check_urdf(PUMA560_URDF)
+    fixed = ("base", "link1", "link2", "link3")
+    bodies, drawn = (
+        [(s.link, s.geometry, s.origin.tolist()) for s in shapes if s.link in fixed]
+        for shapes in (checked.collisions.shapes, checked.visuals)
+    )
+    assert bodies == drawn
+    assert checked.collisions.without == ("link4", "link5")
+    assert checked.collisions.faults == ()
+    nozzle = [s for s in checked.collisions.shapes if s.link not in fixed]
+    assert {s.link for s in nozzle} == {"link6"}
+    for shape in nozzle:
+        end = shape.origin[2, 3] + shape.geometry.length / 2
+        assert end + shape.geometry.radius <= 1e-12
+
+
 def test_rows_limits_and_shapes_have_to_fit_together():
     with pytest.raises(ValueError, match="2 DH rows need as many limits, got 1"):
         dh_urdf("arm", [DHRow(0, 0, 0)] * 2, [(-1, 1)])

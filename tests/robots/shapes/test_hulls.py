@@ -1,0 +1,179 @@
+"""Convex bodies around shapes: nothing stands out of them, and they stand out by little."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.optimize import nnls
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from robots.shapes import Triangles, checked_triangles, hull_of, outer_hull
+from robots.shapes.hulls import HAIR, MOST_VERTICES, PRISM_EXCESS, hull_volume
+from robots.shapes.pieces import MOST_PIECES, pieces_of
+from robots.urdf import Box, Capsule, Cylinder, Sphere
+
+MARGIN = 1e-9  # [m] of the least squares below
+
+
+def distance(point, vertices):
+    """From a point to the hull of vertices, by least squares over their convex combinations."""
+    heavy = 1e4
+    matrix = np.vstack([vertices.T, np.full(len(vertices), heavy)])
+    shares, _ = nnls(matrix, np.append(point, heavy))
+    return np.linalg.norm(shares / shares.sum() @ vertices - point)
+
+
+def stand_out(points, hull):
+    """How far points stand out of a hull, m; at most zero where none does."""
+    return max(distance(point, hull.vertices) for point in points) - hull.radius
+
+
+def random_bodies():
+    rng = np.random.default_rng(0)
+    for k in range(24):
+        size = 10.0 ** rng.uniform(-3, 2)
+        points = rng.normal(size=(int(rng.integers(4, 900)), 3))
+        if k % 3 == 1:
+            points /= np.linalg.norm(points, axis=1, keepdims=True)
+        if k % 3 == 2:
+            points = np.clip(points, -1, 1) * rng.uniform(1e-3, 1, 3)
+        yield size * points @ Rotation.random(random_state=k).as_matrix() + rng.normal(size=3)
+
+
+def test_no_point_stands_out_of_its_hull():
+    for points in random_bodies():
+        hull = outer_hull(points)
+        assert len(hull.vertices) <= MOST_VERTICES
+        some = points[np.random.default_rng(1).permutation(len(points))[:80]]
+        furthest = points[
+            [(points @ d).argmax() for d in np.random.default_rng(2).normal(size=(20, 3))]
+        ]
+        assert stand_out(np.concatenate([some, furthest]), hull) <= MARGIN * max(1, np.ptp(points))
+
+
+def test_a_hull_of_few_vertices_is_exact_and_one_of_many_is_close():
+    for points in random_bodies():
+        hull = outer_hull(points)
+        wide = np.ptp(points, axis=0).max()
+        if len(ConvexHull(points).vertices) <= MOST_VERTICES:
+            assert hull.radius <= 1e-11 * wide
+        else:
+            # A ball of 64 vertices evenly spread has caps of 3 % of its radius.
+            assert hull.radius <= 0.04 * wide
+        assert {tuple(v) for v in hull.vertices} <= {tuple(p) for p in points}
+
+
+def test_what_is_flat_gets_a_hair():
+    rng = np.random.default_rng(3)
+    turn = Rotation.random(random_state=4).as_matrix()
+    disc = np.column_stack([rng.normal(size=(300, 2)), np.zeros(300)]) @ turn
+    line = np.outer(np.linspace(0, 1, 50), [1.0, 2.0, 3.0])
+    tiny = 1e-9 * rng.normal(size=(40, 3))
+    for points in (disc, line, line[[0, -1]], np.ones((1, 3)), np.ones((9, 3)), tiny, 1e4 * disc):
+        hull = outer_hull(points)
+        assert stand_out(points[:60], hull) <= MARGIN * max(1, np.ptp(points))
+        # Of a line the corners are two hairs away at right angles, of a point three.
+        thick = points - points.mean(axis=0)
+        normal = np.linalg.svd(thick, full_matrices=True)[2][-1]
+        assert np.ptp(hull.vertices @ normal) <= np.ptp(points @ normal) + 3.5 * HAIR
+
+
+@pytest.mark.parametrize("shape", [Sphere(0.3), Capsule(0.1, 0.4), Box((0.2, 0.4, 0.6))])
+def test_balls_capsules_and_boxes_are_exact(shape):
+    """In every direction the hull reaches as far as the shape does."""
+    vertices, radius = hull_of(shape)
+    for d in np.random.default_rng(5).normal(size=(200, 3)):
+        d /= np.linalg.norm(d)
+        match shape:
+            case Sphere(r):
+                reach = r
+            case Capsule(r, length):
+                reach = r + abs(d[2]) * length / 2
+            case Box(size):
+                reach = np.abs(d) @ size / 2
+        assert (vertices @ d).max() + radius == pytest.approx(reach, abs=1e-15)
+
+
+@pytest.mark.parametrize(("radius", "exact"), [(1e-3, True), (0.03, True), (0.4, False)])
+def test_a_cylinder_is_inside_its_prism_and_the_prism_hardly_larger(radius, exact):
+    hull = hull_of(Cylinder(radius, 0.5))
+    angle = np.linspace(0, 2 * np.pi, 721)
+    rim = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    planes = ConvexHull(hull.vertices).equations
+    for z in (-0.25, 0.25):
+        points = np.column_stack([rim, np.full(len(rim), z)])
+        assert (points @ planes[:, :3].T + planes[:, 3]).max() <= 1e-12
+    assert set(np.abs(hull.vertices[:, 2])) == {0.25}
+    excess = np.linalg.norm(hull.vertices[:, :2], axis=1).max() - radius
+    assert bool(excess <= PRISM_EXCESS * 1.01) is exact
+    assert excess <= max(1.01 * PRISM_EXCESS, 0.005 * radius)
+
+
+def bodies(*parts):
+    """Triangles of closed parts, as one body."""
+    whole = trimesh.util.concatenate(parts)
+    return checked_triangles(np.asarray(whole.vertices), np.asarray(whole.faces))
+
+
+def turned_l(turn):
+    """An L of two boxes, 0.5 m long and 0.3 m to the side."""
+    foot = trimesh.creation.box((0.1, 0.1, 0.3))
+    foot.apply_translation((0.0, 0.0, 0.1))
+    long = trimesh.creation.box((0.5, 0.1, 0.1))
+    long.apply_translation((0.2, 0.0, 0.0))
+    for part in (foot, long):
+        part.apply_transform(turn)
+    return foot, long
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, 1.0])
+def test_every_point_of_a_solid_is_in_one_of_its_pieces(angle):
+    turn = trimesh.transformations.rotation_matrix(angle, (1, 2, 3))
+    parts = turned_l(turn)
+    mesh = bodies(*parts)
+    assert mesh.closed
+    pieces = pieces_of(mesh)
+    assert 1 < len(pieces) <= MOST_PIECES
+    shares = np.random.default_rng(6).random((1000, 3)) - 0.5
+    inside = [shares * [0.1, 0.1, 0.3] + [0, 0, 0.1], shares * [0.5, 0.1, 0.1] + [0.2, 0, 0]]
+    points = np.concatenate([*(part @ turn[:3, :3].T for part in inside), mesh.vertices])
+    free = np.ones(len(points), dtype=bool)
+    for piece in pieces:
+        planes = ConvexHull(piece.vertices).equations
+        free &= (points @ planes[:, :3].T + planes[:, 3]).max(axis=1) > piece.radius + 1e-12
+    assert not free.any(), points[free][:3]
+    total = sum(hull_volume(piece.vertices) for piece in pieces)
+    assert total < 0.85 * hull_volume(mesh.vertices)
+
+
+def test_the_pieces_of_an_l_along_its_axes_are_its_boxes():
+    pieces = pieces_of(bodies(*turned_l(np.eye(4))))
+    total = sum(hull_volume(piece.vertices) for piece in pieces)
+    assert total == pytest.approx(0.1 * 0.1 * (0.5 + 0.2), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        trimesh.creation.box((0.1, 0.2, 0.9)),
+        trimesh.creation.icosphere(3),
+        trimesh.creation.cone(1, 2),
+    ],
+)
+def test_what_is_convex_stays_in_one_piece(body):
+    assert len(pieces_of(bodies(body))) == 1
+
+
+def test_a_sheet_is_held_by_its_pieces_too():
+    """A bent sheet, open: a visual that stands in."""
+    x = np.linspace(0, 1, 30)
+    grid = np.array([(a, b, 0.5 * abs(a - 0.5)) for a in x for b in (0.0, 0.2)])
+    faces = [(2 * k, 2 * k + 1, 2 * k + 2) for k in range(29)]
+    faces += [(2 * k + 1, 2 * k + 3, 2 * k + 2) for k in range(29)]
+    mesh = checked_triangles(grid, np.array(faces))
+    assert isinstance(mesh, Triangles)
+    assert not mesh.closed
+    pieces = pieces_of(mesh)
+    assert len(pieces) > 1
+    for point in mesh.vertices[mesh.faces].mean(axis=1):
+        assert min(distance(point, hull.vertices) - hull.radius for hull in pieces) <= MARGIN
