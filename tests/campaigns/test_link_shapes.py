@@ -1,4 +1,4 @@
-"""The shapes of every arm of the library: held by their hulls and pieces, which touch where they do.
+"""The shapes of every arm of the library: hulls and pieces hold them, and collide where they do.
 
 `tests/robots/shapes` asks some of this of a few arms.
 """
