@@ -259,7 +259,7 @@ def _open_fault(judge: Judge, left: Stretches, bounds: Bounds) -> MotionFault:
         text = "not certified: the tool point may come too near to the mesh's triangles"
     else:
         text = (
-            "not certified: the tool axis is at the rim of the cone (within "
+            "not certified: the tool axis is at the edge of the cone (within "
             f"{np.degrees(angle_of(float(bounds.chord[one]))):.6f} deg, {judge.task.cone_deg:g} "
             "deg are allowed)"
         )
