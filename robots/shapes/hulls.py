@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,8 @@ CLOSE_ENOUGH = 1e-4  # [m]: no vertex is added for less
 HAIR = 1e-5  # [m] a body without thickness is given this much to each side
 ROUNDING = 1e-12  # of a body's width: what hull and distances may be wrong by
 PRISM_EXCESS = 3e-4  # [m] the corners of a prism around a cylinder stand out by at most this ...
+FACETS = 3  # of a hull, that a distance is taken from at first; four is the least a hull has
+CHUNK = 256  # points whose distances from all facets are taken at a time
 MOST_SIDES = 32  # ... where so many sides are enough
 
 
@@ -87,11 +89,11 @@ def outer_hull(points: Array, most: int = MOST_VERTICES) -> Hull:
     """
     from scipy.spatial import ConvexHull, QhullError
 
-    solid = thickened(np.unique(points, axis=0))
+    solid = thickened(points)
     try:
         corners = solid[ConvexHull(solid).vertices]
         kept = corners if len(corners) <= most else _furthest(corners, most)
-        radius = float(_distances(ConvexHull(kept), corners).max())
+        radius = _reach_outside(ConvexHull(kept), corners)
     except QhullError:  # no file is known that comes here
         low, high = solid.min(axis=0), solid.max(axis=0)
         kept, radius = _box_corners(low, high), 0.0
@@ -134,31 +136,43 @@ def _furthest(corners: Array, most: int) -> Array:
     directions = signs[np.abs(signs).sum(axis=1) % 2 == 1] @ axes  # 6 faces and 8 corners of a box
     chosen = np.unique((corners @ directions.T).argmax(axis=0))
     hull = ConvexHull(corners[chosen])
+    left = np.arange(len(corners))
     while len(chosen) < most:
-        outside = (corners @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
-        worst = int(outside.argmax())
-        if outside[worst] < CLOSE_ENOUGH:
+        outside = (corners[left] @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+        if outside.max() < CLOSE_ENOUGH:
             break
-        chosen = np.append(chosen, worst)
+        chosen = np.append(chosen, left[outside.argmax()])
+        left = left[outside >= CLOSE_ENOUGH]  # the others stay inside: the hull only grows
         hull = ConvexHull(corners[chosen])
     return np.asarray(corners[chosen])
 
 
-def _distances(hull: object, points: Array) -> Array:
-    """(k,) m, upper bounds on the distances of points from a hull of `scipy.spatial`.
+def _reach_outside(hull: Any, points: Array) -> float:
+    """m, an upper bound on the distance of any of the points from a hull of `scipy.spatial`.
 
-    Each point is projected onto the plane of every facet and moved into the facet by clipping its
-    barycentric coordinates; the nearest of these places lies in the hull.
+    A point is projected onto the planes of facets, and moved into each facet by clipping its
+    barycentric coordinates: the nearest of these places is in the hull. A few facets do where they
+    give less than the height of some other point above the hull.
     """
-    corners = hull.points[hull.simplices]  # type: ignore[attr-defined]  # (f, 3, 3)
+    heights = points @ hull.equations[:, :3].T + hull.equations[:, 3]
+    highest = float(heights.max())
+    if highest <= 0.0:
+        return 0.0
+    corners = hull.points[hull.simplices]  # (f, 3, 3)
     inverse = np.linalg.pinv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))  # (f, 2, 3)
-    equations = hull.equations  # type: ignore[attr-defined]
-    outside = (points @ equations[:, :3].T + equations[:, 3]).max(axis=1)
-    distances = np.zeros(len(points))
-    for k in np.flatnonzero(outside > 0.0):
-        shares = np.einsum("fij,fj->fi", inverse, points[k] - corners[:, 0])
-        weights = np.column_stack([1.0 - shares.sum(axis=1), shares]).clip(0.0)
-        weights /= weights.sum(axis=1, keepdims=True)
-        places = np.einsum("fi,fij->fj", weights, corners)
-        distances[k] = np.linalg.norm(places - points[k], axis=1).min()
-    return distances
+
+    def gaps(some: Array, facets: NDArray[np.int64]) -> Array:
+        offsets = some[:, None] - corners[facets, 0]
+        shares = np.einsum("nfij,nfj->nfi", inverse[facets], offsets)
+        first = 1.0 - shares.sum(axis=2, keepdims=True)
+        weights = np.concatenate([first, shares], axis=2).clip(0.0)
+        weights /= weights.sum(axis=2, keepdims=True)
+        places = np.einsum("nfi,nfij->nfj", weights, corners[facets])
+        return np.asarray(np.linalg.norm(places - some[:, None], axis=2).min(axis=1))
+
+    outside = np.flatnonzero(heights.max(axis=1) > 0.0)
+    few = np.argpartition(-heights[outside], FACETS, axis=1)[:, :FACETS]
+    doubtful = outside[gaps(points[outside], few) > highest]
+    every = np.arange(len(corners))[None]
+    chunks = np.split(doubtful, range(CHUNK, len(doubtful), CHUNK))
+    return max([highest, *(float(gaps(points[k], every).max()) for k in chunks if len(k))])
