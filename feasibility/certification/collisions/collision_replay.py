@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.pieces import Below, Piece, piece_of, sheet_piece
-from feasibility.certification.collisions.planes import Pairing, Place
+from feasibility.certification.collisions.planes import NEAR, ROUNDING, Pairing, Place
 from feasibility.certification.collisions.relative_motion import Motion
 from feasibility.collisions import Bodies, Pair
 from robots import Robot
 
 Array = NDArray[np.float64]
 
-NEAR = 0.9  # [1] share of the least distance that is aimed at where it costs little
+TOUCHING = 5e-7  # [m] overlap that is called touching
 KEPT = 8  # bodies of so many problems are kept ready, for motions replayed one after another
 
 
@@ -179,7 +179,7 @@ def _judged(bodies: Bodies, ready: BodiesOfOwners, motion: Motion) -> CollisionR
         needed = pair.clearance + deviation
         pairing.certify(needed, max(needed, NEAR * nearest + deviation))
         calls += pairing.calls
-        distance = pairing.bound - deviation
+        distance = pairing.bound - deviation - ROUNDING
         names = (pair.first, pair.second)
         if pairing.place is not None:
             distance = pairing.place.distance - deviation
@@ -202,6 +202,8 @@ def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:
         text = f"not certified: {names} may come nearer than {1e3 * pair.clearance:g} mm"
     elif place.inside:
         text = f"{names} overlap, one is inside the other"
+    elif distance <= ROUNDING and distance > -TOUCHING:
+        text = f"{names} touch, {wanted}"
     elif distance <= 0.0:
         text = f"{names} overlap by {-1e3 * distance:.3g} mm"
     else:

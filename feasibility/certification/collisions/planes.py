@@ -38,7 +38,10 @@ from feasibility.certification.collisions.relative_motion import (
 
 Array = NDArray[np.float64]
 
+NEAR = 0.9  # [1] share of the distances met, that is aimed at where it costs little
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
+COAL = 1e-6  # [m] more than coal's distances are off, which stops at GJK = 1e-8
+GJK = 1e-8  # [m]
 FAILURES = 3  # of coal's directions in a row, after which another way is taken
 FEW = 8  # triangles, into no less of which a sheet is cut for a hull, which is larger than its mesh
 SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
@@ -144,8 +147,11 @@ class Pairing:
             worst = int(np.argmin(s.bound))
             for end in (False, True):
                 distance, n = self._asked(a, b, s, worst, end)
-                if distance < needed and _is_exact(a, b):
-                    self.place = _place(s, worst, end, distance)
+                if (
+                    a is self.a and b is self.b and _is_exact(a, b)
+                ):  # no higher bound can be found than what was met
+                    aim = max(needed, min(aim, NEAR * distance))
+                if _is_exact(a, b) and self._too_near(a, b, s, worst, end, distance, n, needed):
                     return s
                 if n is not None:
                     s = replace(s, bound=np.maximum(s.bound, _parted(a, b, s, n)))
@@ -177,6 +183,29 @@ class Pairing:
             return distance, None
         return distance, (apart / length)[None].repeat(len(s.row), 0)
 
+    def _too_near(
+        self,
+        a: Piece,
+        b: Piece,
+        s: Stretches,
+        k: int,
+        end: bool,
+        distance: float,
+        n: Array | None,
+        needed: float,
+    ) -> bool:
+        """Are exact pieces nearer than `needed` at an end of stretch k? Sets `place` if so.
+
+        What coal calls far enough, but no plane of its own shows, is at the edge to rounding.
+        """
+        near = distance < needed
+        if not near and n is not None and not _can_be_cut(a, b):
+            poses = (s.last if end else s.first).of(np.array([k]))
+            near = float(_lows(b, poses, n[:1])[0] - a.support(n[:1])[0]) < needed
+        if near:
+            self.place = _place(s, k, end, distance)
+        return near
+
     def _by_budget(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> None:
         """Certify meshes by their distances alone; sets `bound`, or `place`."""
         whole = self.stretches
@@ -184,7 +213,7 @@ class Pairing:
         def distance(row: int, share: float) -> float:
             self.calls += 1
             pose = self.motion.pose(*self.joints, row, share)
-            return coal_distance(a, b, pose.rotations[0], pose.points[0])[0]
+            return coal_distance(a, b, pose.rotations[0], pose.points[0])[0] - COAL
 
         moved = np.zeros(len(self.motion.q) - 1)
         moved[whole.row] = whole.moved
@@ -296,7 +325,7 @@ def _coal() -> tuple[Any, Any, Any]:
     import coal
 
     request = coal.DistanceRequest()
-    request.enable_signed_distance = True
+    request.enable_signed_distance, request.gjk_tolerance = True, GJK
     return coal, request, coal.DistanceResult
 
 
