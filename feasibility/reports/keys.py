@@ -76,8 +76,10 @@ def as_text(found: Groups) -> str:
 
 
 def default_of(key: Key) -> str:
-    """'needed', or what holds where the key is left out."""
-    return NEEDED if key.default is None else f"default: {key.default}"
+    """'needed', perhaps by some kinds only, or what holds where the key is left out."""
+    if key.default is None or key.default.startswith(NEEDED):
+        return key.default or NEEDED
+    return f"default: {key.default}"
 
 
 def as_json(found: Groups) -> dict[str, list[dict[str, str | None]]]:
