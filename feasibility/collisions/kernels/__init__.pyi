@@ -1,4 +1,3 @@
-from .clearance import INFLUENCE as INFLUENCE
 from .clearance import Counts as Counts
 from .clearance import Nearest as Nearest
 from .clearance import blamed as blamed
@@ -8,3 +7,4 @@ from .clearance import configuration_bounds as configuration_bounds
 from .clearance import counts as counts
 from .clearance import nearest as nearest
 from .clearance import segment_clear as segment_clear
+from .packing import INFLUENCE as INFLUENCE

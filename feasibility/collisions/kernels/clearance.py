@@ -23,12 +23,12 @@ from feasibility.collisions.kernels.tables import (
     CALLS,
     DECIDED,
     FRAMES,
+    NODES,
     PAIR,
     SIZE,
     STATE,
     SWEPT,
     TRIED,
-    WISH,
     Array,
     Tables,
     row,
@@ -36,8 +36,6 @@ from feasibility.collisions.kernels.tables import (
 )
 from feasibility.compiled import kernel
 from robots import Robot
-
-INFLUENCE = 0.05  # m beyond its clearance: nearer pairs push
 
 
 def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
@@ -53,7 +51,7 @@ def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
         RobotError: the arm is no serial chain.
     """
     memory = packed(bodies, robot)
-    views(memory).state[0, [BLAMED, WISH]] = -1.0, INFLUENCE
+    views(memory).state[0, BLAMED] = -1.0
     return with_address(memory)
 
 
@@ -126,12 +124,16 @@ class Counts(NamedTuple):
     """Directions tried."""
     frames: int
     """Configurations evaluated."""
+    nodes: int
+    """Boxes and triangles asked for."""
 
 
 def counts(buffer: Array) -> Counts:
     """What a buffer has done since it was made."""
     state = views(buffer).state[0]
-    return Counts(*map(int, state[[CALLS, DECIDED, BY_BUDGET, SWEPT, BOUNDS, TRIED, FRAMES]]))
+    return Counts(
+        *map(int, state[[CALLS, DECIDED, BY_BUDGET, SWEPT, BOUNDS, TRIED, FRAMES, NODES]])
+    )
 
 
 class Nearest(NamedTuple):

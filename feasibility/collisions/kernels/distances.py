@@ -15,7 +15,7 @@ import numpy as np
 
 from feasibility.collisions.kernels.inside import inside_tree
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
-from feasibility.collisions.kernels.separation import BEST, separation
+from feasibility.collisions.kernels.separation import BEST, FEW_TURNS, MOST_TURNS, separation
 from feasibility.collisions.kernels.tables import (
     AXES,
     BALL,
@@ -30,12 +30,14 @@ from feasibility.collisions.kernels.tables import (
     LAST,
     LEFT,
     MIDDLE,
+    NODES,
     OUTER,
     POLYTOPE_COLUMNS,
     RADIUS,
     RELATIVE,
     RIGHT,
     STACK,
+    STATE,
     TREE,
 )
 from feasibility.collisions.kernels.witness import record
@@ -88,7 +90,7 @@ def of_polytopes(m, a, b, direction, ends, need, want, least):  # type: ignore[n
         m[d], m[d + 1], m[d + 2] = x, y, z
     m[BEST], m[BEST + 1], m[BEST + 2] = m[d], m[d + 1], m[d + 2]
     radii = m[a + RADIUS] + m[b + RADIUS]
-    bound = separation(m, a, b, ends, need + radii, want + radii, least + radii)
+    bound = separation(m, a, b, ends, need + radii, want + radii, least + radii, MOST_TURNS)
     m[d], m[d + 1], m[d + 2] = m[BEST], m[BEST + 1], m[BEST + 2]
     return max(lower, bound - radii)
 
@@ -146,8 +148,11 @@ def of_tree(m, root, b, best, ends, need, want, least):  # type: ignore[no-untyp
             enough = min(need, goal) + around
             for k in range(3):
                 m[BEST + k] = side * m[node + AXES + 6 + k]
-            given_up = (least if left < 0 else goal) + around
-            better = separation(m, node, b, ends, enough, goal + around, given_up)
+            turns, given_up = MOST_TURNS, least + around
+            if left >= 0:
+                turns, given_up = FEW_TURNS, goal + around
+            better = separation(m, node, b, ends, enough, goal + around, given_up, turns)
+            m[STATE + NODES] += 1.0
             bound = max(bound, better - around)
         if left < 0 or bound >= goal:
             if least == -np.inf and bound < goal:

@@ -28,9 +28,12 @@ from feasibility.collisions.kernels.tables import (
     flat,
     views,
 )
+from feasibility.collisions.words import SURFACE
 from robots import Robot, joint_alignments
 from robots.shapes import Polytope
 
+INFLUENCE = 0.05  # m beyond its clearance: nearer pairs push
+TOOL_INFLUENCE = 0.002  # m, the same for the tool and the surface, which are always near
 OUTWARD = 1e-12  # m for each metre: balls and capsules hold their vertices in spite of rounding
 
 
@@ -65,7 +68,7 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
         capsule = _capsule(np.vstack(clouds), radius)
         groups.append([joint, start, len(polytopes), *capsule, max(levers), len(groups)])
     roots, nodes, corners = _trees(bodies, sum(map(len, vertices)))
-    items, directions = _items(bodies, list(owners), groups, roots)
+    items, directions = _items(bodies, list(owners), groups, roots, n)
     count = len(groups)
     tables = Tables(
         state=np.zeros((1, STATE_COLUMNS)),
@@ -166,7 +169,11 @@ def _trees(bodies: Bodies, above: int) -> tuple[list[int], Array, Array]:
 
 
 def _items(
-    bodies: Bodies, owners: list[tuple[str, int]], groups: list[list[float]], roots: list[int]
+    bodies: Bodies,
+    owners: list[tuple[str, int]],
+    groups: list[list[float]],
+    roots: list[int],
+    n: int,
 ) -> tuple[list[list[float]], int]:
     """What is asked for, by pairs of groups and of a soup and a group; how many directions."""
     items: list[list[float]] = []
@@ -180,14 +187,15 @@ def _items(
             if owners[a][1] > owners[b][1]:
                 a, b = b, a
             joints = owners[a][1], owners[b][1]
-            items.append([a, b, -1, *joints, pair.clearance, index, directions, 0, *unknown])
+            of_groups = directions, False, INFLUENCE
+            items.append([a, b, -1, *joints, pair.clearance, index, *of_groups, *unknown])
             directions += int((groups[a][2] - groups[a][1]) * (groups[b][2] - groups[b][1]))
         for soup, root in zip(bodies.soups, roots, strict=True):
             if soup.owner in (pair.first, pair.second):
                 clearance = pair.clearance + soup.deviation
                 for b in first if soup.owner == pair.second else second:
                     joints = 0, owners[b][1]
-                    items.append(
-                        [-1, b, root, *joints, clearance, index, -1, soup.closed, *unknown]
-                    )
+                    works = joints[1] == n and soup.owner == SURFACE
+                    of_soup = -1, soup.closed, TOOL_INFLUENCE if works else INFLUENCE
+                    items.append([-1, b, root, *joints, clearance, index, *of_soup, *unknown])
     return items, directions

@@ -61,16 +61,17 @@ def push(m):  # type: ignore[no-untyped-def]
         finite &= abs(m[q + j]) < np.inf
     if not finite:
         return 0.0
-    here, wish, strongest = slot_of_start(m), m[STATE + WISH], 0.0
+    here, strongest = slot_of_start(m), 0.0
     for k in range(rows_of(m, ITEMS)):
         item = row(m, ITEMS, k)
+        wish = m[item + WISH]
         bound, enough = item + BOUND + here, m[item + CLEARANCE] + wish
         if m[bound] < enough:
             cheap_bound(m, item, here)
         if m[bound] >= enough:
             continue
         m[STATE + BOUNDS] += 1.0
-        found = of_item(m, item, here, here, enough, enough, -np.inf)
+        found = of_item(m, item, here, here, -np.inf, enough, -np.inf)
         m[bound] = max(m[bound], found)
         if found < enough:
             share = min((enough - found) / wish, MOST)

@@ -155,8 +155,12 @@ def swept(m, item, here, there, most, need):  # type: ignore[no-untyped-def]
     """Bound of the swept hull between two slots, less delta; -inf where it is less than needed."""
     group, inner = np.int64(m[item + ITEM_B]), np.int64(m[item + INNER])
     less = need + chord_deviation(m, group, inner, here, there)
+    ahead = max(AHEAD * most, LEAST_AHEAD)
+    if m[item + TREE] >= 0.0 and here < PART_START and m[item + BOUND + here] > -np.inf:
+        spare = m[item + BOUND + here] - need
+        ahead = min(ahead, 2.0 * spare) if spare > 0.5 * most else 0.0
     m[STATE + SWEPT] += 1.0
-    bound = of_item(m, item, here, there, less, less + max(AHEAD * most, LEAST_AHEAD), less)
+    bound = of_item(m, item, here, there, less, less + ahead, less)
     return bound - (less - need) if bound >= less else -np.inf
 
 

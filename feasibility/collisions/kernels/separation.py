@@ -18,7 +18,8 @@ from feasibility.collisions.kernels.simplex import WEIGHT, WIDTH, reduce
 from feasibility.collisions.kernels.tables import FIRST, LAST, RELATIVE, SIMPLEX, STATE, TRIED
 from feasibility.compiled import kernel
 
-MOST_ITERATIONS = 40
+MOST_TURNS = np.int64(40)
+FEW_TURNS = np.int64(4)  # for a box, which can be opened instead
 COARSE = 0.1  # relative gap at which a bound that is large enough already is good enough
 FINE = 1e-6  # the same for others
 FARTHEST = 1e300  # m, above any distance
@@ -73,8 +74,8 @@ def shortest(m, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def separation(m, a, b, ends, need, want, least):  # type: ignore[no-untyped-def]
-    """Lower bound of the distance of two hulls of vertices, m, by at most 40 directions.
+def separation(m, a, b, ends, need, want, least, turns):  # type: ignore[no-untyped-def]
+    """Lower bound of the distance of two hulls of vertices, m, by at most `turns` directions.
 
     Args:
         m: the memory. Its place BEST holds the direction to begin with, of any length, and gets the
@@ -84,6 +85,7 @@ def separation(m, a, b, ends, need, want, least):  # type: ignore[no-untyped-def
         need: m, a bound of at least this is enough: it is made sharper by a few more directions.
         want: m, nor are these tried once the bound has reached this.
         least: m, the bound is given up where the distance is less than this.
+        turns: directions that are tried at most.
     """
     nx, ny, nz = m[BEST], m[BEST + 1], m[BEST + 2]
     length = np.sqrt(nx * nx + ny * ny + nz * nz)
@@ -91,7 +93,7 @@ def separation(m, a, b, ends, need, want, least):  # type: ignore[no-untyped-def
         nx, length = 1.0, 1.0
     nx, ny, nz = nx / length, ny / length, nz / length
     lower, upper, size = -np.inf, FARTHEST, 0
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(turns):
         m[STATE + TRIED] += 1.0
         i, top = support(m, a, nx, ny, nz)
         j, bottom, pose = i, np.inf, int(RELATIVE)

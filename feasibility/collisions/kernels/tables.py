@@ -37,13 +37,14 @@ POLYTOPE_COLUMNS = 8
 # Columns of `nodes`: boxes around triangles. FIRST and LAST are 1 and 2, of its corners.
 LEFT, RIGHT, MIDDLE, AXES, HALF = 3, 4, 5, 8, 17
 NODE_COLUMNS = 20
-# Columns of `items`: what is asked for, two groups, or a tree of triangles and a group. BOUND and
+# Columns of `items`: what is asked for, two groups, or a tree of triangles and a group. WISH is
+# how far beyond its clearance it pushes (`push.py`). BOUND and
 # the column after it are lower bounds of its distance in slots 0 and 1.
-ITEM_A, ITEM_B, TREE, INNER, OUTER, CLEARANCE, PAIR, DIRECTION, CLOSED, BOUND = range(10)
-ITEM_COLUMNS = 11
+ITEM_A, ITEM_B, TREE, INNER, OUTER, CLEARANCE, PAIR, DIRECTION, CLOSED, WISH, BOUND = range(11)
+ITEM_COLUMNS = 12
 # Columns of `state`: counters, what was found, and what is asked for.
 CALLS, BOUNDS, SWEPT, DECIDED, BY_BUDGET, FRAMES, TRIED = range(7)
-BLAMED, FIRST_ASKED, SIZE, WISH, VALID = 7, 8, 9, 10, 11  # VALID: of slot 0, then of slot 1
+BLAMED, FIRST_ASKED, SIZE, NODES, VALID = 7, 8, 9, 10, 11  # VALID: of slot 0, then of slot 1
 STATE_COLUMNS = 16
 
 SLOTS = 4  # 0 and 1: the ends of the last segment; 2 and 3: those of a part of it
