@@ -30,7 +30,7 @@ def stand_out(points, hull):
 
 def random_bodies():
     rng = np.random.default_rng(0)
-    for k in range(24):
+    for k in range(15):
         size = 10.0 ** rng.uniform(-3, 2)
         points = rng.normal(size=(int(rng.integers(4, 900)), 3))
         if k % 3 == 1:
