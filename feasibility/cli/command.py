@@ -152,6 +152,7 @@ def open_case(
         from coverable_errors import Fault
         from feasibility.cases import CaseError, load_case
         from feasibility.clock import Clock, OutOfTime
+        from feasibility.collisions import gather
         from feasibility.notices import CUTTING, compiling_notice
 
         case = load_case(args.case, args.settings)
@@ -165,11 +166,15 @@ def open_case(
         try:
             with compiling_notice(notice=CUTTING), clock.enforced():
                 setup = case.build()
+                task, surface = setup.task, setup.cells.surface
+                bodies = gather(setup.robot, surface, task.collision, task.standoff)
             settle()
             for note in setup.robot.notes:
                 print_err(f"note: {setup.robot.name}: {note}")
             for note in setup.cells.notes:
                 print_err(f"note: {case.surface.label}: {note}")
+            for note in bodies.notes if bodies is not None else ():
+                print_err(f"note: collisions: {note}")
             doing = "the search was prepared"
             yield OpenCase(case, setup, progress, clock, began)
         except OutOfTime as late:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -13,7 +13,7 @@ from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_poly
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
-from robots.shapes import LinkPairs, Polytope, link_pairs, link_shapes
+from robots.shapes import LinkPairs, Polytope, Reach, link_pairs, link_shapes, tool_reach
 from surfaces import Surface, sheet_of
 
 KEPT = 16  # problems whose bodies are remembered: `explain` and `place` come back to them
@@ -61,12 +61,9 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False))
     found = _Pairs(collision, {solid.owner: solid.joint for solid in solids}, robot.n)
     if collision.self_:
-        names = [one.name for one in collision.scene]
-        found.add_links(
-            link_pairs(
-                robot, shapes, collision.allow, collision.srdf, tool, [*names, SURFACE, TOOL]
-            )
-        )
+        others = [SURFACE, TOOL, *(one.name for one in collision.scene)]
+        links = link_pairs(robot, shapes, collision.allow, collision.srdf, tool, others)
+        found.add_links(links)
     found.add_objects(touching=not standoff > 0.0)
     return Bodies(
         solids=solids,
@@ -77,8 +74,26 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
         left_out=tuple(found.left_out),
         unchecked=shapes.unchecked,
         checked=collision.checked,
-        notes=(*shapes.notes, *found.notes, *collision.notes_on(standoff)),
+        notes=(
+            *shapes.notes,
+            *found.notes,
+            *(note for one in collision.scene for note in one.notes),
+            *collision.notes_on(standoff),
+            *_beyond(tool_reach(robot, shapes, tool), found.asked, standoff),
+        ),
     )
+
+
+def _beyond(reaches: Iterable[Reach], pairs: Iterable[Pair], standoff: float) -> list[str]:
+    """That bodies reach further beyond the tool point than the standoff leaves them room."""
+    needed = {pair.first: pair.clearance for pair in pairs if pair.second == SURFACE}
+    return [
+        f"shapes of {reach.owner} reach {1e3 * reach.beyond:.1f} mm beyond the tool point, and "
+        f"have to stay {1e3 * needed[reach.owner]:g} mm off the surface; the standoff is "
+        f"{1e3 * standoff:g} mm"
+        for reach in reaches
+        if reach.owner in needed and reach.beyond + needed[reach.owner] > standoff
+    ]
 
 
 def _reach(robot: Robot, polytopes: Sequence[Polytope]) -> float:

@@ -52,10 +52,9 @@ def sides_of(verdict: Verdict) -> Sides | None:
     labels[reached.all(axis=0)] = BOTH
     counts = [int((labels == k).sum()) for k in range(3)]
     place = place_of(cut, verdict.robot)
-    above = (
-        "above it only" if counts[BELOW] else f"above {place} only"
-    )  # empty entries are left out
-    words = (f"below {place} only", above, "on both sides")
+    # Empty entries are left out.
+    upper = "above it only" if counts[BELOW] else f"above {place} only"
+    words = (f"below {place} only", upper, "on both sides")
     named = [f"{word} ({count})" for word, count in zip(words, counts, strict=True)]
     lost = tuple(dict.fromkeys(leaf.cell for leaf in proof.leaves()))
     return Sides(cut, labels, lost, (named[0], named[1], named[2]), _lost_name(verdict, cut, lost))
