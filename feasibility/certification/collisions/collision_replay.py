@@ -198,7 +198,7 @@ def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:
     """A pair that is refused, in words."""
     names = f"{pair.first} and {pair.second}"
     wanted = f"{1e3 * pair.clearance:g} mm are needed"
-    if np.isnan(distance):
+    if np.isnan(distance) or distance >= pair.clearance + TOUCHING:
         text = f"not certified: {names} may come nearer than {1e3 * pair.clearance:g} mm"
     elif place.inside:
         text = f"{names} overlap, one is inside the other"

@@ -45,7 +45,7 @@ GJK = 1e-8  # [m]
 FAILURES = 3  # of coal's directions in a row, after which another way is taken
 FEW = 8  # triangles, into no less of which a sheet is cut for a hull, which is larger than its mesh
 SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
-CALLS = (2000, 40)  # most coal calls for two bodies: so many, and so many for each segment
+CALLS = (500, 20)  # most coal calls for two bodies: so many, and so many for each segment
 
 
 @dataclass(frozen=True, slots=True)
@@ -198,10 +198,11 @@ class Pairing:
 
         What coal calls far enough, but no plane of its own shows, is at the edge to rounding.
         """
-        near = distance < needed
+        stray = float(s.stray[k])
+        near = distance - stray < needed
         if not near and n is not None and not _can_be_cut(a, b):
             poses = (s.last if end else s.first).of(np.array([k]))
-            near = float(_lows(b, poses, n[:1])[0] - a.support(n[:1])[0]) < needed
+            near = float(_lows(b, poses, n[:1])[0] - a.support(n[:1])[0]) - stray < needed
         if near:
             self.place = _place(s, k, end, distance)
         return near
