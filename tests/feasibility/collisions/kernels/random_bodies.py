@@ -42,13 +42,14 @@ def serial_arm(rng: np.random.Generator, kinds: str, length: float = 0.3) -> Rob
 
 
 def hulls(rng: np.random.Generator, n: int, size: float = 0.08, at: float = 0.15) -> list[Polytope]:
-    """A cloud of vertices around each joint, the root included: owners b0 to bn."""
+    """One to three clouds of vertices around each joint, the root included: owners b0 to bn."""
     bodies = []
     for joint in range(n + 1):
-        count = int(rng.integers(4, 30))
-        cloud = rng.normal(size=(count, 3)) * size * rng.uniform(0.2, 1.0, 3)
-        cloud += rng.normal(size=3) * at
-        bodies.append(Polytope(f"b{joint}", joint, cloud, float(rng.choice([0.0, 0.02]))))
+        for _ in range(int(rng.integers(1, 4))):
+            count = int(rng.integers(4, 30))
+            cloud = rng.normal(size=(count, 3)) * size * rng.uniform(0.2, 1.0, 3)
+            cloud += rng.normal(size=3) * at
+            bodies.append(Polytope(f"b{joint}", joint, cloud, float(rng.choice([0.0, 0.02]))))
     return bodies
 
 
