@@ -42,12 +42,12 @@ def test_no_segment_with_a_collision_is_called_clear(kinds: str) -> None:
         needs[-4:] += 0.002
         buffer, scene = collision_buffer(bodies, robot), CoalScene(robot, bodies)
         for size in (1e-3, 0.02, 0.1, 0.5):
-            for _ in range(12):
+            for _ in range(7):
                 q = rng.uniform(-2.0, 2.0, 4)
                 for _ in range(3):
                     end = q + rng.uniform(-1.0, 1.0, 4) * size
                     margin = segment_clear(buffer, q, end)
-                    least = min((scene.distances(s) - needs).min() for s in samples(q, end, 30))
+                    least = min((scene.distances(s) - needs).min() for s in samples(q, end, 15))
                     if margin > 0.0:
                         assert least >= -1e-9
                         assert margin <= (scene.distances(end) - needs).min() + 1e-7
@@ -57,8 +57,8 @@ def test_no_segment_with_a_collision_is_called_clear(kinds: str) -> None:
                         assert 0 <= blamed(buffer) < len(pairs)
                         refused += 1
                         collides += least < 0.0
-    assert clear > 60
-    assert collides > 20
+    assert clear > 30
+    assert collides > 10
     assert refused - collides < 0.1 * (clear + refused)
 
 
