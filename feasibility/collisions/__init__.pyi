@@ -26,6 +26,7 @@ from .settings import Collision as Collision
 from .shapes import HalfSpace as HalfSpace
 from .triangles import read_triangles as read_triangles
 from .words import CHECKABLE as CHECKABLE
+from .words import TOOL as TOOL
 from .words import UNCHECKED as UNCHECKED
 from .words import asked_for as asked_for
 from .words import checked as checked

@@ -17,7 +17,7 @@ from coverable_errors import ArgumentError
 from feasibility.placement import AXES, PlacementMap, Placements
 from feasibility.verdict import Verdict
 from feasibility.viewer.cut_sides import COLOURS, LOST, sides_of
-from feasibility.viewer.scene import CAUSES, CENTRES, EDGES, MISSED, START, missed_by_cause
+from feasibility.viewer.scene import CENTRES, EDGES, MISSED, START, missed_groups
 from robots import Kinematics
 from surfaces import Cells
 
@@ -83,9 +83,8 @@ def plot_causes(verdict: Verdict, title: str | None = None) -> Plot:
     figure, axes = _over_parameters(verdict, title)
     outlines = verdict.cells.unrolled().outlines
     groups = [("covered", COVERED, np.flatnonzero(verdict.covered))]
-    for kind, cells in missed_by_cause(verdict).items():
-        words = "cause not known" if kind is None else kind.replace("_", " ")
-        groups.append((words, MISSED if kind is None else CAUSES[kind], cells))
+    for missed in missed_groups(verdict.causes, np.flatnonzero(~verdict.covered)):
+        groups.append((missed.words, missed.colour, missed.which))
     handles = []
     for words, colour, cells in groups:
         shapes = [outlines[k] for k in cells]

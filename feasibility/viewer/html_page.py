@@ -66,6 +66,8 @@ class Readout:
     """The motion is played to the end and back again."""
     duration: float | None = None
     """s that the motion takes in truth; None where it is not timed: its share is shown instead."""
+    nearest: tuple[str, ...] = ()
+    """The two bodies that are nearest to each other at each of the times; none where not known."""
 
 
 def page(
@@ -103,10 +105,11 @@ def _in_script(text: str) -> str:
 def _legend(legend: Legend, readout: Readout | None) -> str:
     """Text, player and parts of the scene as HTML."""
     title, text = html.escape(legend.title), html.escape(legend.text)
+    kind = "unchecked" if legend.checked == UNCHECKED else "checked"
     lines = [
         f"<summary>{title}</summary>",
         f"<p>{text}</p>",
-        f'<p class="unchecked">{html.escape(legend.checked)}</p>',
+        f'<p class="{kind}">{html.escape(legend.checked)}</p>',
     ]
     if readout is not None:
         lines.append(_player(readout))
@@ -128,10 +131,12 @@ def _player(readout: Readout) -> str:
         for name, unit, _ in readout.rows
     ]
     end = readout.times[-1]
+    near = '<p id="nearest"></p>' if readout.nearest else ""
     slider = f'<input type="range" id="time" min="0" max="{end:.3f}" step="any" value="0">'
     return (
         f'<div id="player"><button type="button" id="pause">pause</button>{slider}'
         f'<output id="seconds"></output></div>\n<table id="readout">{"".join(rows)}</table>'
+        f"{near}"
     )
 
 
@@ -173,6 +178,7 @@ body {{ margin: 0; display: flex; height: 100vh; font: 13px/1.45 system-ui, sans
 #player output {{ flex: none; width: 4em; text-align: right; }}
 #readout {{ border-collapse: collapse; margin: 0 0 8px; width: 100%;
   font-variant-numeric: tabular-nums; }}
+#legend #nearest {{ margin-top: -6px; min-height: 2.9em; }}
 #readout th {{ text-align: left; font-weight: 400; color: #444; }}
 #readout td {{ text-align: right; width: 3.8em; }}
 #readout td:last-child {{ text-align: left; width: 2.2em; padding-left: 4px; color: #444; }}
@@ -213,6 +219,7 @@ function player(viewer, readout, begin) {{
   const [button, slider, seconds] = ["pause", "time", "seconds"].map(
     (id) => document.getElementById(id));
   const cells = [...document.querySelectorAll("#readout tr")].map((row) => row.cells[1]);
+  const near = document.getElementById("nearest");
   const digits = (unit) => unit === "mm" ? 2 : 1;
   const now = () => {{
     const action = animator.actions[0];
@@ -229,6 +236,9 @@ function player(viewer, readout, begin) {{
       const value = values[k - 1] + share * (values[k] - values[k - 1]);
       cells[row].textContent = value.toFixed(digits(unit));
     }});
+    // A pair is the nearest from its key frame on.
+    if (readout.nearest.length > 0)
+      near.textContent = "nearest: " + readout.nearest[times[k] <= time ? k : k - 1];
     slider.value = time;
     const share_of_all = end > 0 ? time / end : 0;
     seconds.textContent = readout.duration === null

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_meshes import FilePart
 from feasibility.viewer.threejs import Colour
+from robots.urdf import Box, Capsule, Cylinder, Sphere
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -102,6 +103,32 @@ def drawn(part: FilePart, scale: Array, colour: Colour | None) -> Mesh:
     # An alpha of zero is a file's way of saying that it left transparency unset.
     alpha = alpha if alpha > 0.05 else 1.0
     return Mesh(part.vertices * scale, part.faces, (red, green, blue), alpha)
+
+
+def as_mesh(body: Any, colour: Colour, opacity: float = 1.0) -> Mesh:
+    """A trimesh as a `Mesh`."""
+    vertices = np.asarray(body.vertices, dtype=float)
+    return Mesh(vertices, np.asarray(body.faces, dtype=np.int64), colour, opacity)
+
+
+def solid_mesh(
+    geometry: Box | Cylinder | Capsule | Sphere, colour: Colour, opacity: float = 1.0
+) -> Mesh:
+    """A primitive in its own frame."""
+    import trimesh
+
+    match geometry:
+        case Box(size):
+            body = trimesh.creation.box(size)
+        case Cylinder(radius, length):
+            body = trimesh.creation.cylinder(radius=radius, height=length, sections=48)
+        case Capsule(radius, length):
+            body = trimesh.creation.capsule(radius=radius, height=length, count=(24, 24))
+            # trimesh has one half ball at the origin; URDF has the middle there.
+            body.apply_translation(-body.bounds.mean(axis=0))
+        case Sphere(radius):
+            body = trimesh.creation.icosphere(subdivisions=3, radius=radius)
+    return as_mesh(body, colour, opacity)
 
 
 def thinned(meshes: Sequence[Mesh], budget: int) -> list[Mesh]:

@@ -1,7 +1,7 @@
 """A view painted without a browser: the picture that a notebook keeps beside the live one.
 
 The commands of the page are painted into a depth buffer, twice as fine as the picture and averaged:
-solid triangles first, lines, then what is half transparent.
+solid triangles first, lines, then what is half transparent, and last what is seen through all.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ class _Part:
     colours: Array
     """(V, 3), 0..1, with the light that falls on each point."""
     opacity: float
+    on_top: bool = False
 
 
 def painted(commands: Iterable[Command], camera: Camera, width: int, height: int) -> Array:
@@ -54,8 +55,12 @@ def painted(commands: Iterable[Command], camera: Camera, width: int, height: int
     image = np.ones((tall, wide, 3))
     depth = np.full((tall, wide), np.inf)
     # Solid triangles, lines, then what is half transparent.
-    parts = sorted(_parts(commands), key=lambda part: (part.opacity < 1.0, part.faces is None))
+    parts = sorted(
+        _parts(commands), key=lambda part: (part.on_top, part.opacity < 1.0, part.faces is None)
+    )
     for part in parts:
+        if part.on_top:
+            depth = np.full((tall, wide), np.inf)
         seen = _seen(part.points, camera, wide, tall)
         if part.faces is None:
             _draw_lines(*_clipped(seen, part.colours), depth, image)
@@ -129,7 +134,8 @@ def _part(scene: dict[str, Any], places: Sequence[Array]) -> _Part:
         else:
             normals = _normals(points, faces)
         colours = colours * _light(normals)[:, None]
-    return _Part(points, faces, np.minimum(colours, 1.0), float(material["opacity"]))
+    on_top = not material.get("depthTest", True)
+    return _Part(points, faces, np.minimum(colours, 1.0), float(material["opacity"]), on_top)
 
 
 def _normals(points: Array, faces: NDArray[np.int64]) -> Array:

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.verdict import CauseKind
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import cell_size
@@ -26,6 +25,7 @@ from feasibility.viewer.scene import (
     cells_layers,
     counted,
     drawn_lines,
+    missed_groups,
     missed_layer,
     patch_layers,
 )
@@ -73,7 +73,7 @@ def view_path(
     title = titled(f"feasible, one path over {counted(count)}", case)
     drawn = compose(
         robot, cells, title, text, [*cells_layers(cells), strokes], motion,
-        resting=path.walk.q[0], tracks=tracks, collision=path.task.collision,
+        resting=path.walk.q[0], tracks=tracks, task=path.task,
     )  # fmt: skip
     if trajectory is None or drawn.readout is None:
         return drawn
@@ -107,7 +107,7 @@ def view_division(division: Division, case: str | None = None) -> View:
     return compose(
         robot, cells, titled(title, case), text.rstrip("; "),
         parts, motion, resting=walks[0][0] if walks else robot_visuals.home(robot),
-        collision=division.task.collision,
+        task=division.task,
     )  # fmt: skip
 
 
@@ -152,12 +152,6 @@ def _move(
 
 def _left_out(division: Division) -> list[Layer]:
     """Cells in no patch, by cause."""
-    kinds: dict[CauseKind | None, list[int]] = {}
-    for cause in division.left_out:
-        kinds.setdefault(cause.kind, []).append(cause.cell)
-    if len(division.unsettled):
-        kinds[None] = division.unsettled.tolist()
-    return [
-        missed_layer(division.cells, kind, np.array(cells, dtype=np.int64))
-        for kind, cells in kinds.items()
-    ]
+    missed = [*(cause.cell for cause in division.left_out), *division.unsettled.tolist()]
+    groups = missed_groups(division.left_out, np.array(missed, dtype=np.int64))
+    return [missed_layer(division.cells, group) for group in groups]

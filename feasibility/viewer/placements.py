@@ -32,7 +32,8 @@ from feasibility.viewer.poses import (
     station_layers,
 )
 from feasibility.viewer.scene import Layer, cells_layers, counted
-from feasibility.viewer.viewer import View, compose, framing, joint_points, titled
+from feasibility.viewer.stage import framing, joint_points
+from feasibility.viewer.viewer import View, compose, titled
 from robots import Robot
 
 if TYPE_CHECKING:
@@ -193,7 +194,7 @@ def _view(
     drawn = compose(
         setup.robot, cells, title, f"{setup.robot.name}: {text}",
         [*parts, *(layer for layer, _ in stations), *class_layers(lines, tried)], motion,
-        resting=robot_visuals.home(setup.robot), collision=setup.task.collision, **playing,
+        resting=robot_visuals.home(setup.robot), task=setup.task, **playing,
     )  # fmt: skip
     points = [placed(lines, one.pose) for one in tried if one.kind is Class.FEASIBLE]
     full_size = [pose for _, pose in stations] or [one.pose for one in tried[:1]]

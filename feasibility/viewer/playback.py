@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from coverable_errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import joint_paths, joint_placements
+from feasibility.viewer.robot import ROOT, joint_paths, joint_placements
 from robots import Kinematics, Robot
 
 KEY_FRAMES = 400
@@ -118,17 +118,31 @@ def key_times(motion: Motion) -> NDArray[np.float64]:
 
 
 def animate(
-    robot: Robot, motion: Motion, *, play: bool, tracks: Sequence[dict[str, Any]] = ()
+    robot: Robot,
+    motion: Motion,
+    *,
+    play: bool,
+    tracks: Sequence[dict[str, Any]] = (),
+    roots: Sequence[str] = (ROOT,),
 ) -> threejs.Command:
-    """The animation of a motion: one track for each joint's group, and what else moves with it."""
+    """The animation of a motion: one track for each joint's group, and what else moves with it.
+
+    Args:
+        robot: the arm.
+        motion: what it plays.
+        play: at once.
+        tracks: of what else moves.
+        roots: of all trees of joint groups, see `joint_paths`.
+    """
     times = key_times(motion)
     placements = joint_placements(robot, motion.at(times))
     tracks = list(tracks)
-    for joint, path in enumerate(joint_paths(robot)[1:]):
+    paths = list(zip(*(joint_paths(robot, root)[1:] for root in roots), strict=True))
+    for joint, groups in enumerate(paths):
         name, values = "position", placements[:, joint, :3, 3]
         if not robot.prismatic[joint]:
             name, values = "quaternion", quaternions(placements[:, joint, :3, :3])
-        tracks.append(threejs.track(path, name, times, values))
+        tracks += [threejs.track(path, name, times, values) for path in groups]
     return threejs.animation(tracks, play=play, there_and_back=motion.there_and_back)
 
 

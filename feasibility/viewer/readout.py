@@ -1,6 +1,8 @@
-"""What is read beside the time slider: joint values, and distance and angle of the tool."""
+"""What is read beside the time slider: joint values, distance and angle of the tool, clearance."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +35,18 @@ def readout_of(robot: Robot, cells: Cells, motion: Motion) -> Readout:
         columns += [*distance_and_angle(robot, cells, q)]
     rows = zip(names, units, [np.round(column, 2).tolist() for column in columns], strict=True)
     return Readout(tuple(np.round(times, 4).tolist()), tuple(rows), motion.there_and_back)
+
+
+def with_nearest(readout: Readout, distances: list[float], names: tuple[str, ...]) -> Readout:
+    """The same with the distance of the nearest pair of bodies, and who they are.
+
+    Args:
+        readout: the other values.
+        distances: mm, at each of its times.
+        names: the pair at each of its times.
+    """
+    rows = (*readout.rows, ("clearance", "mm", distances))
+    return replace(readout, rows=rows, nearest=names)
 
 
 def distance_and_angle(robot: Robot, cells: Cells, q: NDArray[np.float64]) -> NDArray[np.float64]:

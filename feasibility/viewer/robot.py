@@ -15,9 +15,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from coverable_meshes import MeshError, MeshFiles
 from feasibility.viewer import threejs
-from feasibility.viewer.meshes import GREY, Mesh, drawn, moved, shaded, thinned
+from feasibility.viewer.meshes import (
+    GREY,
+    Mesh,
+    as_mesh,
+    drawn,
+    moved,
+    shaded,
+    solid_mesh,
+    thinned,
+)
 from robots import Kinematics, Robot, RobotError
-from robots.urdf import Box, Capsule, Cylinder, MeshFile, Sphere, Visual
+from robots.urdf import MeshFile, Visual
 
 ROOT = "/robot"
 TRIANGLES = 60_000  # of a whole robot; more are thinned
@@ -35,9 +44,9 @@ class Drawing:
     """What could not be drawn as the URDF says, one sentence each."""
 
 
-def joint_paths(robot: Robot) -> tuple[str, ...]:
+def joint_paths(robot: Robot, root: str = ROOT) -> tuple[str, ...]:
     """The n + 1 groups of the scene tree: what is fixed to the root, then each joint's."""
-    paths = [ROOT]
+    paths = [root]
     for name in robot.joint_names:
         paths.append(f"{paths[-1]}/joint {threejs.safe_name(name)}")
     return tuple(paths)
@@ -68,10 +77,10 @@ def joint_placements(robot: Robot, walk: ArrayLike) -> NDArray[np.float64]:
     return placements
 
 
-def pose(robot: Robot, q: ArrayLike) -> list[threejs.Command]:
-    """Commands that put the drawn arm into configuration q (n,)."""
+def pose(robot: Robot, q: ArrayLike, root: str = ROOT) -> list[threejs.Command]:
+    """Commands that put the drawn arm, or another tree of joints, into configuration q (n,)."""
     placements = joint_placements(robot, q)[0]
-    paths = joint_paths(robot)[1:]
+    paths = joint_paths(robot, root)[1:]
     return [threejs.transform(path, place) for path, place in zip(paths, placements, strict=True)]
 
 
@@ -143,31 +152,16 @@ def _meshes(visual: Visual, files: MeshFiles) -> list[Mesh]:
     Raises:
         MeshError: its file cannot be read, or it is more than can be drawn.
     """
-    import trimesh
-
     red, green, blue, opacity = visual.rgba or (*GREY, 1.0)
     colour = None if visual.rgba is None else (red, green, blue)
-    match visual.geometry:
-        case MeshFile(path, scale):
-            return [drawn(part, np.asarray(scale), colour) for part in files.parts(path)]
-        case Box(size):
-            body = trimesh.creation.box(size)
-        case Cylinder(radius, length):
-            body = trimesh.creation.cylinder(radius=radius, height=length, sections=48)
-        case Capsule(radius, length):
-            body = trimesh.creation.capsule(radius=radius, height=length, count=(24, 24))
-            # trimesh has one half ball at the origin; URDF has the middle there.
-            body.apply_translation(-body.bounds.mean(axis=0))
-        case Sphere(radius):
-            body = trimesh.creation.icosphere(subdivisions=3, radius=radius)
-    files.count(len(body.faces))
-    return [_mesh(body, colour or GREY, opacity)]
-
-
-def _mesh(body: Any, colour: threejs.Colour, opacity: float = 1.0) -> Mesh:
-    """A trimesh as a `Mesh`."""
-    vertices = np.asarray(body.vertices, dtype=float)
-    return Mesh(vertices, np.asarray(body.faces, dtype=np.int64), colour, opacity)
+    geometry = visual.geometry
+    if isinstance(geometry, MeshFile):
+        return [
+            drawn(part, np.asarray(geometry.scale), colour) for part in files.parts(geometry.path)
+        ]
+    mesh = solid_mesh(geometry, colour or GREY, opacity)
+    files.count(len(mesh.faces))
+    return [mesh]
 
 
 def _joined(meshes: list[Mesh]) -> list[Mesh]:
@@ -198,4 +192,4 @@ def _capsule(robot: Robot, joint: int) -> Mesh:
     if np.linalg.norm(end) > 1e-6:
         rod = np.array([np.zeros(3), end])
         body += trimesh.creation.cylinder(radius=radius, segment=rod, sections=32)
-    return _mesh(body, SKELETON)
+    return as_mesh(body, SKELETON)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.verdict import CauseKind, Verdict
+from feasibility.verdict import Cause, CauseKind, Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, marks, patch
 from feasibility.viewer.cut_sides import COLOURS, LOST, Sides, sides_of
@@ -36,6 +36,16 @@ CAUSES: dict[CauseKind, Colour] = {  # distinct for colour-blind readers too (Ok
     CauseKind.COLLISION: (0.20, 0.20, 0.20),
     CauseKind.DISCONNECTED: (0.94, 0.86, 0.20),
 }
+PAIRS: tuple[Colour, ...] = (  # of cells that a pair of bodies is in the way of, by pair
+    (0.20, 0.20, 0.20),
+    (0.55, 0.35, 0.17),
+    (0.62, 0.17, 0.50),
+    (0.10, 0.50, 0.50),
+    (0.95, 0.45, 0.30),
+    (0.35, 0.45, 0.85),
+    (0.55, 0.62, 0.20),
+    (0.60, 0.60, 0.60),
+)
 PATCHES: tuple[Colour, ...] = (
     (0.00, 0.45, 0.70),
     (0.90, 0.60, 0.00),
@@ -67,10 +77,11 @@ def layers(verdict: Verdict) -> list[Layer]:
         return []
     missed = []
     sides = sides_of(verdict)
-    for kind, which in missed_by_cause(verdict).items():
-        layer = missed_layer(cells, kind, which)
+    for group in missed_groups(verdict.causes, np.flatnonzero(~verdict.covered)):
+        layer = missed_layer(cells, group)
         # These cells are in the colour of their side.
-        missed.append(layer if sides is None or kind != CauseKind.DISCONNECTED else hidden(layer))
+        by_side = sides is not None and group.kind == CauseKind.DISCONNECTED
+        missed.append(hidden(layer) if by_side else layer)
     parted = [] if sides is None else side_layers(cells, sides)
     return [
         *cells_layers(cells),
@@ -178,15 +189,45 @@ def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
     return (closest_point + height * normal).reshape(len(pairs), len(t), 3)
 
 
-def missed_by_cause(verdict: Verdict) -> dict[CauseKind | None, NDArray[np.int64]]:
-    """Flat indices of the cells that are not covered, by cause; None where no cause is known."""
-    kinds = {cause.cell: cause.kind for cause in verdict.causes}
-    missed = np.flatnonzero(~verdict.covered)
-    found: dict[CauseKind | None, NDArray[np.int64]] = {}
-    for kind in (*CauseKind, None):
-        cells = np.array([cell for cell in missed if kinds.get(int(cell)) == kind], dtype=np.int64)
-        if len(cells):
-            found[kind] = cells
+@dataclass(frozen=True, eq=False, slots=True)
+class Missed:
+    """Cells that are missed for one reason."""
+
+    kind: CauseKind | None
+    """None where no cause is known."""
+    pair: tuple[str, str] | None
+    """The two bodies that are in the way, if that is known."""
+    which: NDArray[np.int64]
+    """Flat indices of the cells."""
+    colour: Colour
+
+    @property
+    def words(self) -> str:
+        """The reason, with the bodies that are in the way."""
+        words = "cause not known" if self.kind is None else self.kind.replace("_", " ")
+        return words if self.pair is None else f"{words}: {' and '.join(self.pair)}"
+
+
+def missed_groups(causes: Sequence[Cause], missed: NDArray[np.int64]) -> list[Missed]:
+    """Cells that are not covered, by cause, and by the pair of bodies that is in the way.
+
+    Cells of one pair have a colour of their own.
+
+    Args:
+        causes: of the cells.
+        missed: (k,) flat indices of the cells.
+    """
+    known = {cause.cell: (cause.kind, cause.pair) for cause in causes}
+    groups: dict[tuple[CauseKind | None, tuple[str, str] | None], list[int]] = {}
+    for cell in missed.tolist():
+        groups.setdefault(known.get(cell, (None, None)), []).append(cell)
+    kinds = [*CauseKind, None]
+    found, pairs = [], 0
+    for kind, pair in sorted(groups, key=lambda group: (kinds.index(group[0]), group[1] or ())):
+        colour = MISSED if kind is None else CAUSES[kind]
+        if pair is not None:
+            colour, pairs = PAIRS[pairs % len(PAIRS)], pairs + 1
+        found.append(Missed(kind, pair, np.array(groups[kind, pair], dtype=np.int64), colour))
     return found
 
 
@@ -218,12 +259,15 @@ def _start(verdict: Verdict) -> Iterator[Layer]:
     yield Layer((command,), Entry("start cell", START, path), 1)
 
 
-def missed_layer(cells: Cells, kind: CauseKind | None, which: NDArray[np.int64]) -> Layer:
-    """Some cells in the colour of the cause for which they are missed; None where it is unknown."""
-    colour = MISSED if kind is None else CAUSES[kind]
-    words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
-    label = f"{words} ({len(which)})"
-    return filled(cells, which, colour, f"/cells/{label}", label)
+def missed_layer(cells: Cells, group: Missed) -> Layer:
+    """Some cells in the colour of what they are missed for."""
+    words = "not covered" if group.kind is None else f"not covered: {group.words}"
+    number = f"({len(group.which)})" if group.pair is None else f"({counted(len(group.which))})"
+    label = f"{words} {number}"
+    path = f"/cells/{label}"
+    if group.pair is not None:  # names of any length: the first cell tells two groups apart
+        path = f"/cells/{group.which[0]} {threejs.safe_name(label)}"
+    return filled(cells, group.which, group.colour, path, label)
 
 
 def hidden(layer: Layer) -> Layer:

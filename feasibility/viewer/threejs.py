@@ -52,6 +52,7 @@ def mesh(
     normals: ArrayLike | None = None,
     opacity: float = 1.0,
     lit: bool = True,
+    on_top: bool = False,
 ) -> Command:
     """Triangles of one colour, visible from both sides.
 
@@ -63,6 +64,7 @@ def mesh(
         normals: (V, 3) unit; averaged over the faces by the page where not given.
         opacity: 1 hides what is behind.
         lit: shaded by the lights; False shows the plain colour.
+        on_top: seen through whatever is before it.
     """
     index = np.asarray(faces)
     small = len(np.asarray(vertices)) < 2**16
@@ -83,6 +85,8 @@ def mesh(
     }
     if lit:
         material |= {"shininess": 25, "specular": 0x222222}
+    if on_top:  # what is transparent is drawn last
+        material |= {"transparent": True, "depthTest": False}
     return _object(path, "Mesh", data, material)
 
 
@@ -123,7 +127,8 @@ def track(path: str, name: str, times: Array, values: Array) -> dict[str, Any]:
 
     Args:
         path: of the group that moves.
-        name: 'position' with values (k, 3), or 'quaternion' with values (k, 4) as x, y, z, w.
+        name: 'position' or 'scale' with values (k, 3), or 'quaternion' with values (k, 4) as x, y,
+            z, w.
         times: (k,) s.
         values: one row per time.
     """
@@ -133,8 +138,12 @@ def track(path: str, name: str, times: Array, values: Array) -> dict[str, Any]:
 
 def appearing(path: str, when: float, end: float) -> dict[str, Any]:
     """What is at `path` hidden until `when` (s), and shown from then to `end`."""
-    times = np.array([0.0, when, max(end, when)])
-    return _clip(path, "visible", "bool", times, [False, True, True])
+    return shown(path, np.array([0.0, when, max(end, when)]), np.array([False, True, True]))
+
+
+def shown(path: str, times: Array, visible: NDArray[np.bool_]) -> dict[str, Any]:
+    """What is at `path` shown or hidden, `visible` (k,), from each of the times (k,) s on."""
+    return _clip(path, "visible", "bool", times, visible.tolist())
 
 
 def _clip(path: str, name: str, kind: str, times: Array, values: Any) -> dict[str, Any]:

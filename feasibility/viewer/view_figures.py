@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import io
+import textwrap
 from collections.abc import Mapping
 from typing import Any, Protocol
 
 from feasibility.viewer.figures import Plot, plain
 from feasibility.viewer.html_page import Legend
+
+WIDTH = 90  # characters of a line above a picture
 
 
 class Drawn(Protocol):
@@ -29,7 +32,8 @@ def plot_view(view: Drawn) -> Plot:
     axes = figure.add_subplot()
     axes.imshow(view.image(), interpolation="lanczos")
     axes.set_axis_off()
-    figure.suptitle(plain(f"{view.legend.title}\n{view.legend.checked}"), fontsize=11)
+    said = [textwrap.fill(line, WIDTH) for line in (view.legend.title, view.legend.checked)]
+    figure.suptitle(plain("\n".join(said)), fontsize=11)
     shown = [entry for entry in view.legend.entries if entry.shown]
     handles = [Patch(color=entry.colour, label=plain(entry.label)) for entry in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)

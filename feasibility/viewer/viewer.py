@@ -18,18 +18,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from feasibility.collisions import Collision, checked_words
+from feasibility.collisions import checked_words, gather
 from feasibility.cut_words import sentence
+from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
+from feasibility.viewer.nearest import draw_nearest
+from feasibility.viewer.obstacles import HULLS, hull_layers, points_of, scene_layers, tool_layers
 from feasibility.viewer.playback import Motion, animate, motion_of
-from feasibility.viewer.readout import readout_of
+from feasibility.viewer.readout import readout_of, with_nearest
 from feasibility.viewer.scene import Layer, counted, layers, trail
+from feasibility.viewer.stage import camera_on, ground
 from feasibility.viewer.threejs import Command
 from robots import Robot
 from surfaces import Cells
@@ -37,8 +41,6 @@ from surfaces import Cells
 Array = NDArray[np.float64]
 
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
-THICKNESS = 0.12  # [1] of the reach: by how much links may stand out beyond their joints
-FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -143,7 +145,7 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
         resting=_resting(verdict),
         play=play,
         at=at,
-        collision=verdict.task.collision,
+        task=verdict.task,
     )
 
 
@@ -159,7 +161,7 @@ def compose(
     tracks: Sequence[dict[str, Any]] = (),
     play: bool = True,
     at: float = 0.0,
-    collision: Collision | None = None,
+    task: Task | None = None,
 ) -> View:
     """Put arm, ground and parts into one picture.
 
@@ -174,26 +176,38 @@ def compose(
         tracks: what else moves with it, see `threejs.track`.
         play: start the motion when the page opens.
         at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
-        collision: what was checked.
+        task: what was asked, for what the arm had to stay clear of.
     """
-    drawing = robot_visuals.draw(robot)
+    drawing, roots = robot_visuals.draw(robot), [robot_visuals.ROOT]
     commands = ground(robot, cells, drawing.lowest) + list(drawing.commands)
-    entries = [Entry(robot.name, ARM, robot_visuals.ROOT)]
-    for part in parts:
-        commands += part.commands
-        entries.append(part.entry)
-    q, readout, start = resting, None, 0.0
+    q, readout, start, around = resting, None, 0.0, None
+    moving = list[Command]()
+    parts, tracks = list(parts), list(tracks)
+    asked = None if task is None else task.collision
+    bodies = None if task is None else gather(robot, cells.surface, asked, task.standoff)
+    if bodies is not None:
+        parts += tool_layers(bodies, robot) + scene_layers(bodies.scene, robot)
+        parts += hull_layers(bodies, robot)
+        around, roots = points_of(bodies.scene, robot), [*roots, HULLS]
     if motion is not None:
         readout, start = readout_of(robot, cells, motion), float(at * motion.seconds[-1])
-        commands.append(animate(robot, motion, play=play, tracks=tracks))
+        near = draw_nearest(robot, bodies, motion, start)
+        if near is not None:
+            parts.append(near.layer)
+            tracks += near.tracks
+            readout = with_nearest(readout, near.distances, near.names)
+        moving = [animate(robot, motion, play=play, tracks=tracks, roots=roots)]
         q = motion.at(np.array([start]))[0]
-    commands += robot_visuals.pose(robot, q)
-    said = checked_words(collision)
+    entries = [Entry(robot.name, ARM, robot_visuals.ROOT), *(part.entry for part in parts)]
+    drawn = [command for part in parts for command in part.commands]
+    poses = [command for root in roots for command in robot_visuals.pose(robot, q, root)]
     return View(
         robot=robot,
-        commands=tuple(commands),
-        legend=Legend(title, " · ".join([text, *drawing.notes]), tuple(entries), said),
-        camera=camera_on(robot, cells, q, drawing.lowest),
+        commands=(*commands, *drawn, *moving, *poses),
+        legend=Legend(
+            title, " · ".join([text, *drawing.notes]), tuple(entries), checked_words(asked)
+        ),
+        camera=camera_on(robot, cells, q, drawing.lowest, around),
         motion=motion,
         notes=drawing.notes,
         readout=readout,
@@ -245,87 +259,3 @@ def _resting(verdict: Verdict) -> Array:
         if q is not None:
             return np.asarray(q, dtype=float)
     return robot_visuals.home(verdict.robot)
-
-
-def ground(robot: Robot, cells: Cells, floor: float) -> list[Command]:
-    """Background, a ground grid at the height of the lowest thing, and the root frame's axes."""
-    box = _extent(cells)
-    size = max(robot.reach if np.isfinite(robot.reach) else 1.0, 0.2)
-    spacing = _round_below(size / 5.0)
-    extent = np.abs(box[:, :2]).max(initial=size)
-    half = spacing * np.ceil(extent / spacing)
-    lines = np.arange(-half, half + spacing / 2.0, spacing)
-    z = min(floor, float(box[:, 2].min(initial=0.0)))
-    ends = [[(x, -half, z), (x, half, z), (-half, x, z), (half, x, z)] for x in lines]
-    axis = 0.25 * size
-    frame = [(0, 0, 0), (axis, 0, 0), (0, 0, 0), (0, axis, 0), (0, 0, 0), (0, 0, axis)]
-    colours = np.repeat([(0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9)], 2, axis=0)
-    return [
-        threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
-        threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
-        threejs.set_property("/Grid", "visible", False),
-        threejs.set_property("/Axes", "visible", False),
-        threejs.segments("/ground", np.reshape(ends, (-1, 3)), (0.78, 0.80, 0.83)),
-        threejs.segments("/root frame", np.array(frame), (0, 0, 0), colours=colours),
-    ]
-
-
-def _round_below(value: float) -> float:
-    """The largest of 1, 2.5 and 5 times a power of ten that is at most `value`."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(max(step * power for step in (1.0, 2.5, 5.0) if step * power <= value))
-
-
-def camera_on(robot: Robot, cells: Cells, q: Array, floor: float) -> Camera:
-    """Look at arm and surface from the tool's side, a little from above.
-
-    Args:
-        robot: the arm.
-        cells: what it works on.
-        q: (n,) its configuration.
-        floor: m, height of the ground.
-    """
-    # Links are thick, and reach beyond their joints.
-    thick = THICKNESS * robot.reach if np.isfinite(robot.reach) else 0.0
-    round_joints = np.vstack([np.eye(3), -np.eye(3)]) * thick
-    links = (joint_points(robot, q)[:, None] + round_joints).reshape(-1, 3)
-    points = np.concatenate([_extent(cells), links, [[0.0, 0.0, floor]]])
-    toward = np.zeros(3)
-    if len(cells):
-        toward = cells.surface.side_sign * cells.normals.mean(axis=0)
-    heading = np.arctan2(toward[1], toward[0]) if np.hypot(*toward[:2]) > 0.1 else -np.pi / 3.0
-    heading, height = heading + np.radians(25.0), np.radians(24.0)
-    level = np.cos(height)
-    direction = np.array([np.cos(heading) * level, np.sin(heading) * level, np.sin(height)])
-    return framing(points, direction)
-
-
-def framing(points: Array, direction: Array, near: float = 1.0) -> Camera:
-    """A camera that has points (k, 3) m in its picture.
-
-    Args:
-        points: what is to be seen.
-        direction: (3,) unit, from the points to the camera.
-        near: 1 where a ball around all points fills `FRAMED`; less comes nearer.
-    """
-    target = (points.min(axis=0) + points.max(axis=0)) / 2.0
-    radius = max(float(np.linalg.norm(points - target, axis=1).max()), 0.1)
-    eye = target + near * radius / np.sin(FRAMED) * direction
-    return Camera(tuple(target.tolist()), tuple(eye.tolist()))
-
-
-def joint_points(robot: Robot, walk: ArrayLike) -> Array:
-    """The joints (m n, 3) m of the arm at configurations (m, n) or (n,)."""
-    placements = robot_visuals.joint_placements(robot, walk)
-    place, points = np.eye(4), []
-    for step in placements.transpose(1, 0, 2, 3):
-        place = place @ step
-        points.append(place[:, :3, 3])
-    return np.concatenate(points)
-
-
-def _extent(cells: Cells) -> Array:
-    """Points (k, 3) m of the surface and the arm's base."""
-    if len(cells) == 0:
-        return np.zeros((1, 3))
-    return np.concatenate([np.zeros((1, 3)), cells.centres, cells.borders(1).reshape(-1, 3)])

@@ -121,7 +121,7 @@ class BodiesOfOwners:
 
 
 @lru_cache(maxsize=KEPT)
-def _ready(bodies: Bodies) -> BodiesOfOwners:
+def ready_bodies(bodies: Bodies) -> BodiesOfOwners:
     """The bodies of a problem, kept for the next motion among them."""
     return BodiesOfOwners(bodies)
 
@@ -153,7 +153,7 @@ def collision_replay(
         row = int(np.argmin(finite))
         fault = CollisionFault(row, 0.0, ("", ""), np.nan, "a joint value is not finite")
         return CollisionReplay(None, None, (fault,), 0)
-    ready = _ready(bodies)
+    ready = ready_bodies(bodies)
     if not len(rows) or not bodies.pairs:
         return CollisionReplay(None, None, (), 0)
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere

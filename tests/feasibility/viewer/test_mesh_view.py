@@ -226,7 +226,8 @@ def test_edges_run_from_target_to_target_at_the_standoff(verdict):
 def test_missed_cells_have_the_colour_of_their_cause(verdict):
     drawn = view(verdict)
     shown = objects(drawn.commands)
-    for kind, which in scene.missed_by_cause(verdict).items():
+    for group in scene.missed_groups(verdict.causes, np.flatnonzero(~verdict.covered)):
+        kind, which = group.kind, group.which
         words = "not covered" if kind is None else f"not covered: {kind.replace('_', ' ')}"
         data = shown[f"/cells/{words} ({len(which)})"]
         middles = points_of(data).astype(float)[faces_of(data)].mean(axis=1)
@@ -303,9 +304,9 @@ def test_the_flat_causes_show_every_cell_once(verdict):
     for part in collections(figure, PolyCollection):
         shown[to_rgb(part.get_facecolor()[0])] += [path.vertices for path in part.get_paths()]
     assert sum(map(len, shown.values())) == COUNT
-    for kind, which in scene.missed_by_cause(verdict).items():
-        colour = scene.MISSED if kind is None else scene.CAUSES[kind]
-        for drawn, k in zip(shown[to_rgb(colour)], which, strict=True):
+    for group in scene.missed_groups(verdict.causes, np.flatnonzero(~verdict.covered)):
+        colour = scene.MISSED if group.kind is None else scene.CAUSES[group.kind]
+        for drawn, k in zip(shown[to_rgb(colour)], group.which, strict=True):
             np.testing.assert_allclose(drawn[: len(outlines[k])], outlines[k])
 
 

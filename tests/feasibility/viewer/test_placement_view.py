@@ -44,8 +44,8 @@ from feasibility.viewer.poses import (
     class_of_share,
     outline,
 )
+from feasibility.viewer.stage import FRAMED
 from feasibility.viewer.threejs import hex_colour, pack
-from feasibility.viewer.viewer import FRAMED
 from robots import load_robot
 from surfaces import cylinder, mesh, plane, sphere, torus
 

@@ -1,0 +1,140 @@
+"""What can collide, as it is drawn: objects of the scene, the tool, the search's convex bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.collisions import TOOL, Bodies, HalfSpace, Obstacle
+from feasibility.viewer import threejs
+from feasibility.viewer.html_page import Entry
+from feasibility.viewer.meshes import CREASE, Mesh, as_mesh, moved, shaded, solid_mesh, thinned
+from feasibility.viewer.robot import joint_paths
+from feasibility.viewer.scene import Layer, hidden
+from feasibility.viewer.threejs import Colour, Command
+from robots import Robot
+from robots.shapes import Polytope, Triangles
+
+Array = NDArray[np.float64]
+
+HULLS = "/hulls"  # a tree of joints beside that of the arm
+SCENE: Colour = (0.66, 0.54, 0.40)
+EDGES: Colour = (0.36, 0.28, 0.20)
+TOOLS: Colour = (0.25, 0.25, 0.28)
+CONVEX: Colour = (0.10, 0.55, 0.55)
+SEEN_THROUGH, SHEER = 0.6, 0.3  # opacities of objects; of half spaces and convex bodies
+MOST_ENTRIES = 8  # objects of the scene with a line of the legend each
+TRIANGLES = 30_000  # of the whole scene; more are thinned
+WIDE = 1.1  # [1] of the reach: half the width of the square that stands for a half space
+
+
+def scene_layers(scene: Sequence[Obstacle], robot: Robot) -> list[Layer]:
+    """The objects of the scene, half transparent; each has a switch where they are not many."""
+    meshes = thinned([_mesh_of(one, robot) for one in scene], TRIANGLES)
+    parts = []
+    for number, (one, mesh) in enumerate(zip(scene, meshes, strict=True)):
+        if not len(mesh.faces):
+            continue
+        path = f"/scene/{number} {threejs.safe_name(one.name)}"
+        lines = threejs.segments(f"{path}/edges", _edges(mesh), EDGES)
+        drawn = (_command(f"{path}/body", mesh), lines)
+        parts.append(Layer(drawn, Entry(one.name, SCENE, path), 1))
+    if len(parts) <= MOST_ENTRIES:
+        return parts
+    every = tuple(command for part in parts for command in part.commands)
+    return [Layer(every, Entry(f"scene ({len(parts)} objects)", SCENE, "/scene"), len(parts))]
+
+
+def tool_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
+    """The shapes that are mounted on the flange."""
+    solids = [solid for solid in bodies.solids if solid.owner == TOOL]
+    if not solids:
+        return []
+    path = f"{joint_paths(robot)[solids[0].joint]}/mounted tool"
+    commands = tuple(
+        _command(f"{path}/{number}", moved(_shape(solid.geometry, TOOLS, 1.0), solid.placement))
+        for number, solid in enumerate(solids)
+    )
+    return [Layer(commands, Entry("mounted tool", TOOLS, path), len(solids))]
+
+
+def hull_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
+    """The convex bodies that the search takes for the links and the tool, off at first."""
+    scene = {one.name for one in bodies.scene}
+    paths = joint_paths(robot, HULLS)
+    commands = []
+    for number, body in enumerate(bodies.polytopes):
+        mesh = None if body.owner in scene else _hull(body)
+        if mesh is not None:
+            path = f"{paths[body.joint]}/body {number} of {threejs.safe_name(body.owner)}"
+            commands.append(_command(path, mesh))
+    if not commands:
+        return []
+    label = f"convex bodies of the search ({len(commands)})"
+    return [hidden(Layer(tuple(commands), Entry(label, CONVEX, HULLS), len(commands)))]
+
+
+def points_of(scene: Sequence[Obstacle], robot: Robot) -> Array:
+    """(k, 3) m of objects of the scene within reach of the arm's root."""
+    solid = [one for one in scene if not isinstance(one.geometry, HalfSpace)]
+    points = [_mesh_of(one, robot).vertices for one in solid]
+    every = np.concatenate([np.empty((0, 3)), *points])
+    return every[np.linalg.norm(every, axis=1) <= _reach(robot)]
+
+
+def _reach(robot: Robot) -> float:
+    """m, 1 for an arm on a rail without end."""
+    return robot.reach if np.isfinite(robot.reach) else 1.0
+
+
+def _mesh_of(one: Obstacle, robot: Robot) -> Mesh:
+    """An object in the root frame; of a half space, a square of its plane beneath the root."""
+    if not isinstance(one.geometry, HalfSpace):
+        return moved(_shape(one.geometry, SCENE, SEEN_THROUGH), one.placement)
+    x, y, _ = np.linalg.inv(one.placement)[:3, 3]
+    wide = WIDE * _reach(robot)
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * wide + [x, y, 0.0]
+    square = Mesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), SCENE, SHEER)
+    return moved(square, one.placement)
+
+
+def _shape(geometry: Any, colour: Colour, opacity: float) -> Mesh:
+    """A shape in its own frame."""
+    if isinstance(geometry, Triangles):
+        return Mesh(geometry.vertices, geometry.faces, colour, opacity)
+    return solid_mesh(geometry, colour, opacity)
+
+
+def _hull(body: Polytope) -> Mesh | None:
+    """A convex body in its joint's frame; None where it is too thin to be drawn."""
+    import trimesh
+
+    points = body.vertices
+    if body.radius > 0.0:
+        ball = trimesh.creation.icosphere(subdivisions=2, radius=body.radius)
+        points = (points[:, None] + ball.vertices).reshape(-1, 3)
+    try:
+        return as_mesh(trimesh.convex.convex_hull(points), CONVEX, SHEER)
+    except (ValueError, trimesh.convex.QhullError):
+        return None
+
+
+def _command(path: str, mesh: Mesh) -> Command:
+    """The command that draws a mesh with its creases."""
+    split, normals = shaded(mesh)
+    return threejs.mesh(
+        path, split.vertices, split.faces, mesh.colour, normals=normals, opacity=mesh.opacity
+    )
+
+
+def _edges(mesh: Mesh) -> Array:
+    """(2 k, 3) m, ends of the edges that a mesh is folded at, and of its border."""
+    import trimesh
+
+    body = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    folded = body.face_adjacency_edges[body.face_adjacency_angles > CREASE]
+    alone = trimesh.grouping.group_rows(body.edges_sorted, require_count=1)
+    return mesh.vertices[np.concatenate([folded, body.edges_sorted[alone]]).reshape(-1)]
