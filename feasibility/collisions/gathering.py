@@ -2,18 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from functools import lru_cache
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
 from coverable_errors import ArgumentError
 from feasibility.collisions.bodies import Bodies, LeftOut, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
-from feasibility.collisions.settings import Collision
+from feasibility.collisions.scene import ToolShape
+from feasibility.collisions.settings import Collision, Fineness
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
-from robots.shapes import LinkPairs, Polytope, Reach, link_pairs, link_shapes, tool_reach
+from robots.shapes import (
+    LinkPairs,
+    LinkShapes,
+    Polytope,
+    Reach,
+    link_pairs,
+    link_shapes,
+    tool_reach,
+)
 from surfaces import Surface, sheet_of
 
 KEPT = 16  # problems whose bodies are remembered: `explain` and `place` come back to them
@@ -47,8 +57,9 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
     faults = collision.unknown_names(robot.link_names)
     if faults:
         raise ArgumentError([fault.renamed({}, "collision") for fault in faults])
-    shapes = link_shapes(robot, collision.shapes)
-    tool = tool_polytopes(collision.tool, robot)
+    names = tuple(one.name for one in collision.scene)
+    arm = _arm(robot, collision.shapes, collision.tool, collision.allow, collision.srdf, names)
+    shapes, tool = arm.shapes, arm.tool
     solids = (*shapes.solids, *tool_solids(collision.tool, robot))
     polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
     reach = _reach(robot, polytopes)
@@ -61,9 +72,7 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False))
     found = _Pairs(collision, {solid.owner: solid.joint for solid in solids}, robot.n)
     if collision.self_:
-        others = [SURFACE, TOOL, *(one.name for one in collision.scene)]
-        links = link_pairs(robot, shapes, collision.allow, collision.srdf, tool, others)
-        found.add_links(links)
+        found.add_links(arm.pairs())
     found.add_objects(touching=not standoff > 0.0)
     return Bodies(
         solids=solids,
@@ -79,9 +88,43 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
             *found.notes,
             *(note for one in collision.scene for note in one.notes),
             *collision.notes_on(standoff),
-            *_beyond(tool_reach(robot, shapes, tool), found.asked, standoff),
+            *_beyond(arm.reaches, found.asked, standoff),
         ),
     )
+
+
+class _Arm(NamedTuple):
+    """Bodies of links and tool, and the pairs of links."""
+
+    shapes: LinkShapes
+    tool: tuple[Polytope, ...]
+    reaches: tuple[Reach, ...]
+    pairs: Callable[[], LinkPairs]
+    """Sorts them when it is first called."""
+
+
+@lru_cache(maxsize=KEPT)
+def _arm(
+    robot: Robot,
+    fineness: Fineness,
+    tool: tuple[ToolShape, ...],
+    allow: tuple[tuple[str, str], ...],
+    srdf: str | None,
+    scene: tuple[str, ...],
+) -> _Arm:
+    """What surface, places and clearances leave as it is: it takes most of the time of `gather`.
+
+    Args:
+        robot, fineness, tool, allow, srdf: see `Collision`.
+        scene: names of its objects.
+    """
+    shapes, bodies = link_shapes(robot, fineness), tool_polytopes(tool, robot)
+
+    @cache
+    def pairs() -> LinkPairs:
+        return link_pairs(robot, shapes, allow, srdf, bodies, [*scene, SURFACE, TOOL])
+
+    return _Arm(shapes, tuple(bodies), tuple(tool_reach(robot, shapes, bodies)), pairs)
 
 
 def _beyond(reaches: Iterable[Reach], pairs: Iterable[Pair], standoff: float) -> list[str]:

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock, OutOfTime
+from feasibility.collisions import Pair
 from feasibility.division.division import Division, Plan
 from feasibility.division.plans import collect_components, plans
 from feasibility.division.proved_bound import ProvedBound, prove_apart
 from feasibility.notices import compiling_notice
+from feasibility.problem import Problem
 from feasibility.roadmap import (
     Exploration,
     Ruling,
@@ -133,7 +135,7 @@ def _shared(
                 fewest, connected = plans(exploration, task, clock.left)
                 missing = np.flatnonzero(fewest.patch_of(total) < 0)
                 shared = shared._replace(fewest=fewest, connected=connected, missing=missing)
-            return shared._replace(causes=_causes(exploration, shared.missing, ended))
+            return shared._replace(causes=_causes(exploration, task, shared.missing, ended))
     except OutOfTime:
         return shared._replace(late=True)
 
@@ -179,16 +181,23 @@ def _searched(
     return exploration, apart, ended
 
 
-def _causes(exploration: Exploration, missing: NDArray[np.int64], ended: bool) -> tuple[Cause, ...]:
+def _causes(
+    exploration: Exploration, task: Task, missing: NDArray[np.int64], ended: bool
+) -> tuple[Cause, ...]:
     """Why cells are in no patch; of a search that did not end, only what is proved."""
     if not ended:
         proved = [c for c in missing.tolist() if exploration.rulings.get(c) is Ruling.PROVED]
         return tuple(diagnose(exploration, cell) for cell in proved[:MOST_EXPLAINED])
-    known = {cause.cell: cause for cause in causes_of(exploration)}
-    return tuple(
-        known.get(c) or (disconnected if exploration.reached[c] else diagnose)(exploration, c)
-        for c in missing.tolist()
-    )
+    pairs = Problem.of(exploration.robot, exploration.cells, task).pairs
+    known = {cause.cell: cause for cause in causes_of(exploration, None, pairs)}
+    return tuple(known.get(c) or _cause(exploration, c, pairs) for c in missing.tolist())
+
+
+def _cause(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> Cause:
+    """Why a cell that the best motion covers is in no patch all the same."""
+    if exploration.reached[cell]:
+        return disconnected(exploration, cell, None, pairs)
+    return diagnose(exploration, cell)
 
 
 def _no_motion(arrays: SearchArrays) -> bool:

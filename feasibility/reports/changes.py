@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +33,9 @@ def key(quantity: Quantity) -> str:
         Kind.CONE: "task.cone_deg",
         Kind.STANDOFF: "task.standoff",
         Kind.SHIFT: "surface.position",
+        Kind.CLEARANCE: "collision.clearance",
+        Kind.TOOL_CLEARANCE: "collision.tool_clearance",
+        Kind.WITHOUT: "collision.scene" if quantity.obstacle else "collision",
     }[quantity.kind]
 
 
@@ -48,6 +52,8 @@ def label(quantity: Quantity) -> str:
         return f"{key(quantity)} ({quantity.name.removeprefix('shift along ')})"
     if quantity.kind is Kind.STANDOFF:
         return f"{key(quantity)} ({quantity.name.removesuffix(' standoff')})"
+    if quantity.kind is Kind.WITHOUT:
+        return f"{key(quantity)} {quantity.name}" if quantity.obstacle else quantity.name
     return key(quantity)
 
 
@@ -57,6 +63,8 @@ def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str
     A feasible limit or cone is rounded to where it allows more, one that is not to where it allows
     less, so that what was found holds for the printed number too.
     """
+    if quantity.kind is Kind.WITHOUT:
+        return "left out" if value else "there"
     return f"{number(quantity, value, feasible)} {'deg' if quantity.unit == 'rad' else 'm'}"
 
 
@@ -65,7 +73,7 @@ def number(quantity: Quantity, value: float, feasible: bool | None = None) -> st
     value, digits = (math.degrees(value), 2) if quantity.unit == "rad" else (value, 5)
     if feasible is None or not quantity.monotone:
         return f"{round(value, digits):.10g}"
-    up = feasible != (quantity.kind is Kind.LOWER)
+    up = feasible != (quantity.kind in (Kind.LOWER, Kind.CLEARANCE, Kind.TOOL_CLEARANCE))
     last = round(value * 10.0**digits, 4)  # what conversions leave behind is no reason to round
     return f"{(math.ceil(last) if up else math.floor(last)) / 10.0**digits:.10g}"
 
@@ -74,6 +82,8 @@ def worded(change: Change) -> str:
     """One change: the key, its new value, and the one of now."""
     quantity = change.quantity
     value = shown(quantity, change.value, True)
+    if quantity.kind is Kind.WITHOUT:
+        return label(quantity)
     if quantity.kind is Kind.SHIFT:
         return f"{label(quantity)} by {value}"
     return f"{label(quantity)} {value} ({shown(quantity, quantity.given)} now)"
@@ -97,6 +107,8 @@ def settings(changes: Sequence[Change], verdict: Verdict, case: Case | None = No
             ends[joint(quantity)] = (value, high) if quantity.kind is Kind.LOWER else (low, value)
         elif quantity.kind is Kind.SHIFT:
             position = position + change.value * np.array(quantity.axis)
+        elif quantity.kind is Kind.WITHOUT:
+            found += _scene_without(quantity.obstacle, case)
         else:
             found.append(f"{key(quantity)}={value}")
     limits = [change.quantity for change in changes if change.quantity.kind in LIMITS]
@@ -106,6 +118,21 @@ def settings(changes: Sequence[Change], verdict: Verdict, case: Case | None = No
         pairs = {key(q): ends[joint(q)] for q in limits}
         return found + [f"{name}=[{low}, {high}]" for name, (low, high) in pairs.items()]
     return found + (_every_limit(verdict.robot, ends) if limits else [])
+
+
+def _scene_without(name: str, case: Case | None) -> list[str]:
+    """The scene of a case without one object; nothing where the case is not known."""
+    if case is None or case.collision is None or not name:
+        return []
+    tables = [one.table() for one in case.collision.scene]
+    rows = [_inline(table) for table in tables if table["name"] != name]
+    return [f"collision.scene=[{', '.join(rows)}]"]
+
+
+def _inline(table: Mapping[str, Any]) -> str:
+    """A table of plain values as TOML in one line; JSON writes these values alike."""
+    pairs = (f"{toml_key(k)} = {json.dumps(value)}" for k, value in table.items())
+    return f"{{ {', '.join(pairs)} }}"
 
 
 def _by_name(case: Case) -> bool:

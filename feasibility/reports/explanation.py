@@ -17,6 +17,7 @@ from feasibility.reports.explanation_words import (
     helpful,
     helpless,
     idle_limits,
+    in_the_way,
     joint_rows,
     row_of,
     sentence,
@@ -111,7 +112,8 @@ def _remarks(explanation: Explanation) -> list[str]:
     opens = [(row_of(t).change, what_it_opens(t, verdict)) for t in helps]
     texts = [f"{change}: {said}." for change, said in opens if said]
     texts.append(idle_limits(explanation))
-    if not helps and explanation.thresholds:
+    texts += in_the_way(explanation)
+    if not helps and not best_changes(explanation) and explanation.thresholds:
         texts.append("No single change that was tried was found to make it feasible.")
     if explanation.pair is not None:
         texts.append(_pair(explanation))
@@ -298,6 +300,8 @@ def _finding(quantity: Quantity, finding: Finding | None) -> dict[str, Any] | No
 
 def _number(quantity: Quantity, name: str, value: float) -> dict[str, float]:
     """A number under a key with its unit, without the rounding errors of conversions."""
+    if not quantity.unit:
+        return {}
     if quantity.unit == "rad":
         return {f"{name}_deg": round(math.degrees(value), 6)}
     return {f"{name}_m": round(value, 9)}

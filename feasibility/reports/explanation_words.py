@@ -37,7 +37,7 @@ def helpful(explanation: Explanation) -> list[Threshold]:
 
     Of a feasible case those with the least to spare; of another those that ask for the least.
     """
-    found = [t for t in explanation.thresholds if t.feasible is not None]
+    found = [t for t in explanation.thresholds if t.feasible is not None and t.quantity.unit]
     return sorted((t for t in found if matters(t, explanation.verdict)), key=effort)
 
 
@@ -64,6 +64,9 @@ def best_changes(explanation: Explanation) -> tuple[Change, ...]:
         return ()
     for threshold in helpful(explanation):
         if threshold.feasible is not None:
+            return (Change(threshold.quantity, threshold.feasible.value),)
+    for threshold in explanation.thresholds:
+        if threshold.quantity.obstacle and threshold.feasible is not None:
             return (Change(threshold.quantity, threshold.feasible.value),)
     return () if explanation.pair is None else explanation.pair.changes
 
@@ -125,9 +128,25 @@ def idle_limits(explanation: Explanation) -> str:
     return f"Limits that do not matter: {', '.join(names)}." if names else ""
 
 
+def in_the_way(explanation: Explanation) -> list[str]:
+    """Which objects are in the way of a case that is not feasible: a line for each tried."""
+    lines = []
+    for threshold in explanation.thresholds:
+        quantity, found = threshold.quantity, threshold.feasible
+        if quantity.kind is not Kind.WITHOUT or threshold.tried:
+            continue
+        name = f"{quantity.name[0].upper()}{quantity.name[1:]}"
+        if found is not None:
+            mark = f" {SEEDED}" if found.unaided is False else ""
+            lines.append(f"{name}: feasible, {found.detail}{mark}.")
+        elif threshold.other is not None:
+            lines.append(f"{name}: {_against(quantity, threshold.other)}.")
+    return lines
+
+
 def helpless(explanation: Explanation) -> list[str]:
     """What was found not to help: a line for what is proved, for values proved, for the rest."""
-    others = [t for t in explanation.thresholds if t.feasible is None]
+    others = [t for t in explanation.thresholds if t.feasible is None and t.quantity.unit]
     rest = [t for t in others if not t.ruled_out]
     groups = {
         "Proved not to help alone": [t for t in others if t.ruled_out],
@@ -145,7 +164,7 @@ def _in_short(verdict: Verdict, group: Sequence[Threshold]) -> Iterator[str]:
     """Quantities with the furthest value that was tried, those of one kind together."""
     for threshold in group:
         quantity = threshold.quantity
-        if quantity.kind in (Kind.CONE, Kind.STANDOFF):
+        if quantity.kind not in (*LIMITS, Kind.SHIFT):
             yield f"{label(quantity)} to {shown(quantity, quantity.end)}"
     limits = [t.quantity for t in group if t.quantity.kind in LIMITS]
     if limits:
@@ -236,13 +255,15 @@ def _margin(quantity: Quantity, value: str, now: str) -> str:
     if quantity.kind is Kind.SHIFT:
         return f"{label(quantity)} can move by {value}"
     change = "tighten"
-    if quantity.kind is Kind.STANDOFF:
+    if quantity.kind not in (*LIMITS, Kind.CONE):
         change = "grow" if quantity.end > quantity.given else "shrink"
     return f"{label(quantity)} can {change} to {value} ({now} now)"
 
 
 def _remedy(quantity: Quantity, value: str, now: str) -> str:
     """What would make a case feasible."""
+    if quantity.kind is Kind.WITHOUT:
+        return f"feasible {quantity.name}"
     if quantity.kind is Kind.SHIFT:
         return f"feasible with {label(quantity)} moved by {value}"
     start = "feasible from" if quantity.kind is Kind.CONE else "feasible with"
@@ -253,6 +274,8 @@ def _helpless(threshold: Threshold) -> str:
     """No value was found to help."""
     quantity, other = threshold.quantity, threshold.other
     text = f"{label(quantity)} to {shown(quantity, quantity.end)} does not help alone"
+    if quantity.kind is Kind.WITHOUT:
+        text = f"{quantity.name} it is not feasible either"
     if threshold.tried:
         text += f" ({threshold.tried})"
     if other is not None:
@@ -266,4 +289,6 @@ def _against(quantity: Quantity, other: Finding) -> str:
         other.evidence is not Evidence.PROOF or other.cell is None
     ):
         return f"{other.answer} at the given {shown(quantity, other.value)}"
+    if quantity.kind is Kind.WITHOUT:
+        return other.detail
     return f"at {shown(quantity, other.value, False)} {other.detail}"

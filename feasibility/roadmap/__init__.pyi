@@ -12,6 +12,7 @@ from .arrays import work_for as work_for
 from .branch_and_bound import Ruling as Ruling
 from .branch_and_bound import root_box as root_box
 from .branch_and_bound import rule as rule
+from .clear_landings import moved_clear as moved_clear
 from .complete import complete_search as complete_search
 from .expansion import CONNECT_STEPS as CONNECT_STEPS
 from .exploration import Exploration as Exploration

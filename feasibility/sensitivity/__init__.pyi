@@ -1,11 +1,11 @@
 from .explanation import explain as explain
-from .thresholds import LEAST_CONE_DEG as LEAST_CONE_DEG
+from .quantities import LEAST_CONE_DEG as LEAST_CONE_DEG
+from .quantities import Kind as Kind
+from .quantities import Quantity as Quantity
 from .thresholds import Change as Change
 from .thresholds import Dropped as Dropped
 from .thresholds import Explanation as Explanation
 from .thresholds import Finding as Finding
-from .thresholds import Kind as Kind
 from .thresholds import Pair as Pair
-from .thresholds import Quantity as Quantity
 from .thresholds import Threshold as Threshold
 from .warm_start import last_true as last_true

@@ -19,16 +19,9 @@ from feasibility.search import Progress, Search
 from feasibility.sensitivity.limited_search import Attempt
 from feasibility.sensitivity.pairs import PairSearch
 from feasibility.sensitivity.probes import Prober
+from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
 from feasibility.sensitivity.threshold_search import BEYOND, ThresholdSearch
-from feasibility.sensitivity.thresholds import (
-    Dropped,
-    Explanation,
-    Finding,
-    Quantity,
-    Threshold,
-    Variant,
-    quantities,
-)
+from feasibility.sensitivity.thresholds import Dropped, Explanation, Finding, Threshold
 from feasibility.task import Task
 from feasibility.verdict import Evidence, Verdict, Walk
 from robots import Robot
@@ -47,6 +40,7 @@ SAME = 0.05  # [1], postures nearer than that are taken for one, see `_posture`
 NEAREST = 4  # changed cases whose motions are tried on the case as given
 VERDICT_SHARE = 0.5  # of the time limit, at most, for the verdict of the case as given
 
+NOT_EVEN = "not even without any collisions"
 AS_GIVEN = "checking the case as given"
 
 
@@ -61,7 +55,8 @@ def explain(
     """Find what would make a case feasible, or by how much a feasible one may be tightened.
 
     One quantity is varied at a time: the cone, each limit of each joint, the standoff, the
-    surface's place along six directions. On both sides of a threshold the verdict is given;
+    surface's place along six directions; where collisions are checked, also the clearances, and one
+    object of the scene is left out at a time. On both sides of a threshold the verdict is given;
     "feasible" is said only of a motion that the replay accepts.
 
     Args:
@@ -144,7 +139,8 @@ def _explained(
         done = [_alone(made, found, most) for made, found in zip(searches, done, strict=True)]
     left_out = tuple(quantity.name for quantity in varied[len(done) :])
     pair, spent = None, prober.spent
-    if not verdict.feasible and motion is None and all(t.feasible is None for t in done):
+    helped = any(t.feasible for t in done if t.quantity.kind is not Kind.WITHOUT)
+    if not verdict.feasible and motion is None and not helped:
         cost = cost_of(verdict)
         most = max(PAIRS * cost, LEAST)
         pairs = PairSearch(variant, verdict, q, cost, most, clock, tick)
@@ -212,6 +208,7 @@ def _thresholds(
     """The thresholds one by one, each with a fair share of what is left; until the deadline."""
     cost = cost_of(verdict)
     total = max(SHARE * cost, LEAST)
+    bare: Threshold | None = None  # the case without collisions
     for index, quantity in enumerate(varied):
         if prober.clock.out_of_time:
             return
@@ -220,9 +217,15 @@ def _thresholds(
         made = ThresholdSearch(prober, quantity, cost, prober.spent + fair, motions)
         if verdict.feasible:
             yield made, made.tighten()
-        else:
-            here = Finding(quantity.given, verdict.answer, verdict.evidence, verdict.message)
-            yield made, made.widen(here, q)
+            continue
+        if quantity.obstacle and bare is not None and bare.feasible is None:
+            yield made, replace(bare, quantity=quantity, tried=NOT_EVEN)
+            continue
+        here = Finding(quantity.given, verdict.answer, verdict.evidence, verdict.message)
+        found = made.widen(here, q)
+        if quantity.kind is Kind.WITHOUT and not quantity.obstacle:
+            bare = found
+        yield made, found
 
 
 def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[Attempt]:

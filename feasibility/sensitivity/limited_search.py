@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 
 from feasibility.clock import OutOfTime
 from feasibility.compiled import kernel
-from feasibility.roadmap import NODES, Exploration, SearchArrays, project_onto_cell
+from feasibility.roadmap import (
+    NODES,
+    Exploration,
+    SearchArrays,
+    Work,
+    moved_clear,
+    project_onto_cell,
+)
 from feasibility.verdict import Answer, Evidence, Walk
 
 LEAST = 100  # evaluations between two checks of the limit
@@ -93,13 +100,28 @@ def certifiable(arrays: SearchArrays) -> bool:
     return smooth and known and arrays.cone_chord > 0.0
 
 
-@kernel
-def project_all(arrays, work, order, q):  # type: ignore[no-untyped-def]
+def project_all(
+    arrays: SearchArrays, work: Work, order: NDArray[np.int64], q: NDArray[np.float64]
+) -> int:
     """Project row q[k] (n,) onto the self-motion manifold over cell k, for the cells of `order`.
+
+    Where collisions are checked, it is moved clear of them too.
 
     Returns:
         How many cells of `order` succeeded before the first failure; q (N, n) is changed in place.
     """
+    if not len(arrays.collisions):
+        return int(_project_all(arrays, work, order, q))
+    for k, cell in enumerate(order.tolist()):
+        projected = _project_all(arrays, work, order[k : k + 1], q) == 1
+        if not projected or not moved_clear(arrays, work, cell, q[cell]):
+            return k
+    return len(order)
+
+
+@kernel
+def _project_all(arrays, work, order, q):  # type: ignore[no-untyped-def]
+    """See `project_all`; collisions are not looked at."""
     for k in range(order.shape[0]):
         row = q[order[k]]
         for j in range(row.shape[0]):

@@ -1,9 +1,9 @@
 """Two changes that make a case feasible together, where no single one does.
 
-Limits and cone only ever help. So they are all opened at once; if that is feasible, they are put
-back one after another as long as it stays feasible, and what cannot be put back is needed. A shift
-of the surface, which may do harm too, is tried in a few sizes, alone with the others opened, and
-with a second shift.
+Wider limits, a wider cone and smaller clearances only ever help. So they are all opened at once; if
+that is feasible, they are put back one after another as long as it stays feasible, and what cannot
+be put back is needed. A shift of the surface, which may do harm too, is tried in a few sizes, alone
+with the others opened, and with a second shift.
 """
 
 from __future__ import annotations
@@ -19,21 +19,16 @@ from feasibility.clock import Clock
 from feasibility.roadmap import Ruling
 from feasibility.sensitivity.limited_search import Attempt
 from feasibility.sensitivity.probes import Prober
+from feasibility.sensitivity.quantities import Kind, Quantity, Variant
 from feasibility.sensitivity.threshold_search import HINT_BOXES, ThresholdSearch
-from feasibility.sensitivity.thresholds import (
-    Change,
-    Finding,
-    Kind,
-    Pair,
-    Quantity,
-    Variant,
-)
+from feasibility.sensitivity.thresholds import Change, Finding, Pair
 from feasibility.verdict import Verdict
 
 Floats = NDArray[np.float64]
 Step = tuple[Quantity, int]
 SHIFTS = (0.2, 0.5, 1.0)  # [1] of the largest shift: sizes that are tried
 NARROWING = 3  # verdicts' worth of evaluations for each side of a pair
+LAST_PUT_BACK = (Kind.CONE, Kind.CLEARANCE, Kind.TOOL_CLEARANCE)
 RULED = 3  # cells that are asked for a proof before a search
 
 
@@ -65,7 +60,7 @@ class PairSearch:
         shifts = [q for q in varied if q.kind is Kind.SHIFT]
         # The cone is put back last: of two pairs the one with it needs fewer new joint limits.
         helpers = [q for q in varied if q.kind in (Kind.LOWER, Kind.UPPER)]
-        helpers += [q for q in varied if q.kind is Kind.CONE]
+        helpers += [q for q in varied if q.kind in LAST_PUT_BACK]
         opened = [(quantity, quantity.last) for quantity in helpers]
         if self._feasible(opened) is not None:
             yield self._needed(opened, ())

@@ -20,6 +20,7 @@ from feasibility.roadmap import (
     Ruling,
     SearchArrays,
     arrays_of,
+    collisions_of,
     covering_walk,
     evenly,
     explore,
@@ -37,7 +38,7 @@ from feasibility.sensitivity.limited_search import (
     configurations,
     project_all,
 )
-from feasibility.sensitivity.thresholds import Kind, Quantity, Variant
+from feasibility.sensitivity.quantities import OF_COLLISIONS, Kind, Quantity, Variant
 from feasibility.verdict import Answer, Evidence
 
 Floats = NDArray[np.float64]
@@ -86,8 +87,7 @@ class Prober:
 
     def arrays_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The arrays with a quantity k steps from the value given, without making it anew."""
-        shifted = quantity.kind is Kind.SHIFT and self.given.task.collision is not None
-        if quantity.kind in (Kind.CONE, Kind.STANDOFF) or shifted:
+        if quantity.kind in (Kind.CONE, Kind.STANDOFF) or self._moves_bodies(quantity):
             return self._made_anew(quantity, k)
         arrays = self.centres_at(quantity, k)
         if quantity.kind is Kind.SHIFT:
@@ -98,10 +98,22 @@ class Prober:
             return arrays._replace(targets=targets)
         return arrays
 
+    def _moves_bodies(self, quantity: Quantity) -> bool:
+        """Does a quantity change what the arm has to stay clear of?"""
+        shifted = quantity.kind is Kind.SHIFT and self.given.task.collision is not None
+        return shifted or quantity.kind in OF_COLLISIONS
+
     def _made_anew(self, quantity: Quantity, k: int) -> SearchArrays:
         """All arrays with a quantity k steps from the value given; the latest are kept."""
         if self._latest[0] != (quantity.name, k):
-            self._latest = (quantity.name, k), arrays_of(*quantity.applied(self.given, k))
+            variant = quantity.applied(self.given, k)
+            if quantity.kind in OF_COLLISIONS:  # nothing else changes
+                robot, cells, task = variant
+                other = collisions_of(robot, cells.surface, task)
+                arrays = self.arrays._replace(collisions=other)
+            else:
+                arrays = arrays_of(*variant)
+            self._latest = (quantity.name, k), arrays
         return self._latest[1]
 
     def centres_at(self, quantity: Quantity, k: int) -> SearchArrays:
@@ -117,7 +129,7 @@ class Prober:
         if quantity.kind is Kind.STANDOFF:
             grown = (value - quantity.given) * self.outwards
             return self.arrays._replace(points=self.arrays.points + grown)
-        if quantity.kind is Kind.SHIFT and self.given.task.collision is not None:
+        if self._moves_bodies(quantity):
             return self._made_anew(quantity, k)
         if quantity.kind is Kind.SHIFT:
             shift = value * np.array(quantity.axis)

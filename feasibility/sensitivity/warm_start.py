@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from feasibility.sensitivity.limited_search import NO_CELL, project_all
 from feasibility.sensitivity.probes import Prober
-from feasibility.sensitivity.thresholds import Quantity
+from feasibility.sensitivity.quantities import Quantity
 
 SAMPLE = 12  # cells that are projected on the way
 MOST = 40  # cells that are projected in the end; the search that follows projects all

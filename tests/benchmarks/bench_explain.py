@@ -11,7 +11,7 @@ from paper_cases import PAPER_CASES
 
 from feasibility import Evidence, Task, check
 from feasibility.sensitivity import explain
-from feasibility.sensitivity.thresholds import Variant
+from feasibility.sensitivity.quantities import Variant
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
 from surfaces.meshes import TriangleMesh, mesh

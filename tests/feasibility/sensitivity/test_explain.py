@@ -20,7 +20,7 @@ from feasibility.reports.explanation_words import helpful
 from feasibility.sensitivity import Explanation, Kind, Quantity, Threshold, explain
 from feasibility.sensitivity import explanation as explanations
 from feasibility.sensitivity.probes import Prober
-from feasibility.sensitivity.thresholds import Variant, quantities
+from feasibility.sensitivity.quantities import Variant, quantities
 from robots import load_robot
 from surfaces import cylinder, plane, sphere
 

@@ -12,7 +12,7 @@ from feasibility.cases import Case, load_case
 from feasibility.certification import replay
 from feasibility.reports.explanation import as_text
 from feasibility.sensitivity import Explanation, Kind, explain
-from feasibility.sensitivity.thresholds import Variant, quantities
+from feasibility.sensitivity.quantities import Variant, quantities
 from feasibility.verdict import Walk
 from robots import load_robot
 from surfaces import plane

@@ -19,8 +19,8 @@ from feasibility.sensitivity import Kind, Quantity, last_true
 from feasibility.sensitivity.explanation import apart, other_motions
 from feasibility.sensitivity.limited_search import NO_CELL, project_all
 from feasibility.sensitivity.probes import LEAST_BOXES, Prober
+from feasibility.sensitivity.quantities import Variant, quantities, shifted
 from feasibility.sensitivity.threshold_search import ThresholdSearch
-from feasibility.sensitivity.thresholds import Variant, quantities, shifted
 from feasibility.sensitivity.warm_start import WarmStart
 from feasibility.verdict import Answer, Evidence, Walk
 from robots import load_robot

@@ -1,0 +1,234 @@
+"""Quantities of a case that are varied one at a time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from typing import NamedTuple
+
+import numpy as np
+
+from feasibility.collisions import Collision
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
+
+ANGLE_STEP_DEG = 0.1  # resolution of cone and revolute joints
+LENGTH_STEP = 1e-3  # [m], resolution of standoff, shifts and prismatic joints
+LEAST_CONE_DEG = 3.0  # cap on tightening the cone: narrower ones take many times the waypoints
+FURTHEST = 0.5  # [m], cap on shifts, on the standoff's growth and on the widening of a slide
+MOST_CLEARANCE = 0.1  # [m], cap on clearances of a feasible case
+MOST_OBJECTS = 12  # objects of the scene that are left out, one at a time
+TURN_DEG = 360.0  # cap on the widening of a revolute joint: more places the arm in no other way
+
+
+class Kind(StrEnum):
+    """What is varied."""
+
+    CONE = "cone"
+    LOWER = "lower_limit"
+    UPPER = "upper_limit"
+    STANDOFF = "standoff"
+    SHIFT = "shift"
+    CLEARANCE = "clearance"
+    TOOL_CLEARANCE = "tool_clearance"
+    WITHOUT = "without"
+    """One object of the scene, or collisions altogether, as if not there."""
+
+
+OF_COLLISIONS = (Kind.CLEARANCE, Kind.TOOL_CLEARANCE, Kind.WITHOUT)
+
+
+class Variant(NamedTuple):
+    """A case, as given or with one quantity varied."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One number of a case, and the values that it may take: from the one given to a cap."""
+
+    kind: Kind
+    name: str
+    """Such as 'cone', 'joint1 upper limit', 'shift along +x', 'without shelf'."""
+    unit: str
+    """'rad' or 'm', of all values; empty for what is there (0) or not (1)."""
+    given: float
+    """The value of the case as given; 0 for a shift."""
+    end: float
+    """The furthest value that is tried."""
+    step: float
+    """> 0, distance of neighbouring values; degrees for angles, m for lengths."""
+    monotone: bool
+    """Is there one threshold at most? True where every value allows all that the ones before it
+    allow, or the other way round."""
+    joint: int = -1
+    """The joint whose limit it is; -1 for other kinds."""
+    axis: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Unit vector of a shift, in the root frame."""
+    obstacle: str = ""
+    """What is left out: the name of an object, or nothing for all collisions."""
+
+    @property
+    def last(self) -> int:
+        """Number of steps from the value given to the end; the last one may be shorter."""
+        length = abs(self.end - self.given)
+        length = math.degrees(length) if self.unit == "rad" else length
+        return math.ceil(round(length / self.step, 6))
+
+    def value(self, k: int) -> float:
+        """The value (rad or m) after k steps, 0 <= k <= last."""
+        if k >= self.last:
+            return self.end
+        sign = 1.0 if self.end >= self.given else -1.0
+        if self.unit == "m":
+            return round(self.given + sign * k * self.step, 9)
+        return math.radians(round(math.degrees(self.given) + sign * k * self.step, 9))
+
+    def applied(self, variant: Variant, k: int) -> Variant:
+        """The case with this quantity k steps from the value given."""
+        if k == 0:
+            return variant
+        robot, cells, task = variant
+        value = self.value(k)
+        if self.kind is Kind.CONE:
+            return Variant(robot, cells, replace(task, cone_deg=round(math.degrees(value), 9)))
+        if self.kind is Kind.STANDOFF:
+            return Variant(robot, cells, replace(task, standoff=value))
+        if self.kind is Kind.SHIFT:
+            return Variant(robot, shifted(cells, value * np.array(self.axis)), task)
+        if self.kind in OF_COLLISIONS:
+            return Variant(robot, cells, replace(task, collision=self._avoided(task, value)))
+        limits = [float(robot.lower[self.joint]), float(robot.upper[self.joint])]
+        limits[self.kind is Kind.UPPER] = value
+        return Variant(robot.with_limits({robot.joint_names[self.joint]: limits}), cells, task)
+
+    def _avoided(self, task: Task, value: float) -> Collision | None:
+        """What the arm stays clear of with this quantity at a value."""
+        asked = task.collision
+        if asked is None or (self.kind is Kind.WITHOUT and not self.obstacle):
+            return None
+        if self.kind is Kind.CLEARANCE:
+            return replace(asked, clearance=value)
+        if self.kind is Kind.TOOL_CLEARANCE:
+            return replace(asked, tool_clearance=value)
+        return without(asked, self.obstacle)
+
+
+def without(asked: Collision, name: str) -> Collision:
+    """The same without one object of the scene, and without what is said of it."""
+    return replace(
+        asked,
+        scene=tuple(one for one in asked.scene if one.name != name),
+        allow=tuple(pair for pair in asked.allow if name not in pair),
+        clearances=tuple(row for row in asked.clearances if name not in row[:2]),
+    )
+
+
+def shifted(cells: Cells, translation: np.ndarray) -> Cells:
+    """The same cells on the surface moved by a translation (3,) m of the root frame."""
+    surface = cells.surface.moved(np.eye(3), translation)
+    moved = replace(cells, surface=surface, centres=cells.centres + translation)
+    # What is derived from the cells is moved too: deriving the curves again takes longer than a
+    # search along them.
+    cubics = cells.curves.cubics.copy()
+    cubics[:, 0, :3] += translation  # the constant coefficients of the closest points
+    vars(moved)["curves"] = replace(cells.curves, cubics=cubics)
+    vars(moved)["neighbours"] = cells.neighbours
+    return moved
+
+
+def quantities(variant: Variant, widen: bool) -> tuple[Quantity, ...]:
+    """What can be varied in a case.
+
+    Args:
+        variant: the case.
+        widen: towards more freedom (for a case that is not feasible), or towards less. Standoff
+            and shifts go both ways in any case.
+
+    Returns:
+        The cone; each finite limit of each joint; standoff; shifts along six directions. Where
+        collisions are checked: the cone; clearances, and what is left out of the scene; standoff;
+        shifts; limits. What cannot be varied (a cone of 180 degrees that is to be widened) is left
+        out.
+    """
+    task = variant.task
+    end = math.radians(180.0 if widen else min(task.cone_deg, LEAST_CONE_DEG))
+    found = [Quantity(Kind.CONE, "cone", "rad", task.cone, end, ANGLE_STEP_DEG, True)]
+    limits = [
+        _limit(variant.robot, joint, kind, widen)
+        for joint in range(variant.robot.n)
+        for kind in (Kind.LOWER, Kind.UPPER)
+    ]
+    of_collisions = _of_collisions(task, widen)
+    found += of_collisions or limits
+    for name, end in (("smaller standoff", 0.0), ("larger standoff", task.standoff + FURTHEST)):
+        found.append(Quantity(Kind.STANDOFF, name, "m", task.standoff, end, LENGTH_STEP, False))
+    for index, letter in enumerate("xyz"):
+        for sign in (1.0, -1.0):
+            x, y, z = (sign if index == k else 0.0 for k in range(3))
+            name = f"shift along {'+' if sign > 0 else '-'}{letter}"
+            found.append(
+                Quantity(Kind.SHIFT, name, "m", 0.0, FURTHEST, LENGTH_STEP, False, -1, (x, y, z))
+            )
+    if of_collisions:  # limits come last where the time may run out: places matter more there
+        found += limits
+    return tuple(q for q in found if math.isfinite(q.given) and q.last > 0)
+
+
+def _of_collisions(task: Task, widen: bool) -> list[Quantity]:
+    """Clearances; and, of a case that is not feasible, collisions at all and one object at a time.
+
+    The tool may not come nearer to the surface than its point does, so the standoff is the largest
+    clearance of the tool that is tried.
+    """
+    asked = task.collision
+    if asked is None or not asked.checked:
+        return []
+    most = max(asked.clearance, MOST_CLEARANCE), max(asked.tool_clearance, task.standoff)
+    ends = (0.0, 0.0) if widen else most
+    given = (asked.clearance, asked.tool_clearance)
+    names = ("clearance", "tool clearance")
+    found = [
+        Quantity(kind, names[k], "m", given[k], ends[k], LENGTH_STEP, True)
+        for k, kind in enumerate((Kind.CLEARANCE, Kind.TOOL_CLEARANCE))
+        if kind is Kind.CLEARANCE or (asked.surface and task.standoff > 0.0)
+    ]
+    if widen:
+        left_out = [("without collisions", "")]
+        left_out += [(f"without {one.name}", one.name) for one in asked.scene[:MOST_OBJECTS]]
+        found += [
+            Quantity(Kind.WITHOUT, name, "", 0.0, 1.0, 1.0, True, obstacle=obstacle)
+            for name, obstacle in left_out
+        ]
+    return found
+
+
+def _limit(robot: Robot, joint: int, kind: Kind, widen: bool) -> Quantity:
+    """One limit of one joint, outwards up to the cap, or inwards to a step from the other limit.
+
+    Limits without any width are no limits that a case may have.
+    """
+    slides = bool(robot.prismatic[joint])
+    lower, upper = float(robot.lower[joint]), float(robot.upper[joint])
+    given, opposite = (lower, upper) if kind is Kind.LOWER else (upper, lower)
+    most = FURTHEST if slides else math.radians(TURN_DEG)
+    if not math.isfinite(opposite):  # tightened by no more than it would be widened
+        opposite = given + (most if kind is Kind.LOWER else -most)
+    outwards = given + (most if kind is Kind.UPPER else -most)
+    step = LENGTH_STEP if slides else math.radians(ANGLE_STEP_DEG)
+    inwards = max(opposite - step, given), min(opposite + step, given)
+    return Quantity(
+        kind=kind,
+        name=f"{robot.joint_names[joint]} {'lower' if kind is Kind.LOWER else 'upper'} limit",
+        unit="m" if slides else "rad",
+        given=given,
+        end=outwards if widen else inwards[kind is Kind.UPPER],
+        step=LENGTH_STEP if slides else ANGLE_STEP_DEG,
+        monotone=True,
+        joint=joint,
+    )
