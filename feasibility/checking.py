@@ -87,8 +87,6 @@ def check(
         task = replace(task, collision=collision)
     problem = Problem.of(robot, cells, task, settings)
     if search.method == "greedy":
-        if task.collision is not None:
-            raise ArgumentError(GREEDY_KNOWS_NONE)
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
         return _decided(problem, search, progress, greedy_search, clock)
@@ -123,10 +121,6 @@ def greedy_check(
     return _decided(Problem.of(robot, cells, task), search, progress, from_start)
 
 
-GREEDY_KNOWS_NONE = (
-    "the greedy search, which is the paper's, knows no collisions: leave out [collision], or take "
-    "the complete search"
-)
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
 Method = Callable[[Problem, Search, Clock], Found]
 

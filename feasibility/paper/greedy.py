@@ -31,6 +31,11 @@ from surfaces.patches import GridCells, closed_form_grid
 
 FEW_SEEDS = 10  # random configurations to try over each cell once the middle one had no start
 
+KNOWS_NO_COLLISIONS = (
+    "the greedy search, which is the paper's, knows no collisions: leave out [collision], or take "
+    "the complete search"
+)
+
 
 @dataclass(slots=True)
 class _Run:
@@ -73,9 +78,12 @@ def greedy_search(
 
     Raises:
         SurfaceError: the cells are no grid on a patch that the compiled loops know.
-        ArgumentError: `start` is not a feasible configuration over one of the cells.
+        ArgumentError: `start` is not a feasible configuration over one of the cells, or collisions
+            are to be checked.
     """
     robot, task = problem.robot, problem.task
+    if problem.bodies is not None:
+        raise ArgumentError(KNOWS_NO_COLLISIONS)
     cells = closed_form_grid(problem.cells)
     steps = Steps.of(robot, cells.closed_form, task, search)
     with compiling_notice(notice=GREEDY):
