@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
 from feasibility.certification.collisions.pieces import Below, Piece, piece_of, sheet_piece
-from feasibility.certification.collisions.planes import NEAR, ROUNDING, Pairing, Place
+from feasibility.certification.collisions.plane_search import NEAR
 from feasibility.certification.collisions.relative_motion import Motion
 from feasibility.collisions import Bodies, Pair
 from robots import Robot

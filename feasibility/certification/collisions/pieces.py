@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.certification.collisions.trees import Tree
 from feasibility.collisions import HalfSpace
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
@@ -66,6 +67,10 @@ class Piece:
         """(k,) m, h(n) for unit vectors n (k, 3) in the joint's frame."""
         return np.asarray((n @ self.corners.T).max(axis=1)) + self.radius
 
+    def farthest(self, n: Array) -> Array:
+        """(k, 3) m, the points furthest along n (k, 3), without the radius."""
+        return self.corners[(n @ self.corners.T).argmax(axis=1)]
+
     @cached_property
     def truth(self) -> Piece:
         """The body itself."""
@@ -89,6 +94,16 @@ class Round(Piece):
         across = np.sqrt(np.maximum((n**2).sum(axis=1) - along**2, 0.0))
         own = 0.5 * self.shape.length * np.abs(along) + self.shape.radius * across
         return np.asarray(n @ self.placement[:3, 3] + own)
+
+    def farthest(self, n: Array) -> Array:
+        """(k, 3) m, see `Piece`: on the rim of an end."""
+        axis = self.placement[:3, 2]
+        along = n @ axis
+        across = n - along[:, None] * axis
+        width = np.maximum(np.linalg.norm(across, axis=1), np.finfo(float).tiny)
+        rim = (self.shape.radius / width)[:, None] * across
+        ends = np.copysign(0.5 * self.shape.length, along)
+        return np.asarray(self.placement[:3, 3] + ends[:, None] * axis + rim)
 
 
 class Below(Piece):
@@ -133,9 +148,24 @@ class MeshPart(Piece):
         """(k, 3) m, corners with the same hull."""
         return _outermost(self.corners)
 
+    @cached_property
+    def tree(self) -> Tree:
+        """Its triangles in boxes."""
+        return Tree(self.vertices[self.faces])
+
     def support(self, n: Array) -> Array:
-        """(k,) m, see `Piece`."""
+        """(k,) m, see `Piece`; of many triangles that of boxes around them, which is larger."""
+        if self.triangles > MANY:
+            return self.tree.levels[min(1, len(self.tree.levels) - 1)].support(n)
         return np.asarray((n @ self.outermost.T).max(axis=1))
+
+    def farthest(self, n: Array) -> Array:
+        """(k, 3) m, see `Piece`."""
+        return self.outermost[(n @ self.outermost.T).argmax(axis=1)]
+
+    def of(self, triangles: NDArray[np.intp]) -> MeshPart:
+        """Some of its triangles."""
+        return MeshPart(self.vertices, self.faces[triangles], False)
 
     @cached_property
     def parts(self) -> tuple[Piece, ...]:
@@ -146,7 +176,7 @@ class MeshPart(Piece):
         side = int(np.argmax(np.ptp(middles, axis=0)))
         order = np.argsort(middles[:, side], kind="stable")
         halves = np.array_split(order, 2)
-        return tuple(MeshPart(self.vertices, self.faces[half], False) for half in halves)
+        return tuple(self.of(half) for half in halves)
 
     @cached_property
     def thin(self) -> Array:

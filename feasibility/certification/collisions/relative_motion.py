@@ -110,13 +110,17 @@ class Motion:
         self._frames = self._kinematics.joints(q)
         self._twists = self._kinematics.twists(q).transpose(0, 2, 1)
         self._relative: dict[tuple[int, int], Poses] = {}
+        self._levers: dict[tuple[int, bytes, float], Array] = {}
 
     def levers(self, joint: int, centre: Array, ball: float) -> Array:
         """(m, joint) m, r_j of a ball that `joint` carries, at each row; 1 for prismatic joints."""
-        points = self._frames.rotations[:, joint] @ centre + self._frames.points[:, joint]
-        linear, angular = np.split(self._twists[:, :joint], 2, axis=2)
-        away = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
-        return np.where(self.prismatic[:joint], 1.0, away + ball)
+        key = (joint, centre.tobytes(), ball)
+        if key not in self._levers:
+            points = self._frames.rotations[:, joint] @ centre + self._frames.points[:, joint]
+            linear, angular = np.split(self._twists[:, :joint], 2, axis=2)
+            away = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
+            self._levers[key] = np.where(self.prismatic[:joint], 1.0, away + ball)
+        return self._levers[key]
 
     def stretches(self, a: int, b: int, centre: Array, ball: float) -> Stretches:
         """Every segment, as a body on joint b moves as seen from joint a <= b."""

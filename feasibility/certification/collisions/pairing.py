@@ -1,0 +1,305 @@
+"""Certified clearance of two bodies along a motion.
+
+First, planes between the whole bodies are tried (`parting`): across the line between the centres,
+then across that of coal's nearest points at the stretch with the lowest bound, each on all
+stretches at once. Many triangles are looked at box by box instead (`descent`). What is left is cut:
+meshes into ever smaller parts, and last the stretch in time. Where the hull of a link's mesh is too
+large, the distances of the mesh itself decide (`budgets`).
+
+A plane certifies bodies with all that is inside them. Triangles of a closed mesh have no inside:
+where they are used, neither body may begin inside the other. As their distance never vanishes,
+neither gets there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.collisions.budgets import Budget, TooNear
+from feasibility.certification.collisions.coal_distances import COAL, coal_distance
+from feasibility.certification.collisions.cutting import FEW, can_be_cut, cut, is_exact
+from feasibility.certification.collisions.descent import Descent, glimpse
+from feasibility.certification.collisions.inside import one_inside_other
+from feasibility.certification.collisions.parting import by_balls, guesses, lows, parted
+from feasibility.certification.collisions.pieces import Below, MeshPart, Piece
+from feasibility.certification.collisions.plane_search import NEAR, Couples
+from feasibility.certification.collisions.relative_motion import Motion, Stretches, joined
+
+Array = NDArray[np.float64]
+
+ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
+FAILURES = 3  # of coal's directions in a row, after which another way is taken
+HALVINGS = 3  # of stretches that no plane parts from a triangle, before coal is asked
+LOOKS = 3  # at stretches that no plane parts from triangles: are they too near?
+SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
+CALLS = (500, 20)  # most coal calls for two bodies: so many, and so many for each segment
+
+Task = tuple[Piece, Piece, Stretches]
+"""Two pieces, and stretches along which they are not certified yet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """An instant at which two bodies are too near, or where that was not decided."""
+
+    row: int
+    share: float
+    """How far the motion has come from that row to the next, 0..1."""
+    distance: float
+    """m, between them; as deep as they overlap where it is negative; NaN where not decided."""
+    inside: bool = False
+    """Is one of them wholly within the other?"""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Met:
+    """What coal says of two pieces at an end of a stretch."""
+
+    stretch: int
+    end: bool
+    distance: float
+    """m, negative where they overlap."""
+    n: Array | None
+    """(3,) from the first piece to the other; None where they touch."""
+
+
+class Pairing:
+    """Two bodies, the stretches of one motion, and what is known of their distance."""
+
+    def __init__(self, a: Piece, b: Piece, joints: tuple[int, int], motion: Motion) -> None:
+        """Bodies a and b, carried by `joints` (i, j), i <= j."""
+        self.a, self.b, self.joints, self.motion = a, b, joints, motion
+        self.calls = 0
+        self.bound = np.inf
+        """m, certified lower bound of their distance along what is accepted so far."""
+        self.place: Place | None = None
+        """Why it is refused."""
+        stretches = motion.stretches(*joints, b.centre, b.ball)
+        self.stretches = replace(stretches, bound=by_balls(a, b, stretches))
+
+    def glance(self) -> float:
+        """Improve the bounds a little; a distance (m) at the row that seems worst.
+
+        The distance is that of the hulls, a hint of how near the bodies are at all.
+        """
+        s = self.stretches
+        if not len(s.row):
+            return np.inf
+        if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
+            low = glimpse(self.a.tree, self.b, s)
+            if not self.a.closed:
+                self.stretches = replace(s, bound=np.maximum(s.bound, low))
+            return self._asked(self.a, self.b, s, int(np.argmin(low)), False).distance
+        bound = s.bound
+        for guess in guesses(self.a, self.b, s):
+            bound = np.maximum(bound, parted(self.a, self.b, s, guess))
+        met = self._asked(self.a, self.b, s, int(np.argmin(bound)), False)
+        self.stretches = _raised(self.a, self.b, replace(s, bound=bound), met.n)
+        return met.distance
+
+    def certify(self, needed: float, aim: float) -> None:
+        """Certify `needed` (m) everywhere, and `aim` >= needed where that takes little.
+
+        Sets `bound` and, where it is refused, `place`.
+        """
+        self.bound, self.place = np.inf, None
+        needed, aim = needed + ROUNDING, aim + ROUNDING
+        tasks = [(self.a, self.b, self._accepted(self.stretches, aim))]
+        while tasks and self.place is None:
+            a, b, s = tasks.pop()
+            if len(s.row):
+                tasks += self._looked_at(a, b, s, needed, aim)
+
+    def _looked_at(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> list[Task]:
+        """Certify stretches as far as it goes; what is left to do. May set `place`."""
+        whole = a is self.a and b is self.b
+        if isinstance(a, MeshPart) and a.triangles > FEW:
+            inside = whole and self._begins_inside(s, needed)
+            return [] if inside else self._box_by_box(a, b, s, needed, aim)
+        if not whole:
+            s = self._cheaply(a, b, s, aim)
+        s = self._by_coal(a, b, s, needed, aim)
+        if self.place is not None or not len(s.row):
+            return []
+        if whole and self._begins_inside(s, needed):
+            return []
+        if can_be_cut(a, b):
+            return [(*pieces, s) for pieces in cut(a, b)]
+        if not is_exact(a, b):
+            self._by_budget(a.truth, b.truth, s, needed, aim)
+            return []
+        s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
+        if len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most()):
+            self.place = _middle(s)
+            return []
+        return [(a, b, self.motion.halves(s, *self.joints))] if len(s.row) else []
+
+    def _accepted(
+        self, s: Stretches, wanted: float, also: NDArray[np.bool_] | None = None
+    ) -> Stretches:
+        """Keep the lowest of the bounds that will do; the stretches that are left."""
+        good = s.bound >= wanted if also is None else also
+        self.bound = min(self.bound, float(np.min(s.bound[good], initial=np.inf)))
+        return s.of(~good)
+
+    def _cheaply(self, a: Piece, b: Piece, s: Stretches, aim: float) -> Stretches:
+        """Certify by balls and by guessed directions."""
+        s = self._accepted(replace(s, bound=np.maximum(s.bound, by_balls(a, b, s))), aim)
+        for n in guesses(a, b, s) if len(s.row) else ():
+            s = replace(s, bound=np.maximum(s.bound, parted(a, b, s, n)))
+        return self._accepted(s, aim)
+
+    def _by_coal(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> Stretches:
+        """Certify by directions from coal; what is left, with its bounds. May set `place`."""
+        exact, whole = is_exact(a, b), a is self.a and b is self.b
+        left, failures = [s.of(np.zeros(len(s.row), dtype=bool))], 0
+        while len(s.row) and not (failures >= FAILURES and (can_be_cut(a, b) or not exact)):
+            worst = int(np.argmin(s.bound))
+            for end in (False, True):
+                met = self._asked(a, b, s, worst, end)
+                if whole and exact:  # no higher bound can be found than what was met
+                    aim = max(needed, min(aim, NEAR * met.distance))
+                if exact and self._too_near(a, b, s, met, needed):
+                    return s
+                s = _raised(a, b, s, met.n)
+                if met.n is None or s.bound[worst] >= aim or s.delta[worst] < ROUNDING:
+                    break
+            if s.bound[worst] < aim:
+                failures += 1
+                left.append(s.of(np.array([worst])))
+                s = s.of(np.arange(len(s.row)) != worst)
+            else:
+                failures = 0
+            s = self._accepted(s, aim)
+        return _all_of([*left, s])
+
+    def _box_by_box(
+        self, a: MeshPart, b: Piece, s: Stretches, needed: float, aim: float
+    ) -> list[Task]:
+        """Certify many triangles; which of them are left to do. May set `place`."""
+        descent = Descent(a.tree, b, needed, aim)
+        couples = descent.parted(s)
+        exact = is_exact(a, b)
+        if exact and self._met_too_near(a, b, s, couples, needed):
+            return []
+        for _ in range(HALVINGS if exact and len(couples.at) else 0):
+            used, at = np.unique(couples.at, return_inverse=True)
+            s = self.motion.halves(s.of(used), *self.joints)
+            boxes, low = np.tile(couples.boxes, 2), np.tile(couples.low, 2)
+            halves = Couples(np.concatenate([at, at + len(used)]), boxes, low)
+            couples = descent.again(s, halves)
+        good = couples.low >= (needed if exact else aim)
+        descent.keep(couples, good)
+        self.bound = min(self.bound, descent.bound)
+        left = couples.of(~good)
+        if exact:
+            return [
+                (a.of(a.tree.last[[box]]), b, s.of(left.at[left.boxes == box]))
+                for box in np.unique(left.boxes)
+            ]
+        if len(left.at):
+            triangles, rest = a.of(a.tree.last[np.unique(left.boxes)]), s.of(np.unique(left.at))
+            self._by_budget(triangles, b.truth, rest, needed, aim)
+        return []
+
+    def _met_too_near(
+        self, a: Piece, b: Piece, s: Stretches, couples: Couples, needed: float
+    ) -> bool:
+        """Are they nearer than needed at the worst of what no plane parts? Sets `place` if so."""
+        worst = couples.of(couples.low < needed)
+        at = worst.at[np.argsort(worst.low)]
+        for k in at[np.sort(np.unique(at, return_index=True)[1])][:LOOKS]:
+            for end in (False, True):
+                if self._too_near(a, b, s, self._asked(a, b, s, int(k), end), needed):
+                    return True
+        return False
+
+    def _asked(self, a: Piece, b: Piece, s: Stretches, k: int, end: bool) -> Met:
+        """Ask coal at an end of stretch k."""
+        poses = (s.last if end else s.first).of(np.array([k]))
+        if isinstance(a, Below):
+            n = a.thin[None]
+            return Met(k, end, float(lows(b, poses, n)[0] - a.support(n)[0]), n[0])
+        self.calls += 1
+        distance, near_a, near_b = coal_distance(a, b, poses.rotations[0], poses.points[0])
+        apart = near_b - near_a
+        length = float(np.linalg.norm(apart))
+        clear = distance > 0.0 and length > 0.0
+        return Met(k, end, distance, apart / length if clear else None)
+
+    def _too_near(self, a: Piece, b: Piece, s: Stretches, met: Met, needed: float) -> bool:
+        """Are exact pieces nearer than `needed` where they were met? Sets `place` if so.
+
+        What coal calls far enough, but no plane of its own shows, is at the edge to rounding.
+        """
+        k, stray = met.stretch, float(s.stray[met.stretch])
+        near = met.distance - stray < needed
+        if not near and met.n is not None and not can_be_cut(a, b):
+            poses, n = (s.last if met.end else s.first).of(np.array([k])), met.n[None]
+            near = float(lows(b, poses, n)[0] - a.support(n)[0]) - stray < needed
+        if near:
+            row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if met.end else 0.0))
+            over = share == 1.0
+            self.place = Place(row + over, 0.0 if over else share, met.distance)
+        return near
+
+    def _by_budget(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> None:
+        """Certify meshes by their distances alone; sets `bound`, or `place`."""
+        whole = self.stretches
+
+        def distance(row: int, share: float) -> float:
+            self.calls += 1
+            pose = self.motion.pose(*self.joints, row, share)
+            return coal_distance(a, b, pose.rotations[0], pose.points[0])[0] - COAL
+
+        moved = np.zeros(len(self.motion.q) - 1)
+        moved[whole.row] = whole.moved
+        budget = Budget(distance, moved, self._most() - self.calls)
+        try:
+            bound = budget.certify(s.row, needed + s.stray, aim)
+            self.bound = min(self.bound, bound - float(s.stray.max()))
+        except TooNear as met:
+            pose = self.motion.pose(*self.joints, met.row, met.share)
+            depth = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
+            overlap = met.distance <= 0.0
+            self.place = Place(met.row, met.share, min(depth, 0.0) if overlap else met.distance)
+
+    def _most(self) -> int:
+        """How often coal may be asked."""
+        return CALLS[0] + CALLS[1] * len(self.motion.q)
+
+    def _begins_inside(self, s: Stretches, needed: float) -> bool:
+        """Is one body inside the other at the first row? Sets `place` if so."""
+        at = np.flatnonzero((s.row == 0) & (s.share == 0.0) & (s.bound < needed))
+        if not len(at):
+            return False
+        pose = s.first.of(at[:1])
+        if one_inside_other(self.a.truth, self.b.truth, pose.rotations[0], pose.points[0]):
+            distance = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
+            self.place = Place(0, 0.0, min(distance, 0.0), inside=True)
+        return self.place is not None
+
+
+def _raised(a: Piece, b: Piece, s: Stretches, n: Array | None) -> Stretches:
+    """Stretches with the bounds that a plane across n (3,) gives."""
+    if n is None:
+        return s
+    found = parted(a, b, s, np.broadcast_to(n, (len(s.row), 3)))
+    return replace(s, bound=np.maximum(s.bound, found))
+
+
+def _all_of(parts: list[Stretches]) -> Stretches:
+    """Several sets of stretches as one."""
+    whole = parts[0]
+    for part in parts[1:]:
+        whole = joined(whole, part)
+    return whole
+
+
+def _middle(s: Stretches) -> Place:
+    """Where the shortest of stretches is, which could not be certified."""
+    k = int(np.argmin(s.length))
+    return Place(int(s.row[k]), float(s.share[k] + 0.5 * s.length[k]), np.nan)

@@ -1,0 +1,112 @@
+"""Planes between boxes and a body, of many couples at once.
+
+The distance of two convex bodies is that of the origin from the set of differences of their points.
+From one such difference v, one goes to the point w of the set that is furthest along -v, and from
+there to the point nearest to the origin among those between w and the points that span v (Gilbert,
+Johnson and Keerthi, IEEE Journal on Robotics and Automation 4, 1988). Each v is a direction to try
+(`parting`), and the distance is at most |v|.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.collisions.nearest_of_simplices import nearest_of
+from feasibility.certification.collisions.parting import nearest_points, unit
+from feasibility.certification.collisions.pieces import Piece
+from feasibility.certification.collisions.relative_motion import Stretches
+from feasibility.certification.collisions.trees import Level
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+NEAR = 0.9  # [1] share of the distances met, that is aimed at where it costs little
+STEPS = 6  # after which smaller boxes are asked
+LAST_STEPS = 16  # the same for triangles
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Couples:
+    """Stretches and boxes, or triangles, two by two."""
+
+    at: Indices
+    """(p,) index of the stretch."""
+    boxes: Indices
+    """(p,) index of the box in its level."""
+    low: Array
+    """(p,) m, bounds of their distances."""
+
+    def of(self, chosen: NDArray[np.bool_] | Indices | slice) -> Couples:
+        """Some of them."""
+        return Couples(self.at[chosen], self.boxes[chosen], self.low[chosen])
+
+
+def ball_bounds(
+    level: Level, b: Piece, s: Stretches, at: Indices, boxes: Indices
+) -> tuple[Array, Array]:
+    """(p,) m, bounds by balls; (p, 3) m, from the centres of boxes to those of the body."""
+    start, end = s.first.moved(b.centre), s.last.moved(b.centre)
+    ahead = nearest_points(start[at] - level.centres[boxes], (end - start)[at])
+    away = np.sqrt(np.einsum("ki,ki->k", ahead, ahead))
+    return away - level.balls[boxes] - (s.delta + s.stray + b.ball)[at], ahead
+
+
+def searched(
+    level: Level, b: Piece, s: Stretches, couples: Couples, between: tuple[float, float]
+) -> tuple[Array, Array]:
+    """Look for planes that part boxes from a body, along stretches.
+
+    Args:
+        level: boxes, or triangles.
+        b: the body.
+        s: stretches.
+        couples: (p,) which boxes and stretches.
+        between: m, what is needed and what is aimed at. The search ends where it has `NEAR` of the
+            distance, or the aim; and where what is needed cannot be had.
+
+    Returns:
+        (p,) m, the distances along the stretches are at least this; (p,) m, and cannot be shown to
+        be more than this.
+    """
+    needed, aim = between
+    at, boxes = couples.at, couples.boxes
+    low, ahead = ball_bounds(level, b, s, at, boxes)
+    most = np.full(len(low), np.inf)
+    corners = np.repeat(ahead[:, None], 3, axis=1)
+    open_ = np.flatnonzero(low < aim)
+    for step in range(-1, STEPS if level.triangles is None else LAST_STEPS):
+        v = ahead[open_]
+        if step < 0:  # across thin boxes
+            across = level.axes[boxes[open_], 0]
+            n = np.copysign(1.0, np.einsum("ki,ki->k", v, across))[:, None] * across
+        else:
+            n = unit(v)
+        some, off = s.of(at[open_]), (s.delta + s.stray)[at[open_]]
+        w = _beside(level.of(boxes[open_]), b, some, n)
+        low[open_] = np.maximum(low[open_], np.einsum("ki,ki->k", n, w) - off)
+        if step >= 0:
+            if step == 0:
+                corners[open_, 1:], v = w[:, None], nearest_points(v, w - v)
+            else:
+                v, corners[open_] = nearest_of(np.concatenate([corners[open_], w[:, None]], axis=1))
+            ahead[open_] = v
+            most[open_] = np.sqrt(np.einsum("ki,ki->k", v, v)) - off
+        goal = np.clip(NEAR * most[open_], needed, aim)
+        open_ = open_[(low[open_] < goal) & (most[open_] >= needed)]
+        if not len(open_):
+            break
+    return low, most
+
+
+def _beside(boxes: Level, b: Piece, s: Stretches, n: Array) -> Array:
+    """(k, 3) m, the differences of points of b and of the boxes that are least along n (k, 3)."""
+    points = []
+    for poses in (s.first, s.last):
+        own = b.farthest(-np.einsum("kji,kj->ki", poses.rotations, n))
+        points.append(np.einsum("kij,kj->ki", poses.rotations, own) + poses.points)
+    sooner = np.einsum("ki,ki->k", n, points[0] - points[1]) <= 0.0
+    nearer = np.where(sooner[:, None], points[0], points[1])
+    return np.asarray(nearer - boxes.farthest(n) - b.radius * n)
