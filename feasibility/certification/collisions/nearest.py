@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.collisions.coal_distances import coal_distance
 from feasibility.certification.collisions.collision_replay import ready_bodies
-from feasibility.certification.collisions.pieces import Below, Piece, Round
-from feasibility.certification.collisions.planes import coal_distance
+from feasibility.certification.collisions.pieces import Below, Piece
 from feasibility.certification.collisions.relative_motion import Motion
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
@@ -114,7 +114,8 @@ class _Couple:
         rotation, point = pose.rotations[0], pose.points[0]
         if isinstance(self.a, Below):
             n = self.a.thin
-            end = rotation @ _furthest(self.b, -rotation.T @ n) + point
+            own = self.b.farthest(-(rotation.T @ n)[None])[0]
+            end = rotation @ own - self.b.radius * n + point
             height = float((end - self.a.centre) @ n)
             return height, np.stack([end - height * n, end])
         a, b = (self.a.truth, self.b.truth) if exactly else (self.a, self.b)
@@ -166,16 +167,3 @@ def _lines(
         joint = couple.joints[0]
         lines.append(couple.line(row)[1] @ rotations[row, joint].T + points[row, joint])
     return NearPair(names, rows, np.array(lines))
-
-
-def _furthest(piece: Piece, n: Array) -> Array:
-    """(3,) m, a point of a piece that is furthest along a unit vector n (3,)."""
-    if not isinstance(piece, Round):
-        corner = piece.corners[np.argmax(piece.corners @ n)]
-        return np.asarray(corner + piece.radius * n)
-    axis, shape = piece.placement[:3, 2], piece.shape
-    along = float(n @ axis)
-    across = n - along * axis
-    across = across / max(float(np.linalg.norm(across)), 1e-12)
-    end = np.copysign(0.5 * shape.length, along) * axis
-    return np.asarray(piece.placement[:3, 3] + end + shape.radius * across)
