@@ -49,7 +49,8 @@ class Plan:
 
     patches: tuple[SubPatch, ...]
     moves: tuple[Reconfiguration, ...]
-    """From the end of each patch's walk to the start of the next one's; one fewer than patches."""
+    """From the end of each patch's walk to the start of the next one's; one fewer than patches.
+    Where collisions are checked, they keep clear, or say that no such way was found."""
     bound: int
     """The components that the search found cannot be shared out in fewer patches."""
 

@@ -236,6 +236,10 @@ def _message(shared: _Shared, at_least: int, cells: int, ended: bool, folded: bo
         most = len(connected.patches)
         least = "" if connected.optimal else f" (at least {connected.bound})"
         sentence += f" Patches that are each connected on the surface: {most}{least}."
+    blocked = [k for k, move in enumerate(fewest.moves, start=1) if move.refusal]
+    if blocked:
+        named = ", ".join(f"{k} to {k + 1}" for k in blocked)
+        sentence += f" No move clear of collisions was found from patch {named}."
     if folded:
         sentence += (
             " Where the standoff reaches the surface's radius of curvature its offset folds and no "

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification import replay
+from feasibility.division.between_patches import clear_moves
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
 from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
@@ -78,7 +79,7 @@ def plan_of(
     roots: list[int],
     covers: NDArray[np.bool_],
 ) -> Plan:
-    """Walks for every patch, in the best order, each replayed.
+    """Walks for every patch, in the best order, each replayed, and moves between them.
 
     Args:
         exploration: the search.
@@ -106,7 +107,8 @@ def plan_of(
                 refusal=replayed.refusal,
             )
         )
-    return Plan(tuple(patches), chosen.moves, partition.bound)
+    moves = clear_moves(robot, cells, task, exploration.arrays.collisions, chosen.moves)
+    return Plan(tuple(patches), moves, partition.bound)
 
 
 def _choices(

@@ -7,20 +7,23 @@ orders of a few patches). What comes within 2 per cent of that is taken for as g
 least sum over all joints.
 
 The moves are straight lines in joint space, away from the surface. They stay inside the limits,
-because limits are convex; collisions are not checked along them.
+because limits are convex. Where collisions are checked, `between_patches` leads a move around what
+is in its way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise, permutations
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification import CollisionReplay
 from feasibility.paths import improved
+from feasibility.read_only import ReadOnlyArrays
 from feasibility.verdict import Walk
 from robots import Robot
 
@@ -34,7 +37,7 @@ LEAST_NAMED = 0.05  # [deg], [0.1 mm]: smaller moves are not named
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Reconfiguration:
+class Reconfiguration(ReadOnlyArrays):
     """The move from the end of one patch's walk to the start of the next one's."""
 
     joint_names: tuple[str, ...]
@@ -44,6 +47,24 @@ class Reconfiguration:
     """(n,) rad or m."""
     end: Floats
     """(n,) rad or m."""
+    via: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    """(k, n) rad or m, configurations in between; none where the move is one straight line."""
+    replayed: CollisionReplay | None = None
+    """What the judge of collisions says of the move; None where collisions are not checked."""
+
+    @property
+    def waypoints(self) -> Floats:
+        """(k + 2, n) rad or m, from start to end; straight lines lead from one to the next."""
+        return np.vstack([self.start, *self.via, self.end])
+
+    @property
+    def refusal(self) -> str:
+        """Why the move must not be made; empty where nothing is known against it."""
+        if self.replayed is None or self.replayed.accepted:
+            return ""
+        worst, *others = self.replayed.faults
+        more = f", and {len(others)} more" if others else ""
+        return f"no way around was found, and straight on {worst.text}{more}"
 
     @property
     def moves(self) -> Floats:

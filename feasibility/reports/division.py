@@ -14,6 +14,8 @@ from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatc
 from feasibility.reports.parts import (
     causes_json,
     certificate_json,
+    clearance_json,
+    clearance_text,
     counted,
     filled,
     seconds,
@@ -105,6 +107,7 @@ def _patch_json(patch: SubPatch, cells: Cells) -> dict[str, Any]:
         "certificate": {
             **certificate_json(patch.certificate),
             "min_limit_margin": plain(float(patch.certificate.min_limit_margin)),
+            **clearance_json(patch.certificate),
         },
     }
 
@@ -116,6 +119,9 @@ def _move_json(move: Reconfiguration, k: int) -> dict[str, Any]:
         "to": k + 1,
         "start": move.start.tolist(),
         "end": move.end.tolist(),
+        "waypoints": move.waypoints.tolist(),
+        "refusal": move.refusal or None,
+        **({} if move.replayed is None else clearance_json(move.replayed)),
         "joints": [
             {"joint": name, **({"by_m": by} if slides else {"by_deg": math.degrees(by)})}
             for name, slides, by in zip(
@@ -194,7 +200,19 @@ def _steps(plan: Plan, division: Division) -> Iterator[str]:
         )
         yield filled(f"  {f'patch {k + 1}':<12}", text)
         if k < len(plan.moves):
-            yield filled(f"  {'move':<12}", plan.moves[k].described())
+            yield filled(f"  {'move':<12}", _move_text(plan.moves[k]))
+
+
+def _move_text(move: Reconfiguration) -> str:
+    """Where the joints go, by which way, and how near bodies come; or why it is refused."""
+    parts = [move.described()]
+    if len(move.via):
+        parts.append(f"by way of {counted(len(move.via), 'configuration')} (--json has them)")
+    if move.refusal:
+        parts.append(f"refused: {move.refusal}")
+    elif move.replayed is not None:
+        parts.append(clearance_text(move.replayed))
+    return "; ".join(part for part in parts if part)
 
 
 def _middle(patch: SubPatch, cells: Cells) -> list[int]:

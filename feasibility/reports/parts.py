@@ -10,7 +10,7 @@ import re
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Protocol
 
 from feasibility.collisions import Collision, LeftOut, checked_words
 from feasibility.results import plain
@@ -126,7 +126,19 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def clearance_json(certificate: Certificate) -> dict[str, Any]:
+class Clearance(Protocol):
+    """How near bodies came along a motion: a `Certificate` or a `CollisionReplay`."""
+
+    @property
+    def min_clearance(self) -> float | None:
+        """m, between the nearest pair; None where there is none."""
+
+    @property
+    def nearest_pair(self) -> tuple[str, str] | None:
+        """The two."""
+
+
+def clearance_json(certificate: Clearance) -> dict[str, Any]:
     """How near which pair came along a motion; no keys where collisions were not checked."""
     if certificate.min_clearance is None:
         return {}
@@ -137,7 +149,7 @@ def clearance_json(certificate: Certificate) -> dict[str, Any]:
     }
 
 
-def clearance_text(certificate: Certificate) -> str:
+def clearance_text(certificate: Clearance) -> str:
     """How near which pair came along a motion; empty where that was not looked at."""
     if certificate.min_clearance is None or certificate.nearest_pair is None:
         return ""

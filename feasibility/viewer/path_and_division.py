@@ -34,7 +34,7 @@ from feasibility.viewer.viewer import View, compose, titled
 from robots import Kinematics, Robot
 
 if TYPE_CHECKING:
-    from feasibility.division import Division
+    from feasibility.division import Division, Reconfiguration
     from feasibility.paths import CoveragePath
     from feasibility.timing import Trajectory
 
@@ -90,19 +90,19 @@ def view_division(division: Division, case: str | None = None) -> View:
     motion = None
     if walks:
         legs = [walks[0]]
-        for walk in walks[1:]:
-            share = np.linspace(0.0, 1.0, DENSE)[1:-1, None]
-            legs += [legs[-1][-1] + share * (walk[0] - legs[-1][-1]), walk]
+        for move, walk in zip(plan.moves, walks[1:], strict=True):
+            legs += [_along(move, DENSE)[1:-1], walk]
         motion = paced(robot, np.concatenate(legs), False, "all patches")
         size = cell_size(cells)
         for k, move in enumerate(plan.moves):
-            parts.append(_move(robot, move.start, move.end, f"{k + 1} to {k + 2}", size))
+            parts.append(_move(robot, move, f"{k + 1} to {k + 2}", size))
     patches = f"{len(plan.patches)} patch{'' if len(plan.patches) == 1 else 'es'}"
     title = f"{division.n_covered} of {counted(len(cells))}: {patches}"
     if division.n_covered < len(cells):
         title += f", {len(cells) - division.n_covered} left out"
     text = f"{robot.name}; " + "; ".join(
-        f"move {k + 1} to {k + 2}: {move.described(FEW)}" for k, move in enumerate(plan.moves)
+        f"move {k + 1} to {k + 2}: {move.described(FEW)}{' (not clear)' if move.refusal else ''}"
+        for k, move in enumerate(plan.moves)
     )
     return compose(
         robot, cells, titled(title, case), text.rstrip("; "),
@@ -140,12 +140,18 @@ def _strokes(motion: Motion, radius: float) -> tuple[Layer, list[dict[str, Any]]
     return Layer(tuple(commands), Entry("painted trail", TRAIL, root), len(commands)), tracks
 
 
-def _move(
-    robot: Robot, start: NDArray[np.float64], end: NDArray[np.float64], name: str, size: float
-) -> Layer:
+def _along(move: Reconfiguration, count: int) -> NDArray[np.float64]:
+    """(k, n) rad or m, configurations along a move: its waypoints, and others in between."""
+    rows = move.waypoints
+    dense = max(2, -(-count // (len(rows) - 1)) + 1)
+    share = np.linspace(0.0, 1.0, dense)[:-1, None]
+    legs = [a + share * (b - a) for a, b in pairwise(rows)]
+    return np.concatenate([*legs, rows[-1:]])
+
+
+def _move(robot: Robot, move: Reconfiguration, name: str, size: float) -> Layer:
     """The path of the tool in a move between patches."""
-    share = np.linspace(0.0, 1.0, 4 * DENSE)[:, None]
-    line, _ = Kinematics(robot).tools(start + share * (end - start))
+    line, _ = Kinematics(robot).tools(_along(move, 4 * DENSE))
     label = f"move from patch {name}"
     return drawn_lines([line], 0.05 * size, RECONFIGURED, f"/motion/{label}", label)
 

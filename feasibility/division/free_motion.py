@@ -1,0 +1,172 @@
+"""A joint motion clear of collisions, away from the surface: RRT-connect, then shortened.
+
+Two trees of certified straight lines grow from both ends: one towards a random place, the other
+towards where the first has got (Kuffner and LaValle, "RRT-Connect", ICRA 2000). Every line is
+certified between its ends too, by the compiled clearance of the search. The effort is a count of
+lines that are asked for, so the same question always has the same answer.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.collisions import segment_clear
+from robots import Robot
+
+Floats = NDArray[np.float64]
+
+MOST_LINES = 40_000  # that may be asked for, for one motion
+FIRST_LINE = 0.5  # [rad], what a way is tried in at first
+SHORTEST = 1e-3  # [rad], no line is halved below this
+LONGEST = 1.0  # [rad] towards a random place at once
+SHORTCUTS = 150  # random places between which a straight line is tried
+TURN = 2.0 * np.pi
+
+
+class FreeSpace:
+    """Straight lines that are certified clear, of which only so many may be asked for."""
+
+    def __init__(self, robot: Robot, buffer: Floats, most: int = MOST_LINES) -> None:
+        """Ask nothing yet.
+
+        Args:
+            robot: the arm.
+            buffer: of `collision_buffer`.
+            most: lines that may be asked for.
+        """
+        self.buffer, self.left = buffer, most
+        # A slide counts as the turn that sweeps it.
+        reach = robot.reach if np.isfinite(robot.reach) and robot.reach > 0.0 else 1.0
+        self.scale = np.where(robot.prismatic, 1.0 / reach, 1.0)
+        self.lower, self.upper = robot.lower, robot.upper
+
+    def length(self, start: Floats, end: Floats) -> float:
+        """rad, the largest move of a joint."""
+        return float(np.max(np.abs(end - start) * self.scale, initial=0.0))
+
+    def reached(self, start: Floats, end: Floats) -> Floats:
+        """(n,) how far the straight line is certified; `end` itself where all of it is."""
+        length = self.length(start, end)
+        here, done, step = start, 0.0, min(1.0, FIRST_LINE / max(length, SHORTEST))
+        while done < 1.0:
+            ahead = min(1.0, done + step)
+            there = end if ahead == 1.0 else start + ahead * (end - start)
+            self.left -= 1
+            if self.left < 0:
+                return here
+            if segment_clear(self.buffer, here, there) > 0.0:
+                here, done, step = there, ahead, 2.0 * step
+            elif step * length < SHORTEST:
+                return here
+            else:
+                step *= 0.5
+        return end
+
+    def clear(self, start: Floats, end: Floats) -> bool:
+        """Is all of a straight line certified?"""
+        return self.reached(start, end) is end
+
+    def box(self, start: Floats, end: Floats) -> tuple[Floats, Floats]:
+        """Limits of joint values worth a try; a joint without limits stays within a turn."""
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        return np.maximum(self.lower, low - TURN), np.minimum(self.upper, high + TURN)
+
+
+class _Tree:
+    """Configurations, each reached by a straight line from the one before it."""
+
+    def __init__(self, space: FreeSpace, root: Floats) -> None:
+        """A tree of one configuration."""
+        self.space, self.q, self.before = space, root[None], [-1]
+
+    def towards(self, aim: Floats, most: float = np.inf) -> tuple[int, bool]:
+        """Grow from the nearest configuration.
+
+        Args:
+            aim: (n,) the configuration to be reached.
+            most: rad, no further than this.
+
+        Returns:
+            Where it got, -1 for nowhere; and whether that is `aim`.
+        """
+        away = np.linalg.norm((self.q - aim) * self.space.scale, axis=1)
+        near = int(np.argmin(away))
+        start = self.q[near]
+        length = self.space.length(start, aim)
+        end = aim if length <= most else start + most / length * (aim - start)
+        got = self.space.reached(start, end)
+        if self.space.length(start, got) < SHORTEST and got is not aim:
+            return -1, False
+        self.q = np.vstack([self.q, got])
+        self.before.append(near)
+        return len(self.before) - 1, got is aim
+
+    def way(self, node: int) -> list[Floats]:
+        """The configurations from the root to a node."""
+        found = []
+        while node >= 0:
+            found.append(self.q[node])
+            node = self.before[node]
+        return found[::-1]
+
+
+def free_motion(space: FreeSpace, start: Floats, end: Floats, seed: int) -> Floats | None:
+    """A motion between two configurations of which every straight line is certified clear.
+
+    Args:
+        space: the arm among its bodies.
+        start, end: (n,) rad or m, inside the limits.
+        seed: of the random places.
+
+    Returns:
+        (m, n) its rows, the straight line itself where that is clear; None where none was found.
+    """
+    if space.clear(start, end):
+        return np.stack([start, end])
+    rng = np.random.default_rng(seed)
+    low, high = space.box(start, end)
+    trees = [_Tree(space, start), _Tree(space, end)]
+    forwards = True
+    while space.left > 0:
+        one, other = trees if forwards else trees[::-1]
+        node, _ = one.towards(rng.uniform(low, high), LONGEST)
+        forwards = not forwards
+        if node < 0:
+            continue
+        meeting, met = other.towards(one.q[node])
+        if met:
+            nodes = (node, meeting) if one is trees[0] else (meeting, node)
+            first, last = trees[0].way(nodes[0]), trees[1].way(nodes[1])
+            return _shortened(space, np.array(first + last[-2::-1]), rng)
+    return None
+
+
+def _shortened(space: FreeSpace, rows: Floats, rng: np.random.Generator) -> Floats:
+    """The same motion with straight lines between random places of it where these are clear."""
+    space.left = MOST_LINES
+    for _ in range(SHORTCUTS):
+        lengths = [space.length(a, b) for a, b in pairwise(rows)]
+        at = np.concatenate([[0.0], np.cumsum(lengths)])
+        first, last = np.sort(rng.uniform(0.0, at[-1], 2))
+        i, j = (int(np.searchsorted(at, place, side="right")) for place in (first, last))
+        if i == j or len(rows) == 2:
+            continue
+        a, b = (
+            np.array([np.interp(place, at, column) for column in rows.T]) for place in (first, last)
+        )
+        if space.clear(a, b) and space.clear(rows[i - 1], a) and space.clear(b, rows[j]):
+            rows = np.vstack([rows[:i], a, b, rows[j:]])
+    return _without_needless(space, rows)
+
+
+def _without_needless(space: FreeSpace, rows: Floats) -> Floats:
+    """The same motion without rows that a straight line from the one before can pass over."""
+    kept = [0]
+    while kept[-1] < len(rows) - 1:
+        here = kept[-1]
+        onward = range(len(rows) - 1, here + 1, -1)
+        kept.append(next((k for k in onward if space.clear(rows[here], rows[k])), here + 1))
+    return rows[kept]
