@@ -11,7 +11,7 @@ which are plain values; so that every kernel is compiled once.
 
 from __future__ import annotations
 
-from numba import njit
+from coverable_kernels import njit
 
 kernel = njit(cache=True, error_model="numpy")
 # Written into its caller, of the same file: each array in a `NamedTuple` costs at every call.

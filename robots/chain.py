@@ -19,9 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numba import njit
 from numpy.typing import NDArray
 
+from coverable_kernels import njit
 from robots.errors import RobotError
 
 AGREEMENT = 1e-9  # [m], [1]: largest difference from Pinocchio that is accepted

@@ -21,6 +21,7 @@ MOST_MODULES = 20  # of one folder
 ORDER = """
 coverable_errors
 coverable_files
+coverable_kernels
 coverable_meshes
 robots: errors arguments chain reach robot kinematics
 robots.urdf

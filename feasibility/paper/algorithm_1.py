@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from coverable_kernels import njit
 from feasibility.paper.jcell_grid import (
     HAIR,
     cell_of,

@@ -18,9 +18,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from coverable_kernels import njit
 from robots import frames
 from surfaces.patches import cell_at, closest_on_patch
 

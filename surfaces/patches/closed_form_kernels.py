@@ -11,7 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from coverable_kernels import njit
 
 PLANE, SPHERE, CYLINDER, HYPERBOLOID = 0, 1, 2, 3
 EDGE = 1e-9  # [rad], [m]: a point that misses the patch by no more than this lies on it

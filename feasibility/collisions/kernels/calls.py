@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import cfunc, types
+from numba import types
 from numba.extending import intrinsic
 
+from coverable_kernels import cfunc
 from feasibility.collisions.kernels.measuring import measure
 from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from coverable_kernels import njit
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_point import nearest_on_triangle
 from surfaces.meshes.triangle_mesh import sum_by

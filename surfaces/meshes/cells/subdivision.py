@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from coverable_kernels import njit
 from surfaces.meshes.triangle_mesh import doubled_areas, half_edge_ends, half_edges
 from surfaces.protected import Protected
 from surfaces.surface import SurfaceError

@@ -11,8 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from coverable_kernels import njit
 
 kernel = njit(cache=True, error_model="numpy")
 

@@ -1,4 +1,4 @@
-"""Who is asked to stay clear of whom: every owner with what it can meet, and the others with why."""
+"""Who is asked to stay clear of whom, and who is left out for which reason."""
 
 from __future__ import annotations
 
