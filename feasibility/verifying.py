@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from coverable_errors import ArgumentError, CoverableError
 from feasibility.certification import (
     MotionFault,
-    replay_along_curves,
+    replay,
     replay_over_surface,
     verify_proof,
 )
@@ -98,8 +98,9 @@ def verify(
     `verify(robot, cells, task, q)` judges a motion q (m, n) that anybody made, straight in joint
     space between its rows (rad or m, unwrapped): at every instant the tool point is within the
     tolerance of the target over a place of the surface, the axis within the cone there, that place
-    moves continuously, the joints are inside their limits; and every cell is reached. `verify` of
-    a verdict, or of a result that was loaded, judges its witness or its proof.
+    moves continuously, the joints are inside their limits; bodies stay clear where the task asks
+    for it; and every cell is reached. `verify` of a verdict, or of a result that was loaded, judges
+    its witness or its proof.
 
     Args:
         claim: the arm; or a verdict or result.
@@ -153,7 +154,7 @@ def _rows(q: Any) -> NDArray[np.float64]:
 def _of_motion(claim: Literal["motion", "witness"], problem: Problem, q: Any) -> Verification:
     """The replay of a motion over the surface."""
     robot, cells, task = problem.robot, problem.cells, problem.task
-    found = replay_over_surface(robot, cells, task, q)
+    found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies)
     return Verification(
         claim, robot, cells, task, found.faults, found.certificate, q, found.reached
     )
@@ -166,7 +167,7 @@ def _of_witness(problem: Problem, walk: Walk) -> Verification:
         return found
     robot, cells, task = problem.robot, problem.cells, problem.task
     every = np.ones(len(cells), dtype=bool)
-    along = replay_along_curves(robot, cells, task, walk, every)
+    along = replay(robot, cells, task, walk, every)
     if not along.accepted:
         return found
     return replace(found, faults=(), certificate=along.certificate, reached=every)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coverable_errors import ArgumentError
-from feasibility import Search, Task, Verdict, check, greedy_check
+from feasibility import Search, Task, Verdict, check, greedy_check, verify
 from feasibility.certification import collision_replay, replay
 from feasibility.collisions import Collision, Obstacle, gather
 from feasibility.reports.verdict import as_json
@@ -103,3 +103,18 @@ def test_the_greedy_search_refuses_what_it_does_not_know() -> None:
         check(puma, CELLS, task, Search(method="greedy"))
     with pytest.raises(ArgumentError, match="knows no collisions"):
         greedy_check(puma, CELLS, task)
+
+
+def test_verify_refuses_a_motion_that_collides() -> None:
+    """One that was found without collisions, and is right in everything else."""
+    free = check(UR5, CELLS, TASK)
+    assert free.witness is not None
+    assert verify(UR5, CELLS, TASK, free.witness.q).holds
+    rail = Obstacle.box("rail", (0.3, 0.3, 0.02), (0.5, 0.0, 0.36))
+    judged = replace(TASK, collision=Collision(scene=(rail,)))
+    refused = verify(UR5, CELLS, judged, free.witness.q)
+    assert not refused.holds
+    assert any("rail" in fault.text for fault in refused.faults)
+    told = replace(free, task=judged)
+    assert not verify(told).holds, "nor as a witness of a verdict"
+    assert verify(UR5, CELLS, replace(TASK, collision=Collision()), free.witness.q).holds
