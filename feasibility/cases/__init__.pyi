@@ -6,6 +6,7 @@ from .case import builtin_cases as builtin_cases
 from .case import load_case as load_case
 from .case import read_document as read_document
 from .collision_table import CollisionPart as CollisionPart
+from .collision_table import ObjectPart as ObjectPart
 from .keys import Key as Key
 from .keys import all_keys as all_keys
 from .robot_table import in_robot_table as in_robot_table

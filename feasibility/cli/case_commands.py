@@ -92,7 +92,7 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         subcommands, "explain", explain, add_case, add_html,
         help="what would make a case feasible, and the margins of a feasible one",
         description="Find the thresholds at which the verdict changes: cone, joint limits, "
-        "standoff, position of the surface, cells to drop.",
+        "standoff, position of the surface, clearances and objects in the way, cells to drop.",
         epilog=LATER_STATUSES,
     )  # fmt: skip
     parser.add_argument(

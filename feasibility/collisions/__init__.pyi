@@ -28,6 +28,7 @@ from .triangles import read_triangles as read_triangles
 from .words import CHECKABLE as CHECKABLE
 from .words import TOOL as TOOL
 from .words import UNCHECKED as UNCHECKED
+from .words import Asked as Asked
 from .words import asked_for as asked_for
 from .words import checked as checked
 from .words import checked_words as checked_words

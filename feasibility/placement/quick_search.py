@@ -31,6 +31,7 @@ from feasibility.roadmap import (
     linearise,
     look_at,
     margin_objective,
+    moved_clear,
     place,
     project,
     project_onto_cell,
@@ -69,10 +70,25 @@ def _probe(problem, work, cells, guesses, hits):  # type: ignore[no-untyped-def]
 
 
 def probe(exploration: Exploration, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """(k,) whether Newton's method finds a configuration over some cells (k,)."""
-    hits = np.zeros(len(cells), dtype=np.int64)
-    _probe(exploration.arrays, exploration.work, cells, exploration.guesses(STARTS), hits)
+    """(k,) whether Newton's method finds a configuration over some cells (k,).
+
+    Where collisions are checked, one that is clear of them.
+    """
+    hits, guesses = np.zeros(len(cells), dtype=np.int64), exploration.guesses(STARTS)
+    _probe(exploration.arrays, exploration.work, cells, guesses, hits)
+    if len(exploration.arrays.collisions):
+        for k in np.flatnonzero(hits).tolist():
+            hits[k] = _lands_clear(exploration, int(cells[k]), guesses)
     return hits.astype(bool)
+
+
+def _lands_clear(exploration: Exploration, cell: int, guesses: NDArray[np.float64]) -> bool:
+    """Does any of some guesses lead to a configuration over a cell that does not collide?"""
+    case = exploration.arrays, exploration.work, cell
+    landed = guesses.copy()
+    return any(
+        project_onto_cell(*case, q, PROJECTION_STEPS) and moved_clear(*case, q) for q in landed
+    )
 
 
 def search_quickly(exploration: Exploration, early: bool) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any
 
-from feasibility.collisions import UNCHECKED
+from feasibility.collisions import checked, checked_words
 from feasibility.reports.parts import COLOURS, MARGINS, aligned, csv_text, page, percent, table
 from feasibility.sensitivity import LEAST_CONE_DEG
 from feasibility.studies import Arm, Comparison
@@ -24,7 +24,7 @@ def as_json(comparison: Comparison) -> dict[str, Any]:
     """One object; arms in the order in which they were named."""
     return {
         "case": comparison.case,
-        "collisions": [],
+        "collisions": checked(comparison.collision),
         "robots": [asdict(arm) for arm in comparison.arms],
         "ranking": [arm.robot for arm in comparison.ranked],
         "version": version(),
@@ -91,7 +91,7 @@ def as_text(comparison: Comparison) -> str:
     rows += [[text(arm) for _, text in heads] for arm in comparison.ranked]
     rules = ["-" * max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [line.rstrip() for line in aligned([rows[0], rules, *rows[1:]])]
-    return "\n".join([headline(comparison), f"  {UNCHECKED}", "", *lines])
+    return "\n".join([headline(comparison), f"  {checked_words(comparison.collision)}", "", *lines])
 
 
 def headline(comparison: Comparison) -> str:
@@ -113,7 +113,7 @@ def as_html(comparison: Comparison) -> str:
     lines = [[html.escape(text(arm)) for _, text in heads] for arm in comparison.ranked]
     body = f"<p>{html.escape(headline(comparison))}.</p>\n{chart(comparison)}\n"
     body += table((html.escape(name) for name, _ in heads), lines)
-    return page(f"Robots compared: {comparison.case}", body, NOTE, None)
+    return page(f"Robots compared: {comparison.case}", body, NOTE, comparison.collision)
 
 
 def chart(comparison: Comparison) -> str:

@@ -233,7 +233,7 @@ def sentence(threshold: Threshold, verdict: Verdict) -> str:
         text += f", and on to {shown(quantity, threshold.span.feasible.value)}"
         if threshold.span.other is not None:
             text += f" ({_against(quantity, threshold.span.other)})"
-    if threshold.other is not None:
+    if threshold.other is not None and quantity.kind is not Kind.WITHOUT:
         text += f"; {_against(quantity, threshold.other)}"
     elif verdict.feasible and found.value == quantity.end:
         text += f", {FURTHEST}"

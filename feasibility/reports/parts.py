@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
 
-from feasibility.collisions import Collision, LeftOut, checked_words
+from feasibility.collisions import Asked, LeftOut, checked_words
 from feasibility.results import plain
 from feasibility.verdict import Cause, Certificate
 from feasibility.version import version
@@ -47,7 +47,7 @@ def filled(head: str, text: str) -> str:
 
 
 def summary(
-    head: str, rows: Iterable[tuple[str, str]], collision: Collision | None, width: int = 12
+    head: str, rows: Iterable[tuple[str, str]], collision: Asked | None, width: int = 12
 ) -> list[str]:
     """The answer in one line, an empty line, and named rows; rows without text are left out.
 
@@ -179,18 +179,19 @@ def seconds_text(timing: Mapping[str, float], phases: Mapping[str, str], before_
     return f"{times['total_s']:.2f} s (loading {times['load_s']:.2f}, {parts})"
 
 
-def page(title: str, body: str, note: str, collision: Collision | None) -> str:
+def page(title: str, body: str, note: str, collision: Asked | str | None) -> str:
     """One page that fetches nothing.
 
     Args:
         title: plain text.
         body: HTML.
         note: plain text at the end; the program's version follows.
-        collision: what was checked.
+        collision: what was checked; or the sentence that says it.
     """
+    said = collision if isinstance(collision, str) else checked_words(collision)
     return _PAGE.format(
         title=html.escape(title),
-        unchecked=html.escape(checked_words(collision)),
+        unchecked=html.escape(said),
         body=body,
         note=html.escape(f"{note} coverable {version()}"),
     )

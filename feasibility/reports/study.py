@@ -8,7 +8,8 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from feasibility.collisions import UNCHECKED
+from feasibility.cases import CollisionPart, ObjectPart
+from feasibility.collisions import CHECKABLE, UNCHECKED, checked, checked_words
 from feasibility.reports.parts import (
     COLOURS,
     MARGINS,
@@ -20,7 +21,7 @@ from feasibility.reports.parts import (
     table,
 )
 from feasibility.reports.study_plot import are_numbers, charts, short, worded
-from feasibility.studies import Row, Study, merit
+from feasibility.studies import Row, Study, StudyTask, merit
 from feasibility.version import version
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def as_json(study: Study, rows: Sequence[Row]) -> dict[str, Any]:
         "study": study.name,
         "description": study.description,
         "parameters": list(study.labels),
-        "collisions": [],
+        "collisions": checked_in_all(study),
         "tasks": len(rows),
         "verdicts": counts(rows),
         "failed": sum(row.status == "failed" for row in rows),
@@ -76,7 +77,7 @@ def as_csv(study: Study, rows: Sequence[Row]) -> str:
 def as_text(study: Study, rows: Sequence[Row]) -> str:
     """The outcome of the study: verdicts, by value where there are few, and the best rows."""
     lines = [study.description] if study.description else []
-    lines += [headline(study, rows), f"  {UNCHECKED}"]
+    lines += [headline(study, rows), f"  {collision_words(study)}"]
     if found := causes(rows):
         listed = ", ".join(f"{cause} in {number}" for cause, number in found)
         lines.append(f"  most frequent cause of missed cells: {listed}.")
@@ -126,7 +127,35 @@ def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str
     if poses is not None:
         inner = html.escape(poses.html(), quote=True)
         parts.append(f'<h2>Poses</h2>\n<iframe srcdoc="{inner}" loading="lazy"></iframe>\n')
-    return page(f"Study: {study.name}", "".join(parts), NOTE, None)
+    return page(f"Study: {study.name}", "".join(parts), NOTE, collision_words(study))
+
+
+def checked_in_all(study: Study) -> list[str]:
+    """What every case of a study checks, in the words of JSON."""
+    every = [checked(_asked(task)) for task in study.tasks]
+    return [name for name in CHECKABLE if every and all(name in one for one in every)]
+
+
+def collision_words(study: Study) -> str:
+    """The sentence that says what is checked, of all cases or of how many."""
+    said = Counter(checked_words(_asked(task)) for task in study.tasks)
+    if len(said) <= 1:
+        return next(iter(said), UNCHECKED)
+    return "; ".join(f"in {number} of {said.total()} cases {text}" for text, number in said.items())
+
+
+def _asked(task: StudyTask) -> CollisionPart | None:
+    """What a checked case asks for: enough of it to say what is checked."""
+    table = task.tables.get("collision")
+    if not table:
+        return None
+    return CollisionPart(
+        self_=table.get("self", True),
+        surface=table.get("surface", True),
+        clearance=float(table.get("clearance", 0.0)),
+        tool_clearance=float(table.get("tool_clearance", 0.0)),
+        scene=tuple(ObjectPart(one["kind"], one) for one in table.get("scene", ())),
+    )
 
 
 def _verdict_bar(rows: Sequence[Row]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from feasibility.cases import Case
+from feasibility.collisions import checked
 from feasibility.reports.parts import summary
 from feasibility.version import version
 
@@ -32,7 +33,7 @@ def as_json(case: Case, text: str, seconds: float) -> dict[str, Any]:
         "edges": 0,
         "uncovered": [],
         "certificate": None,
-        "collisions": [],
+        "collisions": checked(case.collision),
         "unchecked_links": [],
         "pairs_left_out": [],
         "proof": None,
@@ -48,4 +49,4 @@ def as_json(case: Case, text: str, seconds: float) -> dict[str, Any]:
 def as_text(case: Case, text: str) -> str:
     """For people."""
     rows = [("case", f"{case.name}  {case.description}".rstrip()), ("found", text), ("hint", MORE)]
-    return "\n".join(summary(HEAD, rows, None))
+    return "\n".join(summary(HEAD, rows, case.collision))

@@ -48,6 +48,7 @@ MOST_SUSPECTS = 12  # cells that are taken for hard
 AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
 GUESSES = 16  # random configurations that are projected onto a cell that no known one covers
 GUESS_STEPS = np.int64(20)  # Newton steps of each
+KEPT = 2_000_000  # numbers in arrays of values nearby, which are asked for again and again
 LEAST_BOXES = 120  # for one cell, however expensive proofs have been
 
 
@@ -62,7 +63,7 @@ class Prober:
         self.seed = seed
         self.clock = clock
         self.arrays = arrays_of(*variant)
-        self._latest = ("", 0), self.arrays
+        self._made = dict[tuple[str, int], SearchArrays]()
         beyond = replace(variant.task, standoff=variant.task.standoff + 1.0)
         self.outwards = beyond.targets(variant.cells).points - self.arrays.points
         """(N, 3) how the target points move with the standoff."""
@@ -105,7 +106,8 @@ class Prober:
 
     def _made_anew(self, quantity: Quantity, k: int) -> SearchArrays:
         """All arrays with a quantity k steps from the value given; the latest are kept."""
-        if self._latest[0] != (quantity.name, k):
+        made = self._made
+        if (quantity.name, k) not in made:
             variant = quantity.applied(self.given, k)
             if quantity.kind in OF_COLLISIONS:  # nothing else changes
                 robot, cells, task = variant
@@ -113,8 +115,11 @@ class Prober:
                 arrays = self.arrays._replace(collisions=other)
             else:
                 arrays = arrays_of(*variant)
-            self._latest = (quantity.name, k), arrays
-        return self._latest[1]
+            most = KEPT // (arrays.collisions.size + arrays.targets.size + 1)
+            while made and len(made) >= most:
+                del made[next(iter(made))]
+            made[quantity.name, k] = arrays
+        return made[quantity.name, k]
 
     def centres_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The same over the cells' centres, cheaper: what lies between them may be unchanged."""

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import Fault
-from feasibility.cases import Case, CaseError, as_read
+from feasibility.cases import Case, CaseError, CollisionPart, as_read
 from feasibility.clock import Clock, OutOfTime
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
@@ -71,6 +71,8 @@ class Comparison:
     """Were patches counted?"""
     critical: bool
     """Were critical cones searched for?"""
+    collision: CollisionPart | None = None
+    """What was checked of collisions; None where nothing was."""
 
     @property
     def ranked(self) -> tuple[Arm, ...]:
@@ -123,7 +125,7 @@ def compare(
         robot = arm_of(case_of(task.tables))
         known = {"robot": robot.name, "joints": robot.n, "reach_m": finite(robot.reach)}
         arms.append(Arm(**{**known, **row.result}, seconds=row.seconds))
-    return Comparison(case.name, tuple(arms), divide, critical)
+    return Comparison(case.name, tuple(arms), divide, critical, case.collision)
 
 
 def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
