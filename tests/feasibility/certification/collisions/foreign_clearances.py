@@ -8,7 +8,7 @@ import fcl
 import numpy as np
 import pinocchio as pin
 
-from feasibility.collisions import HalfSpace
+from feasibility.collisions import HalfSpace, gather
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
@@ -67,13 +67,14 @@ class ForeignScene:
         world = self.data.oMi[joint].homogeneous @ placement if joint else placement
         return fcl.CollisionObject(model, fcl.Transform(world[:3, :3], world[:3, 3]))
 
-    def distances(self, q):
-        """The distance (m) of every pair, in their order; at most 0 where they touch."""
+    def distances(self, q, asked=None):
+        """The distance (m) of every pair, or of those asked for; at most 0 where they touch."""
         pin.forwardKinematics(
             self.robot.model, self.data, pin.integrate(self.robot.model, self.neutral, q)
         )
         found = []
-        for pair in self.bodies.pairs:
+        pairs = self.bodies.pairs
+        for pair in pairs if asked is None else [pairs[k] for k in asked]:
             least = np.inf
             for one in self.objects[pair.first]:
                 for other in self.objects[pair.second]:
@@ -81,6 +82,52 @@ class ForeignScene:
                     least = min(least, _distance(first, second) - one[3] - other[3])
             found.append(least)
         return np.array(found)
+
+    def least_excess(self, rows):
+        """The least distance (m) over the pairs' clearances at any row (m, n) of a motion.
+
+        No point of the arm moves further than its reach times the joints' turns: where a pair is
+        further apart than that, it is not asked for again.
+        """
+        most = max(1.0, self._reach())
+        way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(rows, axis=0)).sum(axis=1))])
+        until = np.full(len(self.bodies.pairs), -1.0)
+        least = np.inf
+        for q, moved in zip(rows, most * way, strict=True):
+            asked = np.flatnonzero(until <= moved)
+            if not len(asked):
+                continue
+            needed = [self.bodies.pairs[k].clearance for k in asked]
+            excess = self.distances(q, asked) - needed
+            until[asked] = moved + excess
+            least = min(least, float(excess.min()))
+        return least
+
+    def _reach(self):
+        """m, no point of the arm is further from any of its joints."""
+        model = self.robot.model
+        steps = sum(np.linalg.norm(place.translation) for place in model.jointPlacements)
+        slides = np.abs([self.robot.lower, self.robot.upper]).max(axis=0)
+        slides = slides[self.robot.prismatic].sum()
+        wide = max(
+            np.linalg.norm(solid.placement[:3, 3]) + radius_about(solid.geometry)
+            for solid in self.bodies.solids
+        )
+        return steps + slides + wide
+
+
+def radius_about(geometry):
+    """m, no point of the shape is further from its origin."""
+    match geometry:
+        case Box(size):
+            return 0.5 * np.linalg.norm(size)
+        case Sphere(radius):
+            return radius
+        case Capsule(radius, length) | Cylinder(radius, length):
+            return radius + 0.5 * length
+        case Triangles(vertices, _):
+            return np.linalg.norm(vertices, axis=1).max()
+    raise TypeError(geometry)
 
 
 def _distance(first, second):
@@ -97,3 +144,13 @@ def samples(q, step):
         count = max(1, int(np.ceil(np.abs(b - a).max() / step)))
         rows.append(a + (np.arange(1, count + 1) / count)[:, None] * (b - a))
     return np.vstack(rows)
+
+
+def assert_clear(verdict, step_deg):
+    """No pair is too near for fcl at places at most `step_deg` apart along a verdict's motion."""
+    task, surface = verdict.task, verdict.cells.surface
+    bodies = gather(verdict.robot, surface, task.collision, task.standoff)
+    rows = samples(verdict.witness.q, np.radians(step_deg))
+    excess = ForeignScene(verdict.robot, bodies).least_excess(rows)
+    assert excess >= -1e-6, f"{-excess:.3g} m nearer than the clearance"
+    assert verdict.certificate.min_clearance is not None
