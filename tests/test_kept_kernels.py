@@ -1,4 +1,4 @@
-"""Kernels that are kept on disk are compiled anew when what they call has changed, in other files."""
+"""Kernels that are kept on disk are compiled anew when what they call has changed elsewhere."""
 
 from __future__ import annotations
 
