@@ -41,9 +41,10 @@ lint: .venv/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# Compiles the kernels of both searches into the cache; one processor is enough for that.
+# Compiles the kernels of both searches, and of collisions, into the cache; one processor is enough for that.
 kernels: .venv/installed
 	@$(BIN)/coverable check paper/4a >/dev/null
+	@$(BIN)/coverable check paper/5e --set collision.clearance=0.005 >/dev/null
 	@$(BIN)/coverable check paper/4f --set search.method=greedy >/dev/null || test $$? -eq 1
 
 test: .venv/installed
