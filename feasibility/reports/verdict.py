@@ -232,6 +232,9 @@ def _hints(verdict: Verdict) -> list[str]:
         hints.append("--set robot.limits=... tries other joint limits (`coverable robots`)")
     if CauseKind.ORIENTATION in kinds and verdict.task.cone_deg > 0.0:
         hints.append(f"--set task.cone_deg=... opens the cone ({verdict.task.cone_deg:g} now)")
+    asked = verdict.task.collision
+    if asked is not None and CauseKind.COLLISION in kinds and asked.shapes == "hulls":
+        hints.append("--set collision.shapes=pieces takes bodies that are nearer to the real ones")
     if CauseKind.DISCONNECTED in kinds:
         hints.append(f"{_narrower(verdict)} leaves out cells that need a second motion")
     shows = "it" if verdict.covered.all() else "which cells are missed"

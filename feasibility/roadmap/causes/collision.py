@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.collisions import Pair, configuration_bounds
 from feasibility.roadmap.branch_and_bound import Ruling
+from feasibility.roadmap.clear_landings import moved_clear
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.off_target import project_near_cell
 from feasibility.roadmap.projection import PROJECTION_STEPS
 from feasibility.verdict import Cause, CauseKind
 
 LANDINGS = 60  # random configurations that are projected onto the cell
+PUSHED = 5  # of the best landings, which are moved away from what they collide with
 NAMED = 2  # pairs that the detail names with their share of the landings
 
 
@@ -28,25 +32,42 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
     if not len(arrays.collisions) or exploration.rulings.get(cell) is Ruling.PROVED:
         return None
     needed = np.array([pair.clearance for pair in pairs])
-    spare = []  # of each landing: distance beyond the clearance, by pair
+    landed, spare = [], []  # spare: of each landing, distance beyond the clearance by pair
     for q in exploration.guesses(LANDINGS):
         if project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):
+            landed.append(q.copy())
             spare.append(configuration_bounds(arrays.collisions, q) - needed)
-    if not spare or any((row > 0.0).all() for row in spare):
+            if (spare[-1] > 0.0).all():
+                return None
+    if not spare:
         return None
-    return _worded(cell, np.array(spare), pairs)
+    best = spare[int(np.argmax([row.min() for row in spare]))]
+    for k in np.argsort([-row.min() for row in spare], kind="stable")[:PUSHED].tolist():
+        if moved_clear(arrays, work, cell, landed[k]):
+            return None
+        pushed = configuration_bounds(arrays.collisions, landed[k]) - needed
+        best = pushed if pushed.min() > best.min() else best
+    return _worded(cell, np.array(spare), best, pairs)
 
 
-def _worded(cell: int, spare: NDArray[np.float64], pairs: tuple[Pair, ...]) -> Cause:
-    """The pair that is least in the way of the best landing, and who blocks how many of them."""
-    worst = spare.argmin(axis=1)
-    best = int(spare.min(axis=1).argmax())
-    pair = pairs[worst[best]]
-    distance = float(spare[best].min()) + pair.clearance
+def _worded(
+    cell: int, spare: NDArray[np.float64], best: NDArray[np.float64], pairs: tuple[Pair, ...]
+) -> Cause:
+    """What is in the way of the best configuration, and who blocks how many of the landings.
+
+    Args:
+        cell: the cell.
+        spare: (k, P) of each landing, distance beyond the clearance by pair, m.
+        best: (P,) the same of the best configuration, a landing or one that was pushed.
+        pairs: the P pairs.
+    """
+    pair = pairs[int(best.argmin())]
+    distance = float(best.min()) + pair.clearance
     if distance < 0.0:
         how = f"overlap by {-1e3 * distance:.1f} mm"
     else:
-        how = f"come within {1e3 * distance:.1f} mm, {1e3 * pair.clearance:g} mm are asked for"
+        short = math.floor(1e4 * distance) / 10.0  # never rounded up to what is asked for
+        how = f"come within {short:.1f} mm, {1e3 * pair.clearance:g} mm are asked for"
     blocked = (spare <= 0.0).sum(axis=0)
     most = np.argsort(-blocked, kind="stable")[:NAMED]
     shares = ", ".join(
@@ -54,6 +75,6 @@ def _worded(cell: int, spare: NDArray[np.float64], pairs: tuple[Pair, ...]) -> C
     )
     detail = (
         f"at best {pair.first} and {pair.second} {how}; of {len(spare)} configurations over the "
-        f"cell none is clear: {shares}"
+        f"cell none is clear; in the way: {shares}"
     )
     return Cause(cell, CauseKind.COLLISION, False, detail, (pair.first, pair.second), distance)

@@ -47,7 +47,7 @@ def disconnected(
         LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
         CONE: "the tool axis stops at the boundary of the cone",
         SINGULAR: "the arm stops at a singularity",
-        COLLISION: f"{met.first} and {met.second} would collide" if met else None,
+        COLLISION: _stopped_by(met),
         LONG: "the motion takes too many steps",
         FOLD: "the surface is creased, or its offset folds",
     }.get(code)
@@ -56,6 +56,16 @@ def disconnected(
         pair = None if met is None else (met.first, met.second)
         return Cause(cell, CauseKind.DISCONNECTED, False, detail, pair)
     return Cause(cell, CauseKind.DISCONNECTED, False, detail)
+
+
+def _stopped_by(pair: Pair | None) -> str:
+    """That a pair stopped a motion, in words; empty where it is not known."""
+    if pair is None:
+        return ""
+    names = f"{pair.first} and {pair.second}"
+    if pair.clearance > 0.0:
+        return f"{names} would come nearer than {1e3 * pair.clearance:g} mm"
+    return f"{names} would collide"
 
 
 def _parted(exploration: Exploration, proof: CutTree, other: int, roots: set[int]) -> str:
