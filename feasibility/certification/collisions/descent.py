@@ -35,8 +35,9 @@ class Descent:
 
         These have less than `needed`, or less than `aim` where there seems to be more.
         """
-        couples = _all(self.tree.levels[0], s)
-        for level in self.tree.levels[:-1]:
+        first = min(1, len(self.tree.levels) - 1)  # the largest boxes are hardly ever clear
+        couples = _all(self.tree.levels[first], s)
+        for level in self.tree.levels[first:-1]:
             couples, _ = self._searched(level, s, couples, (self.aim, self.aim))
             couples = self.keep(couples, couples.low >= self.aim)
             at = np.repeat(couples.at, 1 << BRANCHES)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import TypeGuard
+
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.collisions.pieces import MeshPart, Piece
 
 Array = NDArray[np.float64]
+
+KEPT = 64  # meshes of which what is asked here is remembered
 
 
 def one_inside_other(a: Piece, b: Piece, rotation: Array, point: Array) -> bool:
@@ -16,15 +21,18 @@ def one_inside_other(a: Piece, b: Piece, rotation: Array, point: Array) -> bool:
     Their boundaries must not touch. Only closed meshes are asked; coal knows of the inside of
     primitives.
     """
-    there = _points(b) @ rotation.T + point
-    back = (_points(a) - point) @ rotation
-    return _any_inside(a, there) or _any_inside(b, back)
+    if _is_closed(a) and _any_inside(a, _points(b) @ rotation.T + point):
+        return True
+    return _is_closed(b) and _any_inside(b, (_points(a) - point) @ rotation)
 
 
-def _any_inside(body: Piece, points: Array) -> bool:
-    """Is one of the points (k, 3) inside the mesh, if it is a closed one?"""
-    if not (isinstance(body, MeshPart) and body.closed):
-        return False
+def _is_closed(body: Piece) -> TypeGuard[MeshPart]:
+    """Is it a closed mesh?"""
+    return isinstance(body, MeshPart) and body.closed
+
+
+def _any_inside(body: MeshPart, points: Array) -> bool:
+    """Is one of the points (k, 3) inside the mesh?"""
     triangles = _outward(body)
     return any(abs(winding(triangles, point)) > 0.5 for point in points)
 
@@ -42,6 +50,7 @@ def winding(triangles: Array, point: Array) -> float:
     return float(2.0 * np.arctan2(above, below).sum() / (4.0 * np.pi))
 
 
+@lru_cache(maxsize=KEPT)
 def _outward(mesh: MeshPart) -> Array:
     """Its triangles (k, 3, 3), each shell with one orientation."""
     faces = mesh.faces
@@ -58,6 +67,7 @@ def _outward(mesh: MeshPart) -> Array:
     return mesh.vertices[faces]
 
 
+@lru_cache(maxsize=KEPT)
 def _points(body: Piece) -> Array:
     """(k, 3) a point of each shell of a mesh; of a primitive its centre."""
     if not isinstance(body, MeshPart):

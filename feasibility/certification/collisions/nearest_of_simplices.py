@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+TINY = 1e-300  # what keeps quotients of zeros finite
 FLAT = 1e-30  # [m^4] square of twice the area of a face, below which its edges have to do
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 FACES = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
@@ -25,7 +26,7 @@ def nearest_of(corners: Array) -> tuple[Array, Array]:
     """
     start = corners[:, EDGES[:, 0]]
     way = corners[:, EDGES[:, 1]] - start
-    square = np.maximum(np.einsum("kei,kei->ke", way, way), np.finfo(float).tiny)
+    square = np.maximum(np.einsum("kei,kei->ke", way, way), TINY)
     share = np.clip(-np.einsum("kei,kei->ke", start, way) / square, 0.0, 1.0)
     on_edges = start + share[:, :, None] * way
     on_faces, inside = _on_faces(corners)

@@ -19,6 +19,8 @@ from feasibility.certification.collisions.relative_motion import Poses, Stretche
 
 Array = NDArray[np.float64]
 
+TINY = 1e-300  # what keeps quotients of zeros finite
+
 
 def lows(b: Piece, poses: Poses, n: Array) -> Array:
     """(k,) m, least n . x over the points of b, for directions (k, 3)."""
@@ -52,7 +54,7 @@ def by_balls(a: Piece, b: Piece, s: Stretches) -> Array:
 
 def nearest_points(start: Array, way: Array) -> Array:
     """(k, 3) m, the points nearest to the origin of lines from `start` along all of `way`."""
-    square = np.maximum(np.einsum("ki,ki->k", way, way), np.finfo(float).tiny)
+    square = np.maximum(np.einsum("ki,ki->k", way, way), TINY)
     share = np.clip(-np.einsum("ki,ki->k", start, way) / square, 0.0, 1.0)
     return np.asarray(start + share[:, None] * way)
 

@@ -26,6 +26,7 @@ FLAT = (
     1e-6  # [1] least thickness of a hull relative to its length; qhull and coal fail on flat ones
 )
 MERGED = 1e-12  # [1] of its size, how far what qhull leaves out may stand out of its hull
+TINY = 1e-300  # what keeps quotients of zeros finite
 MANY = 64  # corners of a part of a mesh, above which only those on its hull are kept
 
 
@@ -100,7 +101,7 @@ class Round(Piece):
         axis = self.placement[:3, 2]
         along = n @ axis
         across = n - along[:, None] * axis
-        width = np.maximum(np.linalg.norm(across, axis=1), np.finfo(float).tiny)
+        width = np.maximum(np.sqrt(np.einsum("ki,ki->k", across, across)), TINY)
         rim = (self.shape.radius / width)[:, None] * across
         ends = np.copysign(0.5 * self.shape.length, along)
         return np.asarray(self.placement[:3, 3] + ends[:, None] * axis + rim)
@@ -255,8 +256,8 @@ def sheet_piece(triangles: Array, closed: bool) -> Piece:
     """
     if not len(triangles) or not np.isfinite(triangles).all():
         raise ArgumentError("a sheet for the replay has no triangles, or they are not finite")
-    faces = np.arange(3 * len(triangles)).reshape(-1, 3)
-    return MeshPart(triangles.reshape(-1, 3), faces, closed)
+    vertices, faces = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
+    return MeshPart(vertices, faces.reshape(-1, 3), closed)
 
 
 def _mesh(vertices: Array, faces: NDArray[np.int64], closed: bool, at_rest: bool) -> Piece:

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
 NEAR = 0.9  # [1] share of the distances met, that is aimed at where it costs little
-STEPS = 6  # after which smaller boxes are asked
+STEPS = 3  # after which smaller boxes are asked
 LAST_STEPS = 16  # the same for triangles
 
 
@@ -68,8 +68,8 @@ def searched(
             distance, or the aim; and where what is needed cannot be had.
 
     Returns:
-        (p,) m, the distances along the stretches are at least this; (p,) m, and cannot be shown to
-        be more than this.
+        (p,) m, the distances along the stretches are at least this; (p,) m, the chords come nearer
+        than this, if that was met.
     """
     needed, aim = between
     at, boxes = couples.at, couples.boxes
@@ -93,9 +93,10 @@ def searched(
             else:
                 v, corners[open_] = nearest_of(np.concatenate([corners[open_], w[:, None]], axis=1))
             ahead[open_] = v
-            most[open_] = np.sqrt(np.einsum("ki,ki->k", v, v)) - off
-        goal = np.clip(NEAR * most[open_], needed, aim)
-        open_ = open_[(low[open_] < goal) & (most[open_] >= needed)]
+            most[open_] = np.sqrt(np.einsum("ki,ki->k", v, v))
+        can_be = most[open_] - off
+        goal = np.clip(NEAR * can_be, needed, aim)
+        open_ = open_[(low[open_] < goal) & (can_be >= needed)]
         if not len(open_):
             break
     return low, most

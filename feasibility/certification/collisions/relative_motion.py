@@ -133,8 +133,8 @@ class Motion:
             np.arange(count),
             np.zeros(count),
             np.ones(count),
-            poses.of(np.arange(count)),
-            poses.of(np.arange(1, count + 1)),
+            Poses(poses.rotations[:-1], poses.points[:-1]),
+            Poses(poses.rotations[1:], poses.points[1:]),
             *bounds,
             np.full(count, -np.inf),
         )
