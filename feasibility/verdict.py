@@ -105,6 +105,8 @@ class Replay:
     certificate: Certificate
     refusal: str
     """Why the motion is refused; empty when it is accepted."""
+    collides: bool = False
+    """Is it refused for bodies that come too near alone?"""
 
     @property
     def accepted(self) -> bool:
@@ -113,8 +115,13 @@ class Replay:
 
     @property
     def narrowly_refused(self) -> bool:
-        """Is the motion refused for its numbers, and not as no motion at all?"""
-        return not self.accepted and math.isfinite(self.certificate.max_position_error)
+        """Is the motion refused for numbers that less tolerance and cone in the search may better?
+
+        Neither makes room between bodies.
+        """
+        if self.accepted or self.collides:
+            return False
+        return math.isfinite(self.certificate.max_position_error)
 
 
 DEFERRED = ("graph", "causes", "tree")

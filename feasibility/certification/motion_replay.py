@@ -68,7 +68,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     certificate = replace(
         found.certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
     )
-    return Replay(certificate, clear.refusal)
+    return Replay(certificate, clear.refusal, collides=not clear.accepted)
 
 
 def _replay_of_tool(

@@ -163,36 +163,69 @@ def collision_replay(
     return _judged(bodies, ready, motion)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Asked:
+    """Two bodies of a pair."""
+
+    pair: Pair
+    deviation: float
+    """m, how far they may stand out from what is known of them."""
+    pairing: Pairing
+
+    @property
+    def needed(self) -> float:
+        """m, of what is known of them."""
+        return self.pair.clearance + self.deviation
+
+    @property
+    def distance(self) -> float:
+        """m, certified, or met where they are refused."""
+        place = self.pairing.place
+        return (self.pairing.bound - ROUNDING if place is None else place.distance) - self.deviation
+
+
 def _judged(bodies: Bodies, ready: BodiesOfOwners, motion: Motion) -> CollisionReplay:
     """All pairs, first at a glance: how near they come sets what is aimed at."""
-    open_pairs: list[tuple[Pair, float, Pairing]] = []
+    asked = [
+        _Asked(
+            pair,
+            a.deviation + b.deviation,
+            Pairing(a.piece, b.piece, (a.joint, b.joint), motion),
+        )
+        for pair in bodies.pairs
+        for a, b in ready.couples(pair)
+    ]
+    asked.sort(key=_outermost)
     nearest = np.inf
-    for pair in bodies.pairs:
-        for a, b in ready.couples(pair):
-            pairing = Pairing(a.piece, b.piece, (a.joint, b.joint), motion)
-            deviation = a.deviation + b.deviation
-            open_pairs.append((pair, deviation, pairing))
-            if pairing.stretches.bound.min() < nearest + deviation:
-                nearest = min(nearest, pairing.glance() - deviation)
-    least, of, calls = np.inf, None, 0
+    for one in asked:
+        met = one.pairing.glance(nearest + one.deviation) - one.deviation
+        nearest = min(nearest, met)
+    for one in asked:
+        one.pairing.certify(one.needed, max(one.needed, NEAR * nearest + one.deviation))
     faults: dict[tuple[str, str], CollisionFault] = {}
-    for pair, deviation, pairing in open_pairs:
-        needed = pair.clearance + deviation
-        pairing.certify(needed, max(needed, NEAR * nearest + deviation))
-        calls += pairing.calls
-        distance = pairing.bound - deviation - ROUNDING
-        names = (pair.first, pair.second)
-        if pairing.place is not None:
-            distance = pairing.place.distance - deviation
-            fault = _fault(pair, pairing.place, distance)
-            known = faults.get(names)
+    for one in asked:
+        if one.pairing.place is not None:
+            fault = _fault(one.pair, one.pairing.place, one.distance)
+            known = faults.get(fault.pair)
             if known is None or not fault.distance >= known.distance:
-                faults[names] = fault
-        if distance < least:
-            least, of = distance, names
-    ordered = sorted(faults.values(), key=lambda fault: np.nan_to_num(fault.distance, nan=np.inf))
-    clearance = None if of is None else float(least)
-    return CollisionReplay(clearance, of, tuple(ordered), calls)
+                faults[fault.pair] = fault
+    least = min(asked, key=lambda one: np.nan_to_num(one.distance, nan=np.inf))
+    ordered = sorted(faults.values(), key=lambda one: np.nan_to_num(one.distance, nan=np.inf))
+    return CollisionReplay(
+        min_clearance=float(least.distance),
+        nearest_pair=(least.pair.first, least.pair.second),
+        faults=tuple(ordered),
+        calls=sum(one.pairing.calls for one in asked),
+    )
+
+
+def _outermost(one: _Asked) -> tuple[object, ...]:
+    """Brings what is furthest from the base, and often the nearest, to the front.
+
+    So the answer does not depend on the order in which bodies and pairs are given.
+    """
+    pairing, names = one.pairing, sorted((one.pair.first, one.pair.second))
+    return (-pairing.joints[1], *names, *pairing.a.centre, *pairing.b.centre)
 
 
 def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:

@@ -77,27 +77,34 @@ class Pairing:
         """m, certified lower bound of their distance along what is accepted so far."""
         self.place: Place | None = None
         """Why it is refused."""
+        self._most = CALLS[0] + CALLS[1] * len(motion.q)
         stretches = motion.stretches(*joints, b.centre, b.ball)
         self.stretches = replace(stretches, bound=by_balls(a, b, stretches))
 
-    def glance(self) -> float:
+    def glance(self, nearest: float) -> float:
         """Improve the bounds a little; a distance (m) at the row that seems worst.
 
-        The distance is that of the hulls, a hint of how near the bodies are at all.
+        The distance is that of the hulls, a hint of how near the bodies are at all; infinite where
+        that is not less than `nearest` (m).
         """
         s = self.stretches
-        if not len(s.row):
+        if s.bound.min() >= nearest:
             return np.inf
         if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
             low = glimpse(self.a.tree, self.b, s)
             if not self.a.closed:
                 self.stretches = replace(s, bound=np.maximum(s.bound, low))
-            return self._asked(self.a, self.b, s, int(np.argmin(low)), False).distance
+            worst = int(np.argmin(low))
+            clear = low[worst] >= nearest
+            return np.inf if clear else self._asked(self.a, self.b, s, worst).distance
         bound = s.bound
         for guess in guesses(self.a, self.b, s):
             bound = np.maximum(bound, parted(self.a, self.b, s, guess))
-        met = self._asked(self.a, self.b, s, int(np.argmin(bound)), False)
-        self.stretches = _raised(self.a, self.b, replace(s, bound=bound), met.n)
+        self.stretches = s = replace(s, bound=bound)
+        if bound.min() >= nearest:
+            return np.inf
+        met = self._asked(self.a, self.b, s, int(np.argmin(bound)))
+        self.stretches = _raised(self.a, self.b, s, met.n)
         return met.distance
 
     def certify(self, needed: float, aim: float) -> None:
@@ -132,7 +139,7 @@ class Pairing:
             self._by_budget(a.truth, b.truth, s, needed, aim)
             return []
         s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
-        if len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most()):
+        if len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most):
             self.place = _middle(s)
             return []
         return [(a, b, self.motion.halves(s, *self.joints))] if len(s.row) else []
@@ -217,7 +224,7 @@ class Pairing:
                     return True
         return False
 
-    def _asked(self, a: Piece, b: Piece, s: Stretches, k: int, end: bool) -> Met:
+    def _asked(self, a: Piece, b: Piece, s: Stretches, k: int, end: bool = False) -> Met:
         """Ask coal at an end of stretch k."""
         poses = (s.last if end else s.first).of(np.array([k]))
         if isinstance(a, Below):
@@ -257,7 +264,7 @@ class Pairing:
 
         moved = np.zeros(len(self.motion.q) - 1)
         moved[whole.row] = whole.moved
-        budget = Budget(distance, moved, self._most() - self.calls)
+        budget = Budget(distance, moved, self._most - self.calls)
         try:
             bound = budget.certify(s.row, needed + s.stray, aim)
             self.bound = min(self.bound, bound - float(s.stray.max()))
@@ -266,10 +273,6 @@ class Pairing:
             depth = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
             overlap = met.distance <= 0.0
             self.place = Place(met.row, met.share, min(depth, 0.0) if overlap else met.distance)
-
-    def _most(self) -> int:
-        """How often coal may be asked."""
-        return CALLS[0] + CALLS[1] * len(self.motion.q)
 
     def _begins_inside(self, s: Stretches, needed: float) -> bool:
         """Is one body inside the other at the first row? Sets `place` if so."""
