@@ -37,10 +37,10 @@ CAUSES: dict[CauseKind, Colour] = {  # distinct for colour-blind readers too (Ok
     CauseKind.DISCONNECTED: (0.94, 0.86, 0.20),
 }
 PAIRS: tuple[Colour, ...] = (  # of cells that a pair of bodies is in the way of, by pair
+    (0.50, 0.10, 0.65),
+    (0.10, 0.50, 0.50),
     (0.20, 0.20, 0.20),
     (0.55, 0.35, 0.17),
-    (0.62, 0.17, 0.50),
-    (0.10, 0.50, 0.50),
     (0.95, 0.45, 0.30),
     (0.35, 0.45, 0.85),
     (0.55, 0.62, 0.20),
