@@ -57,17 +57,21 @@ def test_python_of_the_readme_runs_and_says_what_it_promises(
 
 
 def test_case_file_of_the_readme_is_feasible(tmp_path: Path) -> None:
-    text, _ = blocks(README, "toml")
+    text, collision, _ = blocks(README, "toml")
     (tmp_path / "case.toml").write_text(text)
     assert check(*Case.from_toml(text, tmp_path).build()).feasible
     assert main(["check", str(tmp_path / "case.toml")]) == 0
+    clear = check(*Case.from_toml(f"{text}\n{collision}", tmp_path).build())
+    assert clear.feasible
+    assert clear.task.collision is not None
+    assert clear.task.collision.checked == ("self", "surface", "scene")
 
 
 def test_commands_of_the_readme_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    for name, text in zip(("case", "study"), blocks(README, "toml"), strict=True):
+    for name, text in zip(("case", "collision", "study"), blocks(README, "toml"), strict=True):
         (tmp_path / f"{name}.toml").write_text(text)
     lines = [line for block in blocks(README, "") for line in block.splitlines()]
     commands = [shlex.split(x, comments=True) for x in lines if x.startswith("coverable")]
