@@ -42,7 +42,14 @@ def _malformed(robot: Robot, cells: Cells, walk: Walk) -> str:
     return ""
 
 
-def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]) -> Replay:
+def replay(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    walk: Walk,
+    needed: NDArray[np.bool_],
+    strays: NDArray[np.float64] | None = None,
+) -> Replay:
     """Check a walk: limits, tool point and cone at and between waypoints, and the cells it visits.
 
     A walk that the curves between cell centres do not show to be right, because it leaves them or
@@ -56,6 +63,8 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
             only of walks that are right in everything else.
         walk: the motion.
         needed: (N,) cells that must be visited.
+        strays: (m - 1, n) how far each joint may be from the straight lines between waypoints,
+            for collisions; 0 by default.
 
     Returns:
         What was measured, and the reason if the walk is refused. NaN anywhere refuses.
@@ -64,7 +73,7 @@ def replay(robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[n
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is None or not found.accepted:
         return found
-    clear = collision_replay(robot, bodies, walk.q)
+    clear = collision_replay(robot, bodies, walk.q, strays)
     certificate = replace(
         found.certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
     )

@@ -10,7 +10,13 @@ import numpy as np
 
 from feasibility.collisions import checked
 from feasibility.paths import CoveragePath, PathFigures
-from feasibility.reports.parts import certificate_json, clearance_json, counted, summary
+from feasibility.reports.parts import (
+    certificate_json,
+    clearance_json,
+    clearance_text,
+    counted,
+    summary,
+)
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results import plain
 from feasibility.timing import MotionLimits, Trajectory, used
@@ -147,6 +153,7 @@ def as_text(
             f"{at_most(1e3 * path.certificate.max_position_error, 3)} mm, axis within "
             f"{at_most(math.degrees(path.certificate.max_angle), 4)} deg",
         ),
+        ("clearance", clearance_text(path.certificate)),
     ]
     if trajectory is not None:
         speed = at_most(float(trajectory.tool_speed.max()), 4)

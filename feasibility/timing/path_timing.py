@@ -8,7 +8,8 @@ A controller sees its samples only, and puts quintics or cubics through them (`s
 The fastest timing of a curve jumps from one acceleration to another, and these swing past both. So
 the joints that would exceed a limit then are given less, the curve is timed again, and the little
 that is left is mended by running slower. The samples at last are replayed like any witness: as a
-motion of straight lines, of quintics and of cubics.
+motion of straight lines, of quintics and of cubics; collisions between samples too, along the
+polynomials themselves.
 """
 
 from __future__ import annotations
@@ -18,9 +19,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from feasibility.certification import replay
-from feasibility.collisions import checked
+from feasibility.certification import collision_replay, replay
+from feasibility.collisions import Bodies, checked, gather
 from feasibility.paths import CoveragePath, PathError
+from feasibility.timing.between_samples import strays_between
 from feasibility.timing.sampled_trajectory import (
     KINDS,
     PLACES,
@@ -95,8 +97,9 @@ def trajectory(
         raise PathError(f"the period must be {SHORTEST} to {LONGEST} seconds, got {period!r}")
     if len(np.unique(path.walk.q, axis=0)) == 1:
         q, still = path.walk.q[:1], np.zeros((1, robot.n))
+        asked = tuple(checked(task.collision))
         return Trajectory(
-            robot.joint_names, np.zeros(1), q, still, still, np.zeros(1), path.walk.cell[:1]
+            robot.joint_names, np.zeros(1), q, still, still, np.zeros(1), path.walk.cell[:1], asked
         )
     curve, refusal = blended(robot, cells, task, path.walk), ""
     for _ in range(FINER + 1):
@@ -148,12 +151,43 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
 
 def _refusal(path: CoveragePath, run: Trajectory) -> str:
     """Why the samples are refused, as straight lines or interpolated; empty if they are not."""
-    robot, cells, task = path.robot, path.cells, path.task
+    robot, cells = path.robot, path.cells
     past = float(past_limits(robot, run).max(initial=0.0))
     if past > 0.0:
         return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
-    for walk in (run.walk, *(motion_between(run, kind, PLACES) for kind in KINDS)):
-        replayed = replay(robot, cells, task, walk, path.needed)
+    tool_alone = replace(path.task, collision=None)
+    motions = {kind: motion_between(run, kind, PLACES) for kind in KINDS}
+    for walk in (run.walk, *motions.values()):
+        replayed = replay(robot, cells, tool_alone, walk, path.needed)
         if not replayed.accepted:
             return replayed.refusal
-    return ""
+    bodies = gather(robot, cells.surface, path.task.collision, path.task.standoff)
+    if bodies is None:
+        return ""
+    found = _collision(robot, bodies, run.walk.q, run.time)
+    for kind, walk in motions.items():
+        share = np.arange(len(walk.q)) / PLACES
+        time = np.interp(share, np.arange(len(run)), run.time)
+        strays = strays_between(run, kind, walk.q)
+        found = found or _collision(robot, bodies, walk.q, time, strays)
+    return found
+
+
+def _collision(
+    robot: Robot, bodies: Bodies, q: Array, time: Array, strays: Array | None = None
+) -> str:
+    """Which pair comes nearest to each other, how near, and when; empty if all stay clear.
+
+    Args:
+        robot: the arm.
+        bodies: what can collide.
+        q: (m, n) rows of the motion.
+        time: (m,) s.
+        strays: (m - 1, n) how far joints may be from the straight lines between rows.
+    """
+    replayed = collision_replay(robot, bodies, q, strays)
+    if replayed.accepted:
+        return ""
+    fault = replayed.faults[0]
+    at = float(np.interp(fault.row + fault.share, np.arange(len(time)), time))
+    return f"{fault.text}, at {at:.3f} s"

@@ -23,6 +23,7 @@ from scipy.interpolate import BSpline
 from feasibility.certification import replay
 from feasibility.paths import PathError
 from feasibility.task import Task
+from feasibility.timing.between_samples import strays
 from feasibility.verdict import Walk
 from robots import Robot
 from surfaces import Cells
@@ -138,18 +139,18 @@ def blended(robot: Robot, cells: Cells, task: Task, walk: Walk) -> Curve:
     fault = ""
     for sliver in SLIVERS:
         thin = without_slivers(walk, sliver)
-        curve, where = _turned(robot, cells, task, thin)
+        curve, where, why = _turned(robot, cells, task, thin)
         if curve is not None:
             return curve
-        fault = str(list(cells.unravel(int(thin.cell[thin.cell >= 0][where]))))
+        fault = f"{list(cells.unravel(int(thin.cell[thin.cell >= 0][where])))} on ({why})"
     raise PathError(
-        f"no smooth motion was found that the replay accepts from cell {fault} on, however sharply "
-        "it turns; use a larger tolerance or a wider cone"
+        f"no smooth motion was found that the replay accepts from cell {fault}, however sharply it "
+        "turns; use a larger tolerance or a wider cone"
     )
 
 
-def _turned(robot: Robot, cells: Cells, task: Task, walk: Walk) -> tuple[Curve | None, int]:
-    """The accepted curve along a motion; or None, and the mark from which on it is refused."""
+def _turned(robot: Robot, cells: Cells, task: Task, walk: Walk) -> tuple[Curve | None, int, str]:
+    """The accepted curve along a motion; or None, the mark from which on it is refused, and why."""
     shares = np.full(len(walk.q), WIDEST)
     marks = np.flatnonzero(walk.cell >= 0)
     last = len(marks) - 1
@@ -160,29 +161,39 @@ def _turned(robot: Robot, cells: Cells, task: Task, walk: Walk) -> tuple[Curve |
             for k in refused:
                 shares[marks[k] : marks[k + 1] + 1] *= 0.5
             if shares.min() < SHARPEST:
-                return None, refused[0]
+                return None, *next(iter(refused.items()))
             curve = control_points(walk, shares)
             # Only these and the ones next to them have changed; all are replayed again in the end.
             changed = sorted({near for k in refused for near in (k - 1, k, k + 1)} - {-1, last})
-            refused = [k for k in changed if _refused(robot, cells, task, curve, k, k + 1)]
+            again = [_refused(robot, cells, task, curve, k, k + 1) for k in changed]
+            refused = {k: why for found in again for k, why in found.items()}
         refused = _refused(robot, cells, task, curve, 0, last)
-    return curve, -1
+    return curve, -1, ""
 
 
 def _refused(
     robot: Robot, cells: Cells, task: Task, curve: Curve, first: int, last: int
-) -> list[int]:
-    """Which stretches between marks `first` and `last` the replay refuses, found by halving."""
+) -> dict[int, str]:
+    """Why the replay refuses which stretches between marks `first` and `last`, by halving."""
     nowhere = np.zeros(len(cells), dtype=bool)
-    if replay(robot, cells, task, sampled(robot, curve, first, last), nowhere).accepted:
-        return []
+    walk = sampled(robot, curve, first, last)
+    replayed = replay(robot, cells, task, walk, nowhere, _strays(curve, walk, first, last))
+    if replayed.accepted:
+        return {}
     if last == first + 1:
-        return [first]
+        return {first: replayed.refusal}
     middle = (first + last) // 2
-    return [
-        *_refused(robot, cells, task, curve, first, middle),
-        *_refused(robot, cells, task, curve, middle, last),
-    ]
+    return {
+        **_refused(robot, cells, task, curve, first, middle),
+        **_refused(robot, cells, task, curve, middle, last),
+    }
+
+
+def _strays(curve: Curve, walk: Walk, first: int, last: int) -> Array:
+    """(m - 1, n) how far the curve may be from the straight lines of `sampled`."""
+    k = np.arange(int(curve.marks[first]), int(curve.marks[last]) + 1)
+    bends = curve.spline().derivative(2)(k) / SAMPLES**2  # it runs straight from one to the next
+    return strays(walk.q, np.repeat(np.stack([bends[:-1], bends[1:]]), SAMPLES, axis=1))
 
 
 def without_slivers(walk: Walk, sliver: float) -> Walk:
