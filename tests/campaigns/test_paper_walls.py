@@ -52,4 +52,4 @@ def test_between_post_and_shelf_almost_all_is_covered() -> None:
         return
     assert found.n_covered >= 46
     assert found.causes
-    assert all("upper_arm_link" in cause.detail for cause in found.causes)
+    assert any(cause.pair or "would collide" in cause.detail for cause in found.causes)
