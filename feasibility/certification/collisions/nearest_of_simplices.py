@@ -9,6 +9,8 @@ Array = NDArray[np.float64]
 
 TINY = 1e-300  # what keeps quotients of zeros finite
 FLAT = 1e-30  # [m^4] square of twice the area of a face, below which its edges have to do
+THIN = 1e-12  # [m] height of a tetrahedron, below which nothing is inside
+
 EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
 FACES = np.array([[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]])
 OPPOSITE = np.array([3, 2, 1, 0])  # the corner that is not of each face
@@ -51,7 +53,8 @@ def _on_faces(corners: Array) -> tuple[Array, NDArray[np.bool_]]:
     sides = np.stack([np.einsum("kfi,kfi->kf", normals, one) for one in turned])
     beside = flat | ~(sides.min(axis=0) >= 0.0)
     other = np.einsum("kfi,kfi->kf", normals, corners[:, OPPOSITE]) - height
-    inside = (~flat & (-height * other > 0.0)).all(axis=1)
+    thin = flat | (np.abs(other) <= THIN * np.sqrt(square))
+    inside = (~thin & (-height * other > 0.0)).all(axis=1)
     return np.where(beside[:, :, None], np.inf, feet), inside
 
 
