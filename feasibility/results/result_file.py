@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, CoverableError, shown, worded
 from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, Setup
+from feasibility.collisions import LeftOut
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
 from feasibility.results.proof_arrays import pack_proof, unpack_proof
 from feasibility.results.result_arrays import (
@@ -87,11 +88,10 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         "method": verdict.method,
         "seed": int(verdict.seed),
         "start": None if verdict.start is None else int(verdict.start),
-        "causes": [
-            {"cell": int(c.cell), "kind": str(c.kind), "proved": bool(c.proved), "detail": c.detail}
-            for c in verdict.causes
-        ],
+        "causes": [_cause_row(cause) for cause in verdict.causes],
         "certificate": None if verdict.certificate is None else plain(asdict(verdict.certificate)),
+        "unchecked_links": list(verdict.unchecked_links),
+        "pairs_left_out": [plain(asdict(pair)) for pair in verdict.pairs_left_out],
         "timing": plain(verdict.timing),
         "statistics": plain(verdict.statistics),
         "has_tree": verdict.tree is not None,
@@ -119,6 +119,18 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
     except FileError as error:
         raise ResultError(str(error)) from error
     return Path(path)
+
+
+def _cause_row(cause: Cause) -> dict[str, Any]:
+    """Why a cell is missed, as JSON holds it."""
+    return {
+        "cell": int(cause.cell),
+        "kind": str(cause.kind),
+        "proved": bool(cause.proved),
+        "detail": cause.detail,
+        "pair": plain(cause.pair),
+        "clearance": plain(cause.clearance),
+    }
 
 
 def load_result(path: str | os.PathLike[str]) -> Result:
@@ -224,6 +236,8 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         witness=witness,
         certificate=_certificate(fields),
         proof=proof,
+        unchecked_links=_names(fields, "unchecked_links"),
+        pairs_left_out=_left_out(fields),
         timing={key: timing.number(key) for key in timing.entries},
         statistics=dict(fields.table("statistics").entries),
     )
@@ -254,7 +268,10 @@ def _causes(fields: Fields, count: int) -> tuple[Cause, ...]:
             raise fields.archive.error(f"meta.json: causes[{k}] is {shown(entry)}, not an object")
         row = Fields(fields.archive, entry, f"causes[{k}].")
         cell, kind = row.cell("cell", count), row.member("kind", CauseKind)
-        causes.append(Cause(cell, kind, row.flag("proved"), row.text("detail")))
+        proved, detail = row.flag("proved"), row.text("detail")
+        causes.append(
+            Cause(cell, kind, proved, detail, _pair(row, "pair"), _maybe(row, "clearance"))
+        )
     return tuple(causes)
 
 
@@ -269,4 +286,42 @@ def _certificate(fields: Fields) -> Certificate | None:
         max_position_error=row.number("max_position_error"),
         max_angle=row.number("max_angle"),
         min_limit_margin=np.inf if margin is None else row.number("min_limit_margin"),
+        min_clearance=_maybe(row, "min_clearance"),
+        nearest_pair=_pair(row, "nearest_pair"),
     )
+
+
+def _maybe(row: Fields, key: str) -> float | None:
+    """A number that may be missing or null; files of earlier versions say nothing of collisions."""
+    return None if row.entries.get(key) is None else row.number(key)
+
+
+def _names(row: Fields, key: str) -> tuple[str, ...]:
+    """Names of bodies that may be missing or null."""
+    if row.entries.get(key) is None:
+        return ()
+    names = row.get(key, list, "an array of names")
+    if not all(isinstance(name, str) for name in names):
+        raise row.archive.error(f"meta.json: {row.path}{key} is {shown(names)}, not names")
+    return tuple(names)
+
+
+def _pair(row: Fields, key: str) -> tuple[str, str] | None:
+    """Two names of bodies, or None."""
+    names = _names(row, key)
+    if len(names) not in (0, 2):
+        raise row.archive.error(f"meta.json: {row.path}{key} is {shown(names)}, not two names")
+    return (names[0], names[1]) if names else None
+
+
+def _left_out(fields: Fields) -> tuple[LeftOut, ...]:
+    """The pairs that were not asked for."""
+    found = []
+    given = fields.entries.get("pairs_left_out")
+    for k, entry in enumerate(() if given is None else fields.get("pairs_left_out", list, "rows")):
+        if not isinstance(entry, dict):
+            raise fields.archive.error(f"meta.json: pairs_left_out[{k}] is not an object")
+        row = Fields(fields.archive, entry, f"pairs_left_out[{k}].")
+        first, second, why = (row.text(key) for key in ("first", "second", "why"))
+        found.append(LeftOut(first, second, why, _maybe(row, "rate")))
+    return tuple(found)
