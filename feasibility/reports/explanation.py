@@ -23,7 +23,7 @@ from feasibility.reports.explanation_words import (
     sentence,
     what_it_opens,
 )
-from feasibility.reports.parts import aligned, csv_text, filled, page, table
+from feasibility.reports.parts import aligned, csv_text, filled, framed, page, table
 from feasibility.sensitivity import Change, Dropped, Explanation, Finding, Quantity, Threshold
 from feasibility.verdict import Answer, Verdict, Walk
 from feasibility.version import version
@@ -77,8 +77,7 @@ def as_html(explanation: Explanation, case_name: str, view: View, case: Case | N
         uses = (*JOINTS[:2], f"used by {what}")
         parts.append(table(uses, [map(html.escape, row) for row in joints]))
     parts += [f"<p>{html.escape(text)}</p>" for text in _remarks(explanation) if text]
-    inner = html.escape(view.html(), quote=True)
-    frame = f'<iframe srcdoc="{inner}" title="the case as given"></iframe>'
+    frame = framed(view, "the case as given")
     body = f'<div class="beside">{frame}<div>{"".join(parts)}</div></div>\n'
     return page(
         f"{case_name}: {headline(explanation)}", body, "", explanation.verdict.task.collision

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import csv
 import html
 import io
@@ -10,13 +11,16 @@ import re
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from feasibility.collisions import Asked, LeftOut, checked_words
 from feasibility.results import plain
 from feasibility.verdict import Cause, Certificate
 from feasibility.version import version
 from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.viewer import View
 
 WIDTH = 100  # columns
 MARGINS = ("limit_deg", "limit_m", "cone_deg", "reach_m")
@@ -197,6 +201,16 @@ def page(title: str, body: str, note: str, collision: Asked | str | None) -> str
     )
 
 
+def framed(view: View, title: str) -> str:
+    """A view as HTML: its page in a frame, and its picture on paper, where the frame is empty."""
+    inner, name = html.escape(view.html(), quote=True), html.escape(title, quote=True)
+    picture = base64.b64encode(view.png()).decode("ascii")
+    return (
+        f'<iframe srcdoc="{inner}" title="{name}" loading="lazy"></iframe>\n'
+        f'<img class="printed" src="data:image/png;base64,{picture}" alt="{name}">\n'
+    )
+
+
 def table(heads: Iterable[str], lines: Iterable[Iterable[str]]) -> str:
     """A table of escaped cells, as HTML."""
     head = "".join(f"<th>{cell}</th>" for cell in heads)
@@ -244,7 +258,13 @@ th {{ white-space: nowrap; }}
 .beside td:first-child {{ white-space: nowrap; }}
 code {{ font-size: .85rem; overflow-wrap: anywhere; }}
 footer {{ margin-top: 1.8rem; color: #6b7280; font-size: .85rem; }}
-@media print {{ h2, table, figure {{ break-inside: avoid; }} }}
+.printed {{ display: none; }}
+@media print {{
+  h2, table, figure, img {{ break-inside: avoid; }}
+  iframe {{ display: none; }}
+  .printed, .beside {{ display: block; }}
+  .printed {{ width: 100%; max-width: 36rem; }}
+}}
 </style>
 </head>
 <body>

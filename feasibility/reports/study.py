@@ -16,6 +16,7 @@ from feasibility.reports.parts import (
     aligned,
     counted,
     csv_text,
+    framed,
     page,
     percent,
     table,
@@ -125,8 +126,7 @@ def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str
     if pictures.left_out:
         parts.append(f"<p>Pairs of numbers without a map: {pictures.left_out}.</p>\n")
     if poses is not None:
-        inner = html.escape(poses.html(), quote=True)
-        parts.append(f'<h2>Poses</h2>\n<iframe srcdoc="{inner}" loading="lazy"></iframe>\n')
+        parts.append(f"<h2>Poses</h2>\n{framed(poses, 'poses of the surface')}")
     return page(f"Study: {study.name}", "".join(parts), NOTE, collision_words(study))
 
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import base64
 import html
+import io
 import math
 import re
 from functools import cache
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from feasibility import Answer, check
 from feasibility.cases import Case
@@ -231,3 +234,12 @@ def test_the_page_has_the_tables_beside_the_view(tmp_path, monkeypatch, capsys) 
     assert beside.index("<iframe") < beside.index("<table>")
     assert beside.count("<table>") == 2
     assert "robot.limits_deg.joint1 (upper)" in beside
+    # On paper frames are empty: there the picture stands in their place, and on screen nowhere.
+    (picture,) = re.findall(r'<img class="printed" src="data:image/png;base64,([^"]+)"', beside)
+    with Image.open(io.BytesIO(base64.b64decode(picture))) as image:
+        red, _, blue = np.moveaxis(np.asarray(image.convert("RGB"), dtype=int), -1, 0)
+    assert ((blue > 180) & (red < 90)).sum() > 200, "edges of G"
+    screen, paper = page[: page.index("</style>")].split("@media print")
+    assert re.search(r"\.printed \{ display: none; \}", screen)
+    assert re.search(r"iframe \{ display: none; \}", paper)
+    assert re.search(r"\.printed[^{}]*\{ display: block; \}", paper)

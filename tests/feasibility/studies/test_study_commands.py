@@ -365,6 +365,7 @@ def test_the_page_of_a_study_counts_as_its_table_does(folder, capsys) -> None:
     assert page.tags["figure"] == 1
     assert "Covered share over surface x (m)" in page.text
     (frame,) = page.frames
+    assert page.tags["img"] == 1  # of the poses, for paper
     drawn = Page(frame)
     assert "3 of 6 cases" in drawn.text
     good = sum(r["verdict"] == "feasible" and r["parameters"]["robot"] == arm for r in told["rows"])
