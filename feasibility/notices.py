@@ -11,6 +11,7 @@ from typing import Any
 COMPILING = "compiling {} (first run only, up to a minute) ..."
 NOTICE = COMPILING.format("the search kernels")
 CUTTING = COMPILING.format("the kernels that cut a surface into cells")
+COLLISIONS = COMPILING.format("the kernels that keep clear of collisions")
 GREEDY = COMPILING.format("the kernels of the greedy search")
 WAITING = (
     "waiting for the workers to load the search kernels (compiled on their first run, up to a "

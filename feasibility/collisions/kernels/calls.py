@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import event
 from numba.extending import intrinsic
 
 from coverable_kernels import cfunc
@@ -24,6 +25,7 @@ from feasibility.collisions.kernels.push import push
 from feasibility.collisions.kernels.segments import segment_holds_clear
 from feasibility.collisions.kernels.tables import ADDRESS, Array
 from feasibility.compiled import kernel
+from feasibility.notices import COLLISIONS, compiling_notice
 
 SEGMENT, PUSH, MEASURE = np.int64(0), np.int64(1), np.int64(2)
 
@@ -58,7 +60,37 @@ def _run(memory: Array, what: int) -> float:
 def _compiled() -> Any:
     """The C function, compiled or loaded; it lives as long as the process."""
     signature = types.float64(types.CPointer(types.float64), types.int64)
-    return cfunc(signature, cache=True, error_model="numpy")(_run)
+    whole = _WholeCompilation()
+    with compiling_notice(notice=COLLISIONS), event.install_listener("numba:compile", whole):
+        function = cfunc(signature, cache=True, error_model="numpy")(_run)
+    whole.end()
+    return function
+
+
+class _WholeCompilation(event.Listener):
+    """Makes one compilation, for whoever listens, of the C function and all kernels inside.
+
+    numba tells of the kernels alone, and the function takes as long again. There is none where it
+    is loaded.
+    """
+
+    def __init__(self) -> None:
+        """It has not begun."""
+        self.begun = False
+
+    def on_start(self, about: Any) -> None:
+        """The first kernel begins to be compiled."""
+        if not self.begun:
+            self.begun = True
+            event.start_event("numba:compile")
+
+    def on_end(self, about: Any) -> None:
+        """A kernel has been compiled."""
+
+    def end(self) -> None:
+        """The function is there."""
+        if self.begun:
+            event.end_event("numba:compile")
 
 
 def with_address(memory: Array) -> Array:
