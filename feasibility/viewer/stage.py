@@ -63,7 +63,8 @@ def camera_on(
     thick = THICKNESS * robot.reach if np.isfinite(robot.reach) else 0.0
     round_joints = np.vstack([np.eye(3), -np.eye(3)]) * thick
     links = (joint_points(robot, q)[:, None] + round_joints).reshape(-1, 3)
-    points = np.concatenate([_extent(cells), links, [[0.0, 0.0, floor]]])
+    foot = round_joints * [1.0, 1.0, 0.0] + [0.0, 0.0, floor]
+    points = np.concatenate([_extent(cells), links, foot])
     if around is not None:
         points = np.concatenate([points, around])
     toward = np.zeros(3)

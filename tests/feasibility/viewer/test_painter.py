@@ -13,10 +13,13 @@ from PIL import Image
 from small_cases import paper_verdict, small_verdict
 
 from feasibility.viewer import plot_views, threejs, view
+from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.html_page import Camera
-from feasibility.viewer.painter import LENS, painted
+from feasibility.viewer.painter import LENS, _parts, _seen, painted
 from feasibility.viewer.robot import ROOT
+from feasibility.viewer.stage import camera_on
 from robots import load_robot
+from surfaces import plane
 
 SIZE = (160, 120)
 EYE = (4.0, 0.0, 0.0)
@@ -84,6 +87,21 @@ def test_no_link_is_cut_off_at_the_edge_of_a_small_picture(name, at) -> None:
     assert (image < 0.9).all(axis=2).sum() > 2000
     for edge in (image[0], image[-1], image[:, 0], image[:, -1]):
         assert (edge == 1.0).all()
+
+
+def test_the_foot_is_in_the_picture_wherever_the_surface_stands() -> None:
+    """Of a PUMA in random postures, by planes all around it."""
+    puma, rng = load_robot("puma560"), np.random.default_rng(5)
+    drawing = robot_visuals.draw(puma)
+    for _ in range(60):
+        x, y, z = rng.uniform([-0.8, -0.6, -0.2], [0.6, 0.2, 0.6])
+        cells = plane((x, x + 0.3), (y, y + 0.4), position=(0, 0, z), side="outside").cells(2, 2)
+        q = rng.uniform(puma.lower, puma.upper)
+        camera = camera_on(puma, cells, q, drawing.lowest)
+        parts = _parts([*drawing.commands, *robot_visuals.pose(puma, q, ROOT)])
+        seen = _seen(np.concatenate([part.points for part in parts]), camera, 900, 560)
+        assert (seen[:, :2] > 0).all()
+        assert (seen[:, :2] < [900, 560]).all()
 
 
 def test_hidden_parts_and_what_is_behind_the_camera_are_not_painted() -> None:
