@@ -42,14 +42,15 @@ feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notice
 feasibility.collisions
 feasibility.collisions.kernels
 feasibility: found problem target_curves task verdict
+feasibility.certification: faults
 feasibility.certification.collisions
-feasibility.certification
+feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region kinematic_bounds lever_bounds linear_models motion_replay parts_agreement proof_verification refutation region stretches surface_replay tree_shape
 feasibility.paper
 feasibility.cases
 feasibility.roadmap: arrays graph off_target projection segment_bound self_motion
 feasibility.roadmap.branch_and_bound
 feasibility.roadmap.cuts
-feasibility.roadmap: bridging clear_landings expansion exploration proving search tracking
+feasibility.roadmap: bridging expansion exploration proving search seeding tracking
 feasibility.roadmap.causes
 feasibility.roadmap: between_rounds complete graph_g outcome refinement walk warmup
 feasibility: checking

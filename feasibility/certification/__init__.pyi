@@ -1,6 +1,8 @@
 from .collisions import CollisionFault as CollisionFault
 from .collisions import CollisionReplay as CollisionReplay
 from .collisions import collision_replay as collision_replay
+from .faults import Judged as Judged
+from .faults import MotionFault as MotionFault
 from .kinematic_bounds import placements as placements
 from .kinematic_bounds import second_derivatives as second_derivatives
 from .motion_replay import Replay as Replay
@@ -8,6 +10,5 @@ from .motion_replay import replay as replay
 from .motion_replay import replay_along_curves as replay_along_curves
 from .proof_verification import ProofCheck as ProofCheck
 from .proof_verification import verify_proof as verify_proof
-from .surface_replay import MotionFault as MotionFault
 from .surface_replay import MotionReplay as MotionReplay
 from .surface_replay import replay_over_surface as replay_over_surface

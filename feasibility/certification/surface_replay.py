@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.collisions import collision_replay
+from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.kinematic_bounds import placements
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
 from feasibility.collisions import Bodies
@@ -40,28 +41,8 @@ MOST_SAMPLES = 1_000_000  # configurations looked at between rows
 ENOUGH = 1000  # wrong configurations, after which no more are looked for
 
 
-@dataclass(frozen=True, slots=True)
-class MotionFault:
-    """One thing that is wrong with a motion, and where."""
-
-    row: int
-    """Index of the row, or of the row before; -1 where the whole motion is meant."""
-    share: float
-    """How far the motion has come from there to the next row, 0..1."""
-    text: str
-
-    def __str__(self) -> str:
-        """Place and fault; rows are counted from 1."""
-        if self.row < 0:
-            return self.text
-        if self.share == 0.0:
-            return f"row {self.row + 1}: {self.text}"
-        way = f"row {self.row + 1} to {self.row + 2}, {self.share:.3g} of the way"
-        return f"{way}: {self.text}"
-
-
 @dataclass(frozen=True, eq=False, slots=True)
-class MotionReplay:
+class MotionReplay(Judged):
     """What the replay of a motion over a surface found."""
 
     certificate: Certificate
@@ -70,16 +51,6 @@ class MotionReplay:
     """Why the motion is refused, the worst of each kind; none when it is accepted."""
     reached: Mask
     """(N,) cells that are reached."""
-
-    @property
-    def accepted(self) -> bool:
-        """True when every constraint holds along the whole motion and every cell is reached."""
-        return not self.faults
-
-    @property
-    def refusal(self) -> str:
-        """All faults in words; empty when the motion is accepted."""
-        return "; ".join(map(str, self.faults))
 
 
 def replay_over_surface(
@@ -127,7 +98,7 @@ def replay_over_surface(
     certificate = Certificate(len(rows), error, angle_of(chord), margin)
     if bodies is not None:
         clear = collision_replay(robot, bodies, rows)
-        faults += [MotionFault(fault.row, fault.share, fault.text) for fault in clear.faults]
+        faults += clear.faults
         certificate = replace(
             certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
         )

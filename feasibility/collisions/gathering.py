@@ -12,10 +12,11 @@ from coverable_errors import ArgumentError
 from feasibility.collisions.bodies import Bodies, LeftOut, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
 from feasibility.collisions.scene import ToolShape
-from feasibility.collisions.settings import Collision, Fineness
+from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
 from robots.shapes import (
+    Fineness,
     LinkPairs,
     LinkShapes,
     Polytope,
@@ -169,7 +170,7 @@ class _Pairs:
     """Who must stay clear of whom, and who is left out for which reason."""
 
     def __init__(self, collision: Collision, joints: Mapping[str, int], last: int) -> None:
-        """`joints`: which joint carries each owner of bodies; `last` is the last one."""
+        """With the joint that carries each owner of bodies, and the number of the last joint."""
         self.collision, self.joints = collision, joints
         self.tool = tool_owners(collision, joints, last)
         self.own = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}

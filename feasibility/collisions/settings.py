@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
 from coverable_errors import Checks, Fault
 from feasibility.collisions.pairs import (
@@ -18,8 +18,8 @@ from feasibility.collisions.pairs import (
 )
 from feasibility.collisions.scene import Obstacle, ToolShape
 from feasibility.collisions.words import SURFACE, TOOL, asked_for
+from robots.shapes import Fineness
 
-Fineness = Literal["hulls", "pieces", "meshes"]
 MOST_OBJECTS = 1000
 
 

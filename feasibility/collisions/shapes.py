@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import Checks, Fault, shown
-from feasibility.collisions.triangles import checked_triangles
+from feasibility.collisions.triangles import object_triangles
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
@@ -49,7 +49,7 @@ def checked_shape(checks: Checks, geometry: Any) -> Shape | HalfSpace:
         radius = _side(checks, "radius", geometry.radius)
         return type(geometry)(radius, _side(checks, "length", geometry.length))
     if isinstance(geometry, Triangles):
-        return checked_triangles(checks, geometry.vertices, geometry.faces)
+        return object_triangles(checks, geometry.vertices, geometry.faces)
     checks.wrong("geometry", geometry, "must be a Box, Cylinder, Capsule, Sphere or Triangles")
     return Sphere(1.0)
 

@@ -49,7 +49,7 @@ def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> 
         unit = metres_per_unit(scale)
         raw = read_raw(path)
         with np.errstate(over="ignore"):  # infinite coordinates are refused next
-            made = checked_triangles(checks, raw.vertices * unit, raw.faces)
+            made = object_triangles(checks, raw.vertices * unit, raw.faces)
         if scale is None and not checks.faults:
             refuse_unlikely_unit(float(np.ptp(made.vertices, axis=0).max()))
     except CoverableError as error:
@@ -62,7 +62,7 @@ def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> 
     return made
 
 
-def checked_triangles(checks: Checks, vertices: Any, faces: Any) -> Triangles:
+def object_triangles(checks: Checks, vertices: Any, faces: Any) -> Triangles:
     """Triangles that nothing chokes on: welded, without faces that have no area.
 
     They are `closed` where every edge has two faces that agree about the outer side, and they

@@ -12,7 +12,6 @@ from .arrays import work_for as work_for
 from .branch_and_bound import Ruling as Ruling
 from .branch_and_bound import root_box as root_box
 from .branch_and_bound import rule as rule
-from .clear_landings import moved_clear as moved_clear
 from .complete import complete_search as complete_search
 from .expansion import CONNECT_STEPS as CONNECT_STEPS
 from .exploration import Exploration as Exploration
@@ -28,6 +27,7 @@ from .search import evenly as evenly
 from .search import explore as explore
 from .search import improve as improve
 from .search import seed_middle as seed_middle
+from .seeding import moved_clear as moved_clear
 from .segment_bound import segment_holds as segment_holds
 from .self_motion import CONE_SLACK as CONE_SLACK
 from .self_motion import NEWTON_STEPS as NEWTON_STEPS

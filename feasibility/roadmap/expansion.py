@@ -1,4 +1,4 @@
-"""How the roadmap grows: seeding a cell, spreading over the surface, self-motions, closing pairs.
+"""How the roadmap grows: spreading over the surface, self-motions, closing pairs.
 
 Each kernel connects nodes by motions that `feasibility.roadmap.segment_bound` certifies.
 """
@@ -6,14 +6,11 @@ Each kernel connects nodes by motions that `feasibility.roadmap.segment_bound` c
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feasibility.compiled import inlined, kernel, put
-from feasibility.roadmap.arrays import OVERFLOW, SearchArrays, Work
-from feasibility.roadmap.clear_landings import moved_clear
+from feasibility.roadmap.arrays import OVERFLOW
 from feasibility.roadmap.graph import (
     BUDGET,
-    COMPONENTS,
     COVERED,
     CURSOR,
     DONE,
@@ -23,15 +20,13 @@ from feasibility.roadmap.graph import (
     NODES,
     TAIL,
     WAYPOINTS,
-    Roadmap,
     add_edge,
     add_node,
     root_of,
     unite,
 )
 from feasibility.roadmap.off_target import project_near_cell
-from feasibility.roadmap.projection import PROJECTION_STEPS
-from feasibility.roadmap.self_motion import SETTLE_STEPS, connect, settle
+from feasibility.roadmap.self_motion import connect
 from feasibility.roadmap.tracking import track
 
 MOST_FAILURES = np.int64(12)  # failed connections after which a pair of components is left alone
@@ -162,45 +157,6 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
         count[HEAD] += 1
         count[CURSOR] = 0
     return DONE
-
-
-def seed_cell(
-    arrays: SearchArrays, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
-) -> tuple[int, int]:
-    """Project guesses onto the constraints over one cell; new configurations become components.
-
-    Args:
-        arrays, work: the `SearchArrays` and the `Work`.
-        roadmap: the `Roadmap`, with space for a node and a component per guess, see `grown`.
-        cell: the cell.
-        guesses: (k, n) configurations inside the limits.
-
-    Returns:
-        (configurations found, new components made).
-    """
-    count = roadmap.counters
-    target, approach = arrays.points[cell], arrays.approaches[cell]
-    found, made = 0, 0
-    for guess in guesses:
-        if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
-            break
-        if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
-            break
-        q = guess.copy()
-        if not project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):
-            continue
-        found += 1
-        if not moved_clear(arrays, work, cell, q):
-            continue
-        settle(arrays, work, target, approach, q, SETTLE_STEPS)
-        node, _ = join(arrays, work, roadmap, cell, q, -1, 0, 0)
-        if node >= 0:
-            continue
-        component = int(count[COMPONENTS])
-        count[COMPONENTS] += 1
-        add_node(arrays, work, roadmap, cell, q, component)
-        made += 1
-    return found, made
 
 
 @kernel

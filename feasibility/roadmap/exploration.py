@@ -12,7 +12,7 @@ from feasibility.cut_tree import CutTree
 from feasibility.roadmap.arrays import SearchArrays, Work, passable, work_for
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
-from feasibility.roadmap.expansion import close_pairs, explore_self_motions, seed_cell, spread_out
+from feasibility.roadmap.expansion import close_pairs, explore_self_motions, spread_out
 from feasibility.roadmap.graph import (
     BEST,
     COMPONENTS,
@@ -28,6 +28,7 @@ from feasibility.roadmap.graph import (
     joined_pairs,
     root_of,
 )
+from feasibility.roadmap.seeding import seed_cell
 from robots import Robot
 from surfaces import Cells, components
 

@@ -1,3 +1,4 @@
+from .bodies import Fineness as Fineness
 from .bodies import Polytope as Polytope
 from .bodies import Solid as Solid
 from .bodies import Triangles as Triangles

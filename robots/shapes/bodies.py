@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,8 @@ class Triangles:
     """True where they bound a solid: every edge has two triangles. Else it is a sheet."""
 
 
+Fineness = Literal["hulls", "pieces", "meshes"]
+"""How closely convex bodies follow a link; see `link_shapes`."""
 Geometry = Box | Cylinder | Capsule | Sphere | Triangles
 """Primitives are about their frame's origin, round ones along z, as in URDF."""
 

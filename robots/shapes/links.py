@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 import pinocchio as pin
 
 from robots.errors import RobotError
 from robots.robot import Robot
-from robots.shapes.bodies import Geometry, Polytope, Solid
+from robots.shapes.bodies import Fineness, Geometry, Polytope, Solid
 from robots.shapes.hulls import hull_of
 from robots.shapes.pieces import pieces_of
 from robots.shapes.triangles import MeshBodies
 from robots.urdf import CheckedUrdf, CollisionShape, MeshFile, Visual, check_urdf
 
-Fineness = Literal["hulls", "pieces", "meshes"]
 MOST_NAMED = 8  # links in one note
 
 

@@ -17,6 +17,7 @@ from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Plac
 from feasibility.certification.collisions.pieces import Below, Piece, piece_of, sheet_piece
 from feasibility.certification.collisions.plane_search import NEAR
 from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions import Bodies, Pair
 from robots import Robot
 
@@ -27,30 +28,16 @@ KEPT = 8  # bodies of so many problems are kept ready, for motions replayed one 
 
 
 @dataclass(frozen=True, slots=True)
-class CollisionFault:
+class CollisionFault(MotionFault):
     """Two owners of bodies that come too near, and where."""
 
-    row: int
-    """Index of the row, or of the row before; -1 where the whole motion is meant."""
-    share: float
-    """How far the motion has come from there to the next row, 0..1."""
     pair: tuple[str, str]
     distance: float
     """m, between them; negative where they overlap, as deep as that; NaN where not decided."""
-    text: str
-
-    def __str__(self) -> str:
-        """Place and fault; rows are counted from 1."""
-        if self.row < 0:
-            return self.text
-        if self.share == 0.0:
-            return f"row {self.row + 1}: {self.text}"
-        way = f"row {self.row + 1} to {self.row + 2}, {self.share:.3g} of the way"
-        return f"{way}: {self.text}"
 
 
 @dataclass(frozen=True, slots=True)
-class CollisionReplay:
+class CollisionReplay(Judged):
     """What the replay found."""
 
     min_clearance: float | None
@@ -62,16 +49,6 @@ class CollisionReplay:
     """One for each pair that comes too near, the nearest first; none when it is accepted."""
     calls: int
     """How often coal was asked."""
-
-    @property
-    def accepted(self) -> bool:
-        """True where every pair keeps its clearance along the whole motion."""
-        return not self.faults
-
-    @property
-    def refusal(self) -> str:
-        """All faults in words; empty when the motion is accepted."""
-        return "; ".join(map(str, self.faults))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -152,7 +129,7 @@ def collision_replay(
         finite[:-1] &= np.isfinite(strays).all(axis=1)
     if not finite.all():
         row = int(np.argmin(finite))
-        fault = CollisionFault(row, 0.0, ("", ""), np.nan, "a joint value is not finite")
+        fault = CollisionFault(row, 0.0, "a joint value is not finite", ("", ""), np.nan)
         return CollisionReplay(None, None, (fault,), 0)
     ready = ready_bodies(bodies)
     if not len(rows) or not bodies.pairs:
@@ -242,4 +219,4 @@ def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:
         text = f"{names} overlap by {-1e3 * distance:.3g} mm"
     else:
         text = f"{names} are {1e3 * distance:.4g} mm apart, {wanted}"
-    return CollisionFault(place.row, place.share, (pair.first, pair.second), distance, text)
+    return CollisionFault(place.row, place.share, text, (pair.first, pair.second), distance)

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from feasibility.collisions import Pair, configuration_bounds
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.clear_landings import moved_clear
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.off_target import project_near_cell
 from feasibility.roadmap.projection import PROJECTION_STEPS
+from feasibility.roadmap.seeding import moved_clear
 from feasibility.verdict import Cause, CauseKind
 
 LANDINGS = 60  # random configurations that are projected onto the cell

@@ -1,0 +1,80 @@
+"""Seeds: random configurations projected onto one cell, and moved clear of collisions."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.collisions import clearance_gradient, segment_clear
+from feasibility.compiled import put
+from feasibility.roadmap.arrays import SearchArrays, Work, copy_slot, look_at, place
+from feasibility.roadmap.expansion import join
+from feasibility.roadmap.graph import COMPONENTS, EDGES, NODES, TAIL, Roadmap, add_node
+from feasibility.roadmap.off_target import project_near_cell
+from feasibility.roadmap.projection import PROJECTION_STEPS, project
+from feasibility.roadmap.self_motion import CONE_SLACK, NEWTON_STEPS, SETTLE_STEPS, settle
+
+PUSHES = 8  # steps that a colliding configuration gets
+PUSH = 0.2  # [rad] or [m] of one step
+
+
+def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float64]) -> bool:
+    """Move q (n,), in place, over its cell until it collides no more; False where it still does.
+
+    Each step goes down the gradient of the penetration, and is projected back onto the target. The
+    way is no motion of the arm: q becomes another start.
+    """
+    if len(arrays.collisions) == 0 or segment_clear(arrays.collisions, q, q) > 0.0:
+        return True
+    look_at(arrays, work, arrays.points[cell], arrays.approaches[cell])
+    for _ in range(PUSHES):
+        place(arrays, work, 0, q)
+        copy_slot(work)
+        work.secondary_step[:] = 0.0
+        clearance_gradient(arrays.collisions, q, work.secondary_step, PUSH)
+        put(work.trial, q)
+        if not project(arrays, work, work.trial, CONE_SLACK, np.inf, NEWTON_STEPS):
+            return False
+        put(q, work.trial)
+        if segment_clear(arrays.collisions, q, q) > 0.0:
+            return True
+    return False
+
+
+def seed_cell(
+    arrays: SearchArrays, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
+) -> tuple[int, int]:
+    """Project guesses onto the constraints over one cell; new configurations become components.
+
+    Args:
+        arrays, work: the `SearchArrays` and the `Work`.
+        roadmap: the `Roadmap`, with space for a node and a component per guess, see `grown`.
+        cell: the cell.
+        guesses: (k, n) configurations inside the limits.
+
+    Returns:
+        (configurations found, new components made).
+    """
+    count = roadmap.counters
+    target, approach = arrays.points[cell], arrays.approaches[cell]
+    found, made = 0, 0
+    for guess in guesses:
+        if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
+            break
+        if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
+            break
+        q = guess.copy()
+        if not project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):
+            continue
+        found += 1
+        if not moved_clear(arrays, work, cell, q):
+            continue
+        settle(arrays, work, target, approach, q, SETTLE_STEPS)
+        node, _ = join(arrays, work, roadmap, cell, q, -1, 0, 0)
+        if node >= 0:
+            continue
+        component = int(count[COMPONENTS])
+        count[COMPONENTS] += 1
+        add_node(arrays, work, roadmap, cell, q, component)
+        made += 1
+    return found, made
