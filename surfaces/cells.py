@@ -78,6 +78,19 @@ class Cells(Protected, ABC):
         return self.surface.notes
 
     @property
+    def tangents(self) -> Array | None:
+        """(N, 3) unit u directions at the centres, square to the normals, in the root frame.
+
+        None where the surface has no parameters, as a mesh.
+        """
+        return None
+
+    @property
+    def approaches(self) -> Array | None:
+        """(N, 3) unit tool axes of the cells' own, in the root frame; None where they have none."""
+        return None
+
+    @property
     @abstractmethod
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""

@@ -69,6 +69,13 @@ class GridCells(Cells):
         return Finer(GridCells.cut(self.surface, ways * nu, ways * nv), same)
 
     @cached_property
+    def tangents(self) -> Array:
+        """See `Cells.tangents`."""
+        found = self.surface.tangent(self.u, self.v)
+        found.flags.writeable = False
+        return found
+
+    @cached_property
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise from the upper left one."""
         closed = (self.surface.u_closed, self.surface.v_closed)

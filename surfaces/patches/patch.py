@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from surfaces.patches.grid_cells import GridCells
 
 EDGE = 1e-9  # [rad], [m]: a point that misses the patch by no more than this lies on it
+TANGENT_STEP = 1e-5  # [1], share of the range of u: step of differences
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -160,6 +161,19 @@ class Patch(Surface):
         """
         u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
         return self.local_normal(u, v) @ self.rotation.T
+
+    def tangent(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+        """Unit directions (..., 3), square to the normals, in which u grows, in the root frame.
+
+        By central differences, to about 1e-9. Zero where the points do not move with u.
+        """
+        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
+        step = TANGENT_STEP * (self.u_range[1] - self.u_range[0])
+        along = self.local_point(u + step, v) - self.local_point(u - step, v)
+        normal = self.local_normal(u, v)
+        along = along - (along * normal).sum(axis=-1, keepdims=True) * normal
+        length = np.linalg.norm(along, axis=-1, keepdims=True)
+        return (along / np.maximum(length, 1e-300)) @ self.rotation.T
 
     def cells(self, nu: int, nv: int) -> GridCells:
         """Cut the patch into nu x nv E-cells of equal parameter steps.

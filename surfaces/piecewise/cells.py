@@ -85,6 +85,13 @@ class PieceCells(Cells):
         return seam_pairs_of(self.surface, self.counts)
 
     @cached_property
+    def tangents(self) -> Array:
+        """See `Cells.tangents`: the u directions of each piece."""
+        found = np.concatenate([grid.tangents for grid in self.grids])
+        found.flags.writeable = False
+        return found
+
+    @cached_property
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
         own = [grid.pairs + start for grid, start in zip(self.grids, self.first, strict=False)]
