@@ -1,0 +1,176 @@
+"""Algorithms 1 and 2 as the paper prints them, over Pinocchio's frame placements.
+
+To be read with the paper in hand. The names are its own: q, jc, ec, p, T, G, CONT, TREESEARCH.
+Nothing is compiled and nothing is kept between calls, so it is slow: a reference for small cases,
+which the compiled search of `algorithm_1.py` and `algorithm_2.py` agrees with, call by call.
+
+Where the paper's text leaves room, it is read like this:
+
+- Eq. (5) is never met exactly on a grid of joint values, so it holds within a tolerance.
+- Eqs. (3), (4) and (7) say "a.b = 0" and "a.b <= cos alpha"; its prose says "within a small angle
+  alpha", which is a.b >= cos alpha, with b pointing from the tool to the surface.
+- "Unchecked" J-cells are those that the running call of Algorithm 1 has not looked at.
+- Algorithm 1 prints `call CONT(jc_N, ec_T)` without its result; the result is what it returns.
+- An E-cell is entered once the surface point below the tool lies in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from feasibility.paper.jcell_grid import HAIR
+from feasibility.paper.jcell_steps import Steps
+from feasibility.task import Task
+from robots import Kinematics, Robot
+from surfaces import Cells
+
+JCell = tuple[int, ...]
+"""A J-cell, by its offsets from the one at the start, in steps of delta q."""
+
+
+@dataclass(slots=True)
+class Continuity:
+    """What Algorithm 2 has found: tree T and graph G, by E-cells."""
+
+    T: dict[int, int | None] = field(default_factory=dict)
+    """Each E-cell of the tree with the one it was entered from; None for ec_1."""
+    G: dict[frozenset[int], tuple[JCell, ...]] = field(default_factory=dict)
+    """Each edge of the graph with the path Q of J-cells that showed it."""
+    calls: list[tuple[int, int, bool]] = field(default_factory=list)
+    """Every call of Algorithm 1: ec, ec_T, and the continuity between them."""
+    checked: int = 0
+    """J-cells whose forward kinematics was computed, over all calls."""
+
+    def exists_feasible_path(self, count: int) -> bool:
+        """The last lines of Algorithm 2: G is one connected component of all `count` E-cells."""
+        return len(self.T) == count
+
+
+class LiteralSearch:
+    """Algorithms 1 and 2 for one arm, one surface cut into E-cells, and one first J-cell."""
+
+    def __init__(
+        self, robot: Robot, cells: Cells, task: Task, start: ArrayLike, steps: Steps
+    ) -> None:
+        """Lay the grid of J-cells through a configuration.
+
+        Args:
+            robot: the arm; n joints.
+            cells: the E-cells.
+            task: the standoff d; its tolerance and cone are those of `steps`.
+            start: (n,) q of jc_1, rad or m.
+            steps: delta q for each joint, tolerance and cone, with the margins that keep the
+                constraints between two J-cells too.
+        """
+        self.start = np.array(start, dtype=float)
+        self.robot, self.cells, self.steps = robot, cells, steps
+        self.height = cells.surface.side_sign * task.standoff
+        self.targets = task.targets(cells).points
+        self.kinematics = Kinematics(robot)
+        self.found = Continuity()
+
+    def q(self, jc: JCell) -> NDArray[np.float64]:
+        """The configuration (n,) of a J-cell."""
+        return np.asarray(self.start + np.array(jc) * self.steps.size)
+
+    def neighbouring_jcells(self, jc: JCell) -> Iterator[JCell]:
+        """The J-cells reached "by adjusting a q_i of q by +-delta q"; + first, base to tip.
+
+        With `moves = "all"` any of the joints at once, which is the text of Section III.A: 3^n.
+        """
+        n = len(jc)
+        if self.steps.moves == "single":
+            for i in range(n):
+                for step in (+1, -1):
+                    yield (*jc[:i], jc[i] + step, *jc[i + 1 :])
+            return
+        for number in range(1, 3**n):
+            moves = ((0, 1, -1)[number // 3**i % 3] for i in range(n))
+            yield tuple(offset + move for offset, move in zip(jc, moves, strict=True))
+
+    def ecell(self, jc: JCell) -> tuple[int, NDArray[np.float64]]:
+        """The E-cell of a J-cell by forward kinematics, and p (3,) m; -1 where it is not feasible.
+
+        A J-cell is feasible where it satisfies the joint limits, eq. (5) and inequality (7).
+        """
+        q, steps = self.q(jc), self.steps
+        if (q < self.robot.lower).any() or (q > self.robot.upper).any():
+            return -1, np.full(3, np.nan)
+        self.found.checked += 1
+        p, a = self.kinematics.tool(q)
+        below = self.cells.surface.closest(p)
+        b = -self.cells.surface.side_sign * below.normal
+        on_manifold = abs(float(below.height) - self.height) <= steps.tolerance - steps.sag - HAIR
+        in_cone = float(a @ b) >= steps.cone_cosine + HAIR
+        if not (on_manifold and in_cone):
+            return -1, p
+        return int(self.cells.locate(p[None])[0]), p
+
+    def algorithm_1(self, jc: JCell, ec_T: int) -> tuple[JCell, ...]:
+        """Continuity check in joint space between neighbouring E-cells.
+
+        Args:
+            jc: a feasible J-cell, whose E-cell is ec.
+            ec_T: the target E-cell, a neighbour of ec.
+
+        Returns:
+            The path Q of J-cells from jc to the first one in ec_T; empty where there is no
+            continuity.
+        """
+        checked = {jc}
+        _, p = self.ecell(jc)
+        return self.CONT(jc, p, ec_T, checked)
+
+    def CONT(
+        self, jc: JCell, p: NDArray[np.float64], ec_T: int, checked: set[JCell]
+    ) -> tuple[JCell, ...]:
+        """The procedure of Algorithm 1; as deep as Python's recursion goes, so keep cells small."""
+        p_T = self.targets[ec_T]
+        for jc_N in self.neighbouring_jcells(jc):
+            if jc_N in checked:
+                continue
+            checked.add(jc_N)
+            ec_N, p_N = self.ecell(jc_N)
+            if ec_N < 0:
+                continue
+            if ec_N == ec_T:
+                return (jc, jc_N)
+            if np.linalg.norm(p_N - p_T) < np.linalg.norm(p - p_T) - HAIR:
+                path = self.CONT(jc_N, p_N, ec_T, checked)
+                if path:
+                    return (jc, *path)
+        return ()
+
+    def algorithm_2(self) -> Continuity:
+        """Continuity check on manifold E, from the J-cell at the start.
+
+        Raises:
+            ValueError: the start is not feasible, or over no E-cell.
+        """
+        jc_1 = (0,) * self.robot.n
+        ec_1, _ = self.ecell(jc_1)
+        if ec_1 < 0:
+            raise ValueError("the start is no feasible J-cell: limits, eq. (5) or eq. (7)")
+        self.found.T[ec_1] = None
+        self.TREESEARCH(jc_1)
+        return self.found
+
+    def TREESEARCH(self, jc: JCell) -> None:
+        """The procedure of Algorithm 2: neighbours clockwise, from the upper left one."""
+        T, G = self.found.T, self.found.G
+        ec, _ = self.ecell(jc)
+        for ec_N in self.cells.neighbours.of(ec).tolist():
+            edge = frozenset((ec, ec_N))
+            if edge in G:
+                continue
+            path = self.algorithm_1(jc, ec_N)
+            self.found.calls.append((ec, ec_N, bool(path)))
+            if path:
+                G[edge] = path
+                if ec_N not in T:
+                    T[ec_N] = ec
+                    self.TREESEARCH(path[-1])
