@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from feasibility.collisions import Bodies, Pair, gather
+from feasibility.targets import check_references
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells, Surface
 
-NARROWER = 0.9  # [1] of tolerance and cone, when the replay refuses what just kept to them
+NARROWER = 0.9  # [1] of tolerance, cone and roll, when the replay refuses what just kept to them
 
 Given = tuple[object, str, type, str]
 """The value of an argument, its name, its type, and an example in words."""
@@ -36,6 +37,8 @@ class Problem:
         Raises:
             TypeError: an argument is something else, such as a surface that is not cut into cells;
                 all of them are named.
+            ArgumentError: the roll is limited, but the surface has no reference direction for it,
+                or one that is along the approach direction at some cell.
         """
         _refuse_other_types(
             (robot, "robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
@@ -43,6 +46,7 @@ class Problem:
             (task, "task", Task, "a Task, such as Task(standoff=0.02, cone_deg=20)"),
             *others,
         )
+        check_references(cells, task)
         return cls(robot, cells, task, task)
 
     @property
@@ -63,16 +67,23 @@ class Problem:
 
     @property
     def narrowed(self) -> Problem:
-        """The same problem, searched with less of the tolerance and of the cone."""
+        """The same problem, searched with less of tolerance, cone and range of the roll."""
         tolerance = NARROWER * self.task.effective_tolerance
-        cone_deg = NARROWER * self.task.cone_deg
-        searched = replace(self.task, tolerance=tolerance, cone_deg=cone_deg)
+        cone_deg, roll_deg = NARROWER * self.task.cone_deg, self.task.roll_deg
+        if self.task.roll is not None and roll_deg is not None:
+            less = 0.5 * (1.0 - NARROWER) * (roll_deg[1] - roll_deg[0])
+            roll_deg = roll_deg[0] + less, roll_deg[1] - less
+        searched = replace(self.task, tolerance=tolerance, cone_deg=cone_deg, roll_deg=roll_deg)
         return replace(self, searched=searched)
 
     @property
     def within(self) -> str:
-        """Tolerance and cone in words."""
-        return f"within {1e3 * self.task.effective_tolerance:g} mm and {self.task.cone_deg:g} deg"
+        """Tolerance, cone and range of the roll in words."""
+        words = f"within {1e3 * self.task.effective_tolerance:g} mm and {self.task.cone_deg:g} deg"
+        if self.task.roll is None or self.task.roll_deg is None:
+            return words
+        low, high = self.task.roll_deg
+        return f"{words}, at a roll of {low:g} to {high:g} deg"
 
 
 def _cells_wanted(given: object) -> str:

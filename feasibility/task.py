@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import Checks
+from coverable_errors import ArgumentError, Checks, Fault
 from feasibility.collisions import Collision
 from feasibility.cone import chord_of
+from feasibility.roll import Roll, projected, roll_of_range
 from surfaces import Cells
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
@@ -23,7 +24,14 @@ class Targets(NamedTuple):
     points: NDArray[np.float64]
     """(N, 3) m, in the root frame: centre -+ standoff * normal."""
     approaches: NDArray[np.float64]
-    """(N, 3) unit: +normal for the inside of a surface, -normal for the outside."""
+    """(N, 3) unit: +normal for the inside of a surface, -normal for the outside, unless the task or
+    the cells have others."""
+    references: NDArray[np.float64] | None = None
+    """(N, 3) unit, square to the approaches: where the reference axis of the TCP points at a roll
+    of 0; None where the roll is free."""
+
+
+Direction = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +46,9 @@ class Task:
         0.001
 
     Raises:
-        ArgumentError: standoff or tolerance is negative or not finite, or the cone is outside
-            0 to 180 degrees; all that is wrong is named.
+        ArgumentError: standoff or tolerance is negative or not finite, the cone is outside 0 to
+            180 degrees, a direction is none, or the range of the roll is empty, or limited with a
+            cone over 90 degrees; all that is wrong is named.
     """
 
     standoff: float
@@ -52,6 +61,17 @@ class Task:
     verdict states what was used."""
     collision: Collision | None = None
     """What the arm has to stay clear of; None where collisions are not checked."""
+    approach: Literal["normal"] | Direction | None = None
+    """b(u, v), eq. (3): towards the surface along its normal, or one direction (of any length, in
+    the surface's own frame) all over it. None leaves it to the cells: poses may have approaches of
+    their own, all other cells have the normal. The target stays on the normal in any case."""
+    roll_deg: tuple[float, float] | None = None
+    """The least and the largest roll, degrees: the angle about the approach direction from the
+    reference direction on the surface to the reference axis of the TCP (`feasibility.roll`). None,
+    or 360 degrees and more, leaves it free."""
+    roll_reference: Direction | None = None
+    """The reference direction in the surface's own frame; its part square to the approach counts.
+    None for the direction in which u grows, or the tangents of poses."""
 
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task; keep them as plain floats."""
@@ -70,9 +90,41 @@ class Task:
         if not isinstance(self.collision, Collision | None):
             expected = "must be a Collision, such as Collision(clearance=0.005), or None"
             checks.wrong("collision", self.collision, expected)
+        kept_too = {
+            "approach": self._checked_approach(checks),
+            "roll_deg": self._checked_roll(checks, kept["cone_deg"]),
+            "roll_reference": None
+            if self.roll_reference is None
+            else _unit(checks.direction("roll_reference", self.roll_reference)),
+        }
         checks.done()
-        for name, value in kept.items():
+        for name, value in {**kept, **kept_too}.items():
             object.__setattr__(self, name, value)
+
+    def _checked_approach(self, checks: Checks) -> Any:
+        """The approach as a word or a unit direction."""
+        if self.approach is None or isinstance(self.approach, str):
+            if self.approach not in (None, "normal"):
+                expected = "must be 'normal' or a direction, such as (0, 0, -1)"
+                checks.wrong("approach", self.approach, expected)
+            return self.approach
+        return _unit(checks.direction("approach", self.approach))
+
+    def _checked_roll(self, checks: Checks, cone_deg: Any) -> tuple[float, float] | None:
+        """The range of the roll, which may be a single one."""
+        if self.roll_deg is None:
+            return None
+        expected = "must be a pair (low, high) of degrees in -360 .. 360 with low <= high"
+        found = checks.numbers("roll_deg", self.roll_deg, 2, expected, 360.0)
+        if found is None:
+            return None
+        low, high = found
+        if low > high:
+            checks.wrong("roll_deg", self.roll_deg, f"{expected}; this range is empty")
+        elif high - low < 360.0 and cone_deg > 90.0:
+            expected = "must be 90 or less where roll_deg is limited: further back rolls blur"
+            checks.wrong("cone_deg", cone_deg, expected)
+        return low, high
 
     @property
     def cone(self) -> float:
@@ -89,10 +141,70 @@ class Task:
         """|a - b| at the boundary of the cone, 0 .. 2; inf where any axis will do."""
         return chord_of(self.cone)
 
+    @property
+    def roll(self) -> Roll | None:
+        """The range of the roll, rad; None where it is free."""
+        return None if self.roll_deg is None else roll_of_range(*self.roll_deg)
+
+    def fixed_approach(self, cells: Cells) -> NDArray[np.float64] | None:
+        """(3,) unit, in the root frame, where the approach is one direction; None elsewhere."""
+        if self.approach is None or isinstance(self.approach, str):
+            return None
+        return cells.surface.rotation @ np.array(self.approach)
+
+    def fixed_reference(self, cells: Cells) -> NDArray[np.float64] | None:
+        """(3,) unit, in the root frame, of `roll_reference`; None where there is none."""
+        if self.roll_reference is None:
+            return None
+        return cells.surface.rotation @ np.array(self.roll_reference)
+
+    def approaches(self, cells: Cells) -> NDArray[np.float64]:
+        """(N, 3) unit approach directions b of the cell centres, in the root frame."""
+        fixed = self.fixed_approach(cells)
+        if fixed is not None:
+            return np.tile(fixed, (len(cells), 1))
+        if self.approach is None and cells.approaches is not None:
+            return cells.approaches
+        return -cells.surface.side_sign * cells.normals
+
     def targets(self, cells: Cells) -> Targets:
-        """Targets c_p(u, v), eq. (1), and approaches b(u, v), eq. (3), of the cell centres."""
-        sign = cells.surface.side_sign
+        """Targets c_p(u, v), eq. (1), approaches b(u, v), eq. (3), and reference directions.
+
+        All of the cell centres; NaN in place of a reference that is along its approach.
+
+        Raises:
+            ArgumentError: the roll is limited, but neither task nor cells have a reference.
+        """
+        approaches = self.approaches(cells)
         return Targets(
-            points=cells.centres + sign * self.standoff * cells.normals,
-            approaches=-sign * cells.normals,
+            points=cells.centres + cells.surface.side_sign * self.standoff * cells.normals,
+            approaches=approaches,
+            references=self._references(cells, approaches),
         )
+
+    def _references(
+        self, cells: Cells, approaches: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        if self.roll is None:
+            return None
+        fixed, directions = self.fixed_reference(cells), cells.tangents
+        if fixed is not None:
+            directions = np.broadcast_to(fixed, approaches.shape)
+        if directions is None:
+            raise ArgumentError(
+                Fault(
+                    "roll_reference",
+                    f"is missing: a {cells.surface.kind} has no u direction",
+                    expected="give a direction along it, in its own frame, such as (1, 0, 0)",
+                ),
+                "task",
+            )
+        return projected(directions, approaches)[0]
+
+
+def _unit(direction: list[float]) -> Direction:
+    """The unit direction along three numbers that are not all zero."""
+    largest = max(map(abs, direction))  # first, so that no square is too large
+    x, y, z = (number / largest for number in direction)
+    length = math.sqrt(x * x + y * y + z * z)
+    return (x / length, y / length, z / length)

@@ -3,6 +3,7 @@ from .arguments import check_pose as check_pose
 from .cells import Cells as Cells
 from .cells import Finer as Finer
 from .cells import Triangles as Triangles
+from .curve_fitting import fit_directions as fit_directions
 from .meshes import MeshSurface as MeshSurface
 from .meshes import cut_box as cut_box
 from .meshes import cut_plane as cut_plane
@@ -27,4 +28,5 @@ from .sheet import Sheet as Sheet
 from .sheet import sheet_of as sheet_of
 from .surface import Surface as Surface
 from .surface import SurfaceError as SurfaceError
+from .surface import max_principal_curvature as max_principal_curvature
 from .surface import rotation_from_rpy as rotation_from_rpy

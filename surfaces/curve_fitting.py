@@ -162,6 +162,21 @@ def fit_cubics(
     return by_curve, BETWEEN * np.stack(deviations, axis=1)
 
 
+def fit_directions(values: Array, count: int) -> tuple[Array, Array]:
+    """Cubics (m, count, 4, 3) through every other sample of m curves, and their deviations (m,).
+
+    Args:
+        values: (2 parts + 1, m, 3) unit directions at equal steps.
+        count: number of cubics.
+    """
+    parts = len(values) // 2
+    fit, evaluate = _maps(count, parts, "")
+    cubics = fit @ values[::2].reshape(parts + 1, -1)
+    off = (evaluate @ cubics).reshape(values.shape) - values
+    deviations = BETWEEN * np.linalg.norm(off, axis=2).max(axis=0)
+    return cubics.reshape(count, 4, -1, 3).transpose(2, 0, 1, 3), deviations
+
+
 @cache
 def _maps(count: int, parts: int, rests: str) -> tuple[Array, Array]:
     """From samples to cubics, and from cubics to values; both linear. See `fit_cubics`.

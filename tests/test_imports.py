@@ -38,10 +38,12 @@ surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
 surfaces: sheet tiles
 surfaces.places
-feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only safe_files search target_parts version
+feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only roll safe_files search version
 feasibility.collisions
 feasibility.collisions.kernels
-feasibility: found problem target_curves task verdict
+feasibility: task
+feasibility.targets
+feasibility: found problem verdict
 feasibility.certification: faults
 feasibility.certification.collisions
 feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region kinematic_bounds lever_bounds linear_models motion_replay parts_agreement proof_verification refutation region stretches surface_replay tree_shape
@@ -283,10 +285,7 @@ def test_no_cycles() -> None:
 def test_the_certificate_shares_nothing_with_the_search() -> None:
     ours = loaded_with("feasibility.certification.motion_replay")
     feasibility = {name for name in ours if name.startswith("feasibility.")}
-    words = {
-        f"feasibility.{word}"
-        for word in ("cone", "cut_tree", "target_curves", "target_parts", "task", "verdict")
-    }
+    words = {f"feasibility.{word}" for word in ("cone", "cut_tree", "roll", "task", "verdict")}
     values = (
         "bodies",
         "gathering",
@@ -299,7 +298,11 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
         "words",
     )  # of collisions: no bound, no kernel
     words |= {f"feasibility.collisions.{word}" for word in values}
-    rooms = {"feasibility.certification", "feasibility.certification.collisions"}
+    rooms = {
+        "feasibility.certification",
+        "feasibility.certification.collisions",
+        "feasibility.targets",
+    }
     assert {n for n in feasibility if room_of(n) not in rooms} <= words
     assert "robots.chain" not in ours
     judged = feasibility - {f"feasibility.collisions.{word}" for word in values}

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.target_curves import TargetCurves, beside_facets, target_curves
+from feasibility.targets import TargetCurves, beside_facets, target_curves
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from surfaces import Cells
@@ -75,7 +75,7 @@ def match_to_curves(cells: Cells, task: Task, walk: Walk, points: Array, axes: A
         names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
         return replace(unmatched, fault=f"the motion goes from cell {names}, which do not touch")
     tolerance = task.effective_tolerance
-    curves = target_curves(cells, task.standoff, tolerance)
+    curves = target_curves(cells, task)
 
     # Each segment, and each waypoint between marks, belongs to one section from mark to mark.
     section = np.searchsorted(marks, np.arange(m - 1), side="right") - 1

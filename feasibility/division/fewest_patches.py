@@ -26,7 +26,7 @@ from feasibility.roadmap import (
 )
 from feasibility.roadmap.causes import causes_of, diagnose, disconnected
 from feasibility.search import Progress, Search
-from feasibility.target_curves import blocked_curves
+from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause
 from robots import Robot

@@ -170,7 +170,7 @@ def _starts(
         yield np.array(start, dtype=float)
         return
     robot, task = problem.robot, problem.task
-    points, approaches = task.targets(cells)
+    points, approaches, _ = task.targets(cells)
     middle = len(cells) // 2
     within = np.flatnonzero(_beyond(robot, points) <= 0.0).tolist()
     for cell in sorted(within, key=lambda cell: abs(cell - middle)):

@@ -33,7 +33,7 @@ from feasibility.placement.refinement import Evaluator, Refinement
 from feasibility.placement.region import PlacementError, Pose, Region
 from feasibility.roadmap import warm_up
 from feasibility.search import Progress, Search
-from feasibility.target_curves import blocked_curves
+from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Answer, CauseKind, Evidence
 from robots import Robot

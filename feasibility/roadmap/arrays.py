@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from feasibility.collisions import collision_buffer, gather
 from feasibility.compiled import kernel
-from feasibility.target_curves import target_curves
+from feasibility.targets import target_curves
 from feasibility.task import Task
 from robots import Chain, Robot, frames
 from surfaces import Cells, Surface
@@ -83,7 +83,7 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
     """Arm, cells and task as arrays for the compiled search."""
     tolerance = task.effective_tolerance
     targets = task.targets(cells)
-    curves = target_curves(cells, task.standoff, tolerance)
+    curves = target_curves(cells, task)
     cone_chord = task.cone_chord
     deviations = curves.deviations[:, 1]
     ordinary = (

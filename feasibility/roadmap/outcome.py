@@ -10,7 +10,7 @@ from feasibility.problem import Problem
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.proving import Proving
-from feasibility.target_curves import blocked_curves
+from feasibility.targets import blocked_curves
 
 
 def proof_of(exploration: Exploration) -> CutTree | None:

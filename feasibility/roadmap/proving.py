@@ -14,7 +14,7 @@ import numpy as np
 
 from feasibility.roadmap.cuts import Blocked, Prover, components_of, places_on
 from feasibility.roadmap.exploration import Exploration, wound
-from feasibility.target_curves import blocked_curves
+from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from surfaces import SurfaceError
 

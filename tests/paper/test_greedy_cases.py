@@ -68,7 +68,7 @@ def test_sphere_as_published() -> None:
 def branches(verdict: Verdict) -> list[np.ndarray]:
     from feasibility.paper.starts import starts
 
-    points, approaches = verdict.task.targets(verdict.cells)
+    points, approaches, _ = verdict.task.targets(verdict.cells)
     return list(
         starts(
             verdict.robot, points[verdict.start], approaches[verdict.start], verdict.task.cone, 0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.roadmap.branch_and_bound import Places
-from feasibility.target_parts import target_parts
+from feasibility.targets import target_parts
 from feasibility.task import Task
 from surfaces import Surface
 
@@ -27,6 +27,7 @@ def places_on(surface: Surface, task: Task) -> Places:
         flat=FLAT * task.effective_tolerance,
         straight=max(STRAIGHT * chord, STRAIGHTEST),
         most=MOST_PARTS,
+        approach=None if isinstance(task.approach, str) else task.approach,
     )
     return Places(
         centre=np.array(parts.centre),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feasibility import Task
-from feasibility.target_curves import blocked_curves, target_curves
+from feasibility.targets import blocked_curves, target_curves
 from surfaces import plane, sphere
 from surfaces.meshes import TriangleMesh, mesh
 
@@ -37,7 +37,7 @@ def test_the_parts_that_blocked_curves_leave_are_counted(turns: tuple[int, ...])
     """A motion goes round convex edges, not into concave ones."""
     cells, task = mesh(zigzag(*turns)).cells(60), Task(standoff=0.02, cone_deg=60)
     text = blocked_curves(cells, task)
-    curves = target_curves(cells, task.standoff, 1e-3)
+    curves = target_curves(cells, task)
     usable = ~curves.folded & (curves.deviations[:, 0] < 1e-3) & (curves.deviations[:, 1] < 1.0)
     graph = nx.Graph(cells.pairs[usable].tolist())
     graph.add_nodes_from(range(len(cells)))

@@ -102,7 +102,7 @@ def test_a_cause_without_proof_says_so() -> None:
     near = (0.5391132678890725, 2.322509635628854, 0.46830953436866546)
     wrist = (-2.2497912973505088, -0.6741300784253903, -0.3653724514898134)
     q = np.array([*near, *wrist])
-    points, approaches = task.targets(cells)
+    points, approaches, _ = task.targets(cells)
     point, axis = Kinematics(robot).tool(q)
     assert (robot.lower <= q).all()
     assert (q <= robot.upper).all()

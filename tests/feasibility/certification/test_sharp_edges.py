@@ -8,7 +8,7 @@ from dense_replay import tools
 from test_creases import PER_SEGMENT, nearest, roof
 
 from feasibility import Task, check
-from feasibility.target_curves import beside_facets
+from feasibility.targets import beside_facets
 from robots import load_robot
 from surfaces import mesh
 

@@ -25,7 +25,7 @@ def both(
     robot: Robot, cells: Cells, task: Task, search: Search
 ) -> tuple[JSpace, LiteralSearch, int]:
     """The compiled and the literal search from the same start, and the cell it is over."""
-    points, approaches = task.targets(cells)
+    points, approaches, _ = task.targets(cells)
     steps = Steps.of(robot, cells.closed_form, task, search)  # type: ignore[attr-defined]
     cell = len(cells) // 2
     start = next(starts(robot, points[cell], approaches[cell], task.cone, search.seed))

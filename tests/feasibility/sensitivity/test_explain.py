@@ -146,7 +146,7 @@ def test_the_cone_a_stiff_wrist_needs_is_that_of_the_geometry() -> None:
     found = threshold_of(explained("stiff wrist"), "cone")
     assert found.feasible is not None
     assert found.other is not None
-    points, approaches = variant.task.targets(variant.cells)
+    points, approaches, _ = variant.task.targets(variant.cells)
     tilts = np.array([branch_tilts(p, a) for p, a in zip(points, approaches, strict=True)])
     least = tilts.max(axis=0).min()
     assert -0.2 <= math.degrees(found.feasible.value) - least <= 1.0

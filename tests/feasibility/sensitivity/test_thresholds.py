@@ -291,7 +291,7 @@ def test_proofs_that_fail_are_asked_for_less_until_one_succeeds() -> None:
 def test_a_ruling_brings_a_proof_or_a_configuration() -> None:
     variant = paper("4d")
     prober = prober_of(variant)
-    points, approaches = variant.task.targets(variant.cells)
+    points, approaches, _ = variant.task.targets(variant.cells)
     for cell in (0, 45, 89):
         ruling, q = prober.rule(prober.arrays, cell, 20_000)
         if cell >= 60:

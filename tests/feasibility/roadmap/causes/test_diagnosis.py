@@ -62,7 +62,7 @@ def test_orientation_says_the_smallest_angle_that_could_be_had() -> None:
     wall = plane((-0.2, 0.2), (-0.2, 0.2), "outside", (0.6, 0.1, 0.2), (0.0, 90.0, 0.0))
     verdict = check(arm, wall.cells(3, 3), Task(0.0, 20))
     assert kinds(verdict) == {CauseKind.ORIENTATION}
-    points, approaches = verdict.task.targets(verdict.cells)
+    points, approaches, _ = verdict.task.targets(verdict.cells)
     for cause in verdict.causes:
         reported = number(r"tilts ([0-9.]+) deg", cause.detail)
         best = smallest_angle(points[cause.cell], approaches[cause.cell])

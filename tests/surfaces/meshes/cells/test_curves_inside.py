@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from feasibility import Task
-from feasibility.target_curves import blocked_curves
+from feasibility.targets import blocked_curves
 from surfaces.meshes import TriangleMesh, mesh
 
 FLAT = Task(standoff=0.005, cone_deg=1)

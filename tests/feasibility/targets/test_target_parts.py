@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from part_walks import at_parameters, spread, walk
 
-from feasibility.target_parts import target_parts
+from feasibility.targets import target_parts
 from surfaces import cylinder, hyperboloid, plane, sphere
 
 PATCHES = {

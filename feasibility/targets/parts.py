@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
+import numpy as np
+
+from feasibility.task import Direction
 from surfaces import Surface, SurfaceParts
 
 MOST = 8192
@@ -12,12 +15,17 @@ MOST = 8192
 # Search and replay may ask for the same; surfaces are values, compared by identity.
 @lru_cache(maxsize=4)
 def target_parts(
-    surface: Surface, standoff: float, flat: float, straight: float, most: int = MOST
+    surface: Surface,
+    standoff: float,
+    flat: float,
+    straight: float,
+    most: int = MOST,
+    approach: Direction | None = None,
 ) -> SurfaceParts:
     """The tree of parts of target points T = f + s d n and approach directions b = -s n.
 
     f and n follow one model with the same x, so T follows that of f, shifted by s d times that of
-    n, within r_f + d r_n.
+    n, within r_f + d r_n. An approach that is one direction is that, everywhere.
 
     Args:
         surface: that of the cells; s is its `side_sign`.
@@ -25,6 +33,7 @@ def target_parts(
         flat: m > 0, the largest radius of target points on the finest parts.
         straight: > 0, the largest radius of directions.
         most: how many parts may be made.
+        approach: unit, in the surface's own frame, where it is not the normal.
 
     Returns:
         The same parts as `Surface.parts` has, with targets (m) in the place of points and approach
@@ -46,4 +55,7 @@ def target_parts(
         array[..., :3] += sign * standoff * array[..., 3:]
         array[..., 3:] *= -sign
     radius[:, 0] += standoff * radius[:, 1]
+    if approach is not None:
+        centre[..., 3:] = surface.rotation @ np.array(approach)
+        slopes[..., 3:] = radius[:, 1] = 0.0
     return SurfaceParts(centre, slopes, radius, parts.children, parts.axis)

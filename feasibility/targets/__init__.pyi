@@ -1,0 +1,9 @@
+from .beside_facets import beside_facets as beside_facets
+from .blocked import blocked_curves as blocked_curves
+from .curves import TargetCurves as TargetCurves
+from .curves import target_curves as target_curves
+from .frames import FrameCurves as FrameCurves
+from .parts import target_parts as target_parts
+from .references import check_references as check_references
+from .references import reference_directions as reference_directions
+from .references import u_directions as u_directions

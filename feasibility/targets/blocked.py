@@ -1,0 +1,65 @@
+"""Curves between cell centres that no motion can be certified along, whatever the arm: in words."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.targets.curves import RELIABLE, target_curves
+from feasibility.task import Task
+from surfaces import Cells, components
+
+
+def blocked_curves(cells: Cells, task: Task) -> str:
+    """Why no motion can be certified between some neighbouring cells; empty where it can."""
+    if not task.cone_chord > 0.0:
+        return (
+            "A cone of 0 degrees leaves a motion no margin between samples, so none can be "
+            "certified; allow a small angle."
+        )
+    tolerance = task.effective_tolerance
+    targets = target_curves(cells, task)
+    some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"
+    curves = cells.curves
+    smooth = ~curves.creased & (curves.deviations[:, 1] <= RELIABLE)
+    folds = targets.folded & smooth
+    cone_chord = task.cone_chord
+    rough = (
+        (targets.deviations[:, 0] >= tolerance)
+        | (targets.deviations[:, 1] >= cone_chord)
+        | targets.folded
+    )
+    parted = _parted(cells, ~rough)
+    if folds.any():
+        if cells.surface.mean_edge_length > 0.0:  # facets do not tell the two apart
+            return (
+                "The offset surface folds where it is concave, or the mesh is too coarse where it "
+                f"bends, {some.format(int(folds.sum()))}: the standoff is too large for the "
+                f"radius of curvature, so no motion can be certified there{parted}; use a smaller "
+                "standoff, a mesh that is finer along its bends, or a part of it that ends there."
+            )
+        return (
+            f"The offset surface folds {some.format(int(folds.sum()))}: the standoff reaches "
+            "the surface's radius of curvature on its concave side, so no motion can be certified "
+            f"there{parted}; use a smaller standoff."
+        )
+    if rough.any():
+        return (
+            f"The surface is creased, or rougher than the task allows, "
+            f"{some.format(int(rough.sum()))}, so no motion can be certified there (round an edge "
+            f"of a mesh it can, but not into a concave one, or past a corner){parted}; use smaller "
+            "cells, a finer or smoother mesh, cut it along its creases, or allow a wider cone or a "
+            "larger tolerance."
+        )
+    return ""
+
+
+def _parted(cells: Cells, usable: NDArray[np.bool_]) -> str:
+    """Says so where the usable curves (M,) leave the cells in several parts, whatever the arm."""
+    before, parts = (
+        int(components(pairs, len(cells)).max(initial=-1)) + 1
+        for pairs in (cells.pairs, cells.pairs[usable])
+    )
+    if parts == before:
+        return ""
+    return f", which leaves {parts} parts of the surface that no arm's motion joins"

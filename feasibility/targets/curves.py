@@ -1,0 +1,151 @@
+"""The task applied to cell curves: where the tool has to be between cell centres, and how held."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.targets.beside_facets import beside_facets
+from feasibility.targets.directions import approach_curves
+from feasibility.targets.frames import FrameCurves, frame_curves
+from feasibility.task import Task
+from surfaces import Cells
+
+RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows how the surface bends
+LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
+FEW, MANY = 3, 32  # places on a curve over a mesh; and on one over a crease, or off its facets by
+OFF = 0.05  # [1] of the tolerance
+
+
+class TargetCurves(NamedTuple):
+    """Target point f + h n, approach direction and reference along the M curves of some cells."""
+
+    first: NDArray[np.int64]
+    """(M + 1,) where each curve's pieces begin, and the end of the last."""
+    cubics: NDArray[np.float64]
+    """(P, 4, 6) coefficients of 1, s, s^2, s^3 of point (m) and direction; s in 0..1."""
+    derivative_bounds: NDArray[np.float64]
+    """(P, 2) largest second derivatives of both by t in 0..1; inf where the offset folds."""
+    curvature: NDArray[np.float64]
+    """(P,) 1/m, how fast the direction turns for each metre on the target surface, at most."""
+    deviations: NDArray[np.float64]
+    """(M, 2) how far target point (m) and direction may be from the surface's own, at most."""
+    centre_curvature: float
+    """1/m, the largest `curvature` next to the cells' centres."""
+    folded: NDArray[np.bool_]
+    """(M,) curves where the offset surface folds, see `folded_curves`."""
+    frames: FrameCurves | None = None
+    """The reference direction of the roll; None where the roll is free."""
+
+
+def folded_curves(cells: Cells, height: float) -> NDArray[np.bool_]:
+    """(M,) curves from or to a cell from which some curve runs into a fold of the offset surface.
+
+    At a signed height (m) beyond a radius of curvature the offset surface runs backwards, but in
+    the direction of that curvature only; curves across it do not show it, their neighbours do.
+    """
+    folded = cells.curves.folds(height)
+    cell = np.zeros(len(cells), dtype=bool)
+    # Those over creases, or with larger deviations, show nothing about their neighbours.
+    reliable = ~cells.curves.creased & (cells.curves.deviations[:, 1] <= RELIABLE)
+    cell[cells.pairs[folded & reliable]] = True
+    return np.asarray(folded | cell[cells.pairs].any(axis=1))
+
+
+def _see_facets(
+    cells: Cells, standoff: float, tolerance: float, deviations: NDArray[np.float64]
+) -> None:
+    """Raise the deviations (M, 2) of curves over a mesh to those from its triangles."""
+    some = np.arange(len(deviations))
+    for count in (FEW, MANY):
+        t = (np.arange(count) + 0.5) / count
+        places = np.repeat(some, count), np.tile(t, len(some))
+        found = beside_facets(cells, standoff, tolerance, *places, everywhere=False)
+        off = found.off.reshape(-1, count).max(axis=1)
+        leans = found.leans.reshape(-1, count).max(axis=1)
+        deviations[some] = np.maximum(deviations[some], np.column_stack([off, leans]))
+        some = some[(off > OFF * tolerance) | (leans > 0.0) | cells.curves.creased[some]]
+
+
+def target_curves(cells: Cells, task: Task) -> TargetCurves:
+    """Offset the curves of `cells` to the tool's side by the standoff, and direct the tool there.
+
+    Raises:
+        ArgumentError: the roll is limited, but neither task nor cells have a reference.
+    """
+    # Of two tasks that differ in cone or range alone the curves are the same.
+    rolls = None if task.roll is None else (-1.0, 1.0)
+    aim = Task(
+        standoff=task.standoff,
+        cone_deg=90.0,
+        tolerance=task.effective_tolerance,
+        approach=task.approach,
+        roll_deg=rolls,
+        roll_reference=task.roll_reference if rolls else None,
+    )
+    return _target_curves(cells, aim)
+
+
+# Search and replay need the same; cells are values, compared by identity.
+@lru_cache(maxsize=4)
+def _target_curves(cells: Cells, task: Task) -> TargetCurves:
+    """`target_curves` of a task whose cone and range do not matter."""
+    curves, sign = cells.curves, cells.surface.side_sign
+    standoff, tolerance = task.standoff, task.effective_tolerance
+    height = sign * standoff
+    folded = folded_curves(cells, height)
+    cubics = np.empty_like(curves.cubics)
+    cubics[..., :3] = curves.cubics[..., :3] + height * curves.cubics[..., 3:]
+    cubics[..., 3:] = -sign * curves.cubics[..., 3:]
+    derivative_bounds = curves.derivative_bounds.copy()
+    derivative_bounds[:, 0] += standoff * derivative_bounds[:, 1]
+    deviations = curves.deviations.copy()
+    deviations[:, 0] += standoff * deviations[:, 1]
+    if cells.surface.mean_edge_length > 0.0:
+        _see_facets(cells, standoff, tolerance, deviations)
+    curvature, at_centre = _normal_curvature(cells, standoff, tolerance)
+    others = approach_curves(cells, task)
+    if others is not None:  # the target stays on the normal, but the tool is held otherwise
+        cubics[..., 3:] = others.cubics
+        derivative_bounds[:, 1] = others.derivative_bounds[:, 1]
+        deviations[:, 1] = others.deviations
+        curvature, at_centre = np.zeros_like(curvature), 0.0
+    derivative_bounds[np.repeat(folded, np.diff(curves.first))] = np.inf
+    if len(cells.pairs) and others is None:
+        ends = np.concatenate([curves.first[:-1][~folded], curves.first[1:][~folded] - 1])
+        at_centre = float(curvature[ends].max(initial=0.0))
+    frames = None if task.roll is None else frame_curves(cells, task, cubics, curvature)
+    for array in (cubics, derivative_bounds, curvature, deviations, folded):
+        array.flags.writeable = False
+    return TargetCurves(
+        first=curves.first,
+        cubics=cubics,
+        derivative_bounds=derivative_bounds,
+        curvature=curvature,
+        deviations=deviations,
+        centre_curvature=at_centre,
+        folded=folded,
+        frames=frames,
+    )
+
+
+def _normal_curvature(
+    cells: Cells, standoff: float, tolerance: float
+) -> tuple[NDArray[np.float64], float]:
+    """(P,) 1/m, how fast the normal turns on the target surface, at most; and beside any centre.
+
+    To the side of a curve the normal may turn faster than along it.
+    """
+    height = cells.surface.side_sign * standoff
+    most = cells.parallel_curvature(height)
+    if standoff > 0.0:  # over an edge it turns as over a ball of the standoff
+        edge = np.where(cells.creased, 1.0 / max(standoff, tolerance), 0.0)
+        most = np.maximum(most, edge)
+    across = most[cells.pairs].max(axis=1)
+    curves = cells.curves
+    curvature = np.maximum(curves.curvature(height), np.repeat(across, np.diff(curves.first)))
+    # Of a single cell, which has no curves, the second counts.
+    return LATERAL * curvature, float(LATERAL * most[np.isfinite(most)].max(initial=0.0))

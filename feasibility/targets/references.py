@@ -1,0 +1,104 @@
+"""The reference direction that roll is measured from, before its part square to b is taken.
+
+One direction all over the surface, or the direction in which u grows; between poses, whose tangents
+are known at the poses alone, the direction on the way from one tangent to the next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import ArgumentError, Fault
+from feasibility.roll import ALONG, projected
+from feasibility.targets.directions import great_arcs
+from feasibility.task import Task
+from surfaces import Cells, Patch, Piecewise, Surface
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class OnPatch(NamedTuple):
+    """Places on one patch."""
+
+    rows: Ints
+    """(k,) which of the points asked for."""
+    patch: Patch
+    u: Array
+    """(k,)"""
+    v: Array
+    """(k,)"""
+
+
+def on_patches(surface: Surface, points: Array) -> Iterator[OnPatch]:
+    """The places of a patch, or of several, that are closest to points (k, 3) m."""
+    if isinstance(surface, Patch):
+        found = surface.closest(points)
+        yield OnPatch(np.arange(len(points)), surface, found.u, found.v)
+    elif isinstance(surface, Piecewise):
+        nearest = surface.nearest(points)
+        for k, patch in enumerate(surface.placed):
+            rows = np.flatnonzero(nearest.piece == k)
+            yield OnPatch(rows, patch, nearest.u[rows], nearest.v[rows])
+
+
+def u_directions(surface: Surface, points: Array) -> Array | None:
+    """(k, 3) unit, in which u grows under points (k, 3) m; None where there is no u."""
+    if not isinstance(surface, (Patch, Piecewise)):
+        return None
+    directions = np.full(points.shape, np.nan)
+    for rows, patch, u, v in on_patches(surface, points):
+        directions[rows] = patch.tangent(u, v)
+    return directions
+
+
+def reference_directions(cells: Cells, task: Task, curves: Ints, t: Array) -> Array:
+    """(k, 3) unit, at t (k,) of some curves (k,)."""
+    fixed = task.fixed_reference(cells)
+    if fixed is not None:
+        return np.broadcast_to(fixed, (len(t), 3))
+    points, _ = cells.curves.at(curves, t)
+    found = u_directions(cells.surface, points)
+    if found is not None:
+        return found
+    ends = _tangents(cells)[cells.pairs[curves]]
+    return great_arcs(ends[:, 0], ends[:, 1], t)
+
+
+def _tangents(cells: Cells) -> Array:
+    return np.full((len(cells), 3), np.nan) if cells.tangents is None else cells.tangents
+
+
+def check_references(cells: Cells, task: Task) -> None:
+    """Refuse a reference that shows no direction at some cell.
+
+    Raises:
+        ArgumentError: the roll is limited, and there is no reference, or it runs along the approach
+            direction to within 1 degree; the cells are named.
+    """
+    if task.roll is None:
+        return
+    approaches = task.targets(cells).approaches
+    fixed = task.fixed_reference(cells)
+    directions = _tangents(cells) if fixed is None else np.broadcast_to(fixed, approaches.shape)
+    _, sine = projected(directions, approaches)
+    wrong = np.flatnonzero(~(sine >= ALONG))
+    if not len(wrong):
+        return
+    names = ", ".join(str(list(cells.unravel(int(cell)))) for cell in wrong[:3])
+    more = f" and {len(wrong) - 3:,} more" if len(wrong) > 3 else ""
+    plural = "s" if len(wrong) > 1 else ""
+    what = "the u direction" if fixed is None else "the direction"
+    raise ArgumentError(
+        Fault(
+            "roll_reference",
+            f"{what} is along the approach direction at cell{plural} {names}{more}, where it shows "
+            "no roll",
+            expected="give one that is along the surface there, or cut these cells off",
+        ),
+        "task",
+    )
