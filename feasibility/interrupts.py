@@ -40,6 +40,8 @@ class _State:
     """Is there a block of `interruptible`?"""
     limit: _Limit | None = None
     """Of the block of `limited`, until it is reached."""
+    raised: _Limit | None = None
+    """The same from then on, to the end of the block."""
 
 
 @dataclass(slots=True)
@@ -104,7 +106,7 @@ def limited(left: Callable[[], float], error: type[Exception]) -> Iterator[None]
     try:
         yield
     finally:
-        _state.limit = None
+        _state.limit = _state.raised = None
     if limit.reached:  # and a library dropped the error
         raise error
 
@@ -140,16 +142,12 @@ def interruptible() -> Iterator[None]:
     hooks = sys.unraisablehook, sys.excepthook
 
     def dropped(what: Any) -> None:
-        if issubclass(what.exc_type, KeyboardInterrupt):
-            _later()
-        else:
+        if not _later(what.exc_type):
             hooks[0](what)
 
     def printed(kind: type[BaseException], error: BaseException, trace: Any) -> None:
         """Compiled modules print what they drop."""
-        if issubclass(kind, KeyboardInterrupt):
-            _later()
-        else:
+        if not _later(kind):
             hooks[1](kind, error, trace)
 
     sys.unraisablehook, sys.excepthook = dropped, printed
@@ -164,7 +162,7 @@ def interruptible() -> Iterator[None]:
         settle()
     finally:
         _state.heard = _state.due = _state.active = False
-        _state.limit = None
+        _state.limit = _state.raised = None
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGINT, before)
         signal.signal(signal.SIGALRM, alarm)
@@ -190,7 +188,7 @@ def _again(number: int, frame: FrameType | None) -> None:
         raise KeyboardInterrupt
     elif _state.limit is not None:
         error, _state.limit.reached = _state.limit.error, True
-        _state.limit = None
+        _state.limit, _state.raised = None, _state.limit
         _wake()
         raise error
 
@@ -208,10 +206,16 @@ def _wake() -> None:
     signal.setitimer(signal.ITIMER_REAL, seconds, seconds)
 
 
-def _later() -> None:
-    """Come back to a Ctrl-C in a moment."""
-    _state.due = True
+def _later(dropped: type[BaseException]) -> bool:
+    """Come back in a moment to what was raised and dropped; False if that was not from here."""
+    if issubclass(dropped, KeyboardInterrupt):
+        _state.due = True
+    elif _state.raised is not None and issubclass(dropped, _state.raised.error):
+        _state.limit, _state.raised = _state.raised, None
+    else:
+        return False
     _wake()
+    return True
 
 
 def _importing(frame: FrameType | None) -> bool:

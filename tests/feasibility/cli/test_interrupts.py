@@ -248,3 +248,23 @@ def test_a_handler_of_someone_else_is_left_alone():
     finally:
         signal.signal(signal.SIGINT, before)
     assert heard == [1]
+
+
+def test_a_time_limit_that_a_callback_of_the_interpreter_drops_comes_again(monkeypatch):
+    """Garbage is collected at any moment, and what its callbacks raise is dropped."""
+    monkeypatch.setattr(interrupts, "_wake", lambda: None)  # the alarm rings where this test says
+
+    class Callback:
+        def __del__(self):
+            interrupts._again(0, None)
+
+    def work():
+        with interrupts.interruptible(), interrupts.limited(lambda: 0.0, TimeoutError):
+            Callback()
+            interrupts._again(0, None)
+            ended.append(1)
+
+    ended = []
+    with pytest.raises(TimeoutError):
+        work()
+    assert not ended

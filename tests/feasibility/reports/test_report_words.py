@@ -63,4 +63,6 @@ def test_groups_of_numbers_stand_in_their_order() -> None:
 @pytest.mark.parametrize(("setting", "told"), [("search.seed=0", 0), ("search.time_limit=1e-6", 1)])
 def test_more_time_is_advised_where_time_ran_out(setting, told, capsys) -> None:
     assert main(["path", "paper/4d", "--set", setting]) == (3 if told else 1)
-    assert capsys.readouterr().err.count("--set search.time_limit=") == told
+    said = " ".join("".join(capsys.readouterr()).split())
+    # On a busy machine the time is up before the search begins, which is answered as a table.
+    assert said.count("--set search.time_limit=") == told
