@@ -3,28 +3,74 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
-from coverable_errors import Checks, printable
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import Checks, Fault, printable, shown
 from robots.errors import RobotError
+from robots.mounting import FURTHEST_BASE, FURTHEST_TCP, checked_pose, made_orthogonal, unit_axis
+
+
+class Poses(NamedTuple):
+    """Where the tool and the arm are; None where a URDF alone says so."""
+
+    tcp: NDArray[np.float64] | None
+    """(4, 4) m, the tool centre point in the frame of the link `tool_frame`."""
+    base: NDArray[np.float64] | None
+    """(4, 4) m, the URDF's root link in the world."""
+
+
+AS_IN_URDF = Poses(None, None)
 
 
 def check_arguments(
-    approach_axis: Any = None, lock: Mapping[str, Any] | None = None, source: str = ""
-) -> None:
-    """Refuse an approach axis and held values that fit no arm.
+    approach_axis: Any = None,
+    lock: Mapping[str, Any] | None = None,
+    source: str = "",
+    *,
+    tcp: Any = None,
+    base: Any = None,
+    reference_axis: Any = None,
+) -> Poses:
+    """Refuse axes, poses and held values that fit no arm.
 
     Args:
         approach_axis: (3,) of any length; None for the default.
         lock: joint name -> rad or m.
         source: what the arguments are of, for the message.
+        tcp, base: poses, see `load_robot`; None for the default.
+        reference_axis: (3,) of any length; None for the default.
 
     Raises:
         RobotError: with everything that is wrong.
+
+    Returns:
+        The poses as matrices.
     """
     checks = Checks(source, RobotError)
-    if approach_axis is not None:
-        checks.direction("approach_axis", approach_axis)
+    axes = {"approach_axis": approach_axis, "reference_axis": reference_axis}
+    for key, value in axes.items():
+        if value is not None:
+            checks.direction(key, value)
+    if approach_axis is not None and reference_axis is not None and not checks.faults:
+        _refuse_parallel(checks, approach_axis, reference_axis)
     for joint, value in (lock or {}).items():
         checks.number(f"lock.{printable(joint)}", value, "must be a finite number (rad or m)")
+    poses = Poses(
+        None if tcp is None else checked_pose(checks, "tcp", tcp, FURTHEST_TCP),
+        None if base is None else checked_pose(checks, "base", base, FURTHEST_BASE),
+    )
     checks.done()
+    return poses
+
+
+def _refuse_parallel(checks: Checks, approach: Any, reference: Any) -> None:
+    """Keep the fault of two axes between which there is no angle to measure a roll by."""
+    axes = (np.asarray(axis, dtype=float) for axis in (reference, approach))
+    across = made_orthogonal(*map(unit_axis, axes))
+    if np.isnan(across).any():
+        what = f"got {shown(reference)}, which is parallel to the approach axis {shown(approach)}"
+        expected = "must point across the approach axis, for roll is measured by its part across it"
+        checks.keep(Fault("reference_axis", what, expected=expected))

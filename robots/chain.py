@@ -39,6 +39,8 @@ class Chain(NamedTuple):
     """(n,) True where a joint slides along z, False where it turns about it."""
     approach: NDArray[np.float64]
     """(3,) the approach axis in the last joint's frame."""
+    reference: NDArray[np.float64]
+    """(3,) the reference axis of roll in the last joint's frame."""
 
 
 def checked_chain(
@@ -46,6 +48,7 @@ def checked_chain(
     model: pin.Model,
     tool_frame: int,
     approach_axis: NDArray[np.float64],
+    reference_axis: NDArray[np.float64],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
 ) -> Chain:
@@ -54,8 +57,8 @@ def checked_chain(
     Args:
         name: what the robot is called in messages.
         model: the n free joints.
-        tool_frame: index of the tool's frame in the model.
-        approach_axis: (3,) in the tool frame.
+        tool_frame: index of the TCP's frame in the model.
+        approach_axis, reference_axis: (3,) in that frame.
         lower, upper: (n,) rad or m.
 
     Raises:
@@ -68,7 +71,7 @@ def checked_chain(
             f"robot {name!r}: its {model.nv} free joints do not form one serial chain of "
             f"one-dof joints that ends at {frame.name!r}; lock the joints not on that chain"
         )
-    chain = _constants(model, tool_frame, approach_axis)
+    chain = _constants(model, tool_frame, approach_axis, reference_axis)
     data, neutral = model.createData(), pin.neutral(model)
     rng = np.random.default_rng(0)
     low = np.where(np.isfinite(lower), lower, -np.pi)
@@ -90,7 +93,12 @@ def checked_chain(
     return chain
 
 
-def _constants(model: pin.Model, tool_frame: int, approach_axis: NDArray[np.float64]) -> Chain:
+def _constants(
+    model: pin.Model,
+    tool_frame: int,
+    approach_axis: NDArray[np.float64],
+    reference_axis: NDArray[np.float64],
+) -> Chain:
     """Every joint's frame in that of the joint before it, turned so that its axis is z."""
     n, frame = model.nv, model.frames[tool_frame]
     rotations, translations = np.empty((n, 3, 3)), np.empty((n + 1, 3))
@@ -103,7 +111,8 @@ def _constants(model: pin.Model, tool_frame: int, approach_axis: NDArray[np.floa
         align = alignments[i]
     translations[n] = align.T @ frame.placement.translation
     approach = align.T @ frame.placement.rotation @ approach_axis
-    return Chain(rotations, translations, prismatic, approach)
+    reference = align.T @ frame.placement.rotation @ reference_axis
+    return Chain(rotations, translations, prismatic, approach, reference)
 
 
 def joint_alignments(model: pin.Model) -> NDArray[np.float64]:

@@ -16,6 +16,7 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -81,6 +82,10 @@ def load_robot(
     approach_axis: ArrayLike | None = None,
     lock: Mapping[str, float] | None = None,
     package_dirs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
+    *,
+    tcp: Any = None,
+    base: Any = None,
+    reference_axis: ArrayLike | None = None,
 ) -> Robot:
     """Load an arm by its name in the library, or from a URDF file.
 
@@ -88,49 +93,68 @@ def load_robot(
     at zero, brought into its limits. A continuous joint is one real coordinate without limits
     (whatever the URDF writes there) until `limits` gives it some.
 
+    A pose is a pair (position in m, fixed-axis roll, pitch and yaw in degrees) as in a case file,
+    such as ((0, 0, 0.12), (0, 0, 0)) or a `Pose`; or a (4, 4) matrix, such as a `pin.SE3`.
+
     Args:
         name_or_path: a name of `list_robots()`, or the path of a URDF file.
         limits: replaces the URDF's limits: a named set, (n, 2) rad or m, or a mapping
             joint -> (lower, upper).
-        tool_frame: the link whose origin is the tool point; default from the library, and for a
-            URDF file its only leaf link. Where there are several, the first link called tcp,
+        tool_frame: the link that carries the tool; default from the library, and for a URDF file
+            its only leaf link. Where there are several, the first link called tcp,
             tool0, flange or ee_link that a joint moves, else the only leaf that one moves; a note
             says which.
-        approach_axis: (3,) in the tool frame; default from the library, else +z.
+        approach_axis: (3,) in the TCP's frame; default from the library, else +z.
         lock: joints to hold, name -> rad or m, in addition to those the library holds.
         package_dirs: one or more folders in which `package://` meshes are looked up.
+        tcp: pose of the tool centre point in the frame of `tool_frame`; default: they are the same.
+        base: pose of the URDF's root link in the world; default: they are the same.
+        reference_axis: (3,) in the TCP's frame, by which roll is measured: its part across the
+            approach axis. Default +x, or +z where the approach axis is +-x.
 
     Raises:
-        RobotError: the name is unknown, or the URDF, frame, limits or a locked joint is wrong.
+        RobotError: the name is unknown, or the URDF, frame, limits, a pose, an axis or a locked
+            joint is wrong.
 
     Example:
         >>> load_robot("puma560", limits="set-1")
         Robot('puma560', 6 joints, tool 'link6')
+        >>> load_robot("ur5", tcp=((0, 0, 0.12), (0, 0, 0)))
+        Robot('ur5', 6 joints, tool 'tool0' + (0, 0, 0.12) m)
     """
     from robots.pinocchio_model import robot_from_urdf
     from robots.urdf import check_urdf
 
-    check_arguments(approach_axis, lock, f"robot {os.fspath(name_or_path)!r}")
-    info = _find(name_or_path)
-    if isinstance(package_dirs, (str, os.PathLike)):
-        package_dirs = (package_dirs,)
-    folders = tuple(str(folder) for folder in package_dirs)
-    if info is None:
-        path = Path(name_or_path).expanduser()
-        info = RobotInfo(path.stem, "file", "", str(path), tool_frame or "")
-    changed = tool_frame is not None and tool_frame != info.tool_frame
+    info = _find(name_or_path) or _unknown(Path(name_or_path).expanduser(), tool_frame)
     if approach_axis is None:
         # The library's axis belongs to the library's tool frame.
+        changed = tool_frame is not None and tool_frame != info.tool_frame
         approach_axis = (0.0, 0.0, 1.0) if changed else info.approach_axis
+    source, given = f"robot {os.fspath(name_or_path)!r}", {"tcp": tcp, "base": base}
+    poses = check_arguments(approach_axis, lock, source, reference_axis=reference_axis, **given)
     return robot_from_urdf(
-        check_urdf(info.urdf, package_dirs=(*folders, *info.package_dirs)),
+        check_urdf(info.urdf, package_dirs=(*_folders(package_dirs), *info.package_dirs)),
         name=info.name,
         tool_frame=tool_frame or info.tool_frame or None,
         approach_axis=approach_axis,
+        reference_axis=reference_axis,
+        poses=poses,
         lock={**info.lock, **(lock or {})},
         limits=limits,
         limit_sets=_limit_sets(Path(info.limits)) if info.limits is not None else None,
     )
+
+
+def _unknown(path: Path, tool_frame: str | None) -> RobotInfo:
+    """What is known about the URDF of an arm that is not in the library."""
+    return RobotInfo(path.stem, "file", "", str(path), tool_frame or "")
+
+
+def _folders(package_dirs: str | os.PathLike[str] | Sequence[Any]) -> tuple[str, ...]:
+    """One folder, or several, by their names."""
+    if isinstance(package_dirs, (str, os.PathLike)):
+        return (str(package_dirs),)
+    return tuple(map(str, package_dirs))
 
 
 def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:

@@ -14,8 +14,10 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from coverable_errors import Fault
+from robots.arguments import AS_IN_URDF, Poses
 from robots.errors import RobotError
 from robots.joint_selection import MOST_GUESSES, Selection, select_joints, suggestion
+from robots.mounting import place_base, place_tcp
 from robots.robot import Robot, no_limit_set
 
 if TYPE_CHECKING:
@@ -33,6 +35,8 @@ def robot_from_urdf(
     lock: Mapping[str, float] | None = None,
     limits: str | Mapping[str, ArrayLike] | ArrayLike | None = None,
     limit_sets: Mapping[str, Mapping[str, tuple[float, float]]] | None = None,
+    reference_axis: ArrayLike | None = None,
+    poses: Poses = AS_IN_URDF,
 ) -> Robot:
     """Reduce a URDF to the chain from its root link to the tool frame.
 
@@ -44,9 +48,10 @@ def robot_from_urdf(
     Args:
         checked: a URDF that has passed the check.
         name: what the robot is called in messages.
-        tool_frame, approach_axis, lock, limits: as in `load_robot`.
+        tool_frame, approach_axis, lock, limits, reference_axis: as in `load_robot`.
         limit_sets: name -> joint name -> (lower, upper), rad or m. A set that lacks a free joint
             is left out.
+        poses: of TCP and base.
 
     Raises:
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
@@ -61,7 +66,8 @@ def robot_from_urdf(
     if not chosen.is_chain:
         faults += _limit_faults(checked, limits, sets)
         raise RobotError(faults, f"robot {name!r}")
-    robot = _of_selection(checked, chosen, name, approach_axis, sets)
+    axes = (approach_axis, np.full(3, np.nan) if reference_axis is None else reference_axis)
+    robot = _of_selection(checked, chosen, name, axes, sets, poses)
     try:
         robot = robot if limits is None else robot.with_limits(limits)
     except RobotError as error:
@@ -75,17 +81,24 @@ def _of_selection(
     checked: CheckedUrdf,
     chosen: Selection,
     name: str,
-    approach_axis: ArrayLike,
+    axes: tuple[ArrayLike, ArrayLike],
     limit_sets: Mapping[str, Mapping[str, tuple[float, float]]],
+    poses: Poses,
 ) -> Robot:
-    """The robot with its own limits; arguments as above."""
+    """The robot with its own limits; arguments as above, `axes` are approach and reference."""
     free_names = [joint.name for joint in chosen.free]
     full = parse(checked.text, checked.path)
+    model = reduced_model(full, free_names, chosen.locked, chosen.tool_frame)
+    if poses.base is not None:
+        place_base(model, poses.base)
+    if poses.tcp is not None:
+        place_tcp(model, chosen.tool_frame, poses.tcp)
     return Robot(
         name=name,
-        model=reduced_model(full, free_names, chosen.locked, chosen.tool_frame),
+        model=model,
         tool_frame=chosen.tool_frame,
-        approach_axis=np.asarray(approach_axis),
+        approach_axis=np.asarray(axes[0]),
+        reference_axis=np.asarray(axes[1]),
         joint_names=tuple(free_names),
         joint_kinds=tuple(joint.kind for joint in chosen.free),
         # Not from Pinocchio's model, which loses the limits of continuous joints.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.errors import RobotError
+from robots.mounting import TCP, made_orthogonal, unit_axis
 
 if TYPE_CHECKING:
     import pinocchio as pin
@@ -23,7 +24,10 @@ KINDS = ("revolute", "continuous", "prismatic")
 
 @dataclass(frozen=True, eq=False)  # no slots: cached properties need a __dict__
 class Robot:
-    """A serial chain of n one-dof joints from the URDF's root link to a tool frame.
+    """A serial chain of n one-dof joints from the URDF's root link to a tool centre point (TCP).
+
+    The root frame is the world: the URDF's root link stands in it at `base`. The TCP is the frame
+    of the link `tool_frame`, or at `tcp` in it.
 
     A configuration q is n real numbers, base to tip: radians for revolute and continuous joints,
     metres for prismatic ones. It is *unwrapped*: q and q + 2 pi place the arm alike, yet are two
@@ -35,11 +39,11 @@ class Robot:
 
     name: str
     model: pin.Model
-    """The reduced model: the n free joints, all others locked."""
+    """The reduced model: the n free joints, all others locked; base and TCP are in it."""
     tool_frame: str
-    """Name of the link whose frame's origin is the tool point."""
+    """Name of the link that carries the tool."""
     approach_axis: NDArray[np.float64]
-    """(3,) unit vector in the tool frame; it points from the tool towards the surface."""
+    """(3,) unit vector in the TCP's frame; it points from the tool towards the surface."""
     joint_names: tuple[str, ...]
     joint_kinds: tuple[str, ...]
     """'revolute', 'continuous' or 'prismatic', one per joint."""
@@ -59,13 +63,20 @@ class Robot:
     """Every moving joint of the URDF that is not free here, with the value it is held at."""
     notes: tuple[str, ...] = ()
     """What was assumed or left out when the URDF was read."""
+    reference_axis: NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.nan))
+    """(3,) unit vector in the TCP's frame, by which roll is measured; across `approach_axis`.
+
+    By default +x, or +z where the approach axis is +-x; of another vector the part that is
+    orthogonal to the approach axis is kept.
+    """
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays, and check that they fit together."""
         n = len(self.joint_names)
-        for name, shape in (("approach_axis", (3,)), ("lower", (n,)), ("upper", (n,))):
+        shapes = {"approach_axis": (3,), "lower": (n,), "upper": (n,), "reference_axis": (3,)}
+        for name, shape in shapes.items():
             array = _numbers(getattr(self, name), f"robot {self.name!r}: {name}", shape)
-            if np.isnan(array).any():
+            if np.isnan(array).any() and not (name == "reference_axis" and np.isnan(array).all()):
                 raise RobotError(f"robot {self.name!r}: {name} holds NaN")
             object.__setattr__(self, name, array)
         speeds = _numbers(self.max_velocity, f"robot {self.name!r}: max_velocity")
@@ -75,15 +86,8 @@ class Robot:
                 f"nan where unknown; got {speeds.tolist()}"
             )
         object.__setattr__(self, "max_velocity", np.broadcast_to(speeds, n))  # read-only
-        largest = float(np.abs(self.approach_axis).max())
-        if not 1e-9 < largest < np.inf:
-            raise RobotError(
-                f"robot {self.name!r}: approach_axis must be a finite vector that is not zero, "
-                f"such as [0, 0, 1]; got {self.approach_axis.tolist()}"
-            )
-        axis = self.approach_axis / largest  # first, so that no square is too large
-        object.__setattr__(self, "approach_axis", axis / np.linalg.norm(axis))
-        for array in (self.approach_axis, self.lower, self.upper):
+        self._normalise_axes()
+        for array in (self.approach_axis, self.reference_axis, self.lower, self.upper):
             array.flags.writeable = False
         self._check_joints()
         sets = {
@@ -94,6 +98,24 @@ class Robot:
             table.flags.writeable = False
         object.__setattr__(self, "limit_sets", MappingProxyType(sets))
         object.__setattr__(self, "locked", MappingProxyType(dict(self.locked)))
+
+    def _normalise_axes(self) -> None:
+        """Bring both axes of the tool to length one, and the reference axis across the other."""
+        approach = unit_axis(self.approach_axis)
+        if np.isnan(approach).any():
+            raise RobotError(
+                f"robot {self.name!r}: approach_axis must be a finite vector that is not zero, "
+                f"such as [0, 0, 1]; got {self.approach_axis.tolist()}"
+            )
+        reference = made_orthogonal(self.reference_axis, approach)
+        if np.isnan(reference).any():
+            raise RobotError(
+                f"robot {self.name!r}: reference_axis must be a finite vector that is not zero and "
+                f"not parallel to the approach axis {approach.tolist()}, for roll is measured by "
+                f"its part across it; got {self.reference_axis.tolist()}"
+            )
+        object.__setattr__(self, "approach_axis", approach)
+        object.__setattr__(self, "reference_axis", reference)
 
     def _check_joints(self) -> None:
         """Refuse joints of unknown kind, and empty limit ranges."""
@@ -133,7 +155,17 @@ class Robot:
 
     @cached_property
     def tool_frame_id(self) -> int:
-        """Index of the tool frame in `model.frames`.
+        """Index of the frame of the TCP in `model.frames`."""
+        import pinocchio as pin
+
+        kind = pin.FrameType.OP_FRAME
+        if self.model.existFrame(TCP, kind):
+            return int(self.model.getFrameId(TCP, kind))
+        return self.tool_link_id
+
+    @cached_property
+    def tool_link_id(self) -> int:
+        """Index of the frame of the link `tool_frame` in `model.frames`.
 
         A URDF may give a link and a joint the same name, and `getFrameId(name)` alone then refuses.
         """
@@ -143,6 +175,22 @@ class Robot:
         if not self.model.existFrame(self.tool_frame, kind):
             raise RobotError(f"robot {self.name!r} has no link {self.tool_frame!r} for its tool")
         return int(self.model.getFrameId(self.tool_frame, kind))
+
+    @property
+    def tcp(self) -> NDArray[np.float64]:
+        """(4, 4) m, the tool centre point in the frame of the link `tool_frame`."""
+        link, tcp = (
+            self.model.frames[i].placement for i in (self.tool_link_id, self.tool_frame_id)
+        )
+        return np.array(link.actInv(tcp).homogeneous)
+
+    @property
+    def base(self) -> NDArray[np.float64]:
+        """(4, 4) m, the URDF's root link in the world."""
+        import pinocchio as pin
+
+        links = (frame for frame in self.model.frames if frame.type == pin.FrameType.BODY)
+        return np.array(next(links).placement.homogeneous)
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -183,7 +231,13 @@ class Robot:
         from robots.chain import checked_chain
 
         return checked_chain(
-            self.name, self.model, self.tool_frame_id, self.approach_axis, self.lower, self.upper
+            self.name,
+            self.model,
+            self.tool_frame_id,
+            self.approach_axis,
+            self.reference_axis,
+            self.lower,
+            self.upper,
         )
 
     def with_limits(self, limits: str | Mapping[str, ArrayLike] | ArrayLike) -> Robot:
@@ -232,7 +286,9 @@ class Robot:
 
     def __repr__(self) -> str:
         """One line: name, joints and tool."""
-        return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r})"
+        x, y, z = self.tcp[:3, 3].tolist()
+        off = f" + ({x:g}, {y:g}, {z:g}) m" if self.tool_frame_id != self.tool_link_id else ""
+        return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r}{off})"
 
 
 def no_limit_set(name: str, known: Iterable[str]) -> str:

@@ -23,7 +23,9 @@ coverable_errors
 coverable_files
 coverable_kernels
 coverable_meshes
-robots: errors arguments chain reach robot kinematics
+robots: errors
+robots.mounting
+robots: arguments chain reach robot kinematics
 robots.urdf
 robots: joint_selection pinocchio_model library
 robots.shapes

@@ -6,15 +6,33 @@ import math
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from coverable_errors import Fault, is_number, printable, shown
-from feasibility.cases.table_reader import DEG, METRES, Pair, Section, Triple, frozen, is_text
+from feasibility.cases.table_reader import (
+    DEG,
+    METRES,
+    ORIGIN,
+    Pair,
+    Section,
+    Triple,
+    frozen,
+    is_text,
+)
 
 if TYPE_CHECKING:
     from robots import Robot, RobotError
 
+POSES = ("tcp", "base")
 URDF_ENDINGS = (".urdf", ".xml", ".xacro")
+
+
+class PosePart(NamedTuple):
+    """A pose as a case has it."""
+
+    position: Triple = ORIGIN
+    """m"""
+    rpy_deg: Triple = ORIGIN
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +54,17 @@ class RobotPart:
     limits_deg: tuple[Pair, ...] | Mapping[str, Pair] | None = None
     """One pair per free joint, or some joints by name."""
     limits_m: Mapping[str, Pair] | None = None
+    tcp: PosePart | None = None
+    """In the frame of `tool_frame`."""
+    base: PosePart | None = None
+    """Of the URDF's root link in the world."""
+    reference_axis: Triple | None = None
 
     def table(self) -> dict[str, Any]:
         """The keys of the [robot] table that say something."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
+        for key in POSES:
+            values[key] = None if values[key] is None else values[key]._asdict()
         return {key: value for key, value in values.items() if value not in (None, (), {})}
 
     def build(self) -> Robot:
@@ -60,6 +85,9 @@ class RobotPart:
                 approach_axis=self.approach_axis,
                 lock=self.lock or None,
                 package_dirs=self.package_dirs,
+                tcp=self.tcp,
+                base=self.base,
+                reference_axis=self.reference_axis,
             )
         except RobotError as error:
             units = self._wrong_units(self._kinds_alone())
@@ -159,29 +187,41 @@ def _part(section: Section) -> RobotPart:
         limits=section.text("limits"),
         limits_deg=_limits_deg(section),
         limits_m=_limits_by_name(section, "limits_m", METRES),
-        **_axis_and_lock(section),
+        **_axes_poses_and_lock(section),
     )
     _refuse_contradictions(section)
     section.refuse_others()
     return part
 
 
-def _axis_and_lock(section: Section) -> dict[str, Any]:
-    """The approach axis and the held joints, without what is wrong."""
+def _axes_poses_and_lock(section: Section) -> dict[str, Any]:
+    """The axes and poses of the tool and the base, and the held joints, without what is wrong."""
     from robots import check_arguments
 
-    values = section.take("approach_axis", "lock")
+    values = section.take("approach_axis", "reference_axis", "lock")
     if not isinstance(values.get("lock", {}), Mapping):
         section.wrong_type("lock", values.pop("lock"))
+    for key in POSES:
+        if section.has(key):
+            values[key] = _pose(Section(f"robot.{key}", section.table[key], section.faults))
     before = len(section.faults)
     section.make(check_arguments, values)
     if len(section.faults) > before:
-        wrong = {fault.key for fault in section.faults[before:]}
+        wrong = {fault.key.removeprefix("robot.") for fault in section.faults[before:]}
         lock = values.get("lock", {})
         values["lock"] = {joint: value for joint, value in lock.items() if is_number(value)}
-        if "robot.approach_axis" in wrong:
-            del values["approach_axis"]
-    return cast("dict[str, Any]", frozen(values))
+        for key in ("approach_axis", "reference_axis", *POSES):
+            if wrong & {key, f"{key}.position", f"{key}.rpy_deg"}:
+                values.pop(key, None)
+    kept = {key: frozen(value) for key, value in values.items() if key not in POSES}
+    return kept | {key: PosePart(*frozen(values[key])) for key in POSES if key in values}
+
+
+def _pose(section: Section) -> PosePart:
+    """A pose as it is written; its keys are checked, its numbers not."""
+    values = section.take("position", "rpy_deg")
+    section.refuse_others()
+    return PosePart(**values)
 
 
 def _refuse_contradictions(section: Section) -> None:

@@ -61,7 +61,7 @@ def soup_of(obstacle: Obstacle) -> Soup | None:
 
 def tool_solids(tool: Sequence[ToolShape], robot: Robot) -> tuple[Solid, ...]:
     """The shapes of the tool as they are, on the last joint; their owner is 'tool'."""
-    frame = robot.model.frames[robot.tool_frame_id]
+    frame = robot.model.frames[robot.tool_link_id]
     mount = frame.placement.homogeneous
     return tuple(
         Solid(TOOL, int(frame.parentJoint), mount @ shape.placement, shape.geometry)

@@ -5,7 +5,6 @@ coal and qhull crash on shapes that are flat or not finite, so no other shapes e
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,13 +13,13 @@ from numpy.typing import NDArray
 
 from coverable_errors import Checks, Fault, shown
 from feasibility.collisions.triangles import object_triangles
+from robots.mounting import matrix_of, rigid_matrix
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
 SMALLEST_SIDE, LARGEST_SIDE = 1e-6, 1e4  # [m]
-FARTHEST = 1e4  # [m], from the root link
+FARTHEST = 1e4  # [m], from the origin of the world
 ORIGIN = (0.0, 0.0, 0.0)
-_RIGID = 1e-6  # [1], how far a rotation may be from one
 
 Matrix = NDArray[np.float64]
 
@@ -68,32 +67,9 @@ def _side(checks: Checks, key: str, value: object) -> float:
 
 def checked_placement(checks: Checks, placement: Any) -> Matrix:
     """A (4, 4) rigid motion; the identity after a fault."""
-    try:
-        matrix = np.array(placement, dtype=float)
-    except (TypeError, ValueError):
-        matrix = np.empty(0)
-    if matrix.shape == (4, 4) and np.isfinite(matrix).all():
-        turn = matrix[:3, :3]
-        rigid = np.abs(turn @ turn.T - np.eye(3)).max() <= _RIGID and np.linalg.det(turn) > 0.0
-        near = np.abs(matrix[:3, 3]).max() <= FARTHEST
-        if rigid and near and (matrix[3] == (0.0, 0.0, 0.0, 1.0)).all():
-            return matrix
-    expected = (
-        "must be a 4 x 4 matrix of a rigid motion, its rotation without scale or mirror, "
-        f"within {FARTHEST:g} m"
-    )
-    checks.wrong("placement", placement, expected)
-    return np.eye(4)
+    return rigid_matrix(checks, "placement", placement, FARTHEST)
 
 
 def placement_of(checks: Checks, position: Any, rpy_deg: Any) -> Matrix:
     """The (4, 4) placement at a position (m), turned by roll, pitch and yaw about fixed axes."""
-    from surfaces import rotation_from_rpy
-
-    expected = "must be three finite numbers (metres)"
-    place = checks.numbers("position", position, 3, expected, FARTHEST)
-    angles = checks.numbers("rpy_deg", rpy_deg, 3, "must be three finite numbers (degrees)")
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation_from_rpy(*map(math.radians, angles or ORIGIN))
-    matrix[:3, 3] = place or ORIGIN
-    return matrix
+    return matrix_of(checks, position, rpy_deg, FARTHEST)

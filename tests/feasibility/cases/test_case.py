@@ -356,3 +356,51 @@ def test_grids_from_one_cell_to_the_cap():
     assert len(one.build().cells) == 1
     side = math.isqrt(MOST_CELLS)
     assert load_case("paper/4a", [f"surface.cells=[{side}, {side}]"]).surface.cells == (side, side)
+
+
+POSED = """
+[robot]
+name = "ur5"
+tcp = { position = [0, 0, 0.12] }
+base = { position = [0, 0, 0.8], rpy_deg = [0, 0, 90] }
+reference_axis = [0, 1, 1]
+[surface]
+kind = "plane"
+u = [0, 0.2]
+v = [0, 0.1]
+cells = [2, 1]
+[task]
+standoff = 0.0
+cone_deg = 30
+"""
+
+
+def test_tcp_base_and_reference_axis_come_through():
+    case = Case.from_toml(POSED)
+    assert Case.from_toml(case.to_toml()) == case
+    robot = case.with_overrides(["robot.tcp.rpy_deg=[0, 90, 0]"]).build().robot
+    np.testing.assert_allclose(
+        robot.tcp[:3], [[0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0.12]], atol=1e-12
+    )
+    np.testing.assert_allclose(
+        robot.base[:3], [[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0.8]], atol=1e-12
+    )
+    np.testing.assert_allclose(robot.reference_axis, [0, 1, 0])
+
+
+def test_faults_of_tcp_and_base_are_said_together():
+    with pytest.raises(CaseError) as caught:
+        Case.from_toml(
+            POSED,
+            overrides=[
+                "robot.tcp.position=[0, 0, 10000]",
+                "robot.base.rpy=[0, 0, 90]",
+                "robot.reference_axis=[0, 0, 1]",
+                "robot.approach_axis=[0, 0, 2]",
+            ],
+        )
+    assert [fault.key for fault in caught.value.faults] == [
+        "robot.base.rpy",
+        "robot.reference_axis",
+        "robot.tcp.position",
+    ]

@@ -32,6 +32,8 @@ PAPER = {
     "plane": {"u": [0, 1], "v": [0, 1], **GRID},
 }
 OTHERS = {
+    "robot.tcp": ("", ("tcp",), {}),
+    "robot.base": ("", ("base",), {}),
     "surface.cut": ("mesh", ("cut",), {"point": [0, 0, 0], "normal": [0, 0, 1]}),
     "surface.facing": ("mesh", ("facing",), {"direction": [0, 0, 1], "within_deg": 30}),
     "surface.pieces": ("piecewise", ("pieces", 0), {"kind": "plane", **PAPER["plane"]}),
@@ -62,7 +64,7 @@ def place_of(key):
     kind, path, inner = copy.deepcopy(OTHERS.get(key.table, (key.kind or "sphere", (), {})))
     tables = tables_of(kind or "sphere")
     outer = key.table.split(".")[0]
-    if key.table != "robot":
+    if outer != "robot":
         del tables["robot"]  # no arm is loaded for it
     if not path:
         return tables, tables[key.table], key.table

@@ -1,0 +1,5 @@
+"""Where an arm stands and what it carries: poses as they are given, base, TCP, the tool's axes."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,0 +1,94 @@
+"""Poses as they are given: a pair (position, rpy_deg), or a matrix; checked, as (4, 4) matrices."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import Checks, Fault, shown
+
+FURTHEST_TCP = 10.0  # [m] from tool_frame: no tool is longer, but many are given in millimetres
+FURTHEST_BASE = 1e4  # [m] from the origin of the world
+_RIGID = 1e-6  # [1], how far a rotation may be from one
+
+Matrix = NDArray[np.float64]
+
+
+def checked_pose(checks: Checks, key: str, value: Any, furthest: float) -> Matrix:
+    """A pose as a (4, 4) matrix; the identity after a fault.
+
+    Args:
+        checks: keeps the faults.
+        key: what the pose is called.
+        value: a pair (position in m, fixed-axis roll, pitch and yaw in degrees) as in a case file,
+            or the (4, 4) matrix of a rigid motion, such as a `pin.SE3`.
+        furthest: m, largest coordinate of its position.
+    """
+    value = getattr(value, "homogeneous", value)  # of a pin.SE3
+    if isinstance(value, Sequence) and len(value) == 2 and not isinstance(value, (str, bytes)):
+        position, rpy_deg = value
+        return matrix_of(checks, position, rpy_deg, furthest, f"{key}.")
+    return rigid_matrix(checks, key, value, furthest, "a pair (position, rpy_deg), or ")
+
+
+def matrix_of(
+    checks: Checks, position: Any, rpy_deg: Any, furthest: float, before: str = ""
+) -> Matrix:
+    """The (4, 4) matrix of a frame, turned by roll, pitch and yaw about fixed axes.
+
+    Args:
+        checks: keeps the faults, under "position" and "rpy_deg".
+        position: (3,) m.
+        rpy_deg: (3,) degrees.
+        furthest: m, largest coordinate of the position.
+        before: what stands before the two names.
+    """
+    expected = "must be three finite numbers (metres)"
+    place = checks.numbers(f"{before}position", position, 3, expected, furthest)
+    expected = "must be three finite numbers (degrees)"
+    angles = checks.numbers(f"{before}rpy_deg", rpy_deg, 3, expected)
+    matrix = np.eye(4)
+    matrix[:3, :3] = _rotation(*map(math.radians, angles or (0.0, 0.0, 0.0)))
+    matrix[:3, 3] = place or (0.0, 0.0, 0.0)
+    return matrix
+
+
+def rigid_matrix(checks: Checks, key: str, value: Any, furthest: float, other: str = "") -> Matrix:
+    """A (4, 4) rigid motion; the identity after a fault.
+
+    Args:
+        checks: keeps the fault.
+        key: what it is called.
+        value: anything that numpy reads as such a matrix.
+        furthest: m, largest coordinate of its translation.
+        other: what else would have done, for the message.
+    """
+    try:
+        matrix = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        matrix = np.empty(0)
+    expected = (
+        f"must be {other}a 4 x 4 matrix of a rigid motion, its rotation without scale or mirror, "
+        f"within {furthest:g} m"
+    )
+    if matrix.shape != (4, 4):
+        checks.wrong(key, value, expected)
+        return np.eye(4)
+    turn, place = matrix[:3, :3], matrix[:3, 3]
+    if np.isfinite(matrix).all() and np.abs(matrix).max() <= max(furthest, 2.0):
+        rigid = np.abs(turn @ turn.T - np.eye(3)).max() <= _RIGID and np.linalg.det(turn) > 0.0
+        if rigid and np.abs(place).max() <= furthest and (matrix[3] == (0, 0, 0, 1)).all():
+            return matrix
+    checks.keep(Fault(key, f"got {shown(matrix.tolist())}", expected=expected))
+    return np.eye(4)
+
+
+def _rotation(roll: float, pitch: float, yaw: float) -> Matrix:
+    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from radians: URDF's fixed-axis roll, pitch, yaw."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_euler("xyz", (roll, pitch, yaw)).as_matrix()
