@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 
 NOT_BEGUN = "The time limit of {:g} s ran out while the search was prepared; nothing was searched."
+GREEDY = 'the greedy search knows no {}; use search.method = "complete"'
 NOT_REPLAYED = (
     "A motion over every cell was found, but the time limit of {:g} s ran out before the "
     "independent replay had judged it."
@@ -67,8 +68,9 @@ def check(
         TypeError: an argument is something else, such as a surface that is not cut into cells.
         RobotError: the arm is no serial chain of one-dof joints.
         SurfaceError: the greedy search does not know this kind of surface.
-        ArgumentError: the seeds fit neither arm nor cells; seeds or collisions are given to the
-            greedy search; or a pair names something that is not there.
+        ArgumentError: the seeds fit neither arm nor cells; seeds, collisions, limits of the roll or
+            approaches that are no normals are given to the greedy search; a pair names something
+            that is not there; or the surface has no reference direction for the roll.
 
     Example:
         >>> from robots import load_robot
@@ -89,6 +91,7 @@ def check(
     if search.method == "greedy":
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
+        _refuse_for_greedy(problem)
         return _decided(problem, search, progress, greedy_search, clock)
     return _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
 
@@ -118,7 +121,21 @@ def greedy_check(
         return greedy_search(problem, search, clock, start)
 
     search = Search(method="greedy") if search is None else search
-    return _decided(Problem.of(robot, cells, task), search, progress, from_start)
+    problem = Problem.of(robot, cells, task)
+    _refuse_for_greedy(problem)
+    return _decided(problem, search, progress, from_start)
+
+
+def _refuse_for_greedy(problem: Problem) -> None:
+    """Refuse what the greedy search would pass over.
+
+    Raises:
+        ArgumentError: the approach is not the normal, or the roll is limited.
+    """
+    if not problem.task.along_normals(problem.cells):
+        raise ArgumentError(GREEDY.format("approaches that are not the normal"), "task")
+    if problem.task.roll is not None:
+        raise ArgumentError(GREEDY.format("limits of the roll"), "task")
 
 
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."

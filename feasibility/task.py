@@ -95,20 +95,20 @@ class Task:
             "roll_deg": self._checked_roll(checks, kept["cone_deg"]),
             "roll_reference": None
             if self.roll_reference is None
-            else _unit(checks.direction("roll_reference", self.roll_reference)),
+            else tuple(checks.direction("roll_reference", self.roll_reference)),
         }
         checks.done()
         for name, value in {**kept, **kept_too}.items():
             object.__setattr__(self, name, value)
 
     def _checked_approach(self, checks: Checks) -> Any:
-        """The approach as a word or a unit direction."""
+        """The approach as a word or three numbers."""
         if self.approach is None or isinstance(self.approach, str):
             if self.approach not in (None, "normal"):
                 expected = "must be 'normal' or a direction, such as (0, 0, -1)"
                 checks.wrong("approach", self.approach, expected)
             return self.approach
-        return _unit(checks.direction("approach", self.approach))
+        return tuple(checks.direction("approach", self.approach))
 
     def _checked_roll(self, checks: Checks, cone_deg: Any) -> tuple[float, float] | None:
         """The range of the roll, which may be a single one."""
@@ -150,13 +150,18 @@ class Task:
         """(3,) unit, in the root frame, where the approach is one direction; None elsewhere."""
         if self.approach is None or isinstance(self.approach, str):
             return None
-        return cells.surface.rotation @ np.array(self.approach)
+        return cells.surface.rotation @ unit(self.approach)
 
     def fixed_reference(self, cells: Cells) -> NDArray[np.float64] | None:
         """(3,) unit, in the root frame, of `roll_reference`; None where there is none."""
         if self.roll_reference is None:
             return None
-        return cells.surface.rotation @ np.array(self.roll_reference)
+        return cells.surface.rotation @ unit(self.roll_reference)
+
+    def along_normals(self, cells: Cells) -> bool:
+        """Whether the approach directions are the normals of the surface, towards it."""
+        own = self.approach is None and cells.approaches is not None
+        return self.fixed_approach(cells) is None and not own
 
     def approaches(self, cells: Cells) -> NDArray[np.float64]:
         """(N, 3) unit approach directions b of the cell centres, in the root frame."""
@@ -202,9 +207,8 @@ class Task:
         return projected(directions, approaches)[0]
 
 
-def _unit(direction: list[float]) -> Direction:
-    """The unit direction along three numbers that are not all zero."""
-    largest = max(map(abs, direction))  # first, so that no square is too large
-    x, y, z = (number / largest for number in direction)
-    length = math.sqrt(x * x + y * y + z * z)
-    return (x / length, y / length, z / length)
+def unit(direction: Direction) -> NDArray[np.float64]:
+    """The unit direction (3,) along three numbers that are not all zero."""
+    numbers = np.array(direction)
+    numbers /= np.abs(numbers).max()  # first, so that no square is too large
+    return np.asarray(numbers / np.linalg.norm(numbers))

@@ -96,6 +96,9 @@ class Certificate:
     checked, or there is no pair."""
     nearest_pair: tuple[str, str] | None = None
     """Links, objects of the scene, 'tool' or 'surface': the two that this bound is of."""
+    max_roll: float | None = None
+    """rad, bound on how far the roll is from the middle of its range along the walk; None where it
+    is free."""
 
 
 @dataclass(frozen=True, slots=True)

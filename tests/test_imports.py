@@ -46,9 +46,10 @@ feasibility.collisions.kernels
 feasibility: task
 feasibility.targets
 feasibility: found problem verdict
-feasibility.certification: faults
+feasibility.certification: faults kinematic_bounds
 feasibility.certification.collisions
-feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region kinematic_bounds lever_bounds linear_models motion_replay parts_agreement proof_verification refutation region stretches surface_replay tree_shape
+feasibility.certification.rolls
+feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region lever_bounds linear_models motion_replay parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
 feasibility.paper
 feasibility.cases
 feasibility.roadmap: arrays graph off_target projection segment_bound self_motion
@@ -303,6 +304,7 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
     rooms = {
         "feasibility.certification",
         "feasibility.certification.collisions",
+        "feasibility.certification.rolls",
         "feasibility.targets",
     }
     assert {n for n in feasibility if room_of(n) not in rooms} <= words

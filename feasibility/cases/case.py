@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coverable_errors import MISSING, Fault, alternatives, close, printable
+from coverable_errors import MISSING, ArgumentError, Fault, alternatives, close, printable
 from feasibility.cases.collision_table import CollisionPart, faults_of_meshes, read_collision
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
 from feasibility.cases.surface_keys import CLOSED_FORM_KINDS
@@ -30,6 +30,7 @@ from feasibility.cases.toml import (
 )
 from feasibility.safe_files import FileError, read_regular, shown_path
 from feasibility.search import Search
+from feasibility.targets import check_references
 from feasibility.task import Task
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 BUILT_IN = Path(__file__).with_name("built_in.toml")
 LARGEST_FILE = 256 * 1024  # bytes
 TABLES = ("robot", "surface", "task", "collision", "search")
-ROLL = "is not supported yet; leave it out: the roll about the approach direction is free"
+TASK = ("standoff", "cone_deg", "tolerance", "approach", "roll_deg", "roll_reference")
 
 Tables = dict[str, Any]
 
@@ -94,7 +95,7 @@ class Case:
 
         Raises:
             CaseError: the robot cannot be loaded, the surface cannot be read or cut, a mesh of the
-                scene cannot be read, or a pair names what is not there.
+                scene cannot be read, a pair names what is not there, or the roll has no reference.
         """
         from robots import RobotError
 
@@ -116,11 +117,16 @@ class Case:
             faults += [fault.renamed({}, "collision") for fault in unknown]
         if robot is None or cells is None or task is None or faults:
             raise CaseError(faults, self.name)
+        try:
+            check_references(cells, task)
+        except ArgumentError as error:
+            named = [fault.renamed({}, "task") for fault in error.faults]
+            raise CaseError(named, self.name) from error
         return Setup(robot, cells, task, self.search)
 
     def to_tables(self) -> Tables:
         """The case as the tables of its TOML; what is None is left out."""
-        task = {name: getattr(self.task, name) for name in ("standoff", "cone_deg", "tolerance")}
+        task = {name: as_read(getattr(self.task, name)) for name in TASK}
         search = {name: getattr(self.search, name) for name in Search.__dataclass_fields__}
         tables = {
             "robot": self.robot.table(),
@@ -272,14 +278,8 @@ def _read_task(table: Any, faults: list[Fault]) -> Task | None:
     """Read the [task] table; None where it has faults."""
     section = Section("task", table, faults)
     required = {"standoff": MISSING, "cone_deg": MISSING}
-    values = required | section.take("standoff", "cone_deg", "tolerance")
-    if section.take("approach").get("approach", "normal") != "normal":
-        section.fault(
-            "approach",
-            'a direction other than "normal" is not supported yet; leave it out: the surface '
-            "normal is used",
-        )
-    section.refuse_others({"roll_deg": ROLL})
+    values = required | section.take(*TASK)
+    section.refuse_others()
     return section.make(Task, values)
 
 

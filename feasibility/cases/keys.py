@@ -49,7 +49,7 @@ def all_keys() -> tuple[Key, ...]:
 
     Example:
         >>> [key.name for key in all_keys() if key.table == "task"]
-        ['standoff', 'cone_deg', 'tolerance', 'approach']
+        ['standoff', 'cone_deg', 'tolerance', 'approach', 'roll_deg', 'roll_reference']
     """
     tables = tomllib.loads(KEYS.read_text(encoding="utf-8"))
     kinds = tables.pop("kind")

@@ -1,4 +1,4 @@
-"""Which cells a motion reaches: where its tool is within tolerance and cone of their centres.
+"""Which cells a motion reaches: where its tool is at their centres, and held as it has to be.
 
 A cell counts as reached by one exact configuration of the motion, so no bound is needed. Cells that
 no sample reaches are looked for between samples, where the tool passes nearest.
@@ -9,8 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
+from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Samples
-from feasibility.task import Task
+from feasibility.task import Targets, Task
 from robots import Kinematics, Robot
 from surfaces import Cells
 
@@ -45,8 +47,7 @@ def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: 
     tree = cKDTree(samples.points)
     near = tree.query_ball_point(aims.points, tolerance)
     cell, sample = _flat(near)
-    good = _at(task, samples.points[sample], samples.axes[sample], aims.points[cell],
-               aims.approaches[cell])  # fmt: skip
+    good = _at(task, aims, cell, samples.points[sample], samples.axes[sample], samples.x[sample])
     reached[cell[good]] = True
     left = np.flatnonzero(~reached)
     starts, ends = samples.points[:-1], samples.points[1:]
@@ -66,9 +67,11 @@ def cells_reached(robot: Robot, cells: Cells, task: Task, rows: Array, samples: 
     share = samples.share[piece][:, None] + t * (stop - samples.share[piece])[:, None]
     following = np.minimum(row + 1, len(rows) - 1)
     q = rows[row][:, None] + share[..., None] * (rows[following] - rows[row])[:, None]
-    points, axes = Kinematics(robot).tools(q.reshape(-1, rows.shape[1]))
+    flat = q.reshape(-1, rows.shape[1])
+    points, axes = Kinematics(robot).tools(flat)
+    x = axes if task.roll is None else reference_axes(robot, flat)
     cell = np.repeat(some, len(TRIES))
-    good = _at(task, points, axes, aims.points[cell], aims.approaches[cell])
+    good = _at(task, aims, cell, points, axes, x)
     reached[cell[good]] = True
     return reached
 
@@ -80,11 +83,17 @@ def _flat(lists: NDArray[np.object_]) -> tuple[NDArray[np.int64], NDArray[np.int
     return owner, np.array([k for found in lists for k in found], dtype=np.int64)
 
 
-def _at(task: Task, points: Array, axes: Array, aims: Array, approaches: Array) -> Mask:
-    """(k,) within the tolerance of the target, and the cone of the approach."""
-    off = np.linalg.norm(points - aims, axis=1)
+def _at(
+    task: Task, aims: Targets, cell: NDArray[np.int64], points: Array, axes: Array, x: Array
+) -> Mask:
+    """(k,) within the tolerance of the cell's target, and the cone and the roll there."""
+    off = np.linalg.norm(points - aims.points[cell], axis=1)
+    approaches = aims.approaches[cell]
     chord = np.linalg.norm(axes - approaches, axis=1)
-    inside = chord <= task.cone_chord + CLOSE_TO_ZERO
+    inside = np.asarray(chord <= task.cone_chord + CLOSE_TO_ZERO)
+    if task.roll is not None and aims.references is not None:
+        z = roll_vectors(x, axes, aims.references[cell], approaches, task.roll)
+        inside &= off_middle(z) <= task.roll.half + ROLL_CLOSE
     return np.asarray((off <= task.effective_tolerance) & inside)
 
 
@@ -114,6 +123,7 @@ def missed_text(cells: Cells, task: Task, missed: NDArray[np.int64], samples: Sa
     nearest = int(np.argmin(off))
     where = f"comes no nearer to the target of {names[0]} than about {1e3 * off[nearest]:.4g} mm"
     if off[nearest] <= task.effective_tolerance:
-        where = f"is at the target of {names[0]}, but not inside the cone there"
+        held = "cone" if task.roll is None else "cone, or its range of the roll,"
+        where = f"is at the target of {names[0]}, but not inside the {held} there"
     row = f"near row {samples.row[nearest] + 1}"
     return f"{what} never reached: {row} the tool {where}"

@@ -8,10 +8,12 @@ nearest to the tool point. Any points would do for a proof; these show the least
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.rolls import FrameMatch, MatchedPlaces, match_frames
 from feasibility.targets import TargetCurves, beside_facets, target_curves
 from feasibility.task import Task
 from feasibility.verdict import Walk
@@ -48,6 +50,8 @@ class CurveMatch:
     """1/m, the same curvature next to the cells' centres."""
     fault: str
     """Why the walk is no motion along curves between neighbouring cells; empty when it is."""
+    frames: FrameMatch | None = None
+    """What its roll is compared with; None where it is free."""
 
 
 def match_to_curves(cells: Cells, task: Task, walk: Walk, points: Array, axes: Array) -> CurveMatch:
@@ -74,43 +78,22 @@ def match_to_curves(cells: Cells, task: Task, walk: Walk, points: Array, axes: A
         k = int(np.flatnonzero(curve < STAYS)[0])
         names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
         return replace(unmatched, fault=f"the motion goes from cell {names}, which do not touch")
-    tolerance = task.effective_tolerance
     curves = target_curves(cells, task)
-
-    # Each segment, and each waypoint between marks, belongs to one section from mark to mark.
-    section = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
-    backwards = (start > end)[section]
-    inner = np.flatnonzero(walk.cell < 0)
-    along = inner[curve[section[inner]] != STAYS]
-    t, arrived = np.zeros(m), walk.cell >= 0
-    t[along], arrived[along] = _matched_parameters(
-        curves, curve[section[along]], points[along], ARRIVED * tolerance
-    )
-    t0, t1 = t[:-1].copy(), t[1:].copy()
-    t0[marks[:-1]] = backwards[marks[:-1]]
-    t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
+    way = _way(task, curves, walk, points, marks, curve)
+    places, t0, t1 = way.places, *way.ends
 
     aims = task.targets(cells)
     target, approach = np.empty((m, 3)), np.empty((m, 3))
-    target[marks], approach[marks] = (
-        aims.points[walk.cell[marks]],
-        aims.approaches[walk.cell[marks]],
-    )
-    still = inner[curve[section[inner]] == STAYS]
-    over = start[section[still]]
-    target[still], approach[still] = aims.points[over], aims.approaches[over]
-    target[along], approach[along] = _at(curves, curve[section[along]], t[along])
+    target[places.resting] = aims.points[places.cell]
+    approach[places.resting] = aims.approaches[places.cell]
+    target[places.along], approach[places.along] = _at(curves, places.curve, places.t)
 
+    moves = places.moves
     derivative_bounds, deviations = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
     derivative_bounds[:, 2] = curves.centre_curvature
-    # A self-motion over one centre, at the end of a curve, does not move along it.
-    at_rest = (t0 == t1) & arrived[:-1] & arrived[1:]
-    moves = np.flatnonzero((curve[section] != STAYS) & ~at_rest)
-    used, which = np.unique(curve[section[moves]], return_inverse=True)
-    derivative_bounds[moves] = _derivative_bounds(
-        curves, curve[section[moves]], t0[moves], t1[moves]
-    )
-    found, fault = _deviations(cells, task.standoff, used, tolerance)
+    used, which = np.unique(places.way, return_inverse=True)
+    derivative_bounds[moves] = _derivative_bounds(curves, places.way, t0[moves], t1[moves])
+    found, fault = _deviations(cells, task, curves, used)
     deviations[moves] = found[which]
     return CurveMatch(
         error=np.linalg.norm(points - target, axis=1),
@@ -119,7 +102,55 @@ def match_to_curves(cells: Cells, task: Task, walk: Walk, points: Array, axes: A
         deviations=deviations,
         centre_curvature=curves.centre_curvature,
         fault=fault,
+        frames=match_frames(cells, task, curves, approach, places),
     )
+
+
+class _Way(NamedTuple):
+    """Where the waypoints are, and from where to where on its curve each segment leads."""
+
+    places: MatchedPlaces
+    ends: tuple[Array, Array]
+
+
+def _way(
+    task: Task,
+    curves: TargetCurves,
+    walk: Walk,
+    points: Array,
+    marks: NDArray[np.int64],
+    curve: NDArray[np.int64],
+) -> _Way:
+    """Match the waypoints between marks to the curve (k - 1,) between each two of the k marks."""
+    m = len(points)
+    start, end = walk.cell[marks[:-1]], walk.cell[marks[1:]]
+    # Each segment, and each waypoint between marks, belongs to one section from mark to mark.
+    section = np.searchsorted(marks, np.arange(m - 1), side="right") - 1
+    backwards = (start > end)[section]
+    inner = np.flatnonzero(walk.cell < 0)
+    along = inner[curve[section[inner]] != STAYS]
+    t, arrived = np.zeros(m), walk.cell >= 0
+    t[along], arrived[along] = _matched_parameters(
+        curves, curve[section[along]], points[along], ARRIVED * task.effective_tolerance
+    )
+    t0, t1 = t[:-1].copy(), t[1:].copy()
+    t0[marks[:-1]] = backwards[marks[:-1]]
+    t1[marks[1:] - 1] = ~backwards[marks[1:] - 1]
+    # A self-motion over one centre, at the end of a curve, does not move along it.
+    at_rest = (t0 == t1) & arrived[:-1] & arrived[1:]
+    moves = np.flatnonzero((curve[section] != STAYS) & ~at_rest)
+    still = inner[curve[section[inner]] == STAYS]
+    places = MatchedPlaces(
+        resting=np.concatenate([marks, still]),
+        cell=np.concatenate([walk.cell[marks], start[section[still]]]),
+        along=along,
+        curve=curve[section[along]],
+        t=t[along],
+        moves=moves,
+        way=curve[section[moves]],
+        ends=np.column_stack([t0, t1])[moves],
+    )
+    return _Way(places, (t0, t1))
 
 
 def _curves(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -232,7 +263,7 @@ def _derivative_bounds(
 
 
 def _deviations(
-    cells: Cells, standoff: float, used: NDArray[np.int64], tolerance: float
+    cells: Cells, task: Task, targets: TargetCurves, used: NDArray[np.int64]
 ) -> tuple[Array, str]:
     """Bounds on how far the targets of curves deviate from the surface's, and a fault.
 
@@ -240,9 +271,11 @@ def _deviations(
     not use; the curves' own deviation bounds count where they are larger. On a mesh the samples are
     half a tolerance apart, and the targets are compared with the triangles themselves too, which
     may be nearer to them than the standoff: a thorn beside the curve, another part of the mesh, or
-    facets that are not square to the interpolated normal.
+    facets that are not square to the interpolated normal. An approach that is not the normal
+    deviates as `targets` say.
     """
     curves, surface = cells.curves, cells.surface
+    standoff, tolerance = task.standoff, task.effective_tolerance
     owner, t = _samples(cells, used, 0.5 * tolerance)
     point, normal = curves.at(used[owner], t)
     closest = surface.closest(point)
@@ -265,6 +298,8 @@ def _deviations(
                 f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something protrudes "
                 "there, or its facets are too coarse for this standoff"
             )
+    if not task.along_normals(cells):
+        deviations[:, 1] = targets.deviations[used, 1]
     return deviations, ""
 
 

@@ -10,6 +10,7 @@ by `feasibility.certification.collisions`.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,14 @@ from numpy.typing import NDArray
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.curve_matching import CurveMatch, match_to_curves
 from feasibility.certification.kinematic_bounds import peaks, placements, second_derivatives
+from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
+from feasibility.certification.rolls import (
+    off_middle,
+    reference_axes,
+    roll_vectors,
+    tool_frames,
+)
+from feasibility.certification.rolls_along import rolls_along
 from feasibility.certification.surface_replay import replay_over_surface
 from feasibility.collisions import gather
 from feasibility.cone import angle_of
@@ -25,6 +34,7 @@ from feasibility.verdict import Certificate, Replay, Walk
 from robots import Robot
 from surfaces import Cells
 
+HALVINGS = 3  # of every segment, while the roll alone is not known well enough between waypoints
 CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on metres and unit vectors
 
 
@@ -50,7 +60,7 @@ def replay(
     needed: NDArray[np.bool_],
     strays: NDArray[np.float64] | None = None,
 ) -> Replay:
-    """Check a walk: limits, tool point and cone at and between waypoints, and the cells it visits.
+    """Check a walk: limits, tool point, cone and roll at and between waypoints, and its cells.
 
     A walk that the curves between cell centres do not show to be right, because it leaves them or
     because of how far they may be from the surface, is judged over the surface itself
@@ -59,8 +69,8 @@ def replay(
     Args:
         robot: the arm.
         cells: the cells.
-        task: the task; its tolerance and cone are used exactly. Whether bodies stay clear is asked
-            only of walks that are right in everything else.
+        task: the task; its tolerance, cone and roll are used exactly. Whether bodies stay clear is
+            asked only of walks that are right in everything else.
         walk: the motion.
         needed: (N,) cells that must be visited.
         strays: (m - 1, n) how far each joint may be from the straight lines between waypoints,
@@ -106,8 +116,13 @@ def _marks_are_right(
     visited[walk.cell[at]] = True
     aims, poses = task.targets(cells), placements(robot, walk.q[at])
     off = np.linalg.norm(poses.points - aims.points[walk.cell[at]], axis=1)
-    chord = np.linalg.norm(poses.axes - aims.approaches[walk.cell[at]], axis=1)
+    approaches = aims.approaches[walk.cell[at]]
+    chord = np.linalg.norm(poses.axes - approaches, axis=1)
     right = (off <= task.effective_tolerance) & (chord <= task.cone_chord + CLOSE_TO_ZERO)
+    if task.roll is not None and aims.references is not None:
+        x, references = reference_axes(robot, walk.q[at]), aims.references[walk.cell[at]]
+        z = roll_vectors(x, poses.axes, references, approaches, task.roll)
+        right &= off_middle(z) <= task.roll.half + ROLL_CLOSE
     return bool(visited[needed].all() and right.all())
 
 
@@ -138,15 +153,49 @@ def _largest_tilt(
 def replay_along_curves(
     robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
 ) -> Replay:
-    """`replay` by the curves alone, of a walk that goes from centre to centre along them."""
+    """`replay` by the curves alone, of a walk that goes from centre to centre along them.
+
+    Where the roll alone is not shown to stay in its range, segments are halved, a few times.
+    """
     fault = _malformed(robot, cells, walk)
     if fault:
         return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), fault)
-    tolerance, cone_chord = task.effective_tolerance, task.cone_chord
+    halved = walk
+    for _ in range(HALVINGS + 1):
+        found = _along_curves(robot, cells, task, halved, needed)
+        if not found.roll_is_open:
+            break
+        halved = _with_middles(halved)
+    whole = replace(found.certificate, waypoints=len(walk.q))
+    return Replay(whole, "; ".join(found.refusals))
+
+
+class _Along(NamedTuple):
+    """What was found along the curves."""
+
+    certificate: Certificate
+    refusals: list[str]
+    roll_is_open: bool = False
+    """Is nothing wrong but that the roll between waypoints is not known well enough?"""
+
+
+def _with_middles(walk: Walk) -> Walk:
+    """The same motion with a waypoint in the middle of each segment."""
+    q = np.empty((2 * len(walk.q) - 1, walk.q.shape[1]))
+    q[::2], q[1::2] = walk.q, 0.5 * (walk.q[:-1] + walk.q[1:])
+    cell = np.full(len(q), -1, dtype=np.int64)
+    cell[::2] = walk.cell
+    return Walk(q, cell)
+
+
+def _along_curves(
+    robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
+) -> _Along:
+    """`replay_along_curves` of these segments as they are."""
     poses = placements(robot, walk.q)
     matched = match_to_curves(cells, task, walk, poses.points, poses.axes)
     if matched.fault:
-        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), matched.fault)
+        return _Along(Certificate(len(walk.q), np.nan, np.nan, np.nan), [matched.fault])
     steps = np.abs(np.diff(walk.q, axis=0))
     derivative_bound = (
         second_derivatives(steps, robot.prismatic, poses.levers, np.inf)
@@ -161,7 +210,7 @@ def replay_along_curves(
         deviated + matched.deviations[:, 0], initial=np.max(matched.error, initial=0.0)
     )
     worst = _largest_tilt(matched, derivative_bound, axis_bound, beside=True)
-    if not worst <= cone_chord + CLOSE_TO_ZERO:
+    if not worst <= task.cone_chord + CLOSE_TO_ZERO:
         worst = _largest_tilt(matched, derivative_bound, axis_bound, beside=False)
     margin = float(np.min(np.minimum(walk.q - robot.lower, robot.upper - walk.q), initial=np.inf))
     certificate = Certificate(
@@ -170,7 +219,29 @@ def replay_along_curves(
         max_angle=angle_of(worst),
         min_limit_margin=margin,
     )
+    refusals = _refusals(cells, task, walk, needed, matched, certificate, worst)
+    if task.roll is None or matched.frames is None:
+        return _Along(certificate, refusals)
+    frames = tool_frames(robot, walk.q, poses.axes, reference_axes(robot, walk.q))
+    found = rolls_along(robot, task.roll, walk.q, poses.axes, frames, matched)
+    certificate = replace(certificate, max_roll=found.most)
+    if found.inside:
+        return _Along(certificate, refusals)
+    return _Along(certificate, [*refusals, found.refusal(task)], found.open and not refusals)
 
+
+def _refusals(
+    cells: Cells,
+    task: Task,
+    walk: Walk,
+    needed: NDArray[np.bool_],
+    matched: CurveMatch,
+    certificate: Certificate,
+    worst: float,
+) -> list[str]:
+    """What is wrong with limits, tool point and axis (`worst` the chord of its tilt), and cells."""
+    tolerance, cone_chord = task.effective_tolerance, task.cone_chord
+    position, margin = certificate.max_position_error, certificate.min_limit_margin
     visited = np.zeros(len(cells), dtype=bool)
     visited[walk.cell[walk.cell >= 0]] = True
     refusals = []
@@ -190,4 +261,4 @@ def replay_along_curves(
         refusals.append("a marked waypoint is not at its cell's centre target")
     if not visited[needed].all():
         refusals.append(f"{int((needed & ~visited).sum())} cells are never visited")
-    return Replay(certificate, "; ".join(refusals))
+    return refusals

@@ -11,8 +11,8 @@ part that goes with a piece
     |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 (w^2 D_p + D_T)
 
 with e0 and e1 bounds of |p - T| at its ends: there p is known to s (1 - s) / 2 D_p. The same holds
-for |a - b|. Nothing else is assumed of the surface: not that closest points are unique, nor that
-they move continuously.
+for |a - b|, and for the roll what `certification.rolls` says. Nothing else is assumed of the
+surface: not that closest points are unique, nor that they move continuously.
 
 **On a mesh** the normals of targets are interpolated, and the tool point has to keep its distance
 from the triangles themselves, too: standoff less tolerance from all of them, so that nothing
@@ -30,8 +30,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.kinematic_bounds import Placements, peaks, second_derivatives
+from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
+from feasibility.certification.rolls import Held, ToolAxes, reference_axes, tool_frames
 from feasibility.task import Task
 from robots import Kinematics, Robot
+from surfaces import Cells
 from surfaces.places import OffsetSurface, Places
 
 Array = NDArray[np.float64]
@@ -59,22 +62,27 @@ class Samples(NamedTuple):
     """(k,) |a - b|."""
     facets: Array
     """(k,) m, distance from the triangles of a mesh; inf where the surface is smooth."""
+    x: Array
+    """(k, 3) reference axes; 0 where the roll is free."""
+    roll: Array
+    """(k,) rad, how far the roll is off the middle of its range; 0 where it is free."""
 
     def of(self, rows: Mask | Ints) -> Samples:
         """Some of them."""
         return Samples(
             self.row[rows], self.share[rows], self.points[rows], self.axes[rows],
             self.places.of(rows), self.error[rows], self.chord[rows], self.facets[rows],
+            self.x[rows], self.roll[rows],
         )  # fmt: skip
 
     @staticmethod
     def join(parts: list[Samples]) -> Samples:
         """Samples one after the other; at least one part."""
-        row, share, points, axes, error, chord, facets = (
-            np.concatenate([part[k] for part in parts]) for k in (0, 1, 2, 3, 5, 6, 7)
+        row, share, points, axes, error, chord, facets, x, roll = (
+            np.concatenate([part[k] for part in parts]) for k in (0, 1, 2, 3, 5, 6, 7, 8, 9)
         )
         places = Places.join(*(part.places for part in parts))
-        return Samples(row, share, points, axes, places, error, chord, facets)
+        return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
 
 
 class Stretches(NamedTuple):
@@ -83,7 +91,7 @@ class Stretches(NamedTuple):
     start: Samples
     end: Samples
     bends: Array
-    """(k, 2) D_p (m) and D_a by the stretch's own parameter."""
+    """(k, 3) D_p (m), D_a and D_x + D_y by the stretch's own parameter."""
     length: Array
     """(k,) share of the segment between two rows."""
 
@@ -110,41 +118,58 @@ class Bounds(NamedTuple):
     """(k,) m, lower bounds of the distance from the triangles of a mesh."""
     joined: Mask
     """(k,) whether a path of places from one end to the other is known."""
+    roll: Array
+    """(k,) rad, bounds of how far the roll is off the middle of its range; 0 where it is free."""
 
     def of(self, rows: Mask | Ints) -> Bounds:
         """Some of them."""
-        return Bounds(self.error[rows], self.chord[rows], self.facets[rows], self.joined[rows])
+        return Bounds(self.error[rows], self.chord[rows], self.facets[rows], self.joined[rows],
+                      self.roll[rows])  # fmt: skip
 
 
 class Judge:
     """Compares configurations of one motion, and stretches between them, with a surface."""
 
-    def __init__(self, robot: Robot, task: Task, offset: OffsetSurface, sign: float) -> None:
-        """Judge `robot` by `task`, with b = `sign` times the outward normal."""
-        self.robot, self.task, self.offset, self.sign = robot, task, offset, sign
+    def __init__(self, robot: Robot, task: Task, offset: OffsetSurface, cells: Cells) -> None:
+        """Judge `robot` by `task`, over the surface of `cells`, whose parallel is `offset`."""
+        self.robot, self.task, self.offset = robot, task, offset
         self._kinematics = Kinematics(robot)
+        self._held = Held.of(task, cells, offset)
 
     def sampled(self, row: Ints, share: Array, q: Array) -> Samples:
         """Samples at configurations q (k, n)."""
-        return self.compared(row, share, *self._kinematics.tools(q))
+        return self.compared(row, share, *self._kinematics.tools(q), self.reference_axes(q))
 
-    def compared(self, row: Ints, share: Array, points: Array, axes: Array) -> Samples:
-        """Samples of known tool points and axes; the second guess is where the tool looks."""
+    def reference_axes(self, q: Array) -> Array:
+        """(k, 3) of configurations (k, n); 0 where the roll is free."""
+        free = self.task.roll is None
+        return np.zeros((len(q), 3)) if free else reference_axes(self.robot, q)
+
+    def compared(self, row: Ints, share: Array, points: Array, axes: Array, x: Array) -> Samples:
+        """Samples of known tool points, axes and reference axes (k, 3).
+
+        The second guess is where the tool looks.
+        """
         tolerance = self.task.effective_tolerance
         places = self.offset.nearest(points, points + self.task.standoff * axes, tolerance)
         target, normal = self.offset.at(places)
         error = np.linalg.norm(points - target, axis=1)
-        chord = np.linalg.norm(axes - self.sign * normal, axis=1)
+        approaches = self._held.approaches(normal)
+        chord = np.linalg.norm(axes - approaches, axis=1)
         facets = self.offset.facets(points)
-        return Samples(row, share, points, axes, places, error, chord, facets)
+        roll = self._held.rolls(x, axes, approaches, places)
+        return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
 
     def between_rows(self, rows: Array, poses: Placements, at: Samples) -> Stretches:
-        """The stretches from row to row."""
+        """The stretches from row to row, with the samples `at` every row."""
         steps, slides = np.abs(np.diff(rows, axis=0)), self.robot.prismatic
         bends = [
             second_derivatives(steps, slides, poses.levers, np.inf),
             second_derivatives(steps, slides, poses.sines, 1.0),
+            np.zeros(len(steps)),
         ]
+        if self.task.roll is not None:
+            bends[2] = tool_frames(self.robot, rows, at.axes, at.x).bends(self.robot, steps)
         index = np.arange(len(rows))
         ends = at.of(index[:-1]), at.of(index[1:])
         return Stretches(*ends, np.stack(bends, axis=1), np.ones(len(steps)))
@@ -155,10 +180,10 @@ class Judge:
         share = path.share[..., None]
         width = np.diff(path.share, axis=1) ** 2
         found = []
+        approaches, turned = self._held.approaches(path.normals), self._held.bends(path)
         for start, end, aims, bend, bends in (
             (s.start.points, s.end.points, path.points, s.bends[:, :1], path.bends[..., 0]),
-            (s.start.axes, s.end.axes, self.sign * path.normals, s.bends[:, 1:],
-             path.bends[..., 1]),
+            (s.start.axes, s.end.axes, approaches, s.bends[:, 1:2], turned),
         ):  # fmt: skip
             line = (1.0 - share) * start[:, None] + share * end[:, None]
             sag = 0.5 * path.share * (1.0 - path.share) * bend
@@ -166,12 +191,16 @@ class Judge:
             peak = peaks(off[:, :-1], off[:, 1:], width * bend + bends)
             found.append(peak.max(axis=1, initial=0.0))
         joined = np.asarray(np.isfinite(path.bends).all(axis=(1, 2)))
-        return Bounds(found[0], found[1], _apart(s), joined)
+        first, last = ToolAxes(s.start.axes, s.start.x), ToolAxes(s.end.axes, s.end.x)
+        roll = self._held.rolls_between(first, last, s.bends[:, 2], path, approaches)
+        return Bounds(found[0], found[1], _apart(s), joined, roll)
 
     def within(self, one: Samples | Bounds) -> Mask:
-        """(k,) inside tolerance and cone, and apart from a mesh's triangles; NaN is not."""
+        """(k,) inside tolerance, cone and roll, apart from a mesh's triangles; NaN is not."""
         cone = self.task.cone_chord + CLOSE_TO_ZERO
         inside = (one.error <= self.task.effective_tolerance) & (one.chord <= cone)
+        if self.task.roll is not None:
+            inside &= one.roll <= self.task.roll.half + ROLL_CLOSE
         return np.asarray(inside & (one.facets >= self.least_distance - CLOSE_TO_ZERO))
 
     @property

@@ -2,9 +2,10 @@
 
 A motion is straight in joint space between its rows. It is accepted where, at every instant, the
 joints are inside their limits, and some place x of the surface that moves continuously has the tool
-point within the tolerance of its target T(x) and the tool axis within the cone of its approach
-direction b(x); and where every needed cell is reached at some instant. No curve between cells is
-asked for, nor where the motion says that it is.
+point within the tolerance of its target T(x), the tool axis within the cone of its approach
+direction b(x), and the roll about it, where that is limited, in its range; and where every needed
+cell is reached at some instant. No curve between cells is asked for, nor where the motion says that
+it is.
 
 Between rows, bounds are used (`stretches`). A stretch that they do not accept is halved: they fall
 to a quarter, and one exact configuration is added. What is wrong at an exact configuration is
@@ -24,6 +25,7 @@ from feasibility.certification.cells_reached import cells_reached, in_order, mis
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.kinematic_bounds import placements
+from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
 from feasibility.collisions import Bodies
 from feasibility.cone import angle_of
@@ -77,12 +79,13 @@ def replay_over_surface(
     if fault is not None:
         unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
         return MotionReplay(unknown, (fault,), nowhere)
-    sign = cells.surface.side_sign
-    judge = Judge(robot, task, offset_surface(cells.surface, sign * task.standoff), -sign)
+    height = cells.surface.side_sign * task.standoff
+    judge = Judge(robot, task, offset_surface(cells.surface, height), cells)
     margin, faults = _limits(robot, rows)
     poses = placements(robot, rows)
     count = np.arange(len(rows))
-    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes)
+    x = judge.reference_axes(rows)
+    at_rows = judge.compared(count, np.zeros(len(rows)), poses.points, poses.axes, x)
     good = judge.within(at_rows)
     faults += _exact_faults(judge, at_rows.of(~good), "row")
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
@@ -95,7 +98,10 @@ def replay_over_surface(
         faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, samples)))
     error = max(looked.error, float(np.max(samples.error, initial=0.0)))
     chord = max(looked.chord, float(np.max(samples.chord, initial=0.0)))
-    certificate = Certificate(len(rows), error, angle_of(chord), margin)
+    roll = max(looked.roll, float(np.max(samples.roll, initial=0.0)))
+    certificate = Certificate(
+        len(rows), error, angle_of(chord), margin, max_roll=None if task.roll is None else roll
+    )
     if bodies is not None:
         clear = collision_replay(robot, bodies, rows)
         faults += clear.faults
@@ -111,7 +117,7 @@ class _Between:
     def __init__(self, judge: Judge, rows: Array, stretches: Stretches) -> None:
         """Judge stretches whose ends are good."""
         self.judge, self.rows = judge, rows
-        self.error = self.chord = 0.0
+        self.error = self.chord = self.roll = 0.0
         self.faults: list[MotionFault] = []
         self.samples: list[Samples] = []
         wrong: list[Samples] = []
@@ -121,6 +127,7 @@ class _Between:
             good = judge.within(bounds)
             self.error = max(self.error, float(np.max(bounds.error[good], initial=0.0)))
             self.chord = max(self.chord, float(np.max(bounds.chord[good], initial=0.0)))
+            self.roll = max(self.roll, float(np.max(bounds.roll[good], initial=0.0)))
             left, bounds = left.of(~good), bounds.of(~good)
             seen += len(left.length)
             enough = sum(len(part.row) for part in wrong) > ENOUGH
@@ -191,6 +198,7 @@ def _exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
             f"{task.cone_deg:g} deg are allowed" + _others(len(tilted) - 1, noun)
         )
         faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
+    faults += _roll_faults(task, wrong, noun)
     near = np.flatnonzero(~(wrong.facets >= judge.least_distance - CLOSE_TO_ZERO))
     if len(near) and not len(off):
         worst = near[np.argmin(wrong.facets[near])]
@@ -201,6 +209,22 @@ def _exact_faults(judge: Judge, wrong: Samples, noun: str) -> list[MotionFault]:
         )
         faults.append(MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text))
     return faults
+
+
+def _roll_faults(task: Task, wrong: Samples, noun: str) -> list[MotionFault]:
+    """The one whose roll is furthest outside its range."""
+    if task.roll is None or task.roll_deg is None:
+        return []
+    rolled = np.flatnonzero(~(wrong.roll <= task.roll.half + ROLL_CLOSE))
+    if not len(rolled):
+        return []
+    worst = rolled[np.argmax(np.nan_to_num(wrong.roll[rolled], nan=np.inf))]
+    beyond = np.degrees(wrong.roll[worst] - task.roll.half)
+    low, high = task.roll_deg
+    text = f"the roll is {beyond:.6g} deg outside its range, {low:g} to {high:g} deg" + _others(
+        len(rolled) - 1, noun
+    )
+    return [MotionFault(int(wrong.row[worst]), float(wrong.share[worst]), text)]
 
 
 def _others(number: int, noun: str) -> str:
@@ -226,12 +250,14 @@ def _open_fault(judge: Judge, left: Stretches, bounds: Bounds) -> MotionFault:
             f"surface jumps (within {1e3 * bounds.error[one]:.6g} mm, "
             f"{1e3 * judge.task.effective_tolerance:g} mm are allowed)"
         )
-    elif not bounds.facets[one] >= judge.least_distance - CLOSE_TO_ZERO:
-        text = "not certified: the tool point may come too near to the mesh's triangles"
-    else:
+    elif not bounds.chord[one] <= judge.task.cone_chord + CLOSE_TO_ZERO:
         text = (
             "not certified: the tool axis is at the edge of the cone (within "
             f"{np.degrees(angle_of(float(bounds.chord[one]))):.6f} deg, {judge.task.cone_deg:g} "
             "deg are allowed)"
         )
+    elif not bounds.facets[one] >= judge.least_distance - CLOSE_TO_ZERO:
+        text = "not certified: the tool point may come too near to the mesh's triangles"
+    else:
+        text = "not certified: the roll is at the edge of its range, or the reference turns there"
     return MotionFault(row, share, text)

@@ -123,11 +123,14 @@ def left_out_text(pairs: Sequence[LeftOut]) -> str:
 
 def certificate_json(certificate: Certificate) -> dict[str, Any]:
     """What the replay of a motion measured; null where it measured nothing."""
-    return {
+    found = {
         "waypoints": int(certificate.waypoints),
         "max_position_error_m": plain(float(certificate.max_position_error)),
         "max_angle_deg": plain(math.degrees(certificate.max_angle)),
     }
+    if certificate.max_roll is not None:
+        found["max_roll_deg"] = plain(math.degrees(certificate.max_roll))
+    return found
 
 
 class Clearance(Protocol):

@@ -39,6 +39,7 @@ from feasibility.version import version
 
 FORMAT = "coverable-result"
 TASK = ("standoff", "cone_deg", "tolerance")  # what is stored of it; the rest is the case's
+OF_CASE = ("collision", "approach", "roll_deg", "roll_reference")
 FORMAT_VERSION = 3  # 2 had no proofs; 1 no `places`, and the kinds `CLOSED_FORM_KINDS` alone
 
 
@@ -220,7 +221,7 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         message=fields.text("message"),
         robot=robot,
         cells=cells,
-        task=replace(_task(fields.table("task")), collision=setup.task.collision),
+        task=replace(_task(fields.table("task")), **{k: getattr(setup.task, k) for k in OF_CASE}),
         method=fields.text("method"),
         seed=int(fields.get("seed", int, "a whole number")),
         graph=graph,
@@ -288,6 +289,7 @@ def _certificate(fields: Fields) -> Certificate | None:
         min_limit_margin=np.inf if margin is None else row.number("min_limit_margin"),
         min_clearance=_maybe(row, "min_clearance"),
         nearest_pair=_pair(row, "nearest_pair"),
+        max_roll=_maybe(row, "max_roll"),
     )
 
 

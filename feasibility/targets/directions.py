@@ -79,7 +79,7 @@ def approach_curves(cells: Cells, task: Task) -> DirectionCurves | None:
         cubics = np.zeros((pieces, 4, 3))
         cubics[:, 0] = fixed
         return DirectionCurves(cubics, np.zeros((pieces, 2)), np.zeros(curves))
-    if task.approach is not None or cells.approaches is None:
+    if cells.approaches is None or task.along_normals(cells):
         return None
     ends = cells.approaches[cells.pairs]
     return fitted(cells, lambda curve, t: great_arcs(ends[curve, 0], ends[curve, 1], t), ends)

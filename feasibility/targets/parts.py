@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-import numpy as np
-
-from feasibility.task import Direction
+from feasibility.task import Direction, unit
 from surfaces import Surface, SurfaceParts
 
 MOST = 8192
@@ -33,7 +31,7 @@ def target_parts(
         flat: m > 0, the largest radius of target points on the finest parts.
         straight: > 0, the largest radius of directions.
         most: how many parts may be made.
-        approach: unit, in the surface's own frame, where it is not the normal.
+        approach: in the surface's own frame, where it is not the normal.
 
     Returns:
         The same parts as `Surface.parts` has, with targets (m) in the place of points and approach
@@ -56,6 +54,6 @@ def target_parts(
         array[..., 3:] *= -sign
     radius[:, 0] += standoff * radius[:, 1]
     if approach is not None:
-        centre[..., 3:] = surface.rotation @ np.array(approach)
+        centre[..., 3:] = surface.rotation @ unit(approach)
         slopes[..., 3:] = radius[:, 1] = 0.0
     return SurfaceParts(centre, slopes, radius, parts.children, parts.axis)

@@ -63,7 +63,7 @@ class MeshPlaces(OffsetSurface):
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
         none = np.full((len(start.x), 2), np.inf)
-        made = PlacePaths.straight((self.at(start), self.at(end)), none)
+        made = PlacePaths.straight((self.at(start), self.at(end)), none, start, end)
         same = (start.chart == end.chart) & (start.chart >= 0)
         row = np.flatnonzero(same)
         made.bends[row, 2] = self._bends(start.chart[row], start.x[row], end.x[row])
@@ -119,6 +119,8 @@ class MeshPlaces(OffsetSurface):
             points,
             np.stack([normal for _, normal in placed], axis=1),
             np.stack(bends, axis=1),
+            np.stack([places.chart for places in (start, before, after, end)], axis=1),
+            np.stack([places.x for places in (start, before, after, end)], axis=1),
         )
 
     def _shortest(self, start: Places, end: Places, corner: Ints, last: Ints, t: Array) -> Array:

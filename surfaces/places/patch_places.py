@@ -15,6 +15,8 @@ from surfaces.places.spline_bounds import kinks
 
 Mask = NDArray[np.bool_]
 
+TANGENT_STEP = 1e-5  # [1], share of the range of u: of differences
+SLOWER = 1.0 - 1e-6  # covers their error
 GUESSES = 6  # closest points that lead from a guess to a place
 AT = 1e-9  # [1] of a range: a path that passes a kink by less does not cross it
 AROUND = 0.5  # rad of azimuth between two places from which on a path over a pole is looked at
@@ -82,7 +84,10 @@ class PatchPlaces(OffsetSurface):
             if period:
                 step[:, axis] -= period * np.round(step[:, axis] / period)
         made = PlacePaths.straight(
-            (self._at(start.x), self._at(end.x)), self._bends(start.x, start.x + step)
+            (self._at(start.x), self._at(end.x)),
+            self._bends(start.x, start.x + step),
+            start,
+            Places(end.chart, start.x + step),
         )
         self._over_kinks(made, start.x, step, end.x)
         for pole, is_one in enumerate(self.patch.poles):
@@ -99,6 +104,26 @@ class PatchPlaces(OffsetSurface):
             both = (squares[:, :, None] * self._bounds(self.patch, low, high)).sum(axis=1)
             both[:, 0] += abs(self.height) * both[:, 1]
         return np.asarray(both * ROUNDING)
+
+    def tangents(self, places: Places) -> Array:
+        """See `OffsetSurface.tangents`."""
+        return self.patch.tangent(places.x[:, 0], places.x[:, 1])
+
+    def turning(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.turning`: of f_u / |f_u|, at most |f_uu u' + f_uv v'| / |f_u|."""
+        low, high = np.minimum(start.x, end.x), np.maximum(start.x, end.x)
+        du, dv = (high - low).T
+        bounds = self._bounds(self.patch, low, high)[:, :, 0]
+        with np.errstate(invalid="ignore"):  # inf * 0: nothing is known
+            change = bounds[:, 0] * du + bounds[:, 1] * dv
+        u, v = start.x.T
+        step = TANGENT_STEP * (self.patch.u_range[1] - self.patch.u_range[0])
+        ends = [np.clip(u + sign * step, *self.patch.u_range) for sign in (-1.0, 1.0)]
+        speed = np.linalg.norm(self.patch.point(ends[1], v) - self.patch.point(ends[0], v), axis=1)
+        least = SLOWER * speed / (ends[1] - ends[0]) - change
+        known = least > 0.0
+        found = np.divide(change, least, out=np.full(len(u), np.inf), where=known)
+        return np.where(np.isnan(found), np.inf, found * ROUNDING)
 
     def _over_kinks(self, made: PlacePaths, start: Array, step: Array, end: Array) -> None:
         """Cut paths in two where they cross a line on which the surface has a kink."""
@@ -155,6 +180,8 @@ class PatchPlaces(OffsetSurface):
             np.stack([point for point, _ in places], axis=1),
             np.stack([normal for _, normal in places], axis=1),
             np.stack(bends, axis=1),
+            np.zeros((len(zero), 4), dtype=np.int64),
+            np.stack([start, before, after + shift, end], axis=1),
         )
 
     def _over_pole(self, made: PlacePaths, start: Array, end: Array, some: Mask, pole: int) -> None:
@@ -177,6 +204,8 @@ class PatchPlaces(OffsetSurface):
             np.stack(
                 [self._bends(a, before), np.zeros((len(row), 2)), self._bends(after, b)], axis=1
             ),
+            np.zeros((len(row), 4), dtype=np.int64),
+            np.stack([a, before, after, b], axis=1),
         )
         ends = np.linalg.norm(over.points[:, 3] - over.points[:, 0], axis=1)
         detour = np.linalg.norm(np.diff(over.points, axis=1), axis=2).sum(axis=1) - ends

@@ -61,7 +61,7 @@ class PiecePlaces(OffsetSurface):
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
         made = PlacePaths.straight(
-            (self.at(start), self.at(end)), np.full((len(start.x), 2), np.inf)
+            (self.at(start), self.at(end)), np.full((len(start.x), 2), np.inf), start, end
         )
         pairs = np.stack([start.chart, end.chart], axis=1)
         for a, b in np.unique(pairs[(pairs >= 0).all(axis=1)], axis=0):
@@ -95,9 +95,31 @@ class PiecePlaces(OffsetSurface):
         fro = np.linalg.norm(points[:, 3] - points[:, 2], axis=1)
         share = np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
         zero = np.zeros_like(to)
+        sides = np.repeat([[start.chart[0], end.chart[0]]], 2, axis=1)
         return PlacePaths(
-            np.stack([zero, share, share, zero + 1.0], axis=1), points, normals, bends
+            np.stack([zero, share, share, zero + 1.0], axis=1),
+            points,
+            normals,
+            bends,
+            np.repeat(sides, len(zero), axis=0),
+            np.stack([path.x[:, k] for path, k in ends], axis=1),
         )
+
+    def tangents(self, places: Places) -> Array:
+        """See `OffsetSurface.tangents`."""
+        found = np.full((len(places.chart), 3), np.nan)
+        for k in np.unique(places.chart[places.chart >= 0]):
+            some = np.flatnonzero(places.chart == k)
+            found[some] = self.pieces[k].tangents(places.of(some))
+        return found
+
+    def turning(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.turning`."""
+        found = np.full(len(start.chart), np.inf)
+        for k in np.unique(start.chart[start.chart >= 0]):
+            some = np.flatnonzero((start.chart == k) & (end.chart == k))
+            found[some] = self.pieces[k].turning(start.of(some), end.of(some))
+        return found
 
 
 def _on(piece: PatchPlaces, x: Array) -> Array:

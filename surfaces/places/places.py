@@ -57,27 +57,47 @@ class PlacePaths(NamedTuple):
     bends: Array
     """(k, 3, 2) along each piece offset point (m) and normal differ from the straight line between
     its ends by at most s (1 - s) / 2 times this; inf where nothing is known."""
+    chart: Ints
+    """(k, 4) patch or face of the four places."""
+    x: Array
+    """(k, 4, 2) their parameters; the first piece and the last run straight from one to the next,
+    also where a patch closes."""
+
+    def place(self, which: int) -> Places:
+        """One of the four places of each path."""
+        return Places(self.chart[:, which], self.x[:, which])
 
     @staticmethod
-    def straight(ends: tuple[tuple[Array, Array], tuple[Array, Array]], bends: Array) -> PlacePaths:
+    def straight(
+        ends: tuple[tuple[Array, Array], tuple[Array, Array]],
+        bends: Array,
+        start: Places,
+        end: Places,
+    ) -> PlacePaths:
         """Paths of one piece each.
 
         Args:
             ends: points and normals (k, 3) of the first, and of the last places.
             bends: (k, 2) of that piece.
+            start, end: the places.
         """
-        (point, normal), (end, end_normal) = ends
+        (point, normal), (last, last_normal) = ends
         count = len(point)
         share = np.broadcast_to([0.0, 0.0, 0.0, 1.0], (count, 4)).copy()
-        points = np.stack([point, point, point, end], axis=1)
-        normals = np.stack([normal, normal, normal, end_normal], axis=1)
+        points = np.stack([point, point, point, last], axis=1)
+        normals = np.stack([normal, normal, normal, last_normal], axis=1)
         every = np.zeros((count, 3, 2))
         every[:, 2] = bends
-        return PlacePaths(share, points, normals, every)
+        chart = np.stack([start.chart, start.chart, start.chart, end.chart], axis=1)
+        x = np.stack([start.x, start.x, start.x, end.x], axis=1)
+        return PlacePaths(share, points, normals, every, chart, x)
 
     def of(self, rows: Ints | NDArray[np.bool_]) -> PlacePaths:
         """Some of the paths."""
-        return PlacePaths(*(part[rows] for part in self))
+        return PlacePaths(
+            self.share[rows], self.points[rows], self.normals[rows], self.bends[rows],
+            self.chart[rows], self.x[rows],
+        )  # fmt: skip
 
     def put(self, rows: Ints | NDArray[np.bool_], others: PlacePaths) -> None:
         """Replace some of the paths."""
@@ -112,6 +132,17 @@ class OffsetSurface(ABC):
         Without interpolated normals; inf where the surface is smooth.
         """
         return np.full(len(points), np.inf)
+
+    def tangents(self, places: Places) -> Array:
+        """Unit u directions (k, 3) of the surface at places; NaN where it has none."""
+        return np.full((len(places.chart), 3), np.nan)
+
+    def turning(self, start: Places, end: Places) -> Array:
+        """(k,) the largest slope of the u direction on straight lines between places of one patch.
+
+        By the line's own parameter in 0..1; inf where nothing is known.
+        """
+        return np.full(len(start.chart), np.inf)
 
     @abstractmethod
     def paths(self, start: Places, end: Places) -> PlacePaths:

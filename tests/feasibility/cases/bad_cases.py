@@ -465,8 +465,10 @@ BAD_CASES = {
     "cone too wide": changed("= 45", "= 181", "task.cone_deg", "0 .. 180"),
     "cone in radians": changed("cone_deg", "cone", "task.cone", 'did you mean "cone_deg"?'),
     "tolerance zero": added("task", "tolerance = 0", "task.tolerance", "> 0"),
-    "fixed approach": added("task", "approach = [0, 0, -1]", "task.approach", "not supported yet"),
-    "roll": added("task", "roll_deg = [-15, 15]", "task.roll_deg", "is not supported yet"),
+    "approach in words": added("task", 'approach = "down"', "task.approach", "got 'down'"),
+    "approach of no length": added("task", "approach = [0, 0, 0]", "task.approach", "not all zero"),
+    "roll wrong way round": added("task", "roll_deg = [15, -15]", "task.roll_deg", "is empty"),
+    "reference of two": added("task", "roll_reference = [0, 1]", "task.roll_reference", "three"),
     # search
     "method": added("search", 'method = "compleat"', "search.method", 'did you mean "complete"?'),
     "seed": added("search", "seed = -1", "search.seed", ">= 0"),

@@ -1,0 +1,14 @@
+from .bounds import CLOSE_TO_ZERO as CLOSE_TO_ZERO
+from .bounds import ROOT as ROOT
+from .bounds import ToolFrames as ToolFrames
+from .bounds import largest_off as largest_off
+from .bounds import off_middle as off_middle
+from .bounds import products_of_changes as products_of_changes
+from .bounds import reference_axes as reference_axes
+from .bounds import roll_vectors as roll_vectors
+from .bounds import tool_frames as tool_frames
+from .frame_matching import FrameMatch as FrameMatch
+from .frame_matching import MatchedPlaces as MatchedPlaces
+from .frame_matching import match_frames as match_frames
+from .held import Held as Held
+from .held import ToolAxes as ToolAxes
