@@ -55,7 +55,7 @@ class Verification:
     """(N,) cells that a motion reaches."""
     proof: CutTree | None = None
     boxes: int = 0
-    """Of a proof: how many boxes of joints and surface were looked at."""
+    """Of a proof: how many boxes of joints and surface, or of tilt and roll, were looked at."""
 
     @property
     def holds(self) -> bool:

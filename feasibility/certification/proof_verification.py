@@ -7,6 +7,9 @@ tool on the surface, within tolerance and cone,
     no q in M and in the region of a cut has w . q = t, and
     no q in the region of a leaf has the tool within tolerance and cone of its cell's target.
 
+A tree of one leaf proves its claim too where the tool collides in every pose within tolerance and
+cone of the cell's target, whatever the arm does (`feasibility.certification.tool_alone`).
+
 Both say that a region is empty, which `feasibility.certification.empty_region` proves by bounds
 (`linear_models`, `box_exclusion`). A joint that the tree opens at t is to have no q in M at any
 t + 2 pi k; all turns place the tool alike, so one of them stands for all, and t .. t + 2 pi for the
@@ -34,7 +37,9 @@ from feasibility.certification.linear_models import (
 from feasibility.certification.parts_agreement import disagreement
 from feasibility.certification.refutation import Refuter
 from feasibility.certification.region import TURN, Region
+from feasibility.certification.tool_alone import PoseCheck, never_clear
 from feasibility.certification.tree_shape import malformed
+from feasibility.collisions import gather
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import hyperplane
 from feasibility.task import Task
@@ -55,7 +60,7 @@ class ProofCheck:
     refusal: str
     """Why it is refused; empty when it is accepted."""
     boxes: int
-    """How many boxes of joints and surface were looked at."""
+    """How many boxes of joints and surface, or of the tool's tilt and roll, were looked at."""
 
     @property
     def accepted(self) -> bool:
@@ -87,12 +92,27 @@ def verify_proof(
     fault = out_of_line(robot) or malformed(robot, len(cells), tree)
     if fault:
         return ProofCheck(fault, 0)
+    alone = _by_the_tool(robot, cells, task, tree, tick or (lambda: None))
+    if alone is not None and alone.confirmed:
+        return ProofCheck("", alone.boxes)
     cone = max(min(task.cone_chord, 1.0), NARROWEST)
     try:
         parts = cells.surface.parts(FINE * task.effective_tolerance, FINE * cone)
     except SurfaceError as error:
         return ProofCheck(f"the surface has no bounds to prove anything with: {error}", 0)
     return verify_on(robot, cells, task, tree, parts, tick, most)
+
+
+def _by_the_tool(
+    robot: Robot, cells: Cells, task: Task, tree: CutTree, tick: Callable[[], object]
+) -> PoseCheck | None:
+    """Does the tool collide in every pose over the one cell that a tree is about?"""
+    bodies = gather(robot, cells.surface, task.collision, task.standoff)
+    if bodies is None or not isinstance(tree.root, Leaf):
+        return None
+    targets, cell = task.targets(cells), tree.root.cell
+    target = targets.points[cell], targets.approaches[cell]
+    return never_clear(robot, bodies, task.cone, task.effective_tolerance, *target, tick)
 
 
 def verify_on(

@@ -25,6 +25,7 @@ from feasibility.roadmap import (
     warm_up,
 )
 from feasibility.roadmap.causes import causes_of, diagnose, disconnected
+from feasibility.roadmap.tool_alone import tool_alone_of
 from feasibility.search import Progress, Search
 from feasibility.targets import blocked_curves
 from feasibility.task import Task
@@ -168,7 +169,8 @@ def _searched(
     """The search with all components that it found, a bound, and whether it ran to its end."""
     with clock.enforced():
         arrays = arrays_of(robot, cells, task)
-    exploration = Exploration(robot, cells, arrays, seed, clock)
+    alone = tool_alone_of(robot, cells.surface, task)
+    exploration = Exploration(robot, cells, arrays, seed, clock, alone)
     ended, apart = True, ProvedBound(min(1, len(cells)))
     try:
         explore(exploration)

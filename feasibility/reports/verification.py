@@ -101,7 +101,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     rows += [("certificate" if found.holds else "measured", _measured(found))]
     if found.proof is not None and found.holds:
         boxes = "1 box" if found.boxes == 1 else f"{found.boxes:,} boxes"
-        rows.append(("checked", f"{boxes} of joints and surface"))
+        rows.append(("checked", boxes))
     rows += [("note", note) for note in notes]
     said = f"{head}: {WORDS[found.claim][not found.holds]}."
     return "\n".join(summary(said, rows, found.task.collision))

@@ -25,6 +25,7 @@ from feasibility.roadmap.outcome import (
 )
 from feasibility.roadmap.proving import Proving
 from feasibility.roadmap.search import close, explore
+from feasibility.roadmap.tool_alone import tool_alone_of
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
@@ -57,7 +58,8 @@ def complete_search(
     clock.start()
     with clock.enforced():
         arrays = arrays_of(problem.robot, problem.cells, problem.searched)
-    exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock)
+    alone = tool_alone_of(problem.robot, problem.cells.surface, problem.task)
+    exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock, alone)
     proving = Proving(exploration, problem.task)
     in_time, known = True, None
     try:

@@ -29,6 +29,7 @@ from feasibility.roadmap.graph import (
     root_of,
 )
 from feasibility.roadmap.seeding import seed_cell
+from feasibility.roadmap.tool_alone import Blocking, ToolAlone
 from robots import Robot
 from surfaces import Cells, components
 
@@ -47,10 +48,14 @@ class Exploration:
     arrays: SearchArrays
     seed: int
     clock: Clock = field(default_factory=Clock)
+    tool_alone: ToolAlone | None = None
+    """What the tool may hit by itself; None where that is not looked into."""
     work: Work = field(init=False)
     roadmap: Roadmap = field(init=False)
     rulings: dict[int, Ruling] = field(default_factory=dict)
     """Outcomes of branch and bound, by cell."""
+    blocking: dict[int, Blocking | None] = field(default_factory=dict)
+    """What keeps the tool from a cell in every pose, None where that is not proved, by cell."""
     boxes: int = 0
     rounds: int = 0
     stopped: bool = False
@@ -292,6 +297,18 @@ class Exploration:
         inside = self.covers(component)
         owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
         return np.unique(owners[inside[owners] & ~inside[self.indices]])
+
+    def blocked(self, cell: int) -> bool:
+        """Is it proved that the tool collides over a cell, however it is brought there?"""
+        if self.tool_alone is None:
+            return False
+        if cell not in self.blocking:
+            place = self.arrays.points[cell], self.arrays.approaches[cell]
+            self.blocking[cell] = self.tool_alone.blocking(*place)
+        if self.blocking[cell] is None:
+            return False
+        self.rulings[cell] = Ruling.PROVED
+        return True
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds becomes a seed."""

@@ -30,9 +30,16 @@ def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
             f"{sentence(proof, problem.robot, problem.cells)} ({proving.boxes} boxes); {best}."
         )
     proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
+    blocked = [found for found in exploration.blocking.values() if found is not None]
+    how = [f"reach bound and branch and bound, {exploration.boxes} boxes"]
+    if blocked:
+        boxes = sum(found.boxes for found in blocked)
+        over = "there" if proved == len(blocked) else f"over {len(blocked)} of them"
+        alone = f"the tool collides {over} in every pose, {boxes} boxes of tilt and roll"
+        how = [alone] if proved == len(blocked) else [*how, alone]
     return (
         f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {problem.within} "
-        f"(reach bound and branch and bound, {exploration.boxes} boxes); {best}."
+        f"({'; '.join(how)}); {best}."
     )
 
 

@@ -5,7 +5,8 @@ In this order, because each step is much cheaper than the next:
 1. Seed a pivot cell in the middle, and spread each seed at once into the cells that its component
    does not cover yet. Most feasible cases end here.
 2. Branch and bound over every cell that no component has reached: it either proves that no
-   configuration covers the cell, or finds one (which becomes a seed).
+   configuration covers the cell, or finds one (which becomes a seed). Before that, whether the tool
+   collides over the cell in every pose, whatever the arm does.
 3. Rounds: seed cells that the best component misses; explore self-motions at the border of the
    largest components, to find configurations that reach further; bridge two components, and explore
    self-motions over cells that both cover. The search is exhausted when some rounds in a row have
@@ -93,6 +94,8 @@ def _unreached(exploration: Exploration) -> None:
         fruitless += 1
         if fruitless > MOST_RULED:
             break
+        if exploration.blocked(cell):
+            continue
         boxes = root_box(exploration.arrays)
         if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
             if exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS)) == 0:

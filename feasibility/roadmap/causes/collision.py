@@ -50,6 +50,24 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
     return _worded(cell, np.array(spare), best, pairs)
 
 
+def blocked(exploration: Exploration, cell: int) -> Cause | None:
+    """The cause of a cell over which the tool is proved to collide in every pose; or None."""
+    found = exploration.blocking.get(cell)
+    if found is None:
+        return None
+    pairs = [f"{first} and {second}" for first, second in found.pairs]
+    one = f"{pairs[0]} collide"
+    if len(pairs) > 1:
+        one = f"one of these pairs collides: {', '.join(pairs)}"
+    near = f"{abs(1e3 * found.distance):.1f} mm"
+    how = f"overlap by {near}" if found.distance < 0.0 else f"are {near} apart"
+    detail = (
+        f"in every pose of the tool there that cone and tolerance allow, {one}; at best "
+        f"{pairs[0]} {how} or so"
+    )
+    return Cause(cell, CauseKind.COLLISION, True, detail, found.pairs[0], found.distance)
+
+
 def _worded(
     cell: int, spare: NDArray[np.float64], best: NDArray[np.float64], pairs: tuple[Pair, ...]
 ) -> Cause:

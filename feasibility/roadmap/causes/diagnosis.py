@@ -31,7 +31,7 @@ from feasibility.roadmap.arrays import (
     place,
 )
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.causes.collision import colliding
+from feasibility.roadmap.causes.collision import blocked, colliding
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
@@ -215,9 +215,10 @@ def diagnose(exploration: Exploration, cell: int) -> Cause:
         cell: a cell that no component covers.
 
     Returns:
-        The cause; proved where branch and bound or the reach bound ruled the cell out.
+        The cause; proved where branch and bound or the reach bound ruled the cell out, or the tool
+        collides in every pose over it.
     """
-    cause = _cause(exploration, cell)
+    cause = blocked(exploration, cell) or _cause(exploration, cell)
     settled = cause.proved or cause.kind is CauseKind.DISCONNECTED
     if settled or not exploration.arrays.cone_chord > 0.0:
         return cause

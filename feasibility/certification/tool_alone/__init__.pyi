@@ -1,0 +1,2 @@
+from .every_pose import PoseCheck as PoseCheck
+from .every_pose import never_clear as never_clear

@@ -1,0 +1,258 @@
+"""Does the tool collide in every pose over a cell? Branch and bound over tilt and roll.
+
+Over a cell the tool has three free numbers: two of the tilt w, a rotation vector across the
+approach direction with |w| inside the cone, and the roll about that direction. The tool point is
+within the tolerance of its target. A ball inside the tool, with its centre c from the tool point
+and at a distance of a from the tool axis, is moved by a change of the pose by no more than
+
+    |c| |dw| + a |d roll| + tolerance.
+
+So a box of (w, roll) holds no pose that is clear if at its middle the signed distance of a centre
+from a body at rest, less the ball's radius, is below the clearance by more than that. What the arm
+does to bring the tool there, and whether it can, does not matter.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.collisions import Bodies, Pair, gather
+from feasibility.roadmap.tool_alone.balls_inside import balls_inside
+from feasibility.roadmap.tool_alone.distances import (
+    Distance,
+    distance_from,
+    distance_from_triangles,
+)
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Surface
+
+Array = NDArray[np.float64]
+
+MOST_BOXES = 4_000  # of one cell
+ALL_BOXES = 20_000  # of all cells of one search
+SURE = 1e-6  # [m] deeper than needed
+POSES = 12  # directions of tilt, and rolls, that a distance is measured in
+
+
+class Blocking(NamedTuple):
+    """What keeps the tool from a cell in every pose."""
+
+    pairs: tuple[tuple[str, str], ...]
+    """In every pose one of them collides; the first is that of `distance`."""
+    distance: float
+    """m, of that pair in the pose with most room among some all over the cone; negative where they
+    overlap."""
+    boxes: int
+    """How many were looked at."""
+
+
+class _Held(NamedTuple):
+    """Balls of the tool against a body at rest."""
+
+    pair: Pair
+    distance: Distance
+    centres: Array
+    """(k, 3) m, from the tool point, in the frame of the last joint."""
+    radii: Array
+    """(k,) m."""
+
+
+class _Measured(NamedTuple):
+    """Of k boxes and all E balls of all pairs, m."""
+
+    spare: Array
+    """(k, E) distance beyond the clearance at the middle of a box, at most."""
+    by_tilt: Array
+    """(k, E) how far a ball is moved within a box by tilting."""
+    by_roll: Array
+    """(k, E) the same by rolling."""
+
+
+class ToolAlone:
+    """What the tool may hit by itself, of one problem.
+
+    Pairs that are left out are not used, nor is anything that another joint moves.
+    """
+
+    def __init__(self, robot: Robot, bodies: Bodies, cone: float, tolerance: float) -> None:
+        """Ask nothing yet.
+
+        Args:
+            robot: the arm.
+            bodies: everything that can collide, and the pairs that are asked for.
+            cone: rad, largest angle between tool axis and approach direction.
+            tolerance: m, of the tool point.
+        """
+        self._tool, self._bodies = robot.model.frames[robot.tool_frame_id], bodies
+        self._axis: Array = self._tool.placement.rotation @ robot.approach_axis
+        self._cone, self._tolerance = min(cone, np.pi), tolerance
+        self._left = ALL_BOXES
+
+    @cached_property
+    def _held(self) -> list[_Held]:
+        """Balls in what moves with the tool, against all that is at rest."""
+        bodies = self._bodies
+        carrier, tip = int(self._tool.parentJoint), self._tool.placement.translation
+        moved, still = dict[str, list[Array]](), dict[str, list[Distance]]()
+        for solid in bodies.solids:
+            place = solid.placement
+            if solid.joint == carrier:
+                balls = balls_inside(solid.geometry)
+                balls[:, :3] = balls[:, :3] @ place[:3, :3].T + place[:3, 3] - tip
+                moved.setdefault(solid.owner, []).append(balls)
+            elif solid.joint == 0:
+                still.setdefault(solid.owner, []).append(distance_from(solid.geometry, place))
+        for thing in bodies.scene:
+            still[thing.name] = [distance_from(thing.geometry, thing.placement)]
+        for soup in bodies.soups:
+            if soup.owner not in still:
+                sheet = distance_from_triangles(soup.triangles, soup.deviation)
+                still[soup.owner] = [sheet]
+        held: list[_Held] = []
+        for pair in bodies.pairs:
+            names = (pair.first, pair.second)
+            tool, rest = names if pair.first in moved else names[::-1]
+            if tool in moved and rest in still:
+                balls = np.concatenate(moved[tool])
+                held += [_Held(pair, d, balls[:, :3], balls[:, 3]) for d in still[rest]]
+        return held
+
+    def blocking(self, point: Array, approach: Array) -> Blocking | None:
+        """What keeps the tool from a target in every pose; None where that is not proved.
+
+        Args:
+            point: (3,) m, the target of the tool point.
+            approach: (3,) unit vector, the approach direction there.
+        """
+        boxes = np.array([[0.0, 0.0, self._cone, 0.0, np.pi]])  # w_1, w_2, half, roll, half
+        frame = _Frame(self._axis, approach)
+        held = self._near(boxes, point, frame)
+        if not held:
+            return None
+        owners = np.repeat(np.arange(len(held)), [len(one.radii) for one in held])
+        used, looked = set[int](), 0
+        while len(boxes):
+            looked += len(boxes)
+            self._left -= len(boxes)
+            if looked > MOST_BOXES or self._left < 0:
+                return None
+            found = self._measured(boxes, held, point, frame)
+            rows = np.arange(len(boxes))
+            inside = np.hypot(boxes[:, 0], boxes[:, 1]) <= self._cone
+            if (inside & (found.spare.min(axis=1) + self._tolerance >= 0.0)).any():
+                return None  # nothing speaks against this pose, nor will it in smaller boxes
+            deep = np.maximum(-found.spare - self._tolerance - SURE, 0.0)
+            moved = found.by_tilt + found.by_roll
+            # By which ball a box is, or will be, ruled out: it tells how the box is to be cut.
+            times = np.where(deep > 0.0, moved / np.maximum(deep, SURE), np.inf)
+            best = times.argmin(axis=1)
+            left = moved[rows, best] >= deep[rows, best]
+            used |= set(owners[best[~left]].tolist())
+            tilts = (found.by_tilt >= found.by_roll)[rows, best]
+            boxes = _parts(boxes[left], tilts[left], self._cone)
+        some = self._measured(_all_over(self._cone), held, point, frame).spare
+        best = int(some.min(axis=1).argmax())
+        first = int(owners[some[best].argmin()])
+        pairs = [held[k].pair for k in (first, *sorted(used))]
+        named = dict.fromkeys((pair.first, pair.second) for pair in pairs)
+        return Blocking(tuple(named), float(some[best].min()) + pairs[0].clearance, looked)
+
+    def _near(self, root: Array, point: Array, frame: _Frame) -> list[_Held]:
+        """The balls that collide in some pose, as far as can be told from the whole box."""
+        found = self._measured(root, self._held, point, frame) if self._held else None
+        if found is None:
+            return []
+        close = (found.spare - found.by_tilt - found.by_roll)[0] < 0.0
+        parts = np.split(close, np.cumsum([len(one.radii) for one in self._held])[:-1])
+        return [
+            one._replace(centres=one.centres[some], radii=one.radii[some])
+            for one, some in zip(self._held, parts, strict=True)
+            if some.any()
+        ]
+
+    def _measured(self, boxes: Array, held: list[_Held], point: Array, frame: _Frame) -> _Measured:
+        """Distances at the middles of boxes (k, 5), and how far balls are moved within them."""
+        turns = frame.rotations(boxes)
+        spare, reach, aside = [], [], []
+        for one in held:
+            places = point + np.einsum("kij,bj->kbi", turns, one.centres)
+            spare.append(one.distance(places) - one.radii - one.pair.clearance)
+            reach.append(np.linalg.norm(one.centres, axis=1))
+            across = one.centres - np.outer(one.centres @ self._axis, self._axis)
+            aside.append(np.linalg.norm(across, axis=1))
+        return _Measured(
+            np.concatenate(spare, axis=1),
+            np.outer(np.sqrt(2.0) * boxes[:, 2], np.concatenate(reach)),
+            np.outer(boxes[:, 4], np.concatenate(aside)),
+        )
+
+
+def tool_alone_of(robot: Robot, surface: Surface, task: Task) -> ToolAlone | None:
+    """What the tool may hit by itself; None where collisions are not checked."""
+    bodies = gather(robot, surface, task.collision, task.standoff)
+    if bodies is None:
+        return None
+    return ToolAlone(robot, bodies, task.cone, task.effective_tolerance)
+
+
+class _Frame:
+    """Rotations of the last joint's frame over a target, by tilt and roll."""
+
+    def __init__(self, axis: Array, approach: Array) -> None:
+        """From the tool axis in the joint's frame to the approach direction."""
+        from scipy.spatial.transform import Rotation
+
+        self._rotation, self._approach = Rotation, approach
+        start, end = (np.column_stack([one, *_across(one)]) for one in (axis, approach))
+        self._plane = end[:, 1:].T
+        self._onto = Rotation.from_matrix(end @ start.T)
+
+    def rotations(self, boxes: Array) -> Array:
+        """(k, 3, 3) at the middles of boxes."""
+        tilts = self._rotation.from_rotvec(boxes[:, :2] @ self._plane)
+        rolls = self._rotation.from_rotvec(boxes[:, 3:4] * self._approach)
+        return np.asarray((tilts * rolls * self._onto).as_matrix())
+
+
+def _across(direction: Array) -> tuple[Array, Array]:
+    """Two unit vectors across a direction and each other, right-handed."""
+    first = np.cross(direction, np.eye(3)[int(np.argmin(np.abs(direction)))])
+    first /= np.linalg.norm(first)
+    return first, np.cross(direction, first)
+
+
+def _all_over(cone: float) -> Array:
+    """(k, 5) poses all over the cone, as boxes of no size."""
+    ways, turns = (2.0 * np.pi * np.arange(POSES) / POSES for _ in range(2))
+    tilts = [np.zeros((1, 2))]
+    tilts += [share * cone * np.column_stack([np.cos(ways), np.sin(ways)]) for share in (0.5, 1.0)]
+    both = np.concatenate(tilts)
+    poses = np.zeros((len(both) * POSES, 5))
+    poses[:, :2], poses[:, 3] = np.repeat(both, POSES, axis=0), np.tile(turns, len(both))
+    return poses
+
+
+def _parts(boxes: Array, tilts: NDArray[np.bool_], cone: float) -> Array:
+    """Boxes cut into four along the tilt where `tilts`, else into halves along the roll.
+
+    Parts wholly outside the cone are left out.
+    """
+    found = []
+    for signs in ((-0.5, -0.5), (-0.5, 0.5), (0.5, -0.5), (0.5, 0.5)):
+        part = boxes[tilts]
+        part[:, :2] += np.array(signs) * part[:, 2:3]
+        part[:, 2] *= 0.5
+        found.append(part)
+    for sign in (-0.5, 0.5):
+        part = boxes[~tilts]
+        part[:, 3] += sign * part[:, 4]
+        part[:, 4] *= 0.5
+        found.append(part)
+    cut = np.concatenate(found)
+    nearest = np.maximum(np.abs(cut[:, :2]) - cut[:, 2:3], 0.0)
+    return np.asarray(cut[np.hypot(nearest[:, 0], nearest[:, 1]) <= cone])
