@@ -39,6 +39,7 @@ surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
 surfaces: sheet tiles
+surfaces.passes
 surfaces.places
 feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only roll safe_files search version
 feasibility.collisions

@@ -1,0 +1,344 @@
+"""Parallel passes over a surface, at a stated distance from one another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from coverable_errors import ArgumentError, Checks
+from surfaces.passes.first_pass import Field, distance_field, plane_field
+from surfaces.passes.holes import Lidded, with_lids
+from surfaces.passes.levels import Line, level_lines
+from surfaces.passes.net import WorkingMesh
+from surfaces.passes.working_mesh import working_mesh
+from surfaces.patches import Patch
+from surfaces.protected import Protected
+from surfaces.surface import Surface
+
+Floats = NDArray[np.float64]
+
+By = Literal["distance", "planes", "parameters"]
+BYS: tuple[By, ...] = ("distance", "planes", "parameters")
+EDGES_PER_PITCH = 4.0  # how fine distances are measured
+POINTS_PER_PITCH = 4.0  # how close the points of a pass are, unless it is said
+SHORTEST = 0.5  # [1] of the pitch: shorter pieces are dropped, unless it is said
+KINK = 0.9  # [1] a distance that grows more slowly than this across a face has a ridge there
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Pass(Protected):
+    """One stretch of a pass that the tool can run without leaving the surface."""
+
+    level: int
+    """Which pass it belongs to, counted across the surface from 0."""
+    points: Floats
+    """(k, 3) m, in the root frame; on the surface, but for the overrun."""
+    normals: Floats
+    """(k, 3) outward unit normals; along the overrun those at the border."""
+    on_surface: NDArray[np.bool_]
+    """(k,) False along the overrun."""
+    closed: bool
+    """True where it ends where it begins."""
+
+    @property
+    def length(self) -> float:
+        """m."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Passes:
+    """Passes over a surface, in the order and the directions in which they are to be run."""
+
+    surface: Surface
+    stretches: tuple[Pass, ...]
+    pitch: float
+    """m, what was asked for."""
+    spacing: float
+    """m, the distance between passes: the pitch, or less, so that they are evenly spread."""
+    by: By
+    widest: float
+    """m, the largest distance between neighbouring passes, on the surface: for `distance` the
+    spacing, for planes and parameters more where the surface slopes away from them."""
+    dropped: float
+    """m, total length of stretches that were too short to run."""
+    notes: tuple[str, ...]
+    """What a user should know: holes, kinks, one sentence each."""
+
+    @property
+    def count(self) -> int:
+        """How many passes there are; one that a hole parts in two counts once."""
+        return len({each.level for each in self.stretches})
+
+    @property
+    def length(self) -> float:
+        """m, of all passes together, overrun included."""
+        return sum(each.length for each in self.stretches)
+
+
+def parallel_passes(
+    surface: Surface,
+    pitch: float,
+    direction: float | ArrayLike = 0.0,
+    *,
+    by: By = "distance",
+    overrun: float = 0.0,
+    step: float | None = None,
+    shortest: float | None = None,
+    one_way: bool = False,
+) -> Passes:
+    """Lay parallel passes over a surface.
+
+    By `distance`, every point of a pass has its neighbour at the spacing, measured on the surface
+    (Atkar et al., "Uniform coverage of automotive surface patches", 2005). Section `planes` keep it
+    along straight lines in space, so the passes are further apart where the surface slopes;
+    `parameters` are lines of constant u or v.
+
+    Args:
+        surface: what is to be covered.
+        pitch: m > 0, the largest distance between passes.
+        direction: of the passes at the middle of the surface: an angle (rad) in the surface, from
+            the u direction of a patch or the projected x axis of a mesh's frame, counterclockwise
+            seen from outside; or a vector (3,) in the root frame, which is projected. With
+            `parameters`, 0 runs along u and pi / 2 along v.
+        by: how distance is measured.
+        overrun: m >= 0, by how much passes go on straight beyond the border.
+        step: m > 0 between points of a pass; a quarter of the pitch by default.
+        shortest: m >= 0, stretches shorter than this are dropped; half of the pitch by default.
+        one_way: run all passes in the same direction, and not to and fro.
+
+    Raises:
+        ArgumentError: a number is out of its range, the direction is along the normal, or
+            `parameters` are asked for where there are none.
+        SurfaceError: no passes can be laid over a surface of this kind.
+
+    Example:
+        >>> from surfaces import plane
+        >>> from surfaces.passes import parallel_passes
+        >>> found = parallel_passes(plane((0, 0.6), (0, 0.4)), 0.03)
+        >>> found.count, round(found.spacing, 6), round(found.length, 3)
+        (14, 0.028571, 8.4)
+    """
+    checks = Checks("passes")
+    checks.positive("pitch", pitch, "metres")
+    checks.number("overrun", overrun, "must be a finite number >= 0 (metres)", low=0.0)
+    if step is not None:
+        checks.positive("step", step, "metres")
+    if shortest is not None:
+        checks.number("shortest", shortest, "must be a finite number >= 0 (metres)", low=0.0)
+    checks.choice("by", by, BYS)
+    checks.done()
+    edge = pitch / EDGES_PER_PITCH
+    lidded = with_lids(working_mesh(surface, edge), edge)
+    field = _field(surface, lidded, direction, by)
+    own = field.parent < lidded.faces
+    levels, spacing = _levels(field, own, pitch)
+    kept = SHORTEST * pitch if shortest is None else shortest
+    lines, dropped = list[LevelLine](), 0.0
+    for each in _lines(field, own, levels):
+        if each.line.length >= kept:
+            lines.append(each)
+        else:
+            dropped += each.line.length
+    apart = step or pitch / POINTS_PER_PITCH
+    slopes = field.slopes[np.concatenate([np.zeros(0, int), *(each.line.faces for each in lines)])]
+    return Passes(
+        surface=surface,
+        stretches=tuple(
+            _stretch(surface, each, apart, overrun) for each in _in_order(lines, one_way)
+        ),
+        pitch=float(pitch),
+        spacing=spacing,
+        by=by,
+        widest=spacing if by == "distance" else spacing / max(slopes.min(initial=1.0), 1e-9),
+        dropped=dropped,
+        notes=_notes(lidded.holes, lines, field, by),
+    )
+
+
+def _field(surface: Surface, lidded: Lidded, direction: float | ArrayLike, by: By) -> Field:
+    """What the passes are the level lines of."""
+    mesh = lidded.mesh
+    own = WorkingMesh(mesh.vertices, mesh.faces[: lidded.faces])
+    centres = mesh.vertices[own.faces].mean(axis=1)
+    mean = np.average(centres, axis=0, weights=own.areas)
+    middle = centres[np.linalg.norm(centres - mean, axis=1).argmin()]
+    normal = surface.closest(middle).normal
+    along = _along(surface, middle, normal, direction)
+    if by == "parameters":
+        return _parameter_field(surface, mesh, along, middle)
+    across = np.cross(normal, along)
+    return (distance_field if by == "distance" else plane_field)(mesh, middle, across)
+
+
+def _along(
+    surface: Surface, middle: Floats, normal: Floats, direction: float | ArrayLike
+) -> Floats:
+    """(3,) unit, the direction of the passes at the middle, in the tangent plane."""
+    if np.ndim(direction) == 0:
+        angle = float(np.asarray(direction, dtype=float))
+        if not math.isfinite(angle):
+            raise ArgumentError(f"direction: must be a finite angle (rad), got {direction!r}")
+        u = _u_direction(surface, middle, normal)
+        return np.asarray(math.cos(angle) * u + math.sin(angle) * np.cross(normal, u))
+    vector = np.asarray(direction, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise ArgumentError(
+            f"direction: must be an angle (rad) or a vector (x, y, z), got {direction!r:.60}"
+        )
+    flat = vector - (vector @ normal) * normal
+    if not np.linalg.norm(flat) > 1e-6 * np.linalg.norm(vector):
+        raise ArgumentError(
+            f"direction: {vector.tolist()} is along the surface's normal at its middle, "
+            f"{np.round(normal, 3).tolist()}; take a direction in the surface"
+        )
+    return np.asarray(flat / np.linalg.norm(flat))
+
+
+def _u_direction(surface: Surface, middle: Floats, normal: Floats) -> Floats:
+    """(3,) unit, what an angle of 0 means at the middle of the surface."""
+    if isinstance(surface, Patch):
+        at = surface.closest(middle)
+        found = surface.tangent(at.u, at.v)
+        if np.linalg.norm(found) > 0.5:
+            return np.asarray(found)
+    for axis in surface.rotation.T:
+        flat = axis - (axis @ normal) * normal
+        if np.linalg.norm(flat) > 0.1:
+            break
+    return np.asarray(flat / np.linalg.norm(flat))
+
+
+def _parameter_field(surface: Surface, mesh: WorkingMesh, along: Floats, middle: Floats) -> Field:
+    """The parameter that is constant along the passes, as metres across them at the widest."""
+    if not isinstance(surface, Patch):
+        raise ArgumentError(
+            f"by: a surface of kind {surface.kind!r} has no lines of constant parameters; take "
+            "'distance' or 'planes'"
+        )
+    at, here = surface.closest(mesh.vertices), surface.closest(middle)
+    runs_along_u = abs(float(along @ surface.tangent(here.u, here.v))) > math.sqrt(0.5)
+    low, high = surface.v_range if runs_along_u else surface.u_range
+    values = ((at.v if runs_along_u else at.u) - low) / (high - low)
+    field = Field(mesh, values, np.arange(len(mesh.faces)))
+    slopes = field.slopes[~field.torn]
+    width = 1.0 / float(slopes[slopes > 0.0].min())
+    return field._replace(values=width * values, extent=(0.0, width))
+
+
+def _levels(field: Field, own: NDArray[np.bool_], pitch: float) -> tuple[Floats, float]:
+    """Where the passes are, and the spacing (m): half of it at both ends, never over the pitch."""
+    values = field.values[field.mesh.faces[own]]
+    low, high = field.extent or (float(values.min()), float(values.max()))
+    count = max(1, math.ceil((high - low) / pitch - 1e-9))
+    spacing = min((high - low) / count, pitch)
+    return np.asarray(low + (np.arange(count) + 0.5) * spacing, dtype=float), spacing
+
+
+class LevelLine(NamedTuple):
+    """A line with the number of its level."""
+
+    level: int
+    line: Line
+
+
+def _lines(field: Field, own: NDArray[np.bool_], levels: Floats) -> Iterator[LevelLine]:
+    """Lines of each level, cut where they run over a lid."""
+    whole = ~field.torn
+    for number, level in enumerate(levels.tolist()):
+        for line in level_lines(field.mesh, field.values, level, whole):
+            for part in _parts(line, own[line.faces]):
+                yield LevelLine(number, part)
+
+
+def _parts(line: Line, own: NDArray[np.bool_]) -> Iterator[Line]:
+    """The parts of a line that run over the surface's own faces."""
+    if own.all():
+        yield line
+        return
+    points, faces = line.points, line.faces
+    if line.closed:  # begin at a lid, so that no part is cut at the line's first point
+        turn = int(np.flatnonzero(~own)[0])
+        points = np.roll(points, -turn, axis=0)
+        points = np.concatenate([points, points[:1]])
+        faces, own = np.roll(faces, -turn), np.roll(own, -turn)
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], own.astype(np.int8), [0]])))
+    for start, end in ends.reshape(-1, 2):
+        yield Line(points[start : end + 1], faces[start:end], closed=False)
+
+
+def _in_order(lines: list[LevelLine], one_way: bool) -> Iterator[LevelLine]:
+    """The lines as they are to be run: level after level, every other level turned round.
+
+    Within a level each line begins nearest to where the one before it ended; those that a hole
+    parts follow one another as they lie on their line.
+    """
+    levels: dict[int, list[Line]] = {}
+    for level, line in lines:
+        levels.setdefault(level, []).append(line)
+    here: Floats | None = None
+    for number, level in enumerate(sorted(levels)):
+        row = levels[level]
+        if number % 2 and not one_way:
+            row = [line.reversed() for line in reversed(row)]
+        while row:
+            nearest = 0
+            if here is not None:
+                away = [float(np.linalg.norm(line.points[0] - here)) for line in row]
+                nearest = int(np.argmin(away))
+            line = row.pop(nearest)
+            here = line.points[-1]
+            yield LevelLine(level, line)
+
+
+def _stretch(surface: Surface, each: LevelLine, step: float, overrun: float) -> Pass:
+    """A line with its points evenly apart, on the surface itself, and its overrun."""
+    line = each.line
+    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    count = max(1, math.ceil(along[-1] / step - 1e-9))
+    wanted = np.linspace(0.0, along[-1], count + 1)
+    even = np.column_stack([np.interp(wanted, along, points[:, k]) for k in range(3)])
+    at = surface.closest(even)
+    on, normals = even - at.height[:, None] * at.normal, at.normal
+    inside = np.ones(len(on), dtype=bool)
+    if overrun > 0.0 and not line.closed and len(on) > 1:
+        extra = np.arange(1, max(1, math.ceil(overrun / step - 1e-9)) + 1)
+        reach = overrun * extra / extra[-1]
+        before, after = (
+            _beyond(on[i], on[i] - on[j], normals[i], reach) for i, j in ((0, 1), (-1, -2))
+        )
+        on = np.concatenate([before[::-1], on, after])
+        ends = np.repeat(normals[[0, -1]], len(extra), axis=0)
+        normals = np.concatenate([ends[: len(extra)], normals, ends[len(extra) :]])
+        inside = np.pad(inside, len(extra))
+    return Pass(each.level, on, normals, inside, line.closed)
+
+
+def _beyond(end: Floats, heading: Floats, normal: Floats, reach: Floats) -> Floats:
+    """(k, 3) m, points straight on from an end in its tangent plane, at distances (k,) from it."""
+    flat = heading - (heading @ normal) * normal
+    return np.asarray(end + reach[:, None] * flat / max(float(np.linalg.norm(flat)), 1e-300))
+
+
+def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[str, ...]:
+    """What to know about the passes."""
+    notes = []
+    if holes:
+        notes.append(f"{holes} hole{'s' * (holes > 1)} parted passes; the tool must lift there")
+    if by != "distance" or not lines:
+        return tuple(notes)
+    slopes = field.slopes
+    length = sum(float(line.pieces[slopes[line.faces] < KINK].sum()) for _, line in lines)
+    total = sum(line.length for _, line in lines)
+    if length > 0.005 * total:
+        notes.append(
+            f"passes have kinks over {100.0 * length / total:.1f} % of their length, where ways "
+            "to the first pass from two sides meet; another direction may have none"
+        )
+    return tuple(notes)

@@ -1,0 +1,238 @@
+"""A surface of any kind as one connected net of triangles, fine enough to measure distances on.
+
+Patches are cut along their parameters, the pieces of a piecewise surface are sewn along their
+seams, and a mesh is taken as it is, its large triangles cut. Every vertex lies on the surface.
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.meshes import MeshSurface
+from surfaces.passes.edge_flips import delaunay
+from surfaces.passes.net import WorkingMesh
+from surfaces.patches import Patch
+from surfaces.piecewise import Piecewise
+from surfaces.surface import Surface, SurfaceError
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+MOST_FACES = 2_000_000
+SAMPLES = 65  # along each parameter, to see how long its lines are
+WELDED = 1e-9  # [1] of the surface's extent: vertices nearer to each other are one
+
+
+def working_mesh(surface: Surface, edge: float) -> WorkingMesh:
+    """The surface as triangles with edges of at most about `edge` m.
+
+    Args:
+        surface: a patch, a piecewise surface or a mesh.
+        edge: m > 0.
+
+    Raises:
+        SurfaceError: the kind is another, or it would take more than `MOST_FACES` triangles.
+    """
+    if isinstance(surface, MeshSurface):
+        placed = surface.mesh.vertices @ surface.rotation.T + surface.position
+        return _divided(WorkingMesh(placed, surface.mesh.faces), edge)
+    if isinstance(surface, Patch):
+        return _welded(_grid(surface, edge, 1.0), 0.0)
+    if isinstance(surface, Piecewise):
+        pieces = zip(surface.placed, surface.signs, strict=True)
+        joined = _joined([_grid(patch, edge, sign) for patch, sign in pieces])
+        return _sewn(joined, surface.gap)
+    raise SurfaceError("no passes can be laid over a surface of this kind", surface.kind)
+
+
+def _grid(patch: Patch, edge: float, sign: float) -> WorkingMesh:
+    """A patch cut along its parameters; sign -1.0 turns the faces over."""
+    (u0, u1), (v0, v1) = patch.u_range, patch.v_range
+    u, v = np.meshgrid(np.linspace(u0, u1, SAMPLES), np.linspace(v0, v1, SAMPLES), indexing="ij")
+    points = patch.point(u, v)
+    nu, nv = (
+        max(
+            2,
+            math.ceil(
+                np.linalg.norm(np.diff(points, axis=axis), axis=2).sum(axis=axis).max() / edge
+            ),
+        )
+        for axis in (0, 1)
+    )
+    if 2 * nu * nv > MOST_FACES:
+        raise SurfaceError(
+            f"edges of {1e3 * edge:.3g} mm make {2 * nu * nv} triangles of it, more than "
+            f"{MOST_FACES}; take a larger pitch",
+            patch.kind,
+        )
+    u, v = np.meshgrid(np.linspace(u0, u1, nu + 1), np.linspace(v0, v1, nv + 1), indexing="ij")
+    vertices = patch.point(u, v).reshape(-1, 3)
+    corner = np.arange((nu + 1) * (nv + 1)).reshape(nu + 1, nv + 1)
+    a, b, c, d = (
+        part.ravel()
+        for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
+    )
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    first = vertices[faces[: len(a)]]
+    middle = first.mean(axis=1)
+    normal = np.cross(first[:, 1] - first[:, 0], first[:, 2] - first[:, 0])
+    outward = (normal * patch.closest(middle).normal).sum() * sign
+    return WorkingMesh(vertices, faces if outward >= 0.0 else faces[:, ::-1].copy())
+
+
+def _joined(meshes: list[WorkingMesh]) -> WorkingMesh:
+    """Several meshes as one, their vertices apart."""
+    first = np.cumsum([0, *(len(each.vertices) for each in meshes)])
+    faces = [each.faces + start for each, start in zip(meshes, first, strict=False)]
+    return WorkingMesh(np.concatenate([each.vertices for each in meshes]), np.concatenate(faces))
+
+
+def _welded(mesh: WorkingMesh, gap: float) -> WorkingMesh:
+    """Vertices within `gap` (m) of one another made one: closed ends, poles, seams."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    vertices = mesh.vertices
+    near = max(gap, WELDED * float(np.ptp(vertices, axis=0).max(initial=0.0)))
+    pairs = KDTree(vertices).query_pairs(near, output_type="ndarray")
+    count = len(vertices)
+    joined = coo_array((np.ones(len(pairs), bool), pairs.T.reshape(2, -1)), shape=(count, count))
+    number = connected_components(joined, directed=False)[1]
+    _, kept, of = np.unique(number, return_index=True, return_inverse=True)
+    faces = of[mesh.faces].astype(np.int64)
+    distinct = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    return _used(WorkingMesh(vertices[kept], faces[distinct]))
+
+
+def _used(mesh: WorkingMesh) -> WorkingMesh:
+    """Without vertices of no face."""
+    used, faces = np.unique(mesh.faces, return_inverse=True)
+    return WorkingMesh(mesh.vertices[used], faces.reshape(-1, 3).astype(np.int64))
+
+
+def border_edges(faces: Ints) -> Ints:
+    """(B, 2) directed edges, as their faces run along them, that have one face only."""
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    count = int(faces.max(initial=-1)) + 1
+    keys = np.minimum(edges[:, 0], edges[:, 1]) * count + np.maximum(edges[:, 0], edges[:, 1])
+    _, first, uses = np.unique(keys, return_index=True, return_counts=True)
+    return np.asarray(edges[first[uses == 1]])
+
+
+def _sewn(mesh: WorkingMesh, gap: float) -> WorkingMesh:
+    """Pieces joined where their borders touch: vertices of one border are put into the other."""
+    from scipy.spatial import KDTree
+
+    mesh = _welded(mesh, 0.0)
+    edges = border_edges(mesh.faces)
+    on_border = np.unique(edges)
+    tree = KDTree(mesh.vertices[on_border])
+    a, b = mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]]
+    length = np.linalg.norm(b - a, axis=1)
+    # A border that bends lies off the chord of the other by up to a part of the chord's length.
+    slack = np.maximum(gap, 0.02 * length)
+    put = dict[tuple[int, int], list[int]]()
+    around = tree.query_ball_point(0.5 * (a + b), 0.5 * length + slack)
+    for row, some in enumerate(around):
+        ends = edges[row]
+        inner = [int(k) for k in on_border[some] if k not in ends]
+        off = mesh.vertices[inner] - a[row]
+        along = off @ (b[row] - a[row]) / length[row] ** 2
+        away = np.linalg.norm(off - along[:, None] * (b[row] - a[row]), axis=1)
+        between = (along > 0.02) & (along < 0.98) & (away <= slack[row])
+        if between.any():
+            order = np.argsort(along[between])
+            put[int(ends[0]), int(ends[1])] = np.array(inner)[between][order].tolist()
+    return _welded(_with_points_on_edges(mesh, put), max(gap, 0.0))
+
+
+def _with_points_on_edges(mesh: WorkingMesh, put: dict[tuple[int, int], list[int]]) -> WorkingMesh:
+    """Faces cut in fans where further vertices lie on their border edges.
+
+    One side after the other: a fan from the corner opposite to the side has no face without area.
+    """
+    faces = mesh.faces.tolist()
+    waiting = [k for k, face in enumerate(faces) if _first_cut(face, put) is not None]
+    while waiting:
+        face = faces[waiting[-1]]
+        side = _first_cut(face, put)
+        if side is None:
+            waiting.pop()
+            continue
+        a, b, c = face[side:] + face[:side]
+        row = [a, *put[a, b], b]
+        fan = [[p, q, c] for p, q in pairwise(row)]
+        faces[waiting[-1]] = fan[0]
+        waiting += range(len(faces), len(faces) + len(fan) - 1)
+        faces += fan[1:]
+    return WorkingMesh(mesh.vertices, np.array(faces, dtype=np.int64))
+
+
+def _first_cut(face: list[int], put: dict[tuple[int, int], list[int]]) -> int | None:
+    """The first side of a face on which further vertices lie."""
+    return next((k for k in range(3) if (face[k], face[(k + 1) % 3]) in put), None)
+
+
+def _divided(mesh: WorkingMesh, edge: float) -> WorkingMesh:
+    """A mesh whose edges longer than `edge` m are cut, the longest first.
+
+    Flat parts of CAD files come as long thin triangles, of which cutting alone would make far more
+    than their area asks for; between the cuts their edges are flipped (Lawson's).
+    """
+    longest = mesh.longest_edge
+    while longest > edge and 4 * len(mesh.faces) <= MOST_FACES:
+        longest = max(0.5 * longest, edge)
+        mesh = delaunay(_halved(mesh, longest))
+    return mesh
+
+
+def _halved(mesh: WorkingMesh, edge: float) -> WorkingMesh:
+    """Every edge longer than `edge` m cut in its middle, and the faces with it."""
+    faces, vertices = mesh.faces, mesh.vertices
+    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)  # (F, 3, 2)
+    ends = np.sort(sides.reshape(-1, 2), axis=1)
+    edges, of = np.unique(ends, axis=0, return_inverse=True)
+    long = np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1) > edge
+    number = np.full(len(edges), -1, dtype=np.int64)
+    number[long] = len(vertices) + np.arange(int(long.sum()))
+    middles = vertices[edges[long]].mean(axis=1)
+    cut = number[of.reshape(-1, 3)]  # (F, 3) the vertex on each side, -1 for none
+    return WorkingMesh(np.concatenate([vertices, middles]), cut_faces(faces, cut)[0])
+
+
+def cut_faces(faces: Ints, cut: Ints) -> tuple[Ints, Ints]:
+    """Faces (k, 3) cut where `cut` (k, 3) names a vertex on the side from each corner to the next.
+
+    Returns:
+        The triangles (m, 3), and the face (m,) that each is a part of; -1 in `cut` is no vertex.
+    """
+    whole = np.flatnonzero((cut < 0).all(axis=1))
+    made, parents = [faces[whole]], [whole]
+    for pattern in range(1, 8):
+        wanted = np.array([pattern >> k & 1 for k in range(3)], dtype=bool)
+        some = ((cut >= 0) == wanted).all(axis=1)
+        if not some.any():
+            continue
+        f, m = faces[some], cut[some]
+        count = int(wanted.sum())
+        if count == 3:
+            triangles = [
+                (f[:, 0], m[:, 0], m[:, 2]),
+                (m[:, 0], f[:, 1], m[:, 1]),
+                (m[:, 2], m[:, 1], f[:, 2]),
+                (m[:, 0], m[:, 1], m[:, 2]),
+            ]
+        else:
+            # Turned so that the cut sides are the first, or the first two.
+            turn = next(k for k in range(3) if wanted[k] and (count == 1 or wanted[(k + 1) % 3]))
+            a, b, c = (f[:, (turn + k) % 3] for k in range(3))
+            p, q = m[:, turn], m[:, (turn + 1) % 3]
+            triangles = [(a, p, c), (p, b, c)] if count == 1 else [(p, b, q), (a, p, q), (a, q, c)]
+        made += [np.column_stack(each) for each in triangles]
+        parents += [np.flatnonzero(some)] * len(triangles)
+    return np.concatenate(made), np.concatenate(parents)

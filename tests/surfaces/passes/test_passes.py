@@ -1,0 +1,215 @@
+"""Passes keep their distance on the surface, go round holes, and run in the order they say."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from pass_metrics import ARCH, CAP, PLATE, away, by_level
+from scipy.spatial import Delaunay
+
+from coverable_errors import CoverableError
+from surfaces import bspline, cylinder, mesh, piecewise, plane, sphere, torus
+from surfaces.meshes import TriangleMesh
+from surfaces.passes import parallel_passes
+
+SURFACES = {"plate": PLATE, "arch": ARCH, "cap": CAP}
+HALF = math.pi / 2
+
+
+def panel_with_hole(edge: float = 0.01):
+    """0.6 x 0.4 m with a hole of 80 mm radius in its middle, as irregular triangles."""
+    rng = np.random.default_rng(3)
+    x, y = np.meshgrid(np.arange(0.0, 0.6 + edge / 2, edge), np.arange(0.0, 0.4 + edge / 2, edge))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    inner = ((points > 1e-9) & (points < [0.6 - 1e-9, 0.4 - 1e-9])).all(axis=1)
+    points[inner] += rng.uniform(-0.2, 0.2, (int(inner.sum()), 2)) * edge
+    off = np.linalg.norm(points - [0.3, 0.2], axis=1)
+    angle = np.linspace(0.0, math.tau, 64, endpoint=False)
+    rim = np.array([0.3, 0.2]) + 0.08 * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([points[off > 0.08 + 0.4 * edge], rim])
+    faces = Delaunay(points).simplices
+    middle = points[faces].mean(axis=1)
+    faces = faces[np.linalg.norm(middle - [0.3, 0.2], axis=1) > 0.0799]
+    return mesh(TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces))
+
+
+@pytest.mark.parametrize("direction", [0.0, HALF, 0.4])
+@pytest.mark.parametrize("name", SURFACES)
+def test_the_pitch_holds_on_the_surface(name: str, direction: float) -> None:
+    """From each outer pass to its inner neighbour, towards the first pass, within 2 %."""
+    found = parallel_passes(SURFACES[name], 0.03, direction, step=0.002)
+    levels = by_level(found)
+    assert found.spacing <= 0.03
+    assert sorted(levels) == list(range(found.count))
+    middle = (found.count - 1) / 2
+    checked = 0
+    for level, row in levels.items():
+        inner = level + (1 if level < middle - 0.5 else -1 if level > middle + 0.5 else 0)
+        if inner == level:
+            continue
+        off = np.array(
+            [
+                away(name, each.points, np.concatenate([other.points]))
+                for each in row
+                for other in levels[inner][:1]
+            ],
+            dtype=object,
+        )
+        for distances in off:
+            assert np.abs(np.asarray(distances, float) / found.spacing - 1.0).max() <= 0.02
+            checked += len(distances)
+    assert checked > 500
+
+
+@pytest.mark.parametrize("by", ["planes", "distance"])
+def test_planes_say_how_far_apart_they_are_where_a_surface_slopes(by) -> None:
+    """On a cylinder, planes a pitch apart are R (asin((k + 1) P / R) - asin(k P / R)) apart."""
+    found = parallel_passes(ARCH, 0.03, HALF, by=by, step=0.01)
+    assert (found.widest == found.spacing) == (by == "distance")
+    levels = by_level(found)
+    flat = [
+        np.arctan2(*((each[0].points[5] - ARCH.position) @ ARCH.rotation)[1::-1]) * 0.3
+        for _, each in sorted(levels.items())
+    ]
+    gaps = np.abs(np.diff(flat))
+    assert gaps.max() <= found.widest * 1.001
+    if by == "planes":
+        half = math.radians(45.0)
+        across = 0.3 * np.sin(np.linspace(-half, half, 5)[[0, -1]])
+        at = across[0] + (np.arange(found.count) + 0.5) * found.spacing
+        assert np.allclose(np.sort(gaps), np.sort(np.diff(0.3 * np.arcsin(at / 0.3))), rtol=5e-3)
+        assert gaps.max() > 1.2 * found.spacing
+
+
+@pytest.mark.parametrize("kind", ["patch", "mesh"])
+def test_lines_of_constant_parameters(kind) -> None:
+    surface = sphere(0.4, (50, 90), (0, 60))
+    if kind == "mesh":
+        with pytest.raises(CoverableError, match="no lines of constant parameters"):
+            parallel_passes(panel_with_hole(0.05), 0.05, by="parameters")
+        return
+    found = parallel_passes(surface, 0.03, HALF, by="parameters")
+    for each in found.stretches:
+        assert np.ptp(surface.closest(each.points).u) < 1e-4
+    assert found.widest == pytest.approx(found.spacing, rel=1e-3)  # parallels are evenly apart
+    meridians = parallel_passes(surface, 0.03, 0.0, by="parameters")
+    assert meridians.spacing <= 0.03  # where they are widest apart, at the equator
+
+
+def test_a_hole_parts_passes_and_leaves_them_straight() -> None:
+    surface = panel_with_hole()
+    found = parallel_passes(surface, 0.03)
+    assert found.count == math.ceil(0.4 / 0.03)
+    assert any("1 hole" in note for note in found.notes)
+    heights = 0.4 * (np.arange(found.count) + 0.5) / found.count
+    chords = 2.0 * np.sqrt(np.maximum(0.08**2 - (heights - 0.2) ** 2, 0.0))
+    for level, row in by_level(found).items():
+        y = np.concatenate([each.points[:, 1] for each in row])
+        assert np.abs(y - heights[level]).max() <= 0.02 * found.spacing
+        assert len(row) == (2 if chords[level] > 0.0 else 1)
+        assert sum(each.length for each in row) == pytest.approx(0.6 - chords[level], abs=2e-3)
+        for each in row:
+            off = np.linalg.norm(each.points[:, :2] - [0.3, 0.2], axis=1)
+            assert off.min() >= 0.08 - 2e-4
+
+
+def test_every_other_pass_is_turned_round_unless_it_is_one_way() -> None:
+    for one_way in (False, True):
+        found = parallel_passes(PLATE, 0.05, one_way=one_way)
+        own = [(each.points @ PLATE.rotation)[[0, -1], 0] for each in found.stretches]
+        forward = [bool(ends[1] > ends[0]) for ends in own]
+        assert len(set(forward)) == (1 if one_way else 2)
+        assert all(a != b for a, b in pairwise(forward)) != one_way
+
+
+def test_overrun_goes_straight_on_beyond_the_border() -> None:
+    found = parallel_passes(ARCH, 0.05, HALF, overrun=0.04)
+    for each in found.stretches:
+        on = np.flatnonzero(each.on_surface)
+        assert (np.diff(on) == 1).all()  # the overrun is at both ends
+        assert on[0] == len(each.points) - 1 - on[-1] > 0
+        own = (each.points - ARCH.position) @ ARCH.rotation
+        assert own[:, 2].min() == pytest.approx(-0.04, abs=1e-6)
+        assert own[:, 2].max() == pytest.approx(0.54, abs=1e-6)
+        assert np.allclose(np.linalg.norm(own[:, :2], axis=1), 0.3, atol=1e-6)
+        assert np.allclose(np.linalg.norm(each.normals, axis=1), 1.0)
+
+
+def test_points_lie_on_the_surface_and_evenly() -> None:
+    surface = torus(0.4, 0.1, (0, 120), (0, 180))
+    found = parallel_passes(surface, 0.02, step=0.005)
+    for each in found.stretches:
+        at = surface.closest(each.points)
+        assert np.abs(at.height).max() <= 1e-9
+        assert np.allclose(at.normal, each.normals, atol=1e-9)
+        steps = np.linalg.norm(np.diff(each.points, axis=0), axis=1)
+        assert steps.max() <= 0.0051
+    assert found.length > 0.95 * surface.area(*surface.u_range, *surface.v_range) / found.pitch
+
+
+def test_round_a_tube_and_along_it() -> None:
+    tube = cylinder(0.1, (0, 360), (0, 0.3))
+    rings = parallel_passes(tube, 0.02, 0.0)
+    assert rings.count == 15
+    assert all(each.closed for each in rings.stretches)
+    assert all(np.array_equal(each.points[0], each.points[-1]) for each in rings.stretches)
+    along = parallel_passes(tube, 0.02, HALF)
+    assert along.count == len(along.stretches) == math.ceil(math.tau * 0.1 / 0.02 - 0.01)
+    angle = np.sort([math.atan2(*each.points[3, 1::-1]) % math.tau for each in along.stretches])
+    assert np.allclose(np.diff(angle) * 0.1, along.spacing, rtol=0.02)
+
+
+def test_pieces_are_sewn_along_their_seam() -> None:
+    """A flat plate and a quarter of a cylinder that go over into one another, cut differently."""
+    flat = plane((-0.3, 0.0), (0.0, 0.4), position=(0.0, 0.0, 0.2))
+    bend = cylinder(0.2, (0, 90), (-0.4, 0.0), side="outside", rpy_deg=(90, 0, 0))
+    surface = piecewise([flat, bend], side="outside")
+    assert surface.groups == ((0, 1),)
+    found = parallel_passes(surface, 0.03, (1.0, 0.0, 0.0))
+    assert found.count == math.ceil(0.4 / 0.03)
+    length = 0.3 + 0.1 * math.pi
+    for each in found.stretches:
+        assert each.length == pytest.approx(length, rel=1e-3)
+        assert np.ptp(each.points[:, 1]) <= 0.02 * found.spacing
+    across = parallel_passes(surface, 0.03, (0.0, 1.0, 0.0))
+    assert across.count == math.ceil(length / 0.03)
+
+
+def test_a_spline_as_patch_and_as_mesh_gets_the_same_passes() -> None:
+    u = np.linspace(0.0, 1.0, 7)
+    x, y = np.meshgrid(0.5 * u, 0.4 * u, indexing="ij")
+    patch = bspline(np.stack([x, y, 0.05 * np.sin(4 * x) * np.cos(5 * y)], axis=2))
+    s = np.linspace(0.0, 1.0, 41)
+    a, b = np.meshgrid(s, s, indexing="ij")
+    points = patch.point(a, b).reshape(-1, 3)
+    corner = np.arange(41 * 41).reshape(41, 41)
+    quad = [
+        part.ravel()
+        for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
+    ]
+    faces = np.concatenate([np.column_stack(quad[:3]), np.column_stack([quad[0], *quad[2:]])])
+    one = parallel_passes(patch, 0.03, (1.0, 0.2, 0.0))
+    other = parallel_passes(mesh(TriangleMesh(points, faces)), 0.03, (1.0, 0.2, 0.0))
+    assert one.count == other.count
+    assert one.spacing == pytest.approx(other.spacing, rel=2e-3)
+    assert one.length == pytest.approx(other.length, rel=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"pitch": 0.0}, "pitch"),
+        ({"pitch": math.nan, "overrun": -1.0}, "overrun"),
+        ({"pitch": 0.03, "direction": (0.0, 0.0, 1.0)}, "along the surface's normal"),
+        ({"pitch": 0.03, "direction": math.inf}, "finite angle"),
+        ({"pitch": 0.03, "direction": (1.0, 0.0)}, "vector"),
+        ({"pitch": 0.03, "by": "heat"}, "by"),
+        ({"pitch": 1e-6}, "triangles"),
+    ],
+)
+def test_bad_input_is_named(arguments, said) -> None:
+    with pytest.raises(CoverableError, match=said):
+        parallel_passes(plane((0.0, 0.6), (0.0, 0.4)), **arguments)
