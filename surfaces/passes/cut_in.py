@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.passes.net import WorkingMesh
-from surfaces.passes.working_mesh import cut_faces
+from surfaces.passes.triangulation import cut_faces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

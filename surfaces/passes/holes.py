@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.passes.net import WorkingMesh
-from surfaces.passes.working_mesh import border_edges
+from surfaces.passes.triangulation import border_edges
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

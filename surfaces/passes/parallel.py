@@ -15,7 +15,7 @@ from surfaces.passes.first_pass import Field, distance_field, plane_field
 from surfaces.passes.holes import Lidded, with_lids
 from surfaces.passes.levels import Line, level_lines
 from surfaces.passes.net import WorkingMesh
-from surfaces.passes.working_mesh import working_mesh
+from surfaces.passes.triangulation import working_mesh
 from surfaces.patches import Patch
 from surfaces.protected import Protected
 from surfaces.surface import Surface

@@ -1,0 +1,178 @@
+"""The bracket of the treated share against closed forms, and against points drawn by the area."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from surfaces import cylinder, plane, sphere
+from surfaces.passes import ToolLines, WorkingMesh, parallel_passes, treated_share, working_mesh
+from surfaces.passes.treated import share_below
+
+
+def facing(mesh: WorkingMesh) -> np.ndarray:
+    normals = mesh.doubled_areas
+    return normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def lines_of(*rows: np.ndarray, normal=(0.0, 0.0, 1.0)) -> ToolLines:
+    points = np.concatenate(rows)
+    normals = np.broadcast_to(np.asarray(normal, float), points.shape).copy()
+    return ToolLines(points, normals, np.repeat(np.arange(len(rows)), [len(row) for row in rows]))
+
+
+def straight(a, b, step=0.0035) -> np.ndarray:
+    count = math.ceil(np.linalg.norm(np.subtract(b, a)) / step) + 1
+    return np.linspace(a, b, count)
+
+
+PLATE = working_mesh(plane((0.0, 0.6), (0.0, 0.4)), 0.007)
+
+
+def strips():
+    rows = [straight((-0.03, y, 0), (0.63, y, 0)) for y in (0.05, 0.15, 0.25, 0.35)]
+    return PLATE, lines_of(*rows), 0.02, 4 * 0.04 / 0.4
+
+
+def stadium():
+    length = 0.3
+    line = straight((0.15, 0.2, 0), (0.45, 0.2, 0))
+    return PLATE, lines_of(line), 0.05, (2 * 0.05 * length + math.pi * 0.05**2) / 0.24
+
+
+def annulus():
+    angle = np.linspace(0.0, math.tau, 300)
+    ring = np.column_stack([0.3 + 0.1 * np.cos(angle), 0.2 + 0.1 * np.sin(angle), 0 * angle])
+    return PLATE, lines_of(ring), 0.02, 4 * math.pi * 0.1 * 0.02 / 0.24
+
+
+def along_cylinder():
+    """The half width of a ball on a cylinder, passes along it: 2 R asin(r / 2R)."""
+    surface = cylinder(0.3, (0, 90), (0.0, 0.5))
+    angles = np.radians([15.0, 45.0, 75.0])
+    out = np.column_stack([np.cos(angles), np.sin(angles), 0.0 * angles])
+    rows = [straight((*0.3 * way[:2], -0.03), (*0.3 * way[:2], 0.53)) for way in out]
+    lines = lines_of(*rows)
+    lines = lines._replace(normals=out[lines.stretch])
+    truth = 3 * 2 * (2 * 0.3 * math.asin(0.03 / 0.6)) / (0.3 * math.pi / 2)
+    return working_mesh(surface, 0.007), lines, 0.03, truth
+
+
+def sphere_zone():
+    """Parallels of a sphere: cos(t - a) - cos(t + a), a = 2 asin(r / 2R)."""
+    surface = sphere(0.3, (40, 90), (0, 120))
+    found = parallel_passes(surface, 0.09, math.pi / 2, by="parameters", step=0.003, overrun=0.04)
+    a, low, high = 2 * math.asin(0.02 / 0.6), math.radians(40), math.radians(90)
+    polar = [math.acos(each.points[len(each.points) // 2, 2] / 0.3) for each in found.stretches]
+    bands = sum(math.cos(t - a) - math.cos(t + a) for t in polar)
+    points = np.concatenate([each.points for each in found.stretches])
+    stretch = np.repeat(np.arange(len(polar)), [len(each.points) for each in found.stretches])
+    lines = ToolLines(points, points / np.linalg.norm(points, axis=1)[:, None], stretch)
+    return working_mesh(surface, 0.006), lines, 0.02, bands / (math.cos(low) - math.cos(high))
+
+
+@pytest.mark.parametrize("case", [strips, stadium, annulus, along_cylinder, sphere_zone])
+def test_the_bracket_holds_the_closed_form(case) -> None:
+    mesh, lines, radius, truth = case()
+    found = treated_share(mesh, facing(mesh), lines, radius)
+    bent = 2e-3 * truth if case in (along_cylinder, sphere_zone) else 1e-6  # the mesh's own error
+    assert found.lower <= truth + bent
+    assert found.upper >= truth - bent
+    assert found.upper - found.lower <= 0.005
+    assert abs(0.5 * (found.lower + found.upper) - truth) <= 0.005
+
+
+def test_random_points_agree_and_further_rounds_only_narrow_it() -> None:
+    rng = np.random.default_rng(5)
+    mesh = working_mesh(sphere(0.25, (50, 110), (0, 90)), 0.02)
+    rows = [mesh.corners[rng.integers(len(mesh.faces))].mean(axis=0) for _ in range(12)]
+    points = np.array(rows)
+    normals = points / np.linalg.norm(points, axis=1)[:, None]
+    lines = ToolLines(points, normals, np.arange(12))
+    areas = mesh.areas
+    face = rng.choice(len(areas), 40_000, p=areas / areas.sum())
+    weights = rng.dirichlet((1.0, 1.0, 1.0), 40_000)
+    places = np.einsum("kc,kci->ki", weights, mesh.corners[face])
+    near = np.linalg.norm(places[:, None] - points, axis=2).min(axis=1)
+    before = (0.0, 1.0)
+    for rounds in range(4):
+        found = treated_share(mesh, facing(mesh), lines, 0.045, rounds)
+        assert before[0] - 1e-9 <= found.lower <= found.upper <= before[1] + 1e-9
+        before = found.lower, found.upper
+        inside = float((near <= 0.045).mean())
+        spread = 4.0 * math.sqrt(inside * (1.0 - inside) / len(near))
+        assert found.lower - spread <= inside <= found.upper + spread
+    assert found.upper - found.lower < 0.02
+
+
+def test_overlap_is_counted() -> None:
+    rows = [straight((-0.05, y, 0), (0.65, y, 0)) for y in (0.1, 0.14)]
+    found = treated_share(PLATE, facing(PLATE), lines_of(*rows), 0.03)
+    assert found.twice == pytest.approx(0.02 / 0.4, abs=0.004)
+    alone = treated_share(PLATE, facing(PLATE), lines_of(rows[0]), 0.03)
+    assert alone.twice == 0.0
+
+
+def test_the_back_of_a_thin_part_is_not_treated_through_it() -> None:
+    """Two plates 4 mm apart that look away from one another, a footprint of 40 mm."""
+    front, back = PLATE, PLATE.vertices - [0.0, 0.0, 0.004]
+    both = WorkingMesh(
+        np.concatenate([front.vertices, back]),
+        np.concatenate([front.faces, front.faces[:, ::-1] + len(back)]),
+    )
+    one = lines_of(straight((-0.03, 0.2, 0), (0.63, 0.2, 0)))
+    found = treated_share(both, facing(both), one, 0.02)
+    assert found.lower == pytest.approx(0.5 * 0.1, abs=2e-3)
+    assert found.upper == pytest.approx(0.5 * 0.1, abs=2e-3)
+    # Lines on both sides, those beneath nearer to some places than those above.
+    other = ToolLines(
+        np.concatenate([one.points, one.points + np.array([0.0, 0.01, -0.004])]),
+        np.concatenate([one.normals, -one.normals]),
+        np.concatenate([one.stretch, one.stretch + 1]),
+    )
+    found = treated_share(both, facing(both), other, 0.02)
+    assert found.lower <= 0.1 <= found.upper
+    assert found.upper - found.lower <= 0.005
+
+
+def test_what_is_not_connected_within_the_ball_is_not_treated() -> None:
+    """Two flanges that look the same way, 30 mm above one another."""
+    shelf = PLATE.vertices + np.array([0.0, 0.0, 0.03])
+    both = WorkingMesh(
+        np.concatenate([PLATE.vertices, shelf]),
+        np.concatenate([PLATE.faces, PLATE.faces + len(shelf)]),
+    )
+    found = treated_share(both, facing(both), lines_of(straight((0, 0.2, 0), (0.6, 0.2, 0))), 0.05)
+    assert found.upper <= 0.5 * 0.25 + 0.005
+
+
+def test_nothing_moves_nothing() -> None:
+    """A rigid motion, the path run backwards, or cut in two, changes the share by rounding only."""
+    mesh, lines, radius, _ = stadium()
+    found = treated_share(mesh, facing(mesh), lines, radius)
+    turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    turn *= np.linalg.det(turn)
+    moved = WorkingMesh(mesh.vertices @ turn.T + 2.0, mesh.faces)
+    others = [
+        (moved, ToolLines(lines.points @ turn.T + 2.0, lines.normals @ turn.T, lines.stretch)),
+        (mesh, ToolLines(lines.points[::-1], lines.normals, lines.stretch)),
+    ]
+    for other, path in others:
+        again = treated_share(other, facing(other), path, radius)
+        assert again.lower == pytest.approx(found.lower, abs=1e-6)
+        assert again.upper == pytest.approx(found.upper, abs=1e-6)
+    wider = treated_share(mesh, facing(mesh), lines, 1.1 * radius)
+    assert wider.lower > found.lower
+    nothing = ToolLines(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, np.int64))
+    assert treated_share(mesh, facing(mesh), nothing, radius).upper == 0.0
+
+
+def test_shares_of_triangles_below_a_level() -> None:
+    rng = np.random.default_rng(2)
+    values = rng.normal(size=(50, 3))
+    weights = rng.dirichlet((1.0, 1.0, 1.0), 200_000)
+    for row, share in zip(values, share_below(values, 0.2), strict=True):
+        assert share == pytest.approx((weights @ row <= 0.2).mean(), abs=5e-3)
+    assert share_below(np.array([[0.1, 0.1, 0.1], [0.3, 0.3, 0.3]]), 0.2).tolist() == [1.0, 0.0]
