@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,9 +15,9 @@ from surfaces.passes.first_pass import Field, distance_field, plane_field
 from surfaces.passes.holes import Lidded, with_lids
 from surfaces.passes.levels import Line, level_lines
 from surfaces.passes.net import WorkingMesh
+from surfaces.passes.stretches import LevelLine, Pass, in_order, stretch_of
 from surfaces.passes.triangulation import working_mesh
 from surfaces.patches import Patch
-from surfaces.protected import Protected
 from surfaces.surface import Surface
 
 Floats = NDArray[np.float64]
@@ -28,27 +28,6 @@ EDGES_PER_PITCH = 4.0  # how fine distances are measured
 POINTS_PER_PITCH = 4.0  # how close the points of a pass are, unless it is said
 SHORTEST = 0.5  # [1] of the pitch: shorter pieces are dropped, unless it is said
 KINK = 0.9  # [1] a distance that grows more slowly than this across a face has a ridge there
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Pass(Protected):
-    """One stretch of a pass that the tool can run without leaving the surface."""
-
-    level: int
-    """Which pass it belongs to, counted across the surface from 0."""
-    points: Floats
-    """(k, 3) m, in the root frame; on the surface, but for the overrun."""
-    normals: Floats
-    """(k, 3) outward unit normals; along the overrun those at the border."""
-    on_surface: NDArray[np.bool_]
-    """(k,) False along the overrun."""
-    closed: bool
-    """True where it ends where it begins."""
-
-    @property
-    def length(self) -> float:
-        """m."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -124,15 +103,7 @@ def parallel_passes(
         >>> found.count, round(found.spacing, 6), round(found.length, 3)
         (14, 0.028571, 8.4)
     """
-    checks = Checks("passes")
-    checks.positive("pitch", pitch, "metres")
-    checks.number("overrun", overrun, "must be a finite number >= 0 (metres)", low=0.0)
-    if step is not None:
-        checks.positive("step", step, "metres")
-    if shortest is not None:
-        checks.number("shortest", shortest, "must be a finite number >= 0 (metres)", low=0.0)
-    checks.choice("by", by, BYS)
-    checks.done()
+    _check(pitch, overrun, step, shortest, by)
     edge = pitch / EDGES_PER_PITCH
     lidded = with_lids(working_mesh(surface, edge), edge)
     field = _field(surface, lidded, direction, by)
@@ -150,7 +121,7 @@ def parallel_passes(
     return Passes(
         surface=surface,
         stretches=tuple(
-            _stretch(surface, each, apart, overrun) for each in _in_order(lines, one_way)
+            stretch_of(surface, each, apart, overrun) for each in in_order(lines, one_way)
         ),
         pitch=float(pitch),
         spacing=spacing,
@@ -159,6 +130,21 @@ def parallel_passes(
         dropped=dropped,
         notes=_notes(lidded.holes, lines, field, by),
     )
+
+
+def _check(
+    pitch: float, overrun: float, step: float | None, shortest: float | None, by: By
+) -> None:
+    """Refuse numbers that describe no passes, all of them at once."""
+    checks = Checks("passes")
+    checks.positive("pitch", pitch, "metres")
+    checks.number("overrun", overrun, "must be a finite number >= 0 (metres)", low=0.0)
+    if step is not None:
+        checks.positive("step", step, "metres")
+    if shortest is not None:
+        checks.number("shortest", shortest, "must be a finite number >= 0 (metres)", low=0.0)
+    checks.choice("by", by, BYS)
+    checks.done()
 
 
 def _field(surface: Surface, lidded: Lidded, direction: float | ArrayLike, by: By) -> Field:
@@ -240,13 +226,6 @@ def _levels(field: Field, own: NDArray[np.bool_], pitch: float) -> tuple[Floats,
     return np.asarray(low + (np.arange(count) + 0.5) * spacing, dtype=float), spacing
 
 
-class LevelLine(NamedTuple):
-    """A line with the number of its level."""
-
-    level: int
-    line: Line
-
-
 def _lines(field: Field, own: NDArray[np.bool_], levels: Floats) -> Iterator[LevelLine]:
     """Lines of each level, cut where they run over a lid."""
     whole = ~field.torn
@@ -270,60 +249,6 @@ def _parts(line: Line, own: NDArray[np.bool_]) -> Iterator[Line]:
     ends = np.flatnonzero(np.diff(np.concatenate([[0], own.astype(np.int8), [0]])))
     for start, end in ends.reshape(-1, 2):
         yield Line(points[start : end + 1], faces[start:end], closed=False)
-
-
-def _in_order(lines: list[LevelLine], one_way: bool) -> Iterator[LevelLine]:
-    """The lines as they are to be run: level after level, every other level turned round.
-
-    Within a level each line begins nearest to where the one before it ended; those that a hole
-    parts follow one another as they lie on their line.
-    """
-    levels: dict[int, list[Line]] = {}
-    for level, line in lines:
-        levels.setdefault(level, []).append(line)
-    here: Floats | None = None
-    for number, level in enumerate(sorted(levels)):
-        row = levels[level]
-        if number % 2 and not one_way:
-            row = [line.reversed() for line in reversed(row)]
-        while row:
-            nearest = 0
-            if here is not None:
-                away = [float(np.linalg.norm(line.points[0] - here)) for line in row]
-                nearest = int(np.argmin(away))
-            line = row.pop(nearest)
-            here = line.points[-1]
-            yield LevelLine(level, line)
-
-
-def _stretch(surface: Surface, each: LevelLine, step: float, overrun: float) -> Pass:
-    """A line with its points evenly apart, on the surface itself, and its overrun."""
-    line = each.line
-    points = np.concatenate([line.points, line.points[:1]]) if line.closed else line.points
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    count = max(1, math.ceil(along[-1] / step - 1e-9))
-    wanted = np.linspace(0.0, along[-1], count + 1)
-    even = np.column_stack([np.interp(wanted, along, points[:, k]) for k in range(3)])
-    at = surface.closest(even)
-    on, normals = even - at.height[:, None] * at.normal, at.normal
-    inside = np.ones(len(on), dtype=bool)
-    if overrun > 0.0 and not line.closed and len(on) > 1:
-        extra = np.arange(1, max(1, math.ceil(overrun / step - 1e-9)) + 1)
-        reach = overrun * extra / extra[-1]
-        before, after = (
-            _beyond(on[i], on[i] - on[j], normals[i], reach) for i, j in ((0, 1), (-1, -2))
-        )
-        on = np.concatenate([before[::-1], on, after])
-        ends = np.repeat(normals[[0, -1]], len(extra), axis=0)
-        normals = np.concatenate([ends[: len(extra)], normals, ends[len(extra) :]])
-        inside = np.pad(inside, len(extra))
-    return Pass(each.level, on, normals, inside, line.closed)
-
-
-def _beyond(end: Floats, heading: Floats, normal: Floats, reach: Floats) -> Floats:
-    """(k, 3) m, points straight on from an end in its tangent plane, at distances (k,) from it."""
-    flat = heading - (heading @ normal) * normal
-    return np.asarray(end + reach[:, None] * flat / max(float(np.linalg.norm(flat)), 1e-300))
 
 
 def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[str, ...]:
