@@ -9,21 +9,33 @@ centre and y - c = d, the *residual* is what the constraints keep short:
 By the lemma of `feasibility.certification.lever_bounds`, p(c + d) - p(c) - J d is at most D / 2
 long, and a likewise.
 
+Where the roll is limited, each end of its range adds a coordinate (`rolls.box_models`).
+
 On a part of the surface T and b differ from an affine model of x by at most r_T and r_b. So
 |residual(c) + C d| <= tolerance + D/2 + r_T, where C has the columns J_j and those of the model.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.lever_bounds import Array, lever_bounds, longest_levers
+from feasibility.certification.rolls import (
+    ReferenceParts,
+    TargetModel,
+    ToolModel,
+    reference_axes,
+    reference_parts,
+    roll_models,
+)
+from feasibility.roll import Roll
+from feasibility.task import Targets, Task
 from robots import Kinematics, Robot
-from surfaces import SurfaceParts
+from surfaces import Cells, SurfaceParts
 
 GUARD = 1e-9  # [m], [1] added to every radius; rounding of double arithmetic is about 1e-15
 
@@ -41,30 +53,49 @@ class Parts(NamedTuple):
     """(K, 2) the parts that each is cut into; -1, -1 for the finest."""
     axis: NDArray[np.int64]
     """(K,) the parameter that the cut halves; -1 where the children are any two parts."""
+    references: ReferenceParts
+    """Reference directions over the same parts; those of no use where the roll is free."""
 
 
-def target_parts(parts: SurfaceParts, side_sign: float, standoff: float) -> Parts:
-    """T = f + side d n and b = -side n on every part, from its points f and normals n."""
-    shift = side_sign * standoff
+def target_parts(parts: SurfaceParts, cells: Cells, task: Task) -> Parts:
+    """T = f + side d n and b = -side n on every part, from its points f and normals n.
+
+    The approach may be one direction instead, and the reference direction one, too.
+    """
+    side_sign, fixed = cells.surface.side_sign, task.fixed_approach(cells)
+    shift = side_sign * task.standoff
 
     def moved(values: Array) -> Array:
         points, normals = values[..., :3], values[..., 3:]
         return np.concatenate([points + shift * normals, -side_sign * normals], axis=-1)
 
-    radius = np.column_stack([parts.radius @ [1.0, standoff], parts.radius[:, 1]])
-    return Parts(moved(parts.centre), moved(parts.slopes), radius, parts.children, parts.axis)
+    centre, slopes = moved(parts.centre), moved(parts.slopes)
+    radius = np.column_stack([parts.radius @ [1.0, task.standoff], parts.radius[:, 1]])
+    if fixed is not None:
+        centre[:, 3:], slopes[..., 3:], radius[:, 1] = fixed, 0.0, 0.0
+    reference = None if task.roll is None else task.fixed_reference(cells)
+    held = reference_parts(centre[:, 3:], slopes[..., 3:], radius[:, 1], reference)
+    return Parts(centre, slopes, radius, parts.children, parts.axis, held)
 
 
-def with_cells(parts: Parts, points: Array, approaches: Array) -> Parts:
-    """The parts, and after them one that is a point for each cell's target (N, 3)."""
+def with_cells(parts: Parts, targets: Targets) -> Parts:
+    """The parts, and after them one that is a point for each cell's target."""
+    points, approaches, references = targets
     count = len(points)
     finest = np.full((count, 2), -1)
+    known = np.zeros_like(points) if references is None else references
+    held = ReferenceParts(
+        np.concatenate([parts.references.centre, known]),
+        np.concatenate([parts.references.slopes, np.zeros((count, 2, 3))]),
+        np.concatenate([parts.references.radius, np.zeros(count)]),
+    )
     return Parts(
         np.concatenate([parts.centre, np.concatenate([points, approaches], axis=1)]),
         np.concatenate([parts.slopes, np.zeros((count, 2, 6))]),
         np.concatenate([parts.radius, np.zeros((count, 2))]),
         np.concatenate([parts.children, finest]),
         np.concatenate([parts.axis, finest[:, 0]]),
+        held,
     )
 
 
@@ -77,6 +108,8 @@ class Allowed(NamedTuple):
     """|a - b| at the boundary of the cone; more than 2 where any axis will do."""
     length: float
     """m, which differences of axes are multiplied by: a typical lever."""
+    roll: Roll | None = None
+    """The range of the roll, at most 180 deg; None where the roll is not looked at."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -121,11 +154,12 @@ class Models:
     """Linear models of m boxes: |residual + columns . d| <= radius, for d from low to high."""
 
     residual: Array
-    """(m, 6) p - T (m) and length (a - b) (m), at the centre."""
+    """(m, 6) p - T (m) and length (a - b) (m), at the centre; and one coordinate more for each end
+    of the roll's range, likewise times the length."""
     columns: Array
     """(m, n + 2, 6) their derivatives by joints and surface parameters, m."""
     radius: Array
-    """(m, 2) bounds on the lengths of the two halves, m."""
+    """(m, 2) bounds on the lengths of the two halves, and of each coordinate more, m."""
     low: Array
     """(m, n + 2) the box, seen from its centre."""
     high: Array
@@ -143,6 +177,7 @@ class Arm:
 
     def __init__(self, robot: Robot, low: Array, high: Array) -> None:
         """Work with joints inside low .. high (n,), both finite."""
+        self.robot = robot
         self.kinematics = Kinematics(robot)
         self.prismatic = robot.prismatic
         self.n = robot.n
@@ -166,7 +201,7 @@ class Arm:
         radius[:, 0] = allowed.position + parts.radius[boxes.part, 0] + 0.5 * of_point.second
         radius[:, 1] = allowed.axis + parts.radius[boxes.part, 1] + 0.5 * of_axis.second
         radius = (radius + GUARD) * [1.0, length]
-        return Models(
+        made = Models(
             residual=tool - target,
             columns=np.concatenate([by_joint, -slopes], axis=1),
             radius=radius,
@@ -180,6 +215,51 @@ class Arm:
                 axis=1,
             ),
         )
+        if allowed.roll is None:
+            return made
+        at = TargetModel(
+            *_over_parts(parts, boxes.part, centre[:, n:]),
+            half[:, n:],
+            np.column_stack([parts.radius[:, 1], parts.references.radius])[boxes.part],
+        )
+        return self._with_roll(made, centre[:, :n], h, at, allowed)
+
+    def _with_roll(
+        self, made: Models, q: Array, half: Array, at: TargetModel, allowed: Allowed
+    ) -> Models:
+        """The models with a coordinate more for each end of the roll's range, which is limited."""
+        if allowed.roll is None:
+            return made
+        n, length = self.n, allowed.length
+        axes = self.kinematics.tools(q)[1]
+        x = reference_axes(self.robot, q)
+        both = np.stack([x, _cross(axes, x)], axis=1)
+        turning = self.kinematics.twists(q).transpose(0, 2, 1)[..., 3:]
+        columns = _cross(turning[:, :, None], both[:, None])
+        bounds = [
+            lever_bounds(np.linalg.norm(columns[:, :, k], axis=2), half, self.prismatic, np.ones(n))
+            for k in (0, 1)
+        ]
+        moves = [np.minimum((bound.largest * half).sum(axis=1), 2.0) for bound in bounds]
+        seconds = np.column_stack([bound.second for bound in bounds])
+        tool = ToolModel(both, columns, seconds, np.column_stack(moves))
+        found = roll_models(tool, at, allowed.roll)
+        reach = made.reach.copy()
+        reach[:, :n] += length * (bounds[0].largest + bounds[1].largest) * half
+        return replace(
+            made,
+            residual=np.concatenate([made.residual, length * found.residual], axis=1),
+            columns=np.concatenate([made.columns, length * found.columns], axis=2),
+            radius=np.concatenate([made.radius, length * found.radius], axis=1),
+            reach=reach,
+        )
+
+
+def _over_parts(parts: Parts, part: NDArray[np.int64], x: Array) -> tuple[Array, Array]:
+    """b and t (m, 2, 3) at places x (m, 2) of parts (m,), and their slopes (m, 2, 2, 3)."""
+    centre = np.stack([parts.centre[part, 3:], parts.references.centre[part]], axis=1)
+    slopes = np.stack([parts.slopes[part][..., 3:], parts.references.slopes[part]], axis=2)
+    return centre + (x[:, :, None, None] * slopes).sum(axis=1), slopes
 
 
 def derivatives(kinematics: Kinematics, q: Array, length: float) -> tuple[Array, Array]:

@@ -2,10 +2,10 @@
 
 It shares no code with the search that guessed the tree; kinematics are Pinocchio's. A tree (see
 `feasibility.cut_tree`) proves its claim if, with M the configurations inside the limits with the
-tool on the surface, within tolerance and cone,
+tool on the surface, within tolerance and cone, and its roll in the range,
 
     no q in M and in the region of a cut has w . q = t, and
-    no q in the region of a leaf has the tool within tolerance and cone of its cell's target.
+    no q in the region of a leaf has the tool at its cell's target, and held likewise.
 
 A tree of one leaf proves its claim too where the tool collides in every pose within tolerance and
 cone of the cell's target, whatever the arm does (`feasibility.certification.tool_alone`).
@@ -81,7 +81,7 @@ def verify_proof(
     Args:
         robot: the arm; its limits are used exactly.
         cells: the cells.
-        task: the task; its tolerance and cone are used exactly.
+        task: the task; its tolerance, cone and roll are used exactly.
         tree: the proof.
         tick: called every few thousand boxes; what it raises ends the verification.
         most: how many boxes may be looked at altogether.
@@ -128,13 +128,15 @@ def verify_on(
     fault = disagreement(cells, parts)
     if fault:
         return ProofCheck(fault, 0)
-    surface = target_parts(parts, cells.surface.side_sign, task.standoff)
+    surface = target_parts(parts, cells, task)
     limits, fault = _finite_slides(robot, surface, task.effective_tolerance)
     if fault:
         return ProofCheck(fault, 0)
     arm = Arm(robot, limits.low, limits.high)
     length = max(TYPICAL * float(arm.caps.max()), 1e-3)
-    allowed = Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length)
+    # A wider range leaves out too little for boxes to show it; so does what is proved without.
+    roll = task.roll if task.roll is not None and task.roll.half <= 0.5 * np.pi else None
+    allowed = Allowed(task.effective_tolerance, min(task.cone_chord, ANY_AXIS), length, roll)
     targets = task.targets(cells)
 
     def root_of(cell: int | None) -> int:
@@ -142,7 +144,7 @@ def verify_on(
 
     emptiness = Emptiness(
         arm,
-        with_cells(surface, targets.points, targets.approaches),
+        with_cells(surface, targets),
         root_of,
         allowed,
         tick or (lambda: None),

@@ -15,6 +15,9 @@ from feasibility.certification.box_exclusion import excess
 from feasibility.certification.linear_models import Arm, Array, Models, derivatives
 from feasibility.certification.parts_agreement import feet_of
 from feasibility.certification.region import Region
+from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
+from feasibility.roll import projected
+from feasibility.targets import u_directions
 from feasibility.task import Task
 from surfaces import Cells
 
@@ -62,11 +65,11 @@ class Refuter:
         q = np.clip(starts, low, high)
         for _ in range(STEPS):
             points, axes = self.arm.kinematics.tools(q)
-            target, approach, on_surface = self._targets(points, cell)
+            target, approach, on_surface, feet = self._targets(points, cell)
             error, tilt = points - target, axes - approach
             kept = on_surface & (np.linalg.norm(error, axis=1) <= self.task.effective_tolerance)
             kept &= np.linalg.norm(tilt, axis=1) <= self.task.cone_chord
-            kept &= sums.sums_hold(q)
+            kept &= sums.sums_hold(q) & self._rolled(q, axes, approach, feet, cell)
             if kept.any():
                 first = int(np.argmax(kept))
                 return Refutation(q[first], first)
@@ -77,19 +80,42 @@ class Refuter:
 
     def _targets(
         self, points: Array, cell: NDArray[np.int64]
-    ) -> tuple[Array, Array, NDArray[np.bool_]]:
-        """Target points and approaches (m, 3) for tool points, and where they are on the patch."""
+    ) -> tuple[Array, Array, NDArray[np.bool_], Array]:
+        """Target points and approaches (m, 3) for tool points, and where they are on the patch.
+
+        And the surface's points under them.
+        """
         sign = self.cells.surface.side_sign
         found = feet_of(self.cells.surface, points)
         target = found.points + sign * self.task.standoff * found.normals
         away = np.linalg.norm(points[:, None] - self.targets.points, axis=2)
         near = np.where(cell < 0, np.argmin(away, axis=1), cell)
         slides = (found.on_patch & (cell < 0))[:, None]
+        fixed = self.task.fixed_approach(self.cells)
+        approaches = -sign * found.normals if fixed is None else fixed
         return (
             np.where(slides, target, self.targets.points[near]),
-            np.where(slides, -sign * found.normals, self.targets.approaches[near]),
+            np.where(slides, approaches, self.targets.approaches[near]),
             found.on_patch | (cell >= 0),
+            found.points,
         )
+
+    def _rolled(
+        self, q: Array, axes: Array, approaches: Array, feet: Array, cell: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
+        """(m,) whose roll is in its range, over the surface or at cells' targets."""
+        roll, at_cells = self.task.roll, self.targets.references
+        if roll is None or at_cells is None:
+            return np.ones(len(q), dtype=bool)
+        fixed = self.task.fixed_reference(self.cells)
+        along = u_directions(self.cells.surface, feet) if fixed is None else fixed
+        if along is None:
+            references = np.full_like(approaches, np.nan)
+        else:
+            references, _ = projected(np.broadcast_to(along, approaches.shape), approaches)
+        references = np.where((cell < 0)[:, None], references, at_cells[np.maximum(cell, 0)])
+        z = roll_vectors(reference_axes(self.arm.robot, q), axes, references, approaches, roll)
+        return np.asarray(off_middle(z) <= roll.half)
 
     def _stepped(
         self, q: Array, residual: Array, slides: Array, low: Array, high: Array, sums: Region

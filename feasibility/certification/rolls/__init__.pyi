@@ -7,6 +7,11 @@ from .bounds import products_of_changes as products_of_changes
 from .bounds import reference_axes as reference_axes
 from .bounds import roll_vectors as roll_vectors
 from .bounds import tool_frames as tool_frames
+from .box_models import ReferenceParts as ReferenceParts
+from .box_models import TargetModel as TargetModel
+from .box_models import ToolModel as ToolModel
+from .box_models import reference_parts as reference_parts
+from .box_models import roll_models as roll_models
 from .frame_matching import FrameMatch as FrameMatch
 from .frame_matching import MatchedPlaces as MatchedPlaces
 from .frame_matching import match_frames as match_frames

@@ -10,10 +10,13 @@ from part_walks import at_parameters
 from random_arms import random_arm
 from scipy.spatial.transform import Rotation
 
+from feasibility import Task
 from feasibility.certification.box_cutting import smaller
 from feasibility.certification.empty_region import Claim, Emptiness
 from feasibility.certification.linear_models import Allowed, Arm, Boxes, target_parts
 from feasibility.certification.region import Region
+from feasibility.certification.rolls import reference_axes
+from feasibility.roll import projected, roll_of
 from robots import Kinematics
 from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus
 
@@ -72,13 +75,30 @@ def known(rng, boxes=50):
         np.eye(3), target - (patch.point(u, v) + patch.side_sign * standoff * patch.normal(u, v))[0]
     )
     chord = 2.0 * np.sin(angle / 2.0)
-    parts = target_parts(patch.parts(0.3 * tolerance, 0.3 * chord, 600), patch.side_sign, standoff)
+    task = Task(standoff, 90.0)
+    if angle < np.pi / 2 and rng.random() < 0.5:
+        task = rolled_task(rng, robot, q, patch, (u, v), standoff)
+    finest = patch.parts(0.3 * tolerance, 0.3 * chord, 600)
+    parts = target_parts(finest, patch.cells(1, 1), task)
     arm = Arm(robot, robot.lower - FAR, robot.upper + FAR)
-    allowed = Allowed(tolerance, chord, 0.5)
+    allowed = Allowed(tolerance, chord, 0.5, task.roll)
     emptiness = Emptiness(arm, parts, lambda cell: 0, allowed, lambda: None)
     part, x = at_parameters(patch, u, v)
     made, places = boxes_around(rng, robot, q, parts, int(part[0]), x[0], boxes)
     return Known(emptiness, region_around(rng, robot, q), made, places)
+
+
+def rolled_task(rng, robot, q, patch, place, standoff):
+    """A task with a fixed reference, and a range that the roll at q is just inside of."""
+    _, axis = Kinematics(robot).tool(q)
+    b = -patch.side_sign * patch.normal(*place)[0]
+    reference = rng.normal(size=3)
+    along = patch.rotation @ (reference / np.linalg.norm(reference))
+    roll = roll_of(reference_axes(robot, q[None])[0], axis, projected(along, b)[0], b)
+    half = np.exp(rng.uniform(np.log(1e-3), np.log(np.pi / 2)))
+    middle = roll + rng.choice([-1.0, 0.0, 1.0]) * 0.999 * half
+    low, high = np.degrees([middle - half, middle + half])
+    return Task(standoff, 90.0, roll_deg=(low, high), roll_reference=tuple(reference))
 
 
 def boxes_around(rng, robot, q, parts, part, x, count):
