@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from feasibility.cases import toml_key
-from feasibility.sensitivity import Change, Kind, Quantity
+from feasibility.sensitivity import Change, Kind, Quantity, range_of, tilted
 from feasibility.verdict import Verdict
 from robots import Robot
 
@@ -31,6 +31,8 @@ def key(quantity: Quantity) -> str:
         )
     return {
         Kind.CONE: "task.cone_deg",
+        Kind.ROLL: "task.roll_deg",
+        Kind.TILT: "task.approach",
         Kind.STANDOFF: "task.standoff",
         Kind.SHIFT: "surface.position",
         Kind.CLEARANCE: "collision.clearance",
@@ -50,6 +52,10 @@ def label(quantity: Quantity) -> str:
         return f"{key(quantity)} ({'lower' if quantity.kind is Kind.LOWER else 'upper'})"
     if quantity.kind is Kind.SHIFT:
         return f"{key(quantity)} ({quantity.name.removeprefix('shift along ')})"
+    if quantity.kind is Kind.ROLL:
+        return f"{key(quantity)} (half its range)"
+    if quantity.kind is Kind.TILT:
+        return f"{key(quantity)} ({quantity.name.removeprefix('approach ')})"
     if quantity.kind is Kind.STANDOFF:
         return f"{key(quantity)} ({quantity.name.removesuffix(' standoff')})"
     if quantity.kind is Kind.WITHOUT:
@@ -107,6 +113,12 @@ def settings(changes: Sequence[Change], verdict: Verdict, case: Case | None = No
             ends[joint(quantity)] = (value, high) if quantity.kind is Kind.LOWER else (low, value)
         elif quantity.kind is Kind.SHIFT:
             position = position + change.value * np.array(quantity.axis)
+        elif quantity.kind is Kind.ROLL:
+            least, most = range_of(verdict.task, math.radians(float(value)))
+            found.append(f"task.roll_deg=[{least:.10g}, {most:.10g}]")
+        elif quantity.kind is Kind.TILT:
+            b = tilted(verdict.task, quantity.axis, change.value)
+            found.append(f"task.approach=[{', '.join(f'{x:.10g}' for x in b)}]")
         elif quantity.kind is Kind.WITHOUT:
             found += _scene_without(quantity.obstacle, case)
         else:

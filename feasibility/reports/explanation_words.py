@@ -255,7 +255,7 @@ def _margin(quantity: Quantity, value: str, now: str) -> str:
     if quantity.kind is Kind.SHIFT:
         return f"{label(quantity)} can move by {value}"
     change = "tighten"
-    if quantity.kind not in (*LIMITS, Kind.CONE):
+    if quantity.kind not in (*LIMITS, Kind.CONE, Kind.ROLL):
         change = "grow" if quantity.end > quantity.given else "shrink"
     return f"{label(quantity)} can {change} to {value} ({now} now)"
 
@@ -266,7 +266,7 @@ def _remedy(quantity: Quantity, value: str, now: str) -> str:
         return f"feasible {quantity.name}"
     if quantity.kind is Kind.SHIFT:
         return f"feasible with {label(quantity)} moved by {value}"
-    start = "feasible from" if quantity.kind is Kind.CONE else "feasible with"
+    start = "feasible from" if quantity.kind in (Kind.CONE, Kind.ROLL) else "feasible with"
     return f"{start} {label(quantity)} = {value} ({now} now)"
 
 

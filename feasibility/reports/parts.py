@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from feasibility.collisions import Asked, LeftOut, checked_words
 from feasibility.results import plain
+from feasibility.task import Task
 from feasibility.verdict import Cause, Certificate
 from feasibility.version import version
 from surfaces import Cells
@@ -131,6 +132,15 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     if certificate.max_roll is not None:
         found["max_roll_deg"] = plain(math.degrees(certificate.max_roll))
     return found
+
+
+def roll_text(certificate: Certificate, task: Task) -> str:
+    """How far the roll was from the middle of its range, at most; empty where it is free."""
+    if task.roll is None or certificate.max_roll is None:
+        return ""
+    middle, half = math.degrees(task.roll.middle), math.degrees(task.roll.half)
+    most = math.degrees(certificate.max_roll)
+    return f"roll within {most:.4g} deg of {middle:.4g} deg (allowed {half:g})"
 
 
 class Clearance(Protocol):

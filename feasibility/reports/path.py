@@ -15,6 +15,7 @@ from feasibility.reports.parts import (
     clearance_json,
     clearance_text,
     counted,
+    roll_text,
     summary,
 )
 from feasibility.reports.verdict import as_json as verdict_json
@@ -153,6 +154,7 @@ def as_text(
             f"{at_most(1e3 * path.certificate.max_position_error, 3)} mm, axis within "
             f"{at_most(math.degrees(path.certificate.max_angle), 4)} deg",
         ),
+        ("roll", roll_text(path.certificate, path.task)),
         ("clearance", clearance_text(path.certificate)),
     ]
     if trajectory is not None:

@@ -21,6 +21,7 @@ from feasibility.reports.parts import (
     csv_text,
     left_out_json,
     left_out_text,
+    roll_text,
     seconds,
     seconds_text,
     summary,
@@ -51,7 +52,7 @@ CUT = "cuts through the joint space, which no motion crosses, part cells from ea
 CAUSES = {
     CauseKind.OUT_OF_REACH: "out of reach",
     CauseKind.JOINT_LIMITS: "joint limits",
-    CauseKind.ORIENTATION: "orientation (the tool axis cannot come inside the cone)",
+    CauseKind.ORIENTATION: "orientation (the tool cannot be held as asked)",
     CauseKind.COLLISION: "collision",
     CauseKind.DISCONNECTED: "reachable, but not by the motion that covers the rest",
 }
@@ -183,6 +184,7 @@ def _certificate_text(verdict: Verdict) -> str:
         f"{found['waypoints']:,} waypoints",
         f"tool point within {1e3 * error:.3g} mm of its surface{allowed}",
         f"tool axis within {found['max_angle_deg']:.4g} deg (allowed {verdict.task.cone_deg:g})",
+        roll_text(verdict.certificate, verdict.task),
     ]
     if found["min_limit_margin_deg"] is not None:
         parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
@@ -232,6 +234,9 @@ def _hints(verdict: Verdict) -> list[str]:
         hints.append("--set robot.limits=... tries other joint limits (`coverable robots`)")
     if CauseKind.ORIENTATION in kinds and verdict.task.cone_deg > 0.0:
         hints.append(f"--set task.cone_deg=... opens the cone ({verdict.task.cone_deg:g} now)")
+        if verdict.task.roll is not None and verdict.task.roll_deg is not None:
+            now = "{:g} to {:g} now".format(*verdict.task.roll_deg)
+            hints.append(f"--set 'task.roll_deg=[..., ...]' widens the range of the roll ({now})")
     asked = verdict.task.collision
     if asked is not None and CauseKind.COLLISION in kinds and asked.shapes == "hulls":
         hints.append("--set collision.shapes=pieces takes bodies that are nearer to the real ones")

@@ -14,6 +14,7 @@ from feasibility.reports.parts import (
     clearance_json,
     clearance_text,
     counted,
+    roll_text,
     summary,
 )
 from feasibility.reports.proof import proof_json
@@ -119,6 +120,7 @@ def _measured(found: Verification) -> str:
         counted(figures["waypoints"], "row"),
         f"tool point within {1e3 * figures['max_position_error_m']:.3g} mm of its surface{allowed}",
         f"tool axis within {figures['max_angle_deg']:.4g} deg (allowed {found.task.cone_deg:g})",
+        roll_text(found.certificate, found.task),
     ]
     margin = _margin_deg(found)
     if math.isfinite(margin) and margin >= 0.0:

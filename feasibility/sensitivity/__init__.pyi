@@ -2,6 +2,8 @@ from .explanation import explain as explain
 from .quantities import LEAST_CONE_DEG as LEAST_CONE_DEG
 from .quantities import Kind as Kind
 from .quantities import Quantity as Quantity
+from .quantities import range_of as range_of
+from .quantities import tilted as tilted
 from .thresholds import Change as Change
 from .thresholds import Dropped as Dropped
 from .thresholds import Explanation as Explanation

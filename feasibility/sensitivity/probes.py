@@ -88,7 +88,7 @@ class Prober:
 
     def arrays_at(self, quantity: Quantity, k: int) -> SearchArrays:
         """The arrays with a quantity k steps from the value given, without making it anew."""
-        if quantity.kind in (Kind.CONE, Kind.STANDOFF) or self._moves_bodies(quantity):
+        if quantity.kind in (Kind.CONE, Kind.STANDOFF) or self._changes_much(quantity):
             return self._made_anew(quantity, k)
         arrays = self.centres_at(quantity, k)
         if quantity.kind is Kind.SHIFT:
@@ -99,8 +99,10 @@ class Prober:
             return arrays._replace(targets=targets)
         return arrays
 
-    def _moves_bodies(self, quantity: Quantity) -> bool:
-        """Does a quantity change what the arm has to stay clear of?"""
+    def _changes_much(self, quantity: Quantity) -> bool:
+        """Does a quantity change how the tool is held, or what the arm has to stay clear of?"""
+        if quantity.kind in (Kind.ROLL, Kind.TILT):
+            return True
         shifted = quantity.kind is Kind.SHIFT and self.given.task.collision is not None
         return shifted or quantity.kind in OF_COLLISIONS
 
@@ -134,7 +136,7 @@ class Prober:
         if quantity.kind is Kind.STANDOFF:
             grown = (value - quantity.given) * self.outwards
             return self.arrays._replace(points=self.arrays.points + grown)
-        if self._moves_bodies(quantity):
+        if self._changes_much(quantity):
             return self._made_anew(quantity, k)
         if quantity.kind is Kind.SHIFT:
             shift = value * np.array(quantity.axis)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from feasibility.roadmap import Ruling
 from feasibility.sensitivity.limited_search import NO_CELL, Attempt
 from feasibility.sensitivity.probes import Prober
-from feasibility.sensitivity.quantities import OF_COLLISIONS, Kind, Quantity
+from feasibility.sensitivity.quantities import Kind, Quantity
 from feasibility.sensitivity.thresholds import Finding, Span, Threshold
 from feasibility.sensitivity.warm_start import Reached, WarmStart, last_true
 from feasibility.verdict import Answer, Evidence
@@ -278,7 +278,7 @@ class ThresholdSearch:
     def _extended(self, good: Probe, bad: int) -> Probe:
         """As far as the unchanged motion keeps to the limit or to the cone."""
         walk, joint, value = good.attempt.walk, self.quantity.joint, self.quantity.value
-        if walk is None or not self.quantity.monotone or self.quantity.kind in OF_COLLISIONS:
+        if walk is None or self.quantity.kind not in (Kind.CONE, Kind.LOWER, Kind.UPPER):
             return good
         if self.quantity.kind is Kind.CONE:
             variant = self.quantity.applied(self.prober.given, good.k)

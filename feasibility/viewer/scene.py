@@ -57,6 +57,9 @@ PATCHES: tuple[Colour, ...] = (
     (0.45, 0.35, 0.65),
 )
 TRAIL_POINTS = 2_000
+APPROACH: Colour = (0.10, 0.35, 0.80)
+REFERENCE: Colour = (0.80, 0.25, 0.10)
+ARROW = 0.3  # [1] of a cell's width, of the lines that show how the tool is to be held
 LOST_SIZE = 0.16  # [1] of a cell's width, of a mark on a cell that is proved lost
 
 
@@ -85,6 +88,7 @@ def layers(verdict: Verdict) -> list[Layer]:
     parted = [] if sides is None else side_layers(cells, sides)
     return [
         *cells_layers(cells),
+        *_frames(verdict),
         *_graph(verdict),
         *_start(verdict),
         *parted,
@@ -126,6 +130,27 @@ def cells_layers(cells: Cells) -> list[Layer]:
         dots = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
         parts.append(Layer((dots,), Entry("cell centres", CENTRES, path), count))
     return parts
+
+
+def _frames(verdict: Verdict) -> Iterator[Layer]:
+    """Where the tool's axes are to point at each cell's target, where that is not the normal alone.
+
+    A line along the approach direction, and one along the reference that roll is measured from.
+    """
+    cells, task = verdict.cells, verdict.task
+    points, approaches, references = task.targets(cells)
+    length, path = ARROW * cell_size(cells), "/surface/approach directions"
+    if references is not None or not task.along_normals(cells):
+        # It ends at the target, and comes from where the tool is.
+        ends = np.stack([points - length * approaches, points], axis=1).reshape(-1, 3)
+        lines = threejs.segments(path, ends, APPROACH)
+        yield Layer((lines,), Entry("approach directions", APPROACH, path), len(cells))
+    if references is not None and task.roll_deg is not None:
+        path = "/surface/roll references"
+        ends = np.stack([points, points + length * references], axis=1).reshape(-1, 3)
+        label = "roll 0 (allowed {:g} to {:g} deg)".format(*task.roll_deg)
+        lines = threejs.segments(path, ends, REFERENCE)
+        yield Layer((lines,), Entry(label, REFERENCE, path), len(cells))
 
 
 def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) -> list[Layer]:

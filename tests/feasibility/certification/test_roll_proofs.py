@@ -25,7 +25,12 @@ ARM = load_robot("ur5")
 TABLE = plane((0.35, 0.55), (-0.1, 0.1), side="outside", position=(0, 0, 0.2)).cells(1, 1)
 DOWN = Task(0.005, 2.0, roll_deg=(-2, 2), roll_reference=(1, 0, 0))
 EVERYWHERE = CutTree(Leaf(0))
-LIMITS = {"wrist_3_joint": np.radians([20.0, 60.0])}
+LIMITS = {
+    "wrist_3_joint": np.radians([20.0, 60.0]),
+    "shoulder_pan_joint": (-1.5, 1.5),
+    "shoulder_lift_joint": (-2.5, -0.5),
+    "elbow_joint": (0.5, 2.5),
+}
 
 
 def test_a_cell_that_the_roll_alone_prevents_is_proved():
