@@ -1,4 +1,4 @@
-"""The keys of approach and roll: read, written again, kept in results, and refused with a reason."""
+"""The keys of approach and roll: read, written again, and refused with a reason."""
 
 from __future__ import annotations
 
