@@ -11,3 +11,4 @@ from .library import joint_kinds as joint_kinds
 from .library import list_robots as list_robots
 from .library import load_robot as load_robot
 from .robot import Robot as Robot
+from .urdf import Axis as Axis

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,17 +12,24 @@ from coverable_errors import Checks, Fault, printable, shown
 from robots.errors import RobotError
 from robots.mounting import FURTHEST_BASE, FURTHEST_TCP, checked_pose, made_orthogonal, unit_axis
 
+if TYPE_CHECKING:
+    from robots.urdf import Axis
 
-class Poses(NamedTuple):
-    """Where the tool and the arm are; None where a URDF alone says so."""
+
+class Mounting(NamedTuple):
+    """Where tool, arm and surface are mounted; None where a URDF alone says so."""
 
     tcp: NDArray[np.float64] | None
     """(4, 4) m, the tool centre point in the frame of the link `tool_frame`."""
     base: NDArray[np.float64] | None
-    """(4, 4) m, the URDF's root link in the world."""
+    """(4, 4) m, the URDF's root link in the world, or on the last axis that carries it."""
+    axes: tuple[Axis, ...] = ()
+    """Axes that are no part of the URDF, from the world outwards."""
+    surface_link: str | None = None
+    """The link that carries the surface."""
 
 
-AS_IN_URDF = Poses(None, None)
+AS_IN_URDF = Mounting(None, None)
 
 
 def check_arguments(
@@ -33,7 +40,8 @@ def check_arguments(
     tcp: Any = None,
     base: Any = None,
     reference_axis: Any = None,
-) -> Poses:
+    axes: Any = (),
+) -> Mounting:
     """Refuse axes, poses and held values that fit no arm.
 
     Args:
@@ -42,28 +50,35 @@ def check_arguments(
         source: what the arguments are of, for the message.
         tcp, base: poses, see `load_robot`; None for the default.
         reference_axis: (3,) of any length; None for the default.
+        axes: that arm or surface are mounted on.
 
     Raises:
         RobotError: with everything that is wrong.
 
     Returns:
-        The poses as matrices.
+        The poses as matrices, and the axes.
     """
+    from robots.urdf import Axis
+
     checks = Checks(source, RobotError)
-    axes = {"approach_axis": approach_axis, "reference_axis": reference_axis}
-    for key, value in axes.items():
+    directions = {"approach_axis": approach_axis, "reference_axis": reference_axis}
+    for key, value in directions.items():
         if value is not None:
             checks.direction(key, value)
     if approach_axis is not None and reference_axis is not None and not checks.faults:
         _refuse_parallel(checks, approach_axis, reference_axis)
     for joint, value in (lock or {}).items():
         checks.number(f"lock.{printable(joint)}", value, "must be a finite number (rad or m)")
-    poses = Poses(
+    listed = isinstance(axes, (list, tuple))
+    if not (listed and all(isinstance(axis, Axis) for axis in axes)):
+        checks.wrong("axes", axes, "must be a list of Axis")
+    mounting = Mounting(
         None if tcp is None else checked_pose(checks, "tcp", tcp, FURTHEST_TCP),
         None if base is None else checked_pose(checks, "base", base, FURTHEST_BASE),
+        tuple(axes) if listed else (),
     )
     checks.done()
-    return poses
+    return mounting
 
 
 def _refuse_parallel(checks: Checks, approach: Any, reference: Any) -> None:

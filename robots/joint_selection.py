@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from numpy.typing import ArrayLike
 
 from coverable_errors import Fault, close_matches
+from robots.joint_checks import moves_both
 
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf, JointInfo
@@ -43,23 +44,83 @@ def select_joints(
     tool_frame: str | None,
     lock: Mapping[str, float],
     limits: str | Mapping[str, ArrayLike] | ArrayLike | None,
+    surface_link: str | None = None,
 ) -> Selection:
     """Choose the free joints, those from the root link to the tool frame, and hold all others.
 
-    Arguments are those of `robots.pinocchio_model.robot_from_urdf`; nothing is raised, so that all
-    that is wrong can be said at once.
+    Where a link carries the surface, they are those between it and the tool frame. Arguments are
+    those of `robots.pinocchio_model.robot_from_urdf`; nothing is raised, so that all that is wrong
+    can be said at once.
     """
     tool, words = _tool_frame(checked, tool_frame)
     faults = [] if tool else [Fault("", words)]
-    notes = (words,) if tool and words else ()
+    notes: tuple[str, ...] = (words,) if tool and words else ()
     wrong = _lock_faults(checked, lock)
     faults += wrong.values()
+    if surface_link is not None and surface_link not in checked.links:
+        hint = suggestion(surface_link, checked.links)
+        what = f"{checked.path} has no link {surface_link!r} that could carry the surface; {hint}"
+        return Selection(tool, (), {}, notes, (*faults, Fault("surface_link", what)), False)
     held = {joint: value for joint, value in lock.items() if joint not in wrong}
-    free = _free_joints(checked, tool, held) if tool else ()
+    way = _way(checked, tool, surface_link) if tool else _Way((), ())
+    free = _free_joints(way.between, held)
     of_chain = _chain_faults(checked, tool, free, limits) if tool else []
+    if tool and not free:
+        of_chain = [_nothing_moves(checked, tool, surface_link, way)]
     locked = _locked_values(checked, {joint.name for joint in free}, held)
+    notes += tuple(_held_for_both(way.common, locked, held, surface_link))
     is_chain = bool(tool) and not of_chain
     return Selection(tool, free, locked, notes, (*faults, *of_chain), is_chain)
+
+
+class _Way(NamedTuple):
+    """Joints, fixed ones too."""
+
+    between: tuple[JointInfo, ...]
+    """From the root link, or the link that carries the surface, to the tool frame."""
+    common: tuple[JointInfo, ...]
+    """That move the surface and the tool together."""
+
+
+def _way(checked: CheckedUrdf, tool: str, surface_link: str | None) -> _Way:
+    """The joints on the way to the tool frame."""
+    outwards = checked.path_to(tool)
+    inwards = checked.path_to(surface_link) if surface_link is not None else ()
+    names = {joint.name for joint in inwards} & {joint.name for joint in outwards}
+    apart = [joint for joint in (*reversed(inwards), *outwards) if joint.name not in names]
+    return _Way(tuple(apart), tuple(joint for joint in outwards if joint.name in names))
+
+
+def _held_for_both(
+    common: Sequence[JointInfo],
+    locked: Mapping[str, float],
+    lock: Mapping[str, float],
+    surface_link: str | None,
+) -> list[str]:
+    """That joints are held because they move surface and tool together."""
+    return [
+        moves_both(joint.name, surface_link or "", locked[joint.name], joint.kind == "prismatic")
+        for joint in common
+        if joint.moves and joint.name not in lock
+    ]
+
+
+def _nothing_moves(checked: CheckedUrdf, tool: str, surface_link: str | None, way: _Way) -> Fault:
+    """The fault of an arm without a free joint."""
+    if surface_link is None:
+        return Fault(
+            "",
+            f"no free joint lies between the root link {checked.root!r} and {tool!r} of "
+            f"{checked.path}; choose a tool_frame further out, or lock fewer joints",
+        )
+    moving = [joint.name for joint in way.between if joint.moves]
+    if moving:
+        what = f"every joint between it and the tool is held: {', '.join(moving)}; lock fewer"
+    elif any(joint.moves for joint in way.common):
+        what = f"it moves with the tool, {tool!r}: no joint lies between the two"
+    else:
+        what = f"neither it nor the tool, {tool!r}, is moved by any joint"
+    return Fault("surface_link", f"link {surface_link!r} cannot carry the surface: {what}")
 
 
 def _tool_frame(checked: CheckedUrdf, link: str | None) -> tuple[str, str]:
@@ -132,14 +193,12 @@ def _lock_faults(checked: CheckedUrdf, lock: Mapping[str, float]) -> dict[str, F
     return faults
 
 
-def _free_joints(
-    checked: CheckedUrdf, tool: str, lock: Mapping[str, float]
-) -> tuple[JointInfo, ...]:
-    """The moving joints on the chain to the tool that nothing holds.
+def _free_joints(between: Sequence[JointInfo], lock: Mapping[str, float]) -> tuple[JointInfo, ...]:
+    """The moving joints on the way to the tool that nothing holds.
 
     A mimic joint is held when the joint that leads it is.
     """
-    free = [joint for joint in checked.path_to(tool) if joint.moves and joint.name not in lock]
+    free = [joint for joint in between if joint.moves and joint.name not in lock]
     while True:
         names = {joint.name for joint in free}
         kept = [
@@ -158,15 +217,7 @@ def _chain_faults(
     free: Sequence[JointInfo],
     limits: str | Mapping[str, ArrayLike] | ArrayLike | None,
 ) -> list[Fault]:
-    """What is wrong with a chain without free joints, or with joints that cannot move freely."""
-    if not free:
-        return [
-            Fault(
-                "",
-                f"no free joint lies between the root link {checked.root!r} and {tool!r} of "
-                f"{checked.path}; choose a tool_frame further out, or lock fewer joints",
-            )
-        ]
+    """What is wrong with joints that cannot move freely."""
     faults = []
     for joint in free:
         if joint.mimic is not None and joint.fault is None:

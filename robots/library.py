@@ -11,19 +11,23 @@ import math
 import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from robots.arguments import check_arguments
+from robots.arguments import Mounting, check_arguments
 from robots.errors import RobotError
 from robots.joint_selection import suggestion
 from robots.robot import Robot
+
+if TYPE_CHECKING:
+    from robots.urdf import Axis
 
 HERE = Path(__file__).parent
 DATA = "example-robot-data"
@@ -86,6 +90,9 @@ def load_robot(
     tcp: Any = None,
     base: Any = None,
     reference_axis: ArrayLike | None = None,
+    axes: Sequence[Axis] = (),
+    surface_link: str | None = None,
+    start: ArrayLike | None = None,
 ) -> Robot:
     """Load an arm by its name in the library, or from a URDF file.
 
@@ -111,6 +118,11 @@ def load_robot(
         base: pose of the URDF's root link in the world; default: they are the same.
         reference_axis: (3,) in the TCP's frame, by which roll is measured: its part across the
             approach axis. Default +x, or +z where the approach axis is +-x.
+        axes: that arm or surface are mounted on and that the URDF lacks, from the world outwards;
+            `base` is then the root link's pose on the last axis that carries it.
+        surface_link: the link that carries the surface: the free joints are those between it and
+            the tool. Default the last axis that carries the surface, else the world.
+        start: (n,) rad or m, where the motion has to begin; default: anywhere.
 
     Raises:
         RobotError: the name is unknown, or the URDF, frame, limits, a pose, an axis or a locked
@@ -122,26 +134,45 @@ def load_robot(
         >>> load_robot("ur5", tcp=((0, 0, 0.12), (0, 0, 0)))
         Robot('ur5', 6 joints, tool 'tool0' + (0, 0, 0.12) m)
     """
-    from robots.pinocchio_model import robot_from_urdf
-    from robots.urdf import check_urdf
-
     info = _find(name_or_path) or _unknown(Path(name_or_path).expanduser(), tool_frame)
     if approach_axis is None:
-        # The library's axis belongs to the library's tool frame.
-        changed = tool_frame is not None and tool_frame != info.tool_frame
+        changed = tool_frame not in (None, info.tool_frame)  # the axis belongs to that frame
         approach_axis = (0.0, 0.0, 1.0) if changed else info.approach_axis
-    source, given = f"robot {os.fspath(name_or_path)!r}", {"tcp": tcp, "base": base}
-    poses = check_arguments(approach_axis, lock, source, reference_axis=reference_axis, **given)
-    return robot_from_urdf(
-        check_urdf(info.urdf, package_dirs=(*_folders(package_dirs), *info.package_dirs)),
-        name=info.name,
-        tool_frame=tool_frame or info.tool_frame or None,
+    source, given = f"robot {os.fspath(name_or_path)!r}", {"tcp": tcp, "base": base, "axes": axes}
+    mounting = check_arguments(approach_axis, lock, source, reference_axis=reference_axis, **given)
+    robot = _read(
+        replace(info, lock={**info.lock, **(lock or {})}, tool_frame=tool_frame or info.tool_frame),
+        _folders(package_dirs),
+        mounting._replace(surface_link=surface_link),
+        limits=limits,
         approach_axis=approach_axis,
         reference_axis=reference_axis,
-        poses=poses,
-        lock={**info.lock, **(lock or {})},
-        limits=limits,
+    )
+    return robot if start is None else replace(robot, start=np.asarray(start))
+
+
+def _read(info: RobotInfo, folders: tuple[str, ...], mounting: Mounting, **asked: Any) -> Robot:
+    """Read the URDF of an arm.
+
+    Args:
+        info: the arm, with the tool frame and the held joints that are asked for.
+        folders: where meshes are looked up, besides those of `info`.
+        mounting: of tool, arm and surface; the axes may carry the surface.
+        asked: limits and axes of the tool, as in `load_robot`.
+    """
+    from robots.pinocchio_model import robot_from_urdf
+    from robots.urdf import carrier_of_surface, check_urdf
+
+    link = mounting.surface_link or carrier_of_surface(mounting.axes)
+    folders = (*folders, *info.package_dirs)
+    return robot_from_urdf(
+        check_urdf(info.urdf, folders, mounting.axes, mounting.base),
+        name=info.name,
+        tool_frame=info.tool_frame or None,
+        mounting=mounting._replace(surface_link=link),
+        lock=info.lock,
         limit_sets=_limit_sets(Path(info.limits)) if info.limits is not None else None,
+        **asked,
     )
 
 

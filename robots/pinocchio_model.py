@@ -14,11 +14,12 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from coverable_errors import Fault
-from robots.arguments import AS_IN_URDF, Poses
+from robots.arguments import AS_IN_URDF, Mounting
 from robots.errors import RobotError
+from robots.joint_checks import no_limit_set
 from robots.joint_selection import MOST_GUESSES, Selection, select_joints, suggestion
-from robots.mounting import place_base, place_tcp
-from robots.robot import Robot, no_limit_set
+from robots.mounting import place_base, place_tcp, rerooted
+from robots.robot import Robot
 
 if TYPE_CHECKING:
     from robots.urdf import CheckedUrdf
@@ -36,11 +37,12 @@ def robot_from_urdf(
     limits: str | Mapping[str, ArrayLike] | ArrayLike | None = None,
     limit_sets: Mapping[str, Mapping[str, tuple[float, float]]] | None = None,
     reference_axis: ArrayLike | None = None,
-    poses: Poses = AS_IN_URDF,
+    mounting: Mounting = AS_IN_URDF,
 ) -> Robot:
     """Reduce a URDF to the chain from its root link to the tool frame.
 
     Free are the joints on the chain from the root link to the tool frame, unless `lock` names them.
+    Where another link carries the surface, the chain begins there.
     Every other moving joint is held: at the value `lock` gives, or at zero clipped to its limits
     (a mimic joint where the joint it follows puts it, if that one is held too). A joint whose own
     limits are missing or make no sense needs `limits`.
@@ -51,7 +53,7 @@ def robot_from_urdf(
         tool_frame, approach_axis, lock, limits, reference_axis: as in `load_robot`.
         limit_sets: name -> joint name -> (lower, upper), rad or m. A set that lacks a free joint
             is left out.
-        poses: of TCP and base.
+        mounting: of tool, arm and surface.
 
     Raises:
         RobotError: the tool frame or a locked joint does not exist, a locked value is outside its
@@ -60,14 +62,14 @@ def robot_from_urdf(
     if WORLD in checked.links:
         fault = f"link {WORLD!r}: the name {WORLD!r} is Pinocchio's for the world; rename it"
         raise RobotError(fault, checked.path)
-    chosen = select_joints(checked, tool_frame, lock or {}, limits)
+    chosen = select_joints(checked, tool_frame, lock or {}, limits, mounting.surface_link)
     faults = list(chosen.faults)
     sets = limit_sets or {}
     if not chosen.is_chain:
         faults += _limit_faults(checked, limits, sets)
         raise RobotError(faults, f"robot {name!r}")
     axes = (approach_axis, np.full(3, np.nan) if reference_axis is None else reference_axis)
-    robot = _of_selection(checked, chosen, name, axes, sets, poses)
+    robot = _of_selection(checked, chosen, name, axes, sets, mounting)
     try:
         robot = robot if limits is None else robot.with_limits(limits)
     except RobotError as error:
@@ -83,19 +85,15 @@ def _of_selection(
     name: str,
     axes: tuple[ArrayLike, ArrayLike],
     limit_sets: Mapping[str, Mapping[str, tuple[float, float]]],
-    poses: Poses,
+    mounting: Mounting,
 ) -> Robot:
     """The robot with its own limits; arguments as above, `axes` are approach and reference."""
     free_names = [joint.name for joint in chosen.free]
-    full = parse(checked.text, checked.path)
-    model = reduced_model(full, free_names, chosen.locked, chosen.tool_frame)
-    if poses.base is not None:
-        place_base(model, poses.base)
-    if poses.tcp is not None:
-        place_tcp(model, chosen.tool_frame, poses.tcp)
+    composed = {joint.name: joint.limits for joint in chosen.free} if mounting.axes else {}
+    own = {axis.name: composed[axis.name] for axis in mounting.axes if axis.name in composed}
     return Robot(
         name=name,
-        model=model,
+        model=_chain_model(checked, chosen, mounting),
         tool_frame=chosen.tool_frame,
         approach_axis=np.asarray(axes[0]),
         reference_axis=np.asarray(axes[1]),
@@ -106,15 +104,35 @@ def _of_selection(
         upper=np.array([joint.limits[1] for joint in chosen.free]),
         max_velocity=np.array([joint.max_velocity or math.nan for joint in chosen.free]),
         limit_sets={
-            title: np.array([rows[joint] for joint in free_names])
+            title: np.array([{**own, **rows}[joint] for joint in free_names])
             for title, rows in limit_sets.items()
-            if all(joint in rows for joint in free_names)
+            if all(joint in rows or joint in own for joint in free_names)
         },
         urdf=os.path.abspath(checked.path),
         package_dirs=checked.package_dirs,
         locked=chosen.locked,
         notes=(*checked.warnings, *chosen.notes),
+        root_link=checked.mounted,
+        axes=mounting.axes,
+        surface_link=mounting.surface_link,
     )
+
+
+def _chain_model(checked: CheckedUrdf, chosen: Selection, mounting: Mounting) -> pin.Model:
+    """The model of the free joints, from the surface's link or the world to the TCP."""
+    names = [joint.name for joint in chosen.free]
+    in_a_row = mounting.surface_link is None
+    full = parse(checked.text, checked.path)
+    model = reduced_model(full, names, chosen.locked, chosen.tool_frame, in_a_row)
+    if mounting.base is not None and not mounting.axes:  # else it is in the text
+        place_base(model, mounting.base)
+    if mounting.tcp is not None:
+        place_tcp(model, chosen.tool_frame, mounting.tcp)
+    if in_a_row:
+        return model
+    body = pin.FrameType.BODY
+    ends = (model.getFrameId(link, body) for link in (mounting.surface_link, chosen.tool_frame))
+    return rerooted(model, *ends)
 
 
 def _limit_faults(
@@ -168,7 +186,11 @@ def _duplicate(descriptor: int) -> int:
 
 
 def reduced_model(
-    model: pin.Model, free: Sequence[str], locked: Mapping[str, float], tool: str
+    model: pin.Model,
+    free: Sequence[str],
+    locked: Mapping[str, float],
+    tool: str,
+    in_a_row: bool = True,
 ) -> pin.Model:
     """Lock every joint of a model but the free ones.
 
@@ -177,6 +199,7 @@ def reduced_model(
         free: names of the joints to keep, base to tip.
         locked: value of every other joint, rad or m.
         tool: the link that the free joints carry.
+        in_a_row: whether the free joints form one chain from the root; else their order is free.
 
     Raises:
         RobotError: what is left is not just the free joints and the tool.
@@ -195,9 +218,11 @@ def reduced_model(
             reference[entry.idx_q] = value
     drop = [i for i in range(1, model.njoints) if model.names[i] not in expected]
     reduced = pin.buildReducedModel(model, drop, reference)
-    if list(reduced.names)[1:] != expected or not reduced.existFrame(tool, pin.FrameType.BODY):
+    found = list(reduced.names)[1:]
+    same = found == expected if in_a_row else sorted(found) == sorted(expected)
+    if not same or not reduced.existFrame(tool, pin.FrameType.BODY):
         raise RobotError(
-            f"Pinocchio reads the joints {', '.join(list(reduced.names)[1:])} in robot "
+            f"Pinocchio reads the joints {', '.join(found)} in robot "
             f"{model.name!r} where {', '.join(expected)} lead to {tool!r}"
         )
     return reduced

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -12,14 +13,23 @@ SWEEPS = 60  # of the descent below; any number gives a bound, more a tighter on
 MOST_SLIDES = 10  # prismatic joints in a row whose 2^k end positions are looked at one by one
 
 
+class ReachBound(NamedTuple):
+    """A ball that the tool point cannot leave."""
+
+    origin: NDArray[np.float64]
+    """(3,) m, on the first joint that moves, in the root frame."""
+    radius: float
+    """m; inf where a prismatic joint has no limits."""
+
+
 def reach_bound(
     model: pin.Model,
     tool_frame: int,
     prismatic: NDArray[np.bool_],
     lower: NDArray[np.float64],
     upper: NDArray[np.float64],
-) -> float:
-    """Upper bound (m) on the distance of the tool point from the origin of the first joint.
+) -> ReachBound:
+    """Upper bound on the distance of the tool point from the origin of the first joint.
 
     A revolute joint leaves every point of its axis where it is. So put one anchor on each revolute
     axis: neighbouring anchors keep their distance whatever the joints do, and the tool point is
@@ -28,38 +38,44 @@ def reach_bound(
     gives a good bound. Where prismatic joints lie between two anchors, the distance is convex in
     their positions, so its maximum is at an end of the strokes.
 
+    Joints whose limits leave one value are no joints: they stand at it, and the first joint that
+    does move is the one that counts, such as that of an arm beside a table that is locked.
+
     Args:
         model: the n joints, base to tip.
         tool_frame: index of the frame whose origin is the tool point.
         prismatic: (n,) True where a joint slides.
         lower, upper: (n,) rad or m.
-
-    Returns:
-        The bound; inf where a prismatic joint has no limits.
     """
     n, data = len(prismatic), model.createData()
-    columns = pin.computeJointJacobians(model, data, pin.neutral(model))
+    fixed = lower == upper
+    q = pin.integrate(model, pin.neutral(model), np.where(fixed, lower, 0.0))
+    columns = pin.computeJointJacobians(model, data, q)
     columns = columns.reshape(6, n)  # in the root frame; Pinocchio flattens a single column
     pin.updateFramePlacements(model, data)
-    anchors = [data.oMi[1].translation.copy()]
+    free = np.flatnonzero(~fixed)
+    first = int(free[0]) if len(free) else n - 1
+    origin = data.oMi[first + 1].translation.copy()
+    anchors = [origin.copy()]
     axes: list[NDArray[np.float64] | None] = [None]  # None: this anchor does not slide
     slides: list[list[int]] = [[]]  # prismatic joints between an anchor and the next one
-    for i in range(n):
+    for i in map(int, free):
         if prismatic[i]:
             slides[-1].append(i)
-        elif i > 0:
+        elif i > first:
             anchors.append(data.oMi[i + 1].translation.copy())
             axes.append(columns[3:, i])
             slides.append([])
     anchors.append(data.oMf[tool_frame].translation.copy())
     _shorten(anchors, axes, slides)
     strokes = np.column_stack([lower, upper])
-    return float(
+    radius = float(
         sum(
             _longest(end - start, columns[:3, joints].T, strokes[joints])
             for start, end, joints in zip(anchors, anchors[1:], slides, strict=False)
         )
     )
+    return ReachBound(origin, radius)
 
 
 def _shorten(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -12,22 +12,24 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from robots.errors import RobotError
-from robots.mounting import TCP, made_orthogonal, unit_axis
+from robots.joint_checks import joint_faults, moves_both, no_limit_set, numbers
+from robots.mounting import TCP, made_orthogonal, seen_from, unit_axis, world_frame
 
 if TYPE_CHECKING:
     import pinocchio as pin
 
     from robots.chain import Chain
-
-KINDS = ("revolute", "continuous", "prismatic")
+    from robots.reach import ReachBound
+    from robots.urdf import Axis
 
 
 @dataclass(frozen=True, eq=False)  # no slots: cached properties need a __dict__
 class Robot:
-    """A serial chain of n one-dof joints from the URDF's root link to a tool centre point (TCP).
+    """A serial chain of n one-dof joints from the surface to a tool centre point (TCP).
 
-    The root frame is the world: the URDF's root link stands in it at `base`. The TCP is the frame
-    of the link `tool_frame`, or at `tcp` in it.
+    The root frame is the world, in which the URDF's root link stands at `base`; or, where a link
+    carries the surface, that link's frame (`surface_link`). The TCP is the frame of the link
+    `tool_frame`, or at `tcp` in it.
 
     A configuration q is n real numbers, base to tip: radians for revolute and continuous joints,
     metres for prismatic ones. It is *unwrapped*: q and q + 2 pi place the arm alike, yet are two
@@ -69,17 +71,32 @@ class Robot:
     By default +x, or +z where the approach axis is +-x; of another vector the part that is
     orthogonal to the approach axis is kept.
     """
+    start: NDArray[np.float64] | None = None
+    """(n,) rad or m, where the covering motion has to begin; None for anywhere."""
+    surface_link: str | None = None
+    """The link that carries the surface, and whose frame is the root frame; None for the world."""
+    axes: tuple[Axis, ...] = ()
+    """Axes that arm or surface are mounted on and that the URDF lacks, from the world outwards."""
+    root_link: str = ""
+    """The URDF's root link; by default the model's first."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays, and check that they fit together."""
         n = len(self.joint_names)
-        shapes = {"approach_axis": (3,), "lower": (n,), "upper": (n,), "reference_axis": (3,)}
+        shapes: dict[str, tuple[int]] = {"approach_axis": (3,), "reference_axis": (3,)}
+        shapes |= {"lower": (n,), "upper": (n,)}
         for name, shape in shapes.items():
-            array = _numbers(getattr(self, name), f"robot {self.name!r}: {name}", shape)
+            array = numbers(getattr(self, name), f"robot {self.name!r}: {name}", shape)
             if np.isnan(array).any() and not (name == "reference_axis" and np.isnan(array).all()):
                 raise RobotError(f"robot {self.name!r}: {name} holds NaN")
             object.__setattr__(self, name, array)
-        speeds = _numbers(self.max_velocity, f"robot {self.name!r}: max_velocity")
+        if self.start is not None:
+            start = numbers(self.start, f"robot {self.name!r}: start", (n,))
+            if not np.isfinite(start).all():
+                raise RobotError(f"robot {self.name!r}: start must be finite, got {start.tolist()}")
+            start.flags.writeable = False
+            object.__setattr__(self, "start", start)
+        speeds = numbers(self.max_velocity, f"robot {self.name!r}: max_velocity")
         if speeds.shape not in ((), (n,)) or (speeds <= 0.0).any():
             raise RobotError(
                 f"robot {self.name!r}: max_velocity must be {n} positive numbers (rad/s or m/s), "
@@ -89,9 +106,12 @@ class Robot:
         self._normalise_axes()
         for array in (self.approach_axis, self.reference_axis, self.lower, self.upper):
             array.flags.writeable = False
-        self._check_joints()
+        names, kinds = self.joint_names, self.joint_kinds
+        faults = joint_faults(names, kinds, self.lower, self.upper, self.start)
+        if faults:
+            raise RobotError(faults, f"robot {self.name!r}")
         sets = {
-            name: _numbers(table, f"robot {self.name!r}: limit set {name!r}", (n, 2))
+            name: numbers(table, f"robot {self.name!r}: limit set {name!r}", (n, 2))
             for name, table in self.limit_sets.items()
         }
         for table in sets.values():
@@ -116,26 +136,6 @@ class Robot:
             )
         object.__setattr__(self, "approach_axis", approach)
         object.__setattr__(self, "reference_axis", reference)
-
-    def _check_joints(self) -> None:
-        """Refuse joints of unknown kind, and empty limit ranges."""
-        faults = []
-        if not self.joint_names or len(self.joint_kinds) != len(self.joint_names):
-            faults.append(
-                f"{len(self.joint_names)} joint names and {len(self.joint_kinds)} kinds; "
-                "there must be at least one joint, and one kind for each"
-            )
-        for joint, kind in zip(self.joint_names, self.joint_kinds, strict=False):
-            if kind not in KINDS:
-                faults.append(f"joint {joint!r} is {kind!r}, not one of {', '.join(KINDS)}")
-        for joint, low, high in zip(self.joint_names, self.lower, self.upper, strict=True):
-            if not (low <= high and low < np.inf and high > -np.inf):
-                faults.append(
-                    f"joint {joint!r} has limits {low:g} .. {high:g}; the lower one must not be "
-                    "above the upper one (rad or m)"
-                )
-        if faults:
-            raise RobotError(faults, f"robot {self.name!r}")
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle as a call of the constructor (mapping proxies do not pickle)."""
@@ -186,11 +186,18 @@ class Robot:
 
     @property
     def base(self) -> NDArray[np.float64]:
-        """(4, 4) m, the URDF's root link in the world."""
+        """(4, 4) m, the URDF's root link in the world, with all joints at zero."""
         import pinocchio as pin
 
-        links = (frame for frame in self.model.frames if frame.type == pin.FrameType.BODY)
-        return np.array(next(links).placement.homogeneous)
+        data = self.model.createData()
+        pin.framesForwardKinematics(self.model, data, pin.neutral(self.model))
+        root = self.model.getFrameId(self.root_link or self.link_names[0], pin.FrameType.BODY)
+        return np.array(data.oMf[self.world_frame_id].actInv(data.oMf[root]).homogeneous)
+
+    @property
+    def world_frame_id(self) -> int:
+        """Index of the frame of the world in `model.frames`; 0 where that is the root frame."""
+        return world_frame(self.model)
 
     @property
     def link_names(self) -> tuple[str, ...]:
@@ -201,20 +208,25 @@ class Robot:
 
     @property
     def base_point(self) -> NDArray[np.float64]:
-        """(3,) m, origin of the first joint in the root frame, from which `reach` is measured."""
-        return np.array(self.model.jointPlacements[1].translation)
+        """(3,) m in the root frame, on the first joint that moves: `reach` is measured from it."""
+        return self._reach.origin
 
     def distance_from_base(self, points: ArrayLike) -> NDArray[np.float64]:
         """Distances (...) m of points (..., 3) m in the root frame from `base_point`."""
         return np.asarray(np.linalg.norm(np.asarray(points) - self.base_point, axis=-1))
 
-    @cached_property
+    @property
     def reach(self) -> float:
         """Upper bound (m) on the distance of the tool point from `base_point`.
 
         See `robots.reach.reach_bound`; inf where a prismatic joint has no limits. No configuration
         inside the limits puts the tool further out.
         """
+        return self._reach.radius
+
+    @cached_property
+    def _reach(self) -> ReachBound:
+        """The ball that the tool point cannot leave."""
         from robots.reach import reach_bound
 
         return reach_bound(self.model, self.tool_frame_id, self.prismatic, self.lower, self.upper)
@@ -240,6 +252,49 @@ class Robot:
             self.upper,
         )
 
+    def relative_to(self, link: str) -> Robot:
+        """The same arm as it is seen from one of its links, which carries the surface.
+
+        Its joints are those on the way from the link to the tool, the link's own first: those that
+        carry the link are turned round. Their names, values, limits and velocities are the same;
+        joints that move both are held at zero, or at the limit next to it, and a note says so.
+        Joints that the arm holds stay held: `load_robot(..., surface_link=link)` frees them.
+
+        Raises:
+            RobotError: there is no such link, or no free joint lies between it and the tool.
+
+        Example:
+            >>> from robots import load_robot
+            >>> load_robot("ur5").relative_to("forearm_link").joint_names
+            ('wrist_1_joint', 'wrist_2_joint', 'wrist_3_joint')
+        """
+        rest = np.clip(np.zeros(self.n), self.lower, self.upper)
+        try:
+            found = seen_from(self.model, link, self.tool_frame_id, rest)
+        except RobotError as error:
+            raise RobotError(error.faults, f"robot {self.name!r}") from error
+        order, values = list(found.order), rest.tolist()
+        return replace(
+            self,
+            model=found.model,
+            joint_names=tuple(self.joint_names[j] for j in order),
+            joint_kinds=tuple(self.joint_kinds[j] for j in order),
+            lower=self.lower[order],
+            upper=self.upper[order],
+            max_velocity=self.max_velocity[order],
+            limit_sets={name: table[order] for name, table in self.limit_sets.items()},
+            locked={**self.locked, **{self.joint_names[j]: values[j] for j in found.held}},
+            notes=(
+                *self.notes,
+                *(
+                    moves_both(self.joint_names[j], link, values[j], bool(self.prismatic[j]))
+                    for j in found.held
+                ),
+            ),
+            start=None if self.start is None else self.start[order],
+            surface_link=link,
+        )
+
     def with_limits(self, limits: str | Mapping[str, ArrayLike] | ArrayLike) -> Robot:
         """Return the same arm with other limits.
 
@@ -257,7 +312,7 @@ class Robot:
         elif isinstance(limits, Mapping):
             table = self._limits_by_name(limits)
         else:
-            table = _numbers(limits, f"limits of robot {self.name!r}")
+            table = numbers(limits, f"limits of robot {self.name!r}")
         if table.shape != (self.n, 2):
             raise RobotError(
                 f"limits must have shape ({self.n}, 2), one (lower, upper) for each of "
@@ -274,7 +329,7 @@ class Robot:
             if joint not in self.joint_names:
                 faults.append(f"there is no free joint {joint!r}")
                 continue
-            values = _numbers(pair, f"limits of joint {joint!r}")
+            values = numbers(pair, f"limits of joint {joint!r}")
             if values.shape != (2,):
                 faults.append(f"limits of joint {joint!r} must be a pair (lower, upper)")
                 continue
@@ -288,22 +343,5 @@ class Robot:
         """One line: name, joints and tool."""
         x, y, z = self.tcp[:3, 3].tolist()
         off = f" + ({x:g}, {y:g}, {z:g}) m" if self.tool_frame_id != self.tool_link_id else ""
-        return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r}{off})"
-
-
-def no_limit_set(name: str, known: Iterable[str]) -> str:
-    """That there is no limit set of this name, and which there are."""
-    return f"there is no limit set {name!r}; it has: {', '.join(sorted(known)) or 'none'}"
-
-
-def _numbers(
-    values: ArrayLike, what: str, shape: tuple[int, ...] | None = None
-) -> NDArray[np.float64]:
-    """A copy of `values` as an array of floats of that shape; RobotError where it is none."""
-    try:
-        array = np.array(values, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise RobotError(f"{what} must be an array of numbers, got {values!r}") from error
-    if shape is not None and array.shape != shape:
-        raise RobotError(f"{what} has shape {array.shape}, not {shape}")
-    return array
+        seen = f", seen from {self.surface_link!r}" if self.surface_link else ""
+        return f"Robot({self.name!r}, {self.n} joints, tool {self.tool_frame!r}{off}{seen})"

@@ -25,9 +25,8 @@ coverable_kernels
 coverable_meshes
 robots: errors
 robots.mounting
-robots: arguments chain reach robot kinematics
 robots.urdf
-robots: joint_selection pinocchio_model library
+robots: arguments joint_checks chain reach robot kinematics joint_selection pinocchio_model library
 robots.shapes
 surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
@@ -298,6 +297,7 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
         "outer_bodies",
         "pairs",
         "scene",
+        "seats",
         "settings",
         "shapes",
         "triangles",

@@ -101,7 +101,7 @@ class Case:
 
         faults, robot, cells, task = list[Fault](), None, None, None
         try:
-            robot = self.robot.build()
+            robot = self.robot.build(self.surface.frame)
         except RobotError as error:
             faults += in_robot_table(error)
         try:

@@ -22,14 +22,13 @@ from feasibility.collisions import (
 
 MAKERS = {"scene": Obstacle, "tool": ToolShape}
 KINDS = {"scene": tuple(SHAPES), "tool": tuple(kind for kind in SHAPES if kind != "halfspace")}
-COMMON = {"scene": ("name", "position", "rpy_deg", "clearance"), "tool": ("position", "rpy_deg")}
+COMMON = {
+    "scene": ("name", "position", "rpy_deg", "clearance", "frame"),
+    "tool": ("position", "rpy_deg"),
+}
 """Keys of every object."""
 NAMES = {"self_": "self"}
 """Keys of arguments that are called otherwise in Python."""
-STILL = (
-    "is not supported yet; leave it out: objects of the scene stand still, in the frame of the "
-    "robot's root link"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,7 +210,7 @@ def _object(section: Section, key: str, k: int, entry: Any) -> _Entry | None:
             found.make(metres_per_unit, {"scale": values["scale"]})
     others = {other for keys in SHAPES.values() for other in keys} - set(own)
     says = f"is no key of a {kind}; it has {', '.join((*own, *COMMON[key]))}"
-    found.refuse_others(dict.fromkeys(sorted(others), says) | {"frame": STILL})
+    found.refuse_others(dict.fromkeys(sorted(others), says))
     pose = {name: values[name] for name in COMMON[key] if name in values}
     if key == "scene":
         pose = {"name": MISSING} | pose

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from coverable_errors import Fault, is_number, printable, shown
+from feasibility.cases.axis_table import AxisPart, read_axes
 from feasibility.cases.table_reader import (
     DEG,
     METRES,
@@ -59,16 +62,26 @@ class RobotPart:
     base: PosePart | None = None
     """Of the URDF's root link in the world."""
     reference_axis: Triple | None = None
+    axis: tuple[AxisPart, ...] = ()
+    """From the world outwards."""
+    start: tuple[float, ...] | None = None
+    """rad or m, in the order of the free joints."""
+    start_deg: tuple[float, ...] | None = None
+    """The same in degrees, where all joints turn."""
 
     def table(self) -> dict[str, Any]:
         """The keys of the [robot] table that say something."""
         values = {entry.name: getattr(self, entry.name) for entry in fields(self)}
         for key in POSES:
             values[key] = None if values[key] is None else values[key]._asdict()
+        values["axis"] = tuple(axis.table() for axis in self.axis)
         return {key: value for key, value in values.items() if value not in (None, (), {})}
 
-    def build(self) -> Robot:
+    def build(self, surface_link: str | None = None) -> Robot:
         """Load the arm.
+
+        Args:
+            surface_link: the link that carries the surface, if one does.
 
         Raises:
             RobotError: see `robots.load_robot`; or an angle is given for a sliding joint, or a
@@ -88,6 +101,8 @@ class RobotPart:
                 tcp=self.tcp,
                 base=self.base,
                 reference_axis=self.reference_axis,
+                axes=[axis.build() for axis in self.axis],
+                surface_link=surface_link,
             )
         except RobotError as error:
             units = self._wrong_units(self._kinds_alone())
@@ -95,16 +110,27 @@ class RobotPart:
         in_order = robot.joint_names if isinstance(self.limits_deg, tuple) else ()
         kinds = dict(zip(robot.joint_names, robot.joint_kinds, strict=True))
         faults = self._wrong_units(kinds, in_order)
+        faults += self._start_in_degrees(robot)
         if faults:
             raise RobotError(faults, f"robot {robot.name!r}")
-        return robot
+        start = self.start if self.start_deg is None else tuple(map(math.radians, self.start_deg))
+        return robot if start is None else _starting_at(robot, start, self.start_deg is not None)
+
+    def _start_in_degrees(self, robot: Robot) -> list[Fault]:
+        """Degrees for joints that slide."""
+        return [
+            Fault("start_deg", f"gives degrees for joint {joint!r}, which slides; use start")
+            for joint, kind in zip(robot.joint_names, robot.joint_kinds, strict=True)
+            if kind == "prismatic" and self.start_deg is not None
+        ]
 
     def _kinds_alone(self) -> dict[str, str]:
         """The kinds of all moving joints, by name; none where the URDF itself is at fault."""
         from robots import RobotError, joint_kinds
 
+        axes = {axis.name: axis.type for axis in self.axis}
         try:
-            return joint_kinds(self.urdf or self.name or "", self.package_dirs)
+            return axes | joint_kinds(self.urdf or self.name or "", self.package_dirs)
         except RobotError:
             return {}
 
@@ -136,11 +162,36 @@ class RobotPart:
 
 
 def in_robot_table(error: RobotError) -> list[Fault]:
-    """What loading an arm says, as faults of the [robot] table."""
+    """What loading an arm says, as faults of the [robot] table, and of `surface.frame`."""
+    named = [
+        fault._replace(key="surface.frame")
+        if fault.key == "surface_link"
+        else fault.renamed({}, "robot")
+        for fault in error.faults
+    ]
     return [
         fault._replace(place=": ".join(part for part in (error.source, fault.place) if part))
-        for fault in (fault.renamed({}, "robot") for fault in error.faults)
+        for fault in named
     ]
+
+
+def _starting_at(robot: Robot, start: tuple[float, ...], in_degrees: bool) -> Robot:
+    """The arm with a start.
+
+    Raises:
+        RobotError: it does not fit the joints, or lies outside of their limits.
+    """
+    from robots import RobotError
+
+    key, source = "start_deg" if in_degrees else "start", f"robot {robot.name!r}"
+    if len(start) != robot.n:
+        what = f"has {len(start)} values; expected one for each of {', '.join(robot.joint_names)}"
+        raise RobotError([Fault(key, what)], source)
+    try:
+        return replace(robot, start=np.array(start))
+    except RobotError as error:
+        faults = [Fault(key, fault.message.removeprefix("start ")) for fault in error.faults]
+        raise RobotError(faults, source) from error
 
 
 def _radians(pair: Pair) -> Pair:
@@ -187,6 +238,9 @@ def _part(section: Section) -> RobotPart:
         limits=section.text("limits"),
         limits_deg=_limits_deg(section),
         limits_m=_limits_by_name(section, "limits_m", METRES),
+        axis=read_axes(section),
+        start=_values(section, "start"),
+        start_deg=_values(section, "start_deg"),
         **_axes_poses_and_lock(section),
     )
     _refuse_contradictions(section)
@@ -236,11 +290,23 @@ def _refuse_contradictions(section: Section) -> None:
             "contradicts the list in robot.limits_deg, which is for arms whose joints all turn; "
             "give both by joint name",
         )
+    if "start" in table and "start_deg" in table:
+        section.fault("start", "contradicts robot.start_deg; give one of the two")
     in_degrees, in_metres = _names(table.get("limits_deg")), _names(table.get("limits_m"))
     for joint in sorted(_names(table.get("lock")) & (in_degrees | in_metres)):
         section.fault(f"lock.{printable(joint)}", "contradicts the limits given for that joint")
     for joint in sorted(in_degrees & in_metres):
         section.fault(f"limits_m.{printable(joint)}", "contradicts robot.limits_deg of that joint")
+
+
+def _values(section: Section, key: str) -> tuple[float, ...] | None:
+    """A list of finite numbers; None where it is not written, or wrong."""
+    if not section.has(key):
+        return None
+    value = section.table[key]
+    count = len(value) if isinstance(value, list) else 0
+    found = section.numbers(key, value, count, f"must be {section.keys[key].type}")
+    return tuple(found) if found else None
 
 
 def _names(value: Any) -> set[str]:

@@ -156,6 +156,8 @@ class SurfacePart:
     side: Literal["inside", "outside"] = "inside"
     position: Triple = ORIGIN
     rpy_deg: Triple = ORIGIN
+    frame: str | None = None
+    """The link that carries it; None for the world, or the last axis that carries the surface."""
 
     @property
     def label(self) -> str:
@@ -181,6 +183,7 @@ class SurfacePart:
             **{key: _written(self.values.get(key)) for key in OWN_KEYS[self.kind]},
             "position": self.position,
             "rpy_deg": self.rpy_deg,
+            "frame": self.frame,
             "side": self.side,
             "cells": self.cells,
         }
@@ -229,6 +232,7 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
         section.make(check_pose, pose)
         return None
     section.of_kind(kind)
+    frame = section.text("frame")
     values, cells = _values(section, kind)
     hints = foreign_keys(kind)
     if kind == "piecewise":
@@ -240,7 +244,7 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
         section.make(check_pose, pose)
     if len(faults) > before:
         return None
-    return SurfacePart(kind, frozen_values(values), cells, **frozen(pose))
+    return SurfacePart(kind, frozen_values(values), cells, frame=frame, **frozen(pose))
 
 
 def _kind(section: Section) -> str | None:

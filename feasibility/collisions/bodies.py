@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,15 @@ class Soup:
     """m, how far the body may stand out from its triangles; every clearance is larger by it."""
     closed: bool
     """True where they bound a solid, which has an inside."""
+
+
+class Seat(NamedTuple):
+    """An object of the scene, and what carries it."""
+
+    obstacle: Obstacle
+    """With its placement in the frame of that joint (Pinocchio's)."""
+    joint: int
+    """0 where it is at rest in the root frame."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +64,13 @@ class Bodies:
     """All bodies of one problem; pure data, for the search and for the judge alike."""
 
     solids: tuple[Solid, ...]
-    """Exact shapes of links and tool, for the judge and for pictures."""
+    """Exact shapes of links, tool and carried objects, for the judge and for pictures."""
     polytopes: tuple[Polytope, ...]
-    """Convex bodies around them, and those of convex objects of the scene (joint 0)."""
+    """Convex bodies around them, and those of convex objects at rest (joint 0)."""
     soups: tuple[Soup, ...]
-    """The surface, and objects of the scene that are not convex."""
+    """The surface, and objects at rest that are not convex."""
     scene: tuple[Obstacle, ...]
-    """The objects of the scene as given, for the judge and for pictures."""
+    """The objects at rest, with their place in the root frame, for the judge and for pictures."""
     pairs: tuple[Pair, ...]
     left_out: tuple[LeftOut, ...] = ()
     unchecked: tuple[str, ...] = ()
@@ -69,3 +79,5 @@ class Bodies:
     """Which of self, surface, scene are asked for."""
     notes: tuple[str, ...] = ()
     """What a user should know, one sentence each."""
+    carried: tuple[Seat, ...] = ()
+    """The objects of the scene that move, for pictures."""

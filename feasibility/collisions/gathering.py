@@ -12,6 +12,7 @@ from coverable_errors import ArgumentError
 from feasibility.collisions.bodies import Bodies, LeftOut, Pair, Soup
 from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_polytopes, tool_solids
 from feasibility.collisions.scene import ToolShape
+from feasibility.collisions.seats import Seat, carried_bodies, furthest, seats_of
 from feasibility.collisions.settings import Collision
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
@@ -61,25 +62,29 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
     names = tuple(one.name for one in collision.scene)
     arm = _arm(robot, collision.shapes, collision.tool, collision.allow, collision.srdf, names)
     shapes, tool = arm.shapes, arm.tool
-    solids = (*shapes.solids, *tool_solids(collision.tool, robot))
+    solids = [*shapes.solids, *tool_solids(collision.tool, robot)]
     polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
-    reach = _reach(robot, polytopes)
-    for obstacle in collision.scene:
-        outer, soup = polytopes_of(obstacle, reach), soup_of(obstacle)
-        polytopes += outer or ()
-        soups += [soup] if soup is not None else []
     if collision.surface:
         sheet = sheet_of(surface, thickness=collision.thickness)
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False))
-    found = _Pairs(collision, {solid.owner: solid.joint for solid in solids}, robot.n)
+    seats = seats_of(robot, collision.scene)
+    reach = _reach(robot, polytopes, seats, soups)
+    for obstacle in (seat.obstacle for seat in seats if not seat.joint):
+        outer, soup = polytopes_of(obstacle, reach), soup_of(obstacle)
+        polytopes += outer or ()
+        soups += [soup] if soup is not None else []
+    links = {solid.owner: solid.joint for solid in solids}
+    exact, convex = carried_bodies(seats, reach, collision.shapes)
+    found = _Pairs(collision, links, seats, _tool_owners(collision, links, robot))
     if collision.self_:
         found.add_links(arm.pairs())
     found.add_objects(touching=not standoff > 0.0)
     return Bodies(
-        solids=solids,
-        polytopes=tuple(polytopes),
+        solids=(*solids, *exact),
+        polytopes=(*polytopes, *convex),
         soups=tuple(soups),
-        scene=collision.scene,
+        scene=tuple(seat.obstacle for seat in seats if not seat.joint),
+        carried=tuple(seat for seat in seats if seat.joint),
         pairs=tuple(found.asked),
         left_out=tuple(found.left_out),
         unchecked=shapes.unchecked,
@@ -89,7 +94,7 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
             *found.notes,
             *(note for one in collision.scene for note in one.notes),
             *collision.notes_on(standoff),
-            *_beyond(arm.reaches, found.asked, standoff),
+            *_beyond([r for r in arm.reaches if r.owner in found.tool], found.asked, standoff),
         ),
     )
 
@@ -140,39 +145,56 @@ def _beyond(reaches: Iterable[Reach], pairs: Iterable[Pair], standoff: float) ->
     ]
 
 
-def _reach(robot: Robot, polytopes: Sequence[Polytope]) -> float:
+def _reach(
+    robot: Robot, polytopes: Sequence[Polytope], seats: Iterable[Seat], soups: Iterable[Soup]
+) -> float:
     """m, no point of the arm is further from the origin of the root frame.
 
-    The steps from joint to joint, the slides, and the furthest point of a body from its joint.
+    The steps from joint to joint, the slides, and the furthest point of a body from its joint. With
+    the surface and the carried objects among these, it holds for any body from any joint's frame.
     """
     steps = sum(float(np.linalg.norm(place.translation)) for place in robot.model.jointPlacements)
     slides = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[robot.prismatic].sum()
     wide = max(
         float(np.linalg.norm(body.vertices, axis=1).max()) + body.radius for body in polytopes
     )
+    carried = [seat for seat in seats if seat.joint]
+    if carried:
+        placed = [float(np.linalg.norm(seat.obstacle.placement[:3, 3])) for seat in carried]
+        wide = max(wide, *placed, *(furthest(soup.triangles) for soup in soups))
     return min(steps + float(slides) + wide, FURTHEST)
 
 
-def tool_owners(collision: Collision, joints: Mapping[str, int], last: int) -> set[str]:
+def _tool_owners(collision: Collision, joints: Mapping[str, int], robot: Robot) -> set[str]:
     """The owners that are the tool: those named, or all that move with the last joint.
+
+    Where the tool is fixed in the world and the arm holds the part, the whole world moves with the
+    last joint: the tool is then what is mounted on the tool frame, or else the link of that name.
 
     Args:
         collision: what is asked for.
         joints: which joint carries each owner.
-        last: number of the last joint.
+        robot: the arm.
     """
     if collision.tool_links:
         return {*collision.tool_links, TOOL} & joints.keys()
-    return {owner for owner, joint in joints.items() if joint == last}
+    if robot.model.frames[robot.world_frame_id].parentJoint == robot.n:
+        return {TOOL if collision.tool else robot.tool_frame} & joints.keys()
+    return {owner for owner, joint in joints.items() if joint == robot.n}
 
 
 class _Pairs:
     """Who must stay clear of whom, and who is left out for which reason."""
 
-    def __init__(self, collision: Collision, joints: Mapping[str, int], last: int) -> None:
-        """With the joint that carries each owner of bodies, and the number of the last joint."""
-        self.collision, self.joints = collision, joints
-        self.tool = tool_owners(collision, joints, last)
+    def __init__(
+        self,
+        collision: Collision,
+        joints: Mapping[str, int],
+        seats: Sequence[Seat],
+        tool: set[str],
+    ) -> None:
+        """With the joints of links and tool, the objects of the scene, and the tool's owners."""
+        self.collision, self.joints, self.seats, self.tool = collision, joints, seats, tool
         self.own = {frozenset(pair[:2]): pair[2] for pair in collision.clearances}
         self.allowed = {frozenset(pair) for pair in collision.allow}
         self.asked = list[Pair]()
@@ -190,15 +212,27 @@ class _Pairs:
         """The arm against scene and surface; the tool may be `touching` the surface."""
         general = self.collision.clearance
         for owner, joint in self.joints.items():
+            for seat in self.seats:
+                still = "rigid" if seat.joint == joint else ""
+                self._ask(owner, seat.obstacle.name, self._wanted(seat), still)
             still = "" if joint else "rigid"
-            for one in self.collision.scene:
-                wanted = general if one.clearance is None else one.clearance
-                self._ask(owner, one.name, wanted, still)
             if self.collision.surface and owner in self.tool:
                 near = self.collision.tool_clearance
                 self._ask(owner, SURFACE, near, still or ("contact" if touching else ""))
             elif self.collision.surface:
                 self._ask(owner, SURFACE, general, still)
+        for number, seat in enumerate(self.seats):
+            if self.collision.surface and seat.joint:
+                self._ask(seat.obstacle.name, SURFACE, self._wanted(seat))
+            for other in self.seats[number + 1 :]:
+                if other.joint != seat.joint:
+                    wanted = max(self._wanted(seat), self._wanted(other))
+                    self._ask(seat.obstacle.name, other.obstacle.name, wanted)
+
+    def _wanted(self, seat: Seat) -> float:
+        """m, the clearance of an object of the scene."""
+        own = seat.obstacle.clearance
+        return self.collision.clearance if own is None else own
 
     def _ask(self, first: str, second: str, clearance: float, why: str = "") -> None:
         """Ask for a pair, unless there is a reason why not."""

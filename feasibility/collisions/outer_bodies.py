@@ -42,7 +42,8 @@ def polytopes_of(obstacle: Obstacle, reach: float) -> tuple[Polytope, ...] | Non
     """
     geometry, placement = obstacle.geometry, obstacle.placement
     if isinstance(geometry, HalfSpace):
-        vertices = _below(placement, reach)
+        middle, size = below(placement, reach)
+        vertices = _moved(placement, middle + _CUBE * (0.5 * size))
         return (Polytope(obstacle.name, 0, vertices, 0.0),)
     if isinstance(geometry, Triangles) and not is_convex(geometry):
         return None
@@ -95,12 +96,15 @@ def is_convex(mesh: Triangles) -> bool:
     return bool(heights.max() <= _CONVEX * wide and 2 * len(vertices) == len(faces) + 4)
 
 
-def _below(placement: Points, reach: float) -> Points:
-    """(8, 3) m, the box that stands for a half space; see `polytopes_of`."""
+def below(placement: Points, reach: float) -> tuple[Points, Points]:
+    """The box that stands for a half space, see `polytopes_of`: its middle and its sides, (3,) m.
+
+    Both are in the half space's own frame.
+    """
     own = np.linalg.inv(placement)[:3, 3]  # the origin of the root frame, seen from the plane
     deep = reach + abs(own[2])
     middle = np.array([own[0], own[1], -deep / 2.0])
-    return _moved(placement, middle + _CUBE * np.array([reach, reach, deep / 2.0]))
+    return middle, np.array([2.0 * reach, 2.0 * reach, deep])
 
 
 def _moved(placement: Points, points: Points) -> Points:

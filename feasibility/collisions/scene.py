@@ -33,7 +33,7 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Obstacle:
-    """One object of the scene, at rest in the root frame.
+    """One object of the scene, at rest in the world, or carried by a link of the arm.
 
     Raises:
         ArgumentError: it has no name, or its numbers are no body at no place; all that is wrong is
@@ -54,9 +54,11 @@ class Obstacle:
     name: str
     geometry: Shape | HalfSpace
     placement: NDArray[np.float64]
-    """(4, 4) the object's frame in the root frame, m."""
+    """(4, 4) the object's frame in the world or in the link's frame, m."""
     clearance: float | None = None
     """m, in place of `Collision.clearance` for every pair with it."""
+    frame: str | None = None
+    """The link that carries it; None for the world."""
 
     def __post_init__(self) -> None:
         """Refuse what is no body, and keep plain numbers."""
@@ -67,6 +69,8 @@ class Obstacle:
             checks.wrong(
                 "name", self.name, "must be another: pairs call the surface and the tool so"
             )
+        if self.frame is not None and not (isinstance(self.frame, str) and self.frame.strip()):
+            checks.wrong("frame", self.frame, "must be the name of a link, or None for the world")
         clearance = self.clearance
         _keep(
             self,
@@ -95,17 +99,21 @@ class Obstacle:
         position: Point = ORIGIN,
         rpy_deg: Point = ORIGIN,
         clearance: float | None = None,
+        frame: str | None = None,
     ) -> Obstacle:
         """A box about its position, with full edge lengths `size` (m).
 
         Args:
             name: what pairs and answers call it.
             size: (3,) m, along x, y and z of its own frame.
-            position: (3,) m, of its middle in the root frame, as for the other kinds.
+            position: (3,) m, of its middle in the world or in `frame`, as for the other kinds.
             rpy_deg: (3,) fixed-axis roll, pitch, yaw of its frame.
             clearance: m, in place of `Collision.clearance` for every pair with it.
+            frame: the link that carries it; None for the world.
         """
-        return _placed(Obstacle, Box(cast("Any", size)), position, rpy_deg, name, clearance)
+        return _placed(
+            Obstacle, Box(cast("Any", size)), position, rpy_deg, name, clearance, frame=frame
+        )
 
     @staticmethod
     def cylinder(
@@ -115,9 +123,12 @@ class Obstacle:
         position: Point = ORIGIN,
         rpy_deg: Point = ORIGIN,
         clearance: float | None = None,
+        frame: str | None = None,
     ) -> Obstacle:
         """A cylinder along z of its own frame, about its position; lengths in m."""
-        return _placed(Obstacle, Cylinder(radius, length), position, rpy_deg, name, clearance)
+        return _placed(
+            Obstacle, Cylinder(radius, length), position, rpy_deg, name, clearance, frame=frame
+        )
 
     @staticmethod
     def sphere(
@@ -126,9 +137,10 @@ class Obstacle:
         position: Point = ORIGIN,
         rpy_deg: Point = ORIGIN,
         clearance: float | None = None,
+        frame: str | None = None,
     ) -> Obstacle:
         """A ball, m."""
-        return _placed(Obstacle, Sphere(radius), position, rpy_deg, name, clearance)
+        return _placed(Obstacle, Sphere(radius), position, rpy_deg, name, clearance, frame=frame)
 
     @staticmethod
     def capsule(
@@ -138,9 +150,12 @@ class Obstacle:
         position: Point = ORIGIN,
         rpy_deg: Point = ORIGIN,
         clearance: float | None = None,
+        frame: str | None = None,
     ) -> Obstacle:
         """A cylinder along z of that length (m), with a half ball on each end."""
-        return _placed(Obstacle, Capsule(radius, length), position, rpy_deg, name, clearance)
+        return _placed(
+            Obstacle, Capsule(radius, length), position, rpy_deg, name, clearance, frame=frame
+        )
 
     @staticmethod
     def halfspace(
@@ -148,9 +163,10 @@ class Obstacle:
         position: Point = ORIGIN,
         rpy_deg: Point = ORIGIN,
         clearance: float | None = None,
+        frame: str | None = None,
     ) -> Obstacle:
         """All that is below the xy plane of its own frame: a floor at `position` (m)."""
-        return _placed(Obstacle, HalfSpace(), position, rpy_deg, name, clearance)
+        return _placed(Obstacle, HalfSpace(), position, rpy_deg, name, clearance, frame=frame)
 
     @staticmethod
     def mesh(
@@ -160,9 +176,10 @@ class Obstacle:
         position: Point = ORIGIN,
         rpy_deg: Point = ORIGIN,
         clearance: float | None = None,
+        frame: str | None = None,
     ) -> Obstacle:
         """The triangles of a file; see `read_triangles` for its formats and its unit."""
-        return _from_file(Obstacle, file, scale, position, rpy_deg, name, clearance)
+        return _from_file(Obstacle, file, scale, position, rpy_deg, name, clearance, frame=frame)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -253,6 +270,7 @@ def _placed(
     name: str | None = None,
     clearance: float | None = None,
     faults: Sequence[Fault] = (),
+    frame: str | None = None,
 ) -> Made:
     """An object or a tool shape at a place; all faults together, with those found before."""
     checks = Checks("a tool shape" if name is None else f"obstacle {name!r}")
@@ -262,7 +280,7 @@ def _placed(
         if name is None:
             made = make(geometry, placement)
         else:
-            made = make(name, geometry, placement, clearance)
+            made = make(name, geometry, placement, clearance, frame)
     except ArgumentError as error:
         checks.faults += error.faults
     checks.done()
@@ -277,6 +295,7 @@ def _from_file(
     rpy_deg: Any,
     name: str | None = None,
     clearance: float | None = None,
+    frame: str | None = None,
 ) -> Made:
     """The same with the triangles of a file."""
     shape, faults = PLACEHOLDER, tuple[Fault, ...]()
@@ -284,4 +303,4 @@ def _from_file(
         shape = read_triangles(file, scale)
     except ArgumentError as error:
         faults = error.faults
-    return _placed(make, shape, position, rpy_deg, name, clearance, faults)
+    return _placed(make, shape, position, rpy_deg, name, clearance, faults, frame)

@@ -129,16 +129,16 @@ def arm_of(case: Case) -> Robot:
     Raises:
         RobotError: it cannot be loaded so.
     """
-    return _load(toml_document({"robot": case.robot.table()}))
+    return _load(toml_document({"robot": case.robot.table()}), case.surface.frame)
 
 
 @lru_cache(maxsize=ROBOTS_KEPT)
-def _load(table: str) -> Robot:
-    """The arm of a [robot] table, written as a document."""
+def _load(table: str, surface_link: str | None) -> Robot:
+    """The arm of a [robot] table, written as a document; a link of it may carry the surface."""
     part = read_robot(parse_toml(table)["robot"], [])
     if part is None:
         raise ValueError("the table of a robot that was read before cannot be read again")
-    return part.build()
+    return part.build(surface_link)
 
 
 def cut_of(case: Case) -> Cells:

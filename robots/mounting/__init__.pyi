@@ -1,3 +1,4 @@
+from .between_links import seen_from as seen_from
 from .directions import made_orthogonal as made_orthogonal
 from .directions import unit_axis as unit_axis
 from .poses import FURTHEST_BASE as FURTHEST_BASE
@@ -5,6 +6,9 @@ from .poses import FURTHEST_TCP as FURTHEST_TCP
 from .poses import checked_pose as checked_pose
 from .poses import matrix_of as matrix_of
 from .poses import rigid_matrix as rigid_matrix
+from .rerooting import joints_between as joints_between
+from .rerooting import rerooted as rerooted
+from .rerooting import world_frame as world_frame
 from .tool_and_base import TCP as TCP
 from .tool_and_base import place_base as place_base
 from .tool_and_base import place_tcp as place_tcp

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     import pinocchio as pin
 
-TCP = "tcp"  # name of the frame; a link may be called the same, as frames differ by their type too
+TCP = "coverable tcp"  # name of its frame in a model too
 
 
 def place_base(model: pin.Model, base: NDArray[np.float64]) -> None:

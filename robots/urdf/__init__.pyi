@@ -1,3 +1,5 @@
+from .axes import Axis as Axis
+from .axes import carrier_of_surface as carrier_of_surface
 from .checked_urdf import CheckedUrdf as CheckedUrdf
 from .checked_urdf import check_urdf as check_urdf
 from .collisions import CollisionShape as CollisionShape

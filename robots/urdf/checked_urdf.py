@@ -10,9 +10,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from xml.sax.saxutils import quoteattr
 
+import numpy as np
+from numpy.typing import NDArray
+
+from robots.urdf.axes import Axis, insert_axes
 from robots.urdf.collisions import CollisionShapes, read_collisions
 from robots.urdf.geometry import ShapeFault
 from robots.urdf.joints import JointInfo
@@ -38,13 +42,15 @@ class CheckedUrdf:
     without usable limits (`JointInfo.fault`) has very wide ones, so that it is not locked.
     """
     root: str
-    """The link that no joint moves."""
+    """The link that no joint moves; with composed axes the world."""
+    mounted: str
+    """The root link of the file itself."""
     links: tuple[str, ...]
     """From the root outwards, parents before children."""
     joints: tuple[JointInfo, ...]
     """From the root outwards, in the order of `links[1:]`: joint i moves link i + 1."""
     leaves: tuple[str, ...]
-    """Links without a child."""
+    """Links without a child, those of composed axes left out."""
     visuals: tuple[Visual, ...]
     visual_faults: tuple[ShapeFault, ...]
     """Visuals that cannot be drawn; `warnings` says so in short."""
@@ -78,20 +84,32 @@ class CheckedUrdf:
 
 
 def check_urdf(
-    path: str | os.PathLike[str], package_dirs: Sequence[str | os.PathLike[str]] = ()
+    path: str | os.PathLike[str],
+    package_dirs: Sequence[str | os.PathLike[str]] = (),
+    axes: Sequence[Axis] = (),
+    base: NDArray[np.float64] | None = None,
 ) -> CheckedUrdf:
     """Read and check a URDF file.
 
     Args:
         path: the file.
         package_dirs: folders that hold the packages of `package://` mesh names.
+        axes: that arm or surface are mounted on, added to the tree; the world is then its root.
+        base: (4, 4) m, with axes, the file's root link in the world or on the last base axis.
 
     Raises:
         UrdfError: with every fault that was found, each with its line and what would do.
     """
     name = os.fsdecode(path)
     root = parse_xml(read_bytes(name), name)
-    return _check(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
+    refuse_other_formats(root, name)
+    mounted = insert_axes(root, axes, base, name) if axes else None
+    checked = _check(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
+    if mounted is None:
+        return checked
+    composed = {axis.name for axis in axes}
+    leaves = tuple(leaf for leaf in checked.leaves if leaf not in composed)
+    return replace(checked, mounted=mounted, leaves=leaves)
 
 
 def check_urdf_text(
@@ -118,13 +136,16 @@ def check_urdf_text(
     except UnicodeEncodeError as error:
         raise UrdfError(f"is no text: {error.reason} at {error.start}", name) from None
     root = parse_xml(data, name, encoding="utf-8")
+    refuse_other_formats(root, name)
     return _check(root, name, os.fsdecode(base_dir) if base_dir is not None else None, package_dirs)
 
 
 def _check(
-    robot: Node, path: str, base_dir: str | None, package_dirs: Sequence[str | os.PathLike[str]]
+    robot: Node,
+    path: str,
+    base_dir: str | None,
+    package_dirs: Sequence[str | os.PathLike[str]],
 ) -> CheckedUrdf:
-    refuse_other_formats(robot, path)
     faults = Faults()
     folders = tuple(os.path.abspath(os.fsdecode(folder)) for folder in package_dirs)
     faults.errors += [
@@ -150,6 +171,7 @@ def _check(
         name=title,
         text=_written(title, names, joints),
         root=root,
+        mounted=root,
         links=names,
         joints=joints,
         leaves=tuple(name for name in names if name not in parents),

@@ -404,3 +404,63 @@ def test_faults_of_tcp_and_base_are_said_together():
         "robot.reference_axis",
         "robot.tcp.position",
     ]
+
+
+MOUNTED = POSED.replace(
+    "[surface]",
+    """[[robot.axis]]
+name = "rail"
+type = "prismatic"
+carries = "base"
+axis = [0, 1, 0]
+limits_m = [-0.5, 0.5]
+max_velocity_m = 0.7
+[[robot.axis]]
+name = "table"
+type = "revolute"
+carries = "surface"
+position = [0.6, 0, 0]
+limits_deg = [-90, 90]
+max_velocity_deg = 90
+[surface]""",
+)
+
+
+def test_composed_axes_come_through():
+    case = Case.from_toml(MOUNTED)
+    assert Case.from_toml(case.to_toml()) == case
+    robot = case.build().robot
+    assert robot.joint_names[:2] == ("table", "rail")
+    assert robot.surface_link == "table"
+    np.testing.assert_allclose(robot.upper[:2], [np.pi / 2, 0.5])
+    np.testing.assert_allclose(robot.max_velocity[:2], [np.pi / 2, 0.7])
+    other = case.with_overrides(["surface.frame=forearm_link"]).build().robot
+    assert other.joint_names == ("wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
+    assert case.with_overrides(["robot.limits_m={ rail = [0, 0.1] }"]).build().robot.upper[1] == 0.1
+
+
+@pytest.mark.parametrize(
+    ("setting", "key", "message"),
+    [
+        ("surface.frame=nowhere", "surface.frame", "no link 'nowhere' that could carry"),
+        ("surface.frame=wrist_3_link", "surface.frame", "it moves with the tool"),
+        ("surface.frame=3", "surface.frame", "the name of a link"),
+        ("robot.axis=3", "robot.axis", "an array of tables"),
+        ("robot.axis=[{ name = 'a', type = 'prismatic', carries = 'base', limits_deg = [0, 1] }]",
+         "robot.axis[0].limits_deg", "use limits_m"),
+        ("robot.axis=[{ name = 'a', type = 'revolute', carries = 'tool' }]",
+         "robot.axis[0].carries", "'base' or 'surface'"),
+        ("robot.axis=[{ type = 'revolute', carries = 'base' }]", "robot.axis[0].name", "missing"),
+        ("robot.axis=[{ name = 'tool0', type = 'revolute', carries = 'base' }]", "robot.axis",
+         "is the name of a link already"),
+        ("robot.start=[0, 0, 0]", "robot.start", "has 3 values; expected one for each of table, r"),
+        ("robot.start_deg=[0, 0, 0, 0, 0, 0, 0, 0]", "robot.start_deg", "'rail', which slides"),
+        ("robot.start=[9, 0, 0, 0, 0, 0, 0, 0]", "robot.start", "puts joint 'table' at 9, outside"),
+        ("robot.start=[0, nan]", "robot.start", "numbers"),
+    ],
+)  # fmt: skip
+def test_faults_of_axes_frames_and_starts(setting, key, message):
+    with pytest.raises(CaseError) as caught:
+        Case.from_toml(MOUNTED, overrides=[setting]).build()
+    found = {fault.key: fault for fault in caught.value.faults}
+    assert message in found[key].message

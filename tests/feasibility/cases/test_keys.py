@@ -21,7 +21,7 @@ from feasibility.collisions import Collision
 WRONG = datetime.date(2026, 1, 1)  # no key takes a date
 ALTERNATIVES = {"name": "urdf", "urdf": "name", "points": "file", "file": "points",
                 "cell_size": "cells", "limits_deg": "limits", "limits_m": "limits",
-                "lock": "limits"}  # fmt: skip
+                "lock": "limits", "start": "start_deg", "start_deg": "start"}  # fmt: skip
 UNITS = {"degrees": "deg", "metres": "m", "seconds": "s"}
 GRID = {"cells": [3, 4]}
 TABLES = ("robot", "surface", "task", "collision", "search")
@@ -32,6 +32,8 @@ PAPER = {
     "plane": {"u": [0, 1], "v": [0, 1], **GRID},
 }
 OTHERS = {
+    "robot.axis": ("", ("axis", 0), {"name": "rail", "type": "prismatic", "carries": "base",
+                                     "limits_m": [0, 1]}),
     "robot.tcp": ("", ("tcp",), {}),
     "robot.base": ("", ("base",), {}),
     "surface.cut": ("mesh", ("cut",), {"point": [0, 0, 0], "normal": [0, 0, 1]}),
@@ -71,6 +73,8 @@ def place_of(key):
     if outer == "collision" and key.name in OF_SHAPES:
         inner = {"name": "post"} if "name" in inner else {}
         inner |= copy.deepcopy(OF_SHAPES[key.name])
+    if key.table == "robot.axis" and key.name.endswith("_deg"):
+        inner = {"name": "table", "type": "revolute", "carries": "surface"}
     tables[outer][path[0]] = [inner] if path[1:] else inner
     return tables, inner, key.table + "[0]" * len(path[1:])
 
@@ -168,7 +172,7 @@ def test_an_unknown_key_is_answered_with_those_of_the_table_each_once(table):
             "it belongs to [surface], [surface.pieces], [collision.scene] or [collision.tool]",
         ),
         ("task", "thickness", "it belongs to [collision]"),
-        ("collision", "name", "it belongs to [robot] or [collision.scene]"),
+        ("collision", "name", "it belongs to [robot], [robot.axis] or [collision.scene]"),
         ("collision", "cone_deg", "it belongs to [task]"),
         ("task", "time_limit", "it belongs to [search]"),
         ("task", "search", "it belongs to [search]"),
@@ -281,7 +285,7 @@ def test_every_key_says_what_it_is():
     for key in all_keys():
         assert key.type, title(key)
         assert re.fullmatch(r"\S.*\.", key.meaning), title(key)
-        assert key.name.endswith("_deg") == (key.unit == "deg"), title(key)
+        assert key.name.endswith("_deg") == (key.unit.split("/")[0] == "deg"), title(key)
         assert "|" not in f"{key.type}{key.meaning}{key.default}", title(key)
 
 
