@@ -59,4 +59,18 @@ def _stamp_by_content() -> None:
     setattr(caching._SourceFileBackedLocatorMixin, "get_source_stamp", get_source_stamp)  # noqa: B010
 
 
+def _forget_what_is_elsewhere() -> None:
+    """Have numba compile anew where a list of kept kernels names a class that has moved."""
+    load = caching.IndexDataCacheFile._load_index
+
+    def load_index(kept: Any) -> Any:
+        try:
+            return load(kept)
+        except (ImportError, AttributeError):
+            return {}
+
+    setattr(caching.IndexDataCacheFile, "_load_index", load_index)  # noqa: B010
+
+
 _stamp_by_content()
+_forget_what_is_elsewhere()

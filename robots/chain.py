@@ -151,8 +151,8 @@ def _rotation_onto(axis: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @njit(cache=True, error_model="numpy")
-def frames(chain, q, origins, axes, point, axis):  # type: ignore[no-untyped-def]
-    """Tool point, approach axis, and every joint's axis, in the root frame.
+def frames(chain, q, origins, axes, point, axis, reference):  # type: ignore[no-untyped-def]
+    """Tool point, approach and reference axis, and every joint's axis, in the root frame.
 
     Args:
         chain: a `Chain`.
@@ -161,6 +161,7 @@ def frames(chain, q, origins, axes, point, axis):  # type: ignore[no-untyped-def
         axes: (n, 3) out, unit joint axes.
         point: (3,) out, the tool point, m.
         axis: (3,) out, the unit approach axis.
+        reference: (3,) out, the unit reference axis of roll.
     """
     n = q.shape[0]
     xx, xy, xz = 1.0, 0.0, 0.0  # columns of the rotation so far
@@ -203,6 +204,10 @@ def frames(chain, q, origins, axes, point, axis):  # type: ignore[no-untyped-def
     axis[0] = xx * t[0] + yx * t[1] + zx * t[2]
     axis[1] = xy * t[0] + yy * t[1] + zy * t[2]
     axis[2] = xz * t[0] + yz * t[1] + zz * t[2]
+    t = chain.reference
+    reference[0] = xx * t[0] + yx * t[1] + zx * t[2]
+    reference[1] = xy * t[0] + yy * t[1] + zy * t[2]
+    reference[2] = xz * t[0] + yz * t[1] + zz * t[2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -236,6 +241,6 @@ def jacobians(chain, origins, axes, point, axis, point_rows, axis_rows):  # type
 def tool(chain: Chain, q: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Tool point (3,) m and approach axis (3,) at one configuration, by `frames`."""
     n = len(q)
-    point, axis = np.empty(3), np.empty(3)
-    frames(chain, np.ascontiguousarray(q, float), np.empty((n, 3)), np.empty((n, 3)), point, axis)
+    point, axis, at = np.empty(3), np.empty(3), np.ascontiguousarray(q, float)
+    frames(chain, at, np.empty((n, 3)), np.empty((n, 3)), point, axis, np.empty(3))
     return point, axis

@@ -53,11 +53,12 @@ feasibility.certification.rolls
 feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region lever_bounds linear_models motion_replay parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
 feasibility.paper
 feasibility.cases
-feasibility.roadmap: arrays graph off_target projection segment_bound self_motion
+feasibility.roadmap.motions
+feasibility.roadmap: graph
 feasibility.roadmap.branch_and_bound
 feasibility.roadmap.cuts
 feasibility.roadmap.tool_alone
-feasibility.roadmap: bridging expansion exploration proving search seeding tracking
+feasibility.roadmap: bridging expansion exploration proving search seeding
 feasibility.roadmap.causes
 feasibility.roadmap: between_rounds complete graph_g outcome refinement walk warmup
 feasibility: checking

@@ -1,8 +1,8 @@
 """Bounds between samples of a joint motion, from Pinocchio's placements and Jacobians.
 
-The bound D is derived in `feasibility.roadmap.segment_bound`; here it is evaluated again from
-Pinocchio's Jacobian: the linear part of column j, moved to the tool point, has the length r_j (the
-lever arm), and |z_j x a| = s_j for its angular part z_j.
+The bound D is derived in `feasibility.roadmap.motions.segment_bound`; here it is evaluated again
+from Pinocchio's Jacobian: the linear part of column j, moved to the tool point, has the length r_j
+(the lever arm), and |z_j x a| = s_j for its angular part z_j.
 """
 
 from __future__ import annotations

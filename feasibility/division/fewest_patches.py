@@ -23,6 +23,7 @@ from feasibility.roadmap import (
     arrays_of,
     explore,
     warm_up,
+    within,
 )
 from feasibility.roadmap.causes import causes_of, diagnose, disconnected
 from feasibility.roadmap.tool_alone import tool_alone_of
@@ -205,7 +206,7 @@ def _cause(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> Caus
 def _no_motion(arrays: SearchArrays) -> bool:
     """Can no motion at all be certified?"""
     folds = np.isinf(arrays.derivative_bounds).any(axis=1)
-    rough = (arrays.deviations >= (arrays.tolerance, arrays.cone_chord)).any(axis=1)
+    rough = ~within(arrays)
     nowhere = any(np.size(places) > 0 and np.all(places) for places in (folds, rough))
     return nowhere or not arrays.cone_chord > 0.0
 

@@ -127,7 +127,7 @@ def place_tool(chain, grid, offsets, tool):  # type: ignore[no-untyped-def]
     q = np.empty(n)
     for i in range(n):
         q[i] = grid.origin[i] + offsets[i] * grid.step[i]
-    frames(chain, q, np.empty((n, 3)), np.empty((n, 3)), tool[:3], tool[3:])
+    frames(chain, q, np.empty((n, 3)), np.empty((n, 3)), tool[:3], tool[3:], np.empty(3))
 
 
 @njit(cache=True, error_model="numpy")

@@ -23,6 +23,7 @@ from feasibility.roadmap import (
     Work,
     arrays_of,
     connect,
+    look_at,
     track,
     work_for,
 )
@@ -216,10 +217,8 @@ def _self_motion(graph: MotionGraph, cell: int, start: Floats, goal: Floats) -> 
     q = start.copy()
     rows = np.empty((CONNECT_STEPS + 1, len(q)))
     arrays = graph.arrays
-    count, reached = connect(
-        arrays, graph.work, arrays.points[cell], arrays.approaches[cell], q, goal, rows, 0,
-        CONNECT_STEPS,
-    )  # fmt: skip
+    look_at(arrays, graph.work, cell)
+    count, reached = connect(arrays, graph.work, q, goal, rows, 0, CONNECT_STEPS)
     return np.vstack([start[None], rows[:count]]) if reached else None
 
 

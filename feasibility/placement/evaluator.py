@@ -137,6 +137,8 @@ class LocalEvaluator:
         return here._replace(
             points=np.ascontiguousarray(here.points @ turn.T + shift),
             approaches=np.ascontiguousarray(here.approaches @ turn.T),
+            references=np.ascontiguousarray(here.references @ turn.T),
+            frames=np.ascontiguousarray(here.frames @ turn.T),
             targets=targets,
             collisions=collisions_of(self.robot, surface.moved(turn, shift), self.task),
         )

@@ -153,21 +153,21 @@ def _margins_at(problem, work, q, out):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def _widen_margins(problem, aimed, work, target, approach, q, best):  # type: ignore[no-untyped-def]
-    """Self-motion over one target away from limits and boundary of the cone; changes q and `best`.
+def _widen_margins(problem, aimed, work, cell, q, best):  # type: ignore[no-untyped-def]
+    """Self-motion over a cell away from limits and boundary of the cone; changes q and `best`.
 
     As `self_motion.settle`, but further: each step leads the axis inwards by a part of its angle,
     down to the cone of `aimed`. Every step is certified. `best` gets the margins.
     """
     n = q.shape[0]
     here = np.empty(2)
-    look_at(problem, work, target, approach)
+    look_at(problem, work, cell)
     place(problem, work, HERE, q)
     _margins_at(problem, work, q, best)
     size, stale = 0.3, 0
     for _ in range(MARGIN_STEPS):
-        copy_slot(work)
-        linearise(problem, work, NEXT, problem.cone_chord)
+        copy_slot(problem, work)
+        linearise(problem, work, NEXT)
         margin_objective(problem, work, q, size)
         for j in range(n):
             work.trial[j] = q[j]
@@ -210,9 +210,7 @@ def least_margins(exploration: Exploration) -> NDArray[np.float64]:
             continue
         settled[cell] += 1
         q = roadmap.q[x].copy()
-        _widen_margins(
-            problem, aimed, work, problem.points[cell], problem.approaches[cell], q, here
-        )
+        _widen_margins(problem, aimed, work, cell, q, here)
         if here.min() > best[cell].min():
             best[cell] = here
     return np.clip(best.min(axis=0), 0.0, 1.0)

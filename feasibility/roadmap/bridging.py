@@ -13,11 +13,17 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.arrays import SearchArrays, Work, aim
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.graph import NODES, Roadmap, add_motion, root_of
-from feasibility.roadmap.self_motion import connect
-from feasibility.roadmap.tracking import MOST_STEPS, track
+from feasibility.roadmap.motions import (
+    MOST_STEPS,
+    SearchArrays,
+    Work,
+    aim,
+    connect,
+    stand_still,
+    track,
+)
 
 NARROWEST, WIDEST = 0.1, 0.9  # [1] of the curve between two centres: where a bridge is tried
 Reserve = Callable[[int], Roadmap]
@@ -68,8 +74,6 @@ def bridge(
         True when an edge was added and the components are one now.
     """
     roadmap = reserve(0)
-    aim(arrays, work, curve, share)
-    target, approach = work.target[0].copy(), work.target[1].copy()
     starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)
     waypoints, ends = [], []
     for node, start in ((x, starts[0]), (y, starts[1])):
@@ -80,7 +84,9 @@ def bridge(
             return False
         waypoints.append(rows[:count])
         ends.append(q)
-    between = _self_motion(arrays, work, target, approach, ends)
+    aim(arrays, work, curve, share)
+    stand_still(arrays, work)
+    between = _self_motion(arrays, work, ends)
     if between is None:
         return False
     # From x to the point, the self-motion there, and the motion from y backwards.
@@ -91,17 +97,13 @@ def bridge(
 
 
 def _self_motion(
-    arrays: SearchArrays,
-    work: Work,
-    target: NDArray[np.float64],
-    approach: NDArray[np.float64],
-    ends: list[NDArray[np.float64]],
+    arrays: SearchArrays, work: Work, ends: list[NDArray[np.float64]]
 ) -> NDArray[np.float64] | None:
-    """(k, n) waypoints over one target from the first configuration to the second, or None."""
+    """(k, n) waypoints over `work.target` from the first configuration to the second, or None."""
     rows = np.empty((CONNECT_STEPS + 1, len(ends[0])))
     for a, b in ((0, 1), (1, 0)):
         q = ends[a].copy()
-        count, reached = connect(arrays, work, target, approach, q, ends[b], rows, 0, CONNECT_STEPS)
+        count, reached = connect(arrays, work, q, ends[b], rows, 0, CONNECT_STEPS)
         if reached and a == 0:
             return rows[:count]
         if reached:

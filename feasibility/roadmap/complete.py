@@ -12,11 +12,11 @@ from feasibility.clock import Clock, OutOfTime
 from feasibility.found import Found
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.between_rounds import between_rounds
 from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.graph_g import graph_of
+from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.outcome import (
     exhausted_words,
     proof_of,

@@ -1,6 +1,6 @@
 """How the roadmap grows: spreading over the surface, self-motions, closing pairs.
 
-Each kernel connects nodes by motions that `feasibility.roadmap.segment_bound` certifies.
+Each kernel connects nodes by motions that `feasibility.roadmap.motions.segment_bound` certifies.
 """
 
 from __future__ import annotations
@@ -8,7 +8,6 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.compiled import inlined, kernel, put
-from feasibility.roadmap.arrays import OVERFLOW
 from feasibility.roadmap.graph import (
     BUDGET,
     COVERED,
@@ -25,9 +24,7 @@ from feasibility.roadmap.graph import (
     root_of,
     unite,
 )
-from feasibility.roadmap.off_target import project_near_cell
-from feasibility.roadmap.self_motion import connect
-from feasibility.roadmap.tracking import track
+from feasibility.roadmap.motions import OVERFLOW, connect, look_at, project_near_cell, track
 
 MOST_FAILURES = np.int64(12)  # failed connections after which a pair of components is left alone
 MOST_RIVALS = 6  # other components that a new configuration tries to join, the nearest first
@@ -77,9 +74,10 @@ def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-un
             break
         tried[k] = root_of(roadmap, roadmap.component[node])
         put(here, q)
+        look_at(arrays, work, cell)
         written, reached = connect(
-            arrays, work, arrays.points[cell], arrays.approaches[cell], here, roadmap.q[node],
-            roadmap.waypoints, roadmap.counters[WAYPOINTS] + rows, CONNECT_STEPS,
+            arrays, work, here, roadmap.q[node], roadmap.waypoints,
+            roadmap.counters[WAYPOINTS] + rows, CONNECT_STEPS,
         )  # fmt: skip
         if written == OVERFLOW:
             return -1, OVERFLOW
@@ -201,10 +199,10 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
             own = root_of(roadmap, roadmap.component[node])
             tried[k] = own
             put(q, roadmap.q[node])
+            look_at(arrays, work, cell)
             rows, _ = connect(
-                arrays, work, arrays.points[cell], arrays.approaches[cell], q, goal,
-                roadmap.waypoints, count[WAYPOINTS], CONNECT_STEPS,
-            )  # fmt: skip
+                arrays, work, q, goal, roadmap.waypoints, count[WAYPOINTS], CONNECT_STEPS
+            )
             if rows == OVERFLOW:
                 return FULL, g, merged
             if rows < 2:
@@ -289,9 +287,10 @@ def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type
                     if rows < 0:
                         continue
                     put(arrival, q)
+                    look_at(arrays, work, j)
                     more, reached = connect(
-                        arrays, work, arrays.points[j], arrays.approaches[j], q, roadmap.q[b],
-                        roadmap.waypoints, count[WAYPOINTS] + rows, CONNECT_STEPS,
+                        arrays, work, q, roadmap.q[b], roadmap.waypoints, count[WAYPOINTS] + rows,
+                        CONNECT_STEPS,
                     )  # fmt: skip
                     if more == OVERFLOW:
                         state[k] = 0

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from feasibility.clock import Clock
 from feasibility.cut_tree import CutTree
-from feasibility.roadmap.arrays import SearchArrays, Work, passable, work_for
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, rule
 from feasibility.roadmap.bridging import NARROWEST, WIDEST, bridge, nearest_pairs
 from feasibility.roadmap.expansion import close_pairs, explore_self_motions, spread_out
@@ -28,6 +27,7 @@ from feasibility.roadmap.graph import (
     joined_pairs,
     root_of,
 )
+from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
 from feasibility.roadmap.seeding import seed_cell
 from feasibility.roadmap.tool_alone import Blocking, ToolAlone
 from robots import Robot

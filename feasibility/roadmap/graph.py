@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
-from feasibility.roadmap.arrays import NEXT, place
-from feasibility.roadmap.self_motion import effects
+from feasibility.roadmap.motions import NEXT, effects, place
 
 NODES, EDGES, WAYPOINTS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
 """Indices into `Roadmap.counters`."""

@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.clock import Clock
-from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import (
     COMPONENTS,
@@ -28,6 +27,7 @@ from feasibility.roadmap.graph import (
     grown,
     root_of,
 )
+from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import improve
 from feasibility.roadmap.walk import edge_motion
 from feasibility.task import Task

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from feasibility.roadmap.branch_and_bound import Boxes, Ruling, root_box
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import NODES, root_of
-from feasibility.roadmap.self_motion import margin_shares
+from feasibility.roadmap.motions import margin_shares
 
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on

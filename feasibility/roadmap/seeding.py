@@ -7,12 +7,22 @@ from numpy.typing import NDArray
 
 from feasibility.collisions import clearance_gradient, segment_clear
 from feasibility.compiled import put
-from feasibility.roadmap.arrays import SearchArrays, Work, copy_slot, look_at, place
 from feasibility.roadmap.expansion import join
 from feasibility.roadmap.graph import COMPONENTS, EDGES, NODES, TAIL, Roadmap, add_node
-from feasibility.roadmap.off_target import project_near_cell
-from feasibility.roadmap.projection import PROJECTION_STEPS, project
-from feasibility.roadmap.self_motion import CONE_SLACK, NEWTON_STEPS, SETTLE_STEPS, settle
+from feasibility.roadmap.motions import (
+    CONE_SLACK,
+    NEWTON_STEPS,
+    PROJECTION_STEPS,
+    SETTLE_STEPS,
+    SearchArrays,
+    Work,
+    copy_slot,
+    look_at,
+    place,
+    project,
+    project_near_cell,
+    settle,
+)
 
 PUSHES = 8  # steps that a colliding configuration gets
 PUSH = 0.2  # [rad] or [m] of one step
@@ -26,10 +36,10 @@ def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float
     """
     if len(arrays.collisions) == 0 or segment_clear(arrays.collisions, q, q) > 0.0:
         return True
-    look_at(arrays, work, arrays.points[cell], arrays.approaches[cell])
+    look_at(arrays, work, cell)
     for _ in range(PUSHES):
         place(arrays, work, 0, q)
-        copy_slot(work)
+        copy_slot(arrays, work)
         work.secondary_step[:] = 0.0
         clearance_gradient(arrays.collisions, q, work.secondary_step, PUSH)
         put(work.trial, q)
@@ -56,7 +66,6 @@ def seed_cell(
         (configurations found, new components made).
     """
     count = roadmap.counters
-    target, approach = arrays.points[cell], arrays.approaches[cell]
     found, made = 0, 0
     for guess in guesses:
         if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
@@ -69,7 +78,7 @@ def seed_cell(
         found += 1
         if not moved_clear(arrays, work, cell, q):
             continue
-        settle(arrays, work, target, approach, q, SETTLE_STEPS)
+        settle(arrays, work, cell, q, SETTLE_STEPS)
         node, _ = join(arrays, work, roadmap, cell, q, -1, 0, 0)
         if node >= 0:
             continue

@@ -46,10 +46,10 @@ def warm_up() -> None:
     if _warm:
         return
     from feasibility.certification import replay
-    from feasibility.roadmap.arrays import arrays_of
     from feasibility.roadmap.branch_and_bound import root_box
     from feasibility.roadmap.causes import diagnose
     from feasibility.roadmap.exploration import Exploration
+    from feasibility.roadmap.motions import arrays_of
     from feasibility.roadmap.proving import Proving
     from feasibility.roadmap.search import close, explore
     from feasibility.roadmap.walk import covering_walk

@@ -20,6 +20,7 @@ from feasibility.roadmap import (
     Work,
     moved_clear,
     project_onto_cell,
+    within,
 )
 from feasibility.verdict import Answer, Evidence, Walk
 
@@ -96,7 +97,7 @@ def certifiable(arrays: SearchArrays) -> bool:
     the tolerance or the cone.
     """
     smooth = bool(np.isfinite(arrays.derivative_bounds).all())
-    known = bool((arrays.deviations < (arrays.tolerance, arrays.cone_chord)).all())
+    known = bool(within(arrays).all())
     return smooth and known and arrays.cone_chord > 0.0
 
 

@@ -21,8 +21,8 @@ from feasibility.clock import Clock
 from feasibility.collisions import Collision, Obstacle
 from feasibility.collisions.kernels import counts
 from feasibility.problem import Problem
-from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import close, explore
 from robots import Robot, load_robot
 from surfaces import Cells, plane

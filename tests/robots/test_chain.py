@@ -17,7 +17,7 @@ def evaluate(chain, q):
     origins, axes = np.empty((n, 3)), np.empty((n, 3))
     point, axis = np.empty(3), np.empty(3)
     point_rows, axis_rows = np.empty((3, n)), np.empty((3, n))
-    frames(chain, q, origins, axes, point, axis)
+    frames(chain, q, origins, axes, point, axis, np.empty(3))
     jacobians(chain, origins, axes, point, axis, point_rows, axis_rows)
     return point, axis, point_rows, axis_rows
 

@@ -7,7 +7,7 @@ h (the distance at c plus what the joints behind j can add), a tool point in the
     D / 2 = 1/2 sum_j r_j h_j (h_j + 2 sum_{i<j} h_i)   from p(c) + J d    (second order)
 
 and likewise for the axis, with sines s_j in place of r_j (D is that of
-`feasibility.roadmap.segment_bound`).
+`feasibility.roadmap.motions.segment_bound`).
 
 Contraction: what must lie in a <= g . d <= b leaves each d_j the interval that the others' leave
 open. No comparison with NaN cuts anything off.

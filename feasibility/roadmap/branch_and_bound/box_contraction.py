@@ -12,8 +12,11 @@ every unit w
 
     |w . (p(c) + J dq - T(c) - e dx)| <= tolerance + D/2 + r
 
-and likewise for the tool axis, with the chord of the cone in place of the tolerance. *Proof.* p is
-within D/2 of p(c) + J dq, the target within r of T(c) + e dx, and a projection only shrinks. QED
+and likewise for the tool axis, with the chord of the cone in place of the tolerance; and for its
+reference axis, which is to point along that of the target, turned to the middle of the range of
+roll: from there a tilt of at most alpha and a roll of at most rho to either side turn it by Theta
+at most, cos(Theta / 2) = cos(alpha / 2) cos(rho / 2), over a chord of 2 sin(Theta / 2). *Proof.* p
+is within D/2 of p(c) + J dq, the target within r of T(c) + e dx, and a projection only shrinks. QED
 
 So a box holds nothing when its target is further off than tolerance, r and first-order bounds
 allow, or when no (dq, dx) in it satisfies these inequalities for a few w; and every interval can be
@@ -27,12 +30,22 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.compiled import inlined, kernel
-from feasibility.roadmap.arrays import NEXT, place
 from feasibility.roadmap.branch_and_bound.box_bounds import contract, contract_to_ball, reach_of_box
+from feasibility.roadmap.branch_and_bound.roll_bounds import (
+    contract_roll,
+    length_of,
+    reach_of_reference,
+    reference_rows,
+    roll_chord,
+    rolls_over,
+    unturned,
+)
+from feasibility.roadmap.motions import NEXT, place
 from robots import jacobians
 
 THINNEST = 1e-6  # [rad], [m]: boxes are not halved further
 ROUNDING = 1e-10  # [m], [1], [rad]: more than the error of double arithmetic in a cut
+SKEWED = 1.5  # [1] roll differs by no more than so many times what its frame does, up to 90 deg
 PASSES = 3  # contractions of a box
 GAIN = 0.3  # [1] of the volume left: contracting again would gain little
 
@@ -52,6 +65,13 @@ def _place_centre(arrays, work, places, part, low, high, space):  # type: ignore
             for i in range(m - n):
                 value += space.middle[n + i] * places.slopes[part, i, 3 * which + k]
             work.target[which, k] = value
+    if rolls_over(arrays, places, part):
+        for k in range(3):
+            value = places.centre[part, 6 + k]
+            for i in range(m - n):
+                value += space.middle[n + i] * places.slopes[part, i, 6 + k]
+            space.toward[k] = value
+        unturned(work.target, space.toward, arrays.roll[0])
     place(arrays, work, NEXT, space.q)
 
 
@@ -73,14 +93,15 @@ def _first_and_second(arrays, work, places, part, space):  # type: ignore[no-unt
 
 
 @inlined
-def _contract_second(arrays, work, places, part, near, narrow, directions, space, low, high):  # type: ignore[no-untyped-def]
+def _contract_second(arrays, work, places, part, directions, space, low, high):  # type: ignore[no-untyped-def]
     """Cut the present box by the lemma of this module; False when nothing is left.
 
     Args:
         arrays, work, places, part, directions, space, low, high: as in `shrink`.
-        near, narrow: the right hand sides, for tool point and axis; inf where they say nothing.
+            `space.most` holds the right hand sides.
     """
     n, m = space.q.shape[0], low.shape[0]
+    near, narrow, rolled = space.most[0], space.most[1], space.most[2]
     jacobians(
         arrays.chain, work.origins[1], work.axes[1], work.point[1], work.axis[1],
         space.point_rows, space.axis_rows,
@@ -91,6 +112,7 @@ def _contract_second(arrays, work, places, part, near, narrow, directions, space
         for i in range(m - n):
             space.point_rows[k, n + i] = -places.slopes[part, i, k]
             space.axis_rows[k, n + i] = -places.slopes[part, i, 3 + k]
+            space.reference_rows[k, n + i] = -places.slopes[part, i, 6 + k]
     for j in range(m):
         low[j] -= space.middle[j]
         high[j] -= space.middle[j]
@@ -102,10 +124,47 @@ def _contract_second(arrays, work, places, part, near, narrow, directions, space
         space.axis_rows, space.gap[1], work.error[1, 1], narrow, directions, space.row, low, high
     ):
         return False
+    if rolled < np.inf:
+        reference_rows(arrays, work, space.reference_rows)
+        if not contract_to_ball(
+            space.reference_rows, space.gap[2], length_of(space.gap[2]), rolled, directions,
+            space.row, low, high,
+        ):  # fmt: skip
+            return False
+    # The target at rest, so that roll itself is a function of the joints alone.
+    at_rest = m == n and rolls_over(arrays, places, part)
+    if at_rest and not contract_roll(arrays, work, space.half, space.sine, space.row, low, high):
+        return False
     for j in range(m):
         low[j] += space.middle[j]
         high[j] += space.middle[j]
     return True
+
+
+@inlined
+def _first_and_second_of_roll(arrays, work, places, part, space):  # type: ignore[no-untyped-def]
+    """Bounds of first and second order for the reference axis over a box; sets its gap."""
+    n, m = space.q.shape[0], space.half.shape[0]
+    for k in range(3):
+        space.gap[2, k] = space.toward[k] - work.reference[1, k]
+    first, second = reach_of_reference(arrays, work, space.half, space.reference_sine)
+    for i in range(m - n):
+        first += length_of(places.slopes[part, i, 6:]) * space.half[n + i]
+    return first, second
+
+
+@inlined
+def _is_solution(arrays, work, places, part):  # type: ignore[no-untyped-def]
+    """Does slot 1 hold the tool at a place of the part, wherever the model may be off by?"""
+    off, turned = places.radius[part, 0], places.radius[part, 1]
+    inside = work.error[1, 0] + off <= arrays.tolerance
+    inside &= work.error[1, 1] + turned <= arrays.cone_chord
+    if arrays.roll[1] < np.inf and places.children[part, 0] >= 0:
+        inside &= places.radius[part, 2] < np.inf  # its children tell
+    if rolls_over(arrays, places, part):
+        stray = SKEWED * (turned + places.radius[part, 2])
+        inside &= abs(work.error[1, 2]) + stray <= arrays.roll[1]
+    return inside
 
 
 @inlined
@@ -126,48 +185,52 @@ def shrink(arrays, work, places, part, slabs, directions, space, low, high):  # 
 
     Returns:
         1 when nothing is left, 2 when its centre is a solution, 3 when it is not finite, 0
-        otherwise; and whether the tool point, rather than the axis, is closer to ruling it out.
+        otherwise; and what is closest to ruling it out: 0 the tool point, 1 the axis, 2 roll.
     """
-    by_point = True
-    off, turned = places.radius[part, 0], places.radius[part, 1]
+    driver = 0
+    rolls, rolled, off_roll = rolls_over(arrays, places, part), np.inf, 0.0
     for _ in range(PASSES):
         for i in range(slabs.weights.shape[0]):
             least, most = slabs.low[i] - ROUNDING, slabs.high[i] + ROUNDING
             if not contract(slabs.weights[i], least, most, low, high):
-                return 1, by_point
+                return 1, driver
         _place_centre(arrays, work, places, part, low, high, space)
         distance, chord = work.error[1, 0], work.error[1, 1]
         if not (distance < np.inf and chord < np.inf):
-            return 3, by_point
-        if (
-            distance + off <= arrays.tolerance
-            and chord + turned <= arrays.cone_chord
-            and _inside_slabs(slabs, space.q)
-        ):
-            return 2, by_point
+            return 3, driver
+        if _is_solution(arrays, work, places, part) and _inside_slabs(slabs, space.q):
+            return 2, driver
         first, second, first_axis, second_axis = _first_and_second(
             arrays, work, places, part, space
         )
-        near = arrays.tolerance + off + ROUNDING
-        narrow = arrays.cone_chord + turned + ROUNDING
-        by_point = distance / (near + min(first, second)) > chord / (
-            narrow + min(first_axis, second_axis)
-        )
+        near = arrays.tolerance + places.radius[part, 0] + ROUNDING
+        narrow = arrays.cone_chord + places.radius[part, 1] + ROUNDING
+        by_point = distance / (near + min(first, second))
+        by_axis = chord / (narrow + min(first_axis, second_axis))
+        driver = 0 if by_point > by_axis else 1
         if distance > near + first or chord > narrow + first_axis:
-            return 1, by_point
+            return 1, driver
+        if rolls:
+            first_roll, second_roll = _first_and_second_of_roll(arrays, work, places, part, space)
+            rolled = roll_chord(arrays) + places.radius[part, 2] + ROUNDING
+            off_roll = length_of(space.gap[2])
+            if off_roll / (rolled + min(first_roll, second_roll)) > max(by_point, by_axis):
+                driver = 2
+            if off_roll > rolled + first_roll:
+                return 1, driver
+            rolled = rolled + second_roll if second_roll < first_roll else np.inf
         # The second order is of use only where it beats the first.
-        near = near + second if second < first else np.inf
-        narrow = narrow + second_axis if second_axis < first_axis else np.inf
-        if not (near < np.inf or narrow < np.inf):
+        space.most[0] = near + second if second < first else np.inf
+        space.most[1] = narrow + second_axis if second_axis < first_axis else np.inf
+        space.most[2] = rolled
+        if not (space.most[0] < np.inf or space.most[1] < np.inf or rolls):
             break
-        if not _contract_second(
-            arrays, work, places, part, near, narrow, directions, space, low, high
-        ):
-            return 1, by_point
+        if not _contract_second(arrays, work, places, part, directions, space, low, high):
+            return 1, driver
         left = 1.0
         for j in range(low.shape[0]):
             if space.half[j] > 0.0:
                 left *= max((high[j] - low[j]) / (2.0 * space.half[j]), 1e-3)
         if left > GAIN:
             break
-    return 0, by_point
+    return 0, driver

@@ -7,6 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.roadmap.motions import SearchArrays
+
 STACK = 512  # most boxes on the stack; depth first, so their number grows with the depth only
 
 
@@ -18,26 +20,40 @@ class Places(NamedTuple):
     """
 
     centre: NDArray[np.float64]
-    """(K, 6) target point (m) and approach direction."""
+    """(K, 9) target point (m), approach direction, and where the tool's reference axis is to point:
+    the reference direction, turned to the middle of the range of roll."""
     slopes: NDArray[np.float64]
-    """(K, 2, 6) their change by x."""
+    """(K, 2, 9) their change by x."""
     radius: NDArray[np.float64]
-    """(K, 2) how far both may be from that model (m, 1)."""
+    """(K, 3) how far they may be from that model (m, 1, 1); the last is inf where roll is free, or
+    not known well enough: proofs then leave it out."""
     children: NDArray[np.int64]
     """(K, 2) parts that a part is cut into; -1 where it is not."""
     axis: NDArray[np.int64]
     """(K,) the parameter that is halved, or -1."""
 
 
-def place_at_rest(point: NDArray[np.float64], approach: NDArray[np.float64]) -> Places:
-    """One target point (3,) and approach direction (3,)."""
+def place_at_rest(arrays: SearchArrays, cell: int) -> Places:
+    """The target of a cell's centre."""
+    limited = bool(arrays.roll[1] < np.inf)
+    toward = np.zeros(3)
+    if limited:
+        toward = toward_middle(arrays.approaches[cell], arrays.references[cell], arrays.roll[0])
     return Places(
-        centre=np.concatenate([point, approach])[None],
-        slopes=np.zeros((1, 2, 6)),
-        radius=np.zeros((1, 2)),
+        centre=np.concatenate([arrays.points[cell], arrays.approaches[cell], toward])[None],
+        slopes=np.zeros((1, 2, 9)),
+        radius=np.array([[0.0, 0.0, 0.0 if limited else np.inf]]),
         children=np.full((1, 2), -1),
         axis=np.full(1, -1),
     )
+
+
+def toward_middle(
+    approach: NDArray[np.float64], reference: NDArray[np.float64], middle: float
+) -> NDArray[np.float64]:
+    """A reference direction (..., 3) turned about the approach direction by an angle (rad)."""
+    turned = np.cos(middle) * reference + np.sin(middle) * np.cross(approach, reference)
+    return np.asarray(turned, dtype=np.float64)
 
 
 class Slabs(NamedTuple):
@@ -90,8 +106,16 @@ class BoxWork(NamedTuple):
     """(3, m) derivatives of tool point less target point."""
     axis_rows: NDArray[np.float64]
     """(3, m) derivatives of tool axis less approach direction."""
+    reference_rows: NDArray[np.float64]
+    """(3, m) the same of the reference axis less where it is to point."""
+    reference_sine: NDArray[np.float64]
+    """(n,)"""
+    toward: NDArray[np.float64]
+    """(3,) where the reference axis is to point, at the box's centre."""
     gap: NDArray[np.float64]
-    """(2, 3)"""
+    """(3, 3) of tool point, axis and reference axis at the box's centre."""
+    most: NDArray[np.float64]
+    """(3,) how far rows times d may be from these gaps; inf where that says nothing."""
     row: NDArray[np.float64]
     """(m,)"""
 
@@ -108,7 +132,11 @@ def box_work(n: int, parameters: int) -> BoxWork:
         longest=np.zeros(n),
         point_rows=np.zeros((3, m)),
         axis_rows=np.zeros((3, m)),
-        gap=np.zeros((2, 3)),
+        reference_rows=np.zeros((3, m)),
+        reference_sine=np.zeros(n),
+        toward=np.zeros(3),
+        gap=np.zeros((3, 3)),
+        most=np.zeros(3),
         row=np.zeros(m),
     )
 

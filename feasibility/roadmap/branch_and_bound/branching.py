@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import inlined, kernel, put
-from feasibility.roadmap.arrays import SearchArrays, Work
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
@@ -29,6 +28,7 @@ from feasibility.roadmap.branch_and_bound.boxes import (
     no_slabs,
     place_at_rest,
 )
+from feasibility.roadmap.motions import SearchArrays, Work
 
 DIRECTIONS = np.array(
     [
@@ -66,18 +66,23 @@ def root_box(arrays: SearchArrays) -> Boxes:
 
 
 @inlined
-def _split(arrays, places, part, by_point, space, low, high):  # type: ignore[no-untyped-def]
+def _split(arrays, places, part, driver, space, low, high):  # type: ignore[no-untyped-def]
     """Which interval of a box to halve; m where the part is to be cut, -1 where all are too thin.
 
     The one with most effect on the constraint that is closest to ruling the box out.
     """
     n, m = space.q.shape[0], low.shape[0]
-    for_point, for_axis = (1.0 / arrays.scale, 0.05) if by_point else (0.05 / arrays.scale, 1.0)
+    for_point, for_axis = (1.0 / arrays.scale, 0.05) if driver == 0 else (0.05 / arrays.scale, 1.0)
+    for_roll = 0.0
+    if arrays.roll[1] < np.inf and places.radius[part, 2] < np.inf:
+        for_roll = 1.0 if driver == 2 else 0.05
+        for_axis = for_axis if driver < 2 else 0.05
     worst, largest = -1, 0.0
     for j in range(n):
         width = high[j] - low[j]
         if width > THINNEST:
             move = (for_point * space.lever[j] + for_axis * space.sine[j]) * width
+            move += for_roll * space.reference_sine[j] * width
             if move > largest:
                 worst, largest = j, move
     for i in range(m - n):
@@ -93,6 +98,8 @@ def _split(arrays, places, part, by_point, space, low, high):  # type: ignore[no
     if places.children[part, 0] < 0:
         return worst
     off = for_point * places.radius[part, 0] + for_axis * places.radius[part, 1]
+    if for_roll > 0.0:
+        off += for_roll * places.radius[part, 2]
     return m if worst < 0 or worst >= n or 2.0 * off > largest else worst
 
 
@@ -155,13 +162,13 @@ def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space
         put(low, boxes.low[top])
         put(high, boxes.high[top])
         part, weight = boxes.part[top], boxes.weight[top]
-        code, by_point = shrink(arrays, work, places, part, slabs, directions, space, low, high)
+        code, driver = shrink(arrays, work, places, part, slabs, directions, space, low, high)
         if code == 1:
             continue
         if code == 2:
             put(found, space.q)
             return 2
-        worst = _split(arrays, places, part, by_point, space, low, high)
+        worst = _split(arrays, places, part, driver, space, low, high)
         if code == 3 or worst < 0 or boxes.counts[0] + 2 > boxes.low.shape[0]:
             for j in range(n):
                 found[j] = 0.5 * (low[j] + high[j])
@@ -186,7 +193,7 @@ def rule(
         The ruling, and a configuration (n,) that covers the cell when it is REACHED, or may nearly
         do so when it is UNKNOWN.
     """
-    places = place_at_rest(arrays.points[cell], arrays.approaches[cell])
+    places = place_at_rest(arrays, cell)
     return examine(arrays, work, places, no_slabs(len(arrays.lower)), boxes, most)
 
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from feasibility.collisions import Pair, configuration_bounds
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.off_target import project_near_cell
-from feasibility.roadmap.projection import PROJECTION_STEPS
+from feasibility.roadmap.motions import PROJECTION_STEPS, project_near_cell
 from feasibility.roadmap.seeding import moved_clear
 from feasibility.verdict import Cause, CauseKind
 

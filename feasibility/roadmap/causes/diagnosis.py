@@ -23,21 +23,23 @@ from numpy.typing import NDArray
 from feasibility.collisions import Pair
 from feasibility.compiled import kernel, put
 from feasibility.cut_tree import CutTree
-from feasibility.roadmap.arrays import (
-    NEXT,
-    SearchArrays,
-    Work,
-    look_at,
-    place,
-)
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.causes.collision import blocked, colliding
 from feasibility.roadmap.causes.disconnection import disconnected
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.projection import PROJECTION_STEPS, cholesky_solve, project_onto_cell
+from feasibility.roadmap.motions import (
+    NEXT,
+    PROJECTION_STEPS,
+    SearchArrays,
+    Work,
+    cholesky_solve,
+    connect,
+    look_at,
+    place,
+    project_onto_cell,
+)
 from feasibility.roadmap.search import evenly
-from feasibility.roadmap.self_motion import connect
 from feasibility.verdict import Cause, CauseKind
 from robots import Kinematics, Robot, jacobians
 
@@ -70,7 +72,7 @@ def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
     best = np.inf
     q, step = np.empty(n), np.empty(n)
     square, pull = np.empty((4, 4)), np.empty(4)
-    look_at(arrays, work, arrays.points[cell], arrays.approaches[cell])
+    look_at(arrays, work, cell)
     for g in range(guesses.shape[0]):
         put(q, guesses[g])
         damping = 0.1
@@ -138,14 +140,12 @@ def _nearest_to_limits(
     """(n,) the configuration over a cell that passes the limits least, among those found."""
     robot = exploration.robot
     waypoints = np.empty((64, robot.n))
-    target, approach = relaxed.points[cell], relaxed.approaches[cell]
     best, least = solutions[0], np.inf
     for q in solutions:
         here = _wrapped(robot, q)
         goal = np.clip(here, robot.lower, robot.upper)
-        connect(
-            relaxed, exploration.work, target, approach, here, goal, waypoints, 0, CONNECT_STEPS
-        )
+        look_at(relaxed, exploration.work, cell)
+        connect(relaxed, exploration.work, here, goal, waypoints, 0, CONNECT_STEPS)
         here = _wrapped(robot, here)
         past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
         if past < least:

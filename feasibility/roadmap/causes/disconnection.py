@@ -7,9 +7,9 @@ import numpy as np
 from feasibility.collisions import Pair
 from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
-from feasibility.roadmap.arrays import COLLISION, CONE, FOLD, LIMIT, LONG, SINGULAR
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import root_of
+from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
 from feasibility.verdict import Cause, CauseKind
 
 
@@ -46,6 +46,7 @@ def disconnected(
     reason = {
         LIMIT: f"{name} stops at its limit" if joint >= 0 else "a joint stops at its limit",
         CONE: "the tool axis stops at the boundary of the cone",
+        ROLL: "the roll of the tool stops at the end of its range",
         SINGULAR: "the arm stops at a singularity",
         COLLISION: _stopped_by(met),
         LONG: "the motion takes too many steps",

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.arrays import SearchArrays, Work
 from feasibility.roadmap.branch_and_bound import Boxes, Places, Ruling, examine
 from feasibility.roadmap.cuts.regions import Region
+from feasibility.roadmap.motions import SearchArrays, Work
 
 BATCH = 4000  # boxes between two ticks
 LEAST = 500  # boxes of a statement before it is compared with others

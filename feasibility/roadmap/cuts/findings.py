@@ -8,11 +8,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.arrays import SearchArrays, Work, work_for
 from feasibility.roadmap.branch_and_bound import Places, place_at_rest
 from feasibility.roadmap.cuts.counting import Statement
 from feasibility.roadmap.cuts.regions import Region, folded
 from feasibility.roadmap.cuts.samples import projected, random_targets
+from feasibility.roadmap.motions import SearchArrays, Work, with_free_roll, work_for
 from robots.chain import tool
 
 SAMPLES = 100  # Newton tries onto the motion set, each attempt
@@ -49,6 +49,8 @@ class Findings:
     rng: np.random.Generator
     newton: bool
     work: Work = field(init=False)
+    over_places: SearchArrays = field(init=False)
+    """`arrays`, with any roll where it is not known over all places."""
     samples: NDArray[np.float64] = field(init=False)
     """(k, n) points of the motion set, at any winding."""
     cuts: list[ProvedCut] = field(default_factory=list)
@@ -63,6 +65,10 @@ class Findings:
         """Working memory, and no samples yet."""
         n = len(self.arrays.lower)
         self.work = work_for(n)
+        # Where proofs leave roll out, a configuration with any roll refutes them.
+        finest = self.places.children[:, 0] < 0
+        left_out = np.isinf(self.places.radius[finest, 2]).any()
+        self.over_places = with_free_roll(self.arrays) if left_out else self.arrays
         self.samples = np.empty((0, n))
 
     # -- points of the motion set --------------------------------------------------------------
@@ -71,7 +77,7 @@ class Findings:
         """More points of the motion set inside the limits, unless there are enough."""
         if self.newton and len(self.samples) < MOST_SAMPLES:
             targets = random_targets(self.places, SAMPLES, self.rng)
-            q = projected(self.arrays, self.work, limits, targets, SAMPLES, self.rng)
+            q = projected(self.over_places, self.work, limits, targets, SAMPLES, self.rng)
             self.samples = np.vstack([self.samples, q])
 
     def on_cut(self, on: Region) -> bool:
@@ -80,7 +86,7 @@ class Findings:
         if not self.newton or slanted:
             return False
         targets = random_targets(self.places, CUT_TRIES, self.rng)
-        q = projected(self.arrays, self.work, on, targets, ENOUGH, self.rng)
+        q = projected(self.over_places, self.work, on, targets, ENOUGH, self.rng)
         self.keep(q)
         return len(q) > 0
 
@@ -88,8 +94,7 @@ class Findings:
         """Is a configuration of the region found that covers a cell? It is kept, and a seed."""
         if not self.newton:
             return False
-        target = np.concatenate([self.arrays.points[cell], self.arrays.approaches[cell]])
-        targets = np.tile(target, (LEAF_TRIES, 1))
+        targets = np.tile(place_at_rest(self.arrays, cell).centre, (LEAF_TRIES, 1))
         q = projected(self.arrays, self.work, region, targets, 1, self.rng)
         self.keep(q, cell)
         return len(q) > 0
@@ -134,7 +139,7 @@ class Findings:
                 del self.unfinished[next(iter(self.unfinished))]
             places, parameters = self.places, 2
             if cell >= 0:
-                places = place_at_rest(self.arrays.points[cell], self.arrays.approaches[cell])
+                places = place_at_rest(self.arrays, cell)
                 parameters = 0
             self.unfinished[key] = Statement(region, places, parameters)
         return self.unfinished[key]

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
-from feasibility.roadmap.arrays import SearchArrays
 from feasibility.roadmap.branch_and_bound import Places
 from feasibility.roadmap.cuts.counting import Counted
 from feasibility.roadmap.cuts.findings import Findings
@@ -22,6 +21,7 @@ from feasibility.roadmap.cuts.gaps import Component
 from feasibility.roadmap.cuts.guess import Blocked, Guessing, first_proved
 from feasibility.roadmap.cuts.opening import openings
 from feasibility.roadmap.cuts.regions import Region, folded, limits_of, turn_from, wide_joints
+from feasibility.roadmap.motions import SearchArrays
 
 MOST_SEEDS = 12  # handed back by an attempt
 

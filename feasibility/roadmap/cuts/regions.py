@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.arrays import SearchArrays
 from feasibility.roadmap.branch_and_bound import Boxes, Places, Slabs, box_of, no_slabs
+from feasibility.roadmap.motions import SearchArrays
 
 TURN = 2.0 * np.pi
 WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they tell

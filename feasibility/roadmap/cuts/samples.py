@@ -10,20 +10,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.compiled import kernel
-from feasibility.roadmap.arrays import NEXT, SearchArrays, Work, look_at, place
-from feasibility.roadmap.branch_and_bound import Places
+from feasibility.roadmap.branch_and_bound import Places, unturned
 from feasibility.roadmap.cuts.regions import Region
-from feasibility.roadmap.projection import PROJECTION_SLACK, project
+from feasibility.roadmap.motions import (
+    NEXT,
+    PROJECTION_SLACK,
+    SearchArrays,
+    Work,
+    place,
+    project,
+    stand_still,
+)
 
 NEWTON_STEPS = np.int64(16)  # of a try: most that succeed need fewer, and the rest are many
 
 
 @kernel
 def _project_rows(arrays, work, targets, q, enough, hit):  # type: ignore[no-untyped-def]
-    """Project rows of q (k, n), in place, onto the targets (k, 6), until there are enough hits."""
+    """Project rows of q (k, n), in place, onto the targets (k, 9), until there are enough hits."""
     hits = 0
     for i in range(q.shape[0]):
-        look_at(arrays, work, targets[i, :3], targets[i, 3:])
+        for k in range(3):
+            work.target[0, k], work.target[1, k] = targets[i, k], targets[i, 3 + k]
+        if arrays.roll[1] < np.inf:
+            unturned(work.target, targets[i, 6:], arrays.roll[0])
+        stand_still(arrays, work)
         place(arrays, work, NEXT, q[i])
         for j in range(q.shape[1]):
             work.secondary_step[j] = 0.0
@@ -46,7 +57,7 @@ def projected(
     Args:
         arrays, work: of the search.
         region: one turn of it takes the place of the limits; what its slabs leave out is dropped.
-        targets: (k, 6) target points and approach directions.
+        targets: (k, 9) as `Places.centre`.
         enough: hits after which no more are tried.
         rng: draws the guesses.
 
@@ -63,10 +74,10 @@ def projected(
 
 
 def random_targets(places: Places, k: int, rng: np.random.Generator) -> NDArray[np.float64]:
-    """(k, 6) targets at random places of the surface, up to the radius of the finest parts."""
+    """(k, 9) targets at random places of the surface, up to the radius of the finest parts."""
     finest = np.flatnonzero(places.children[:, 0] < 0)
     part = rng.choice(finest, k)
     x = rng.uniform(-1.0, 1.0, (k, 2, 1))
     targets = places.centre[part] + (x * places.slopes[part]).sum(axis=1)
-    targets[:, 3:] /= np.linalg.norm(targets[:, 3:], axis=1)[:, None]
+    targets[:, 3:6] /= np.linalg.norm(targets[:, 3:6], axis=1)[:, None]
     return targets

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from random_arms import rail_arm, random_arm, random_configuration, tilted, tools, turn_onto
 
 from feasibility import Task
-from feasibility.roadmap.arrays import arrays_of, work_for
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import shrink
-from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work
+from feasibility.roadmap.branch_and_bound.boxes import Slabs, box_work, place_at_rest
 from feasibility.roadmap.branch_and_bound.branching import DIRECTIONS
 from feasibility.roadmap.cuts.places import places_on
+from feasibility.roadmap.motions import arrays_of, work_for
+from feasibility.roll import projected, roll_of
 from robots import load_robot
 from surfaces import cone, cylinder, hyperboloid, plane, sphere, torus
 
@@ -33,6 +35,8 @@ class Known(NamedTuple):
 
     arrays: object
     places: object
+    at_rest: object
+    """The target alone."""
     q: np.ndarray
     parts: np.ndarray
     """(k,) parts that the place lies on."""
@@ -65,7 +69,8 @@ def known_point(arm, kind, rng):
     (point,), (axis,) = tools(robot, q[None])
     surface = random_patch(kind, str(rng.choice(["inside", "outside"])), rng)
     cone_deg = float(rng.choice([0.5, 5.0, 45.0, 120.0, 180.0]))
-    task = Task(float(rng.choice([0.0, 0.02])), cone_deg, float(rng.choice([1e-4, 1e-3, 0.02])))
+    standoff, tolerance = float(rng.choice([0.0, 0.02])), float(rng.choice([1e-4, 1e-3, 0.02]))
+    task = Task(standoff, cone_deg, tolerance)
     cells = surface.cells(4, 5)
     cell = int(rng.integers(len(cells)))
     targets = task.targets(cells)
@@ -74,21 +79,40 @@ def known_point(arm, kind, rng):
     approach = tilted(axis, 0.9999 * task.cone, rng)
     turn = turn_onto(targets.approaches[cell], approach, rng)
     surface = surface.moved(turn, point + offset - turn @ targets.points[cell])
+    if cone_deg <= 90.0:
+        task = with_roll(task, robot, surface, q, axis, approach, rng)
     arrays = arrays_of(robot, surface.cells(4, 5), task)
     places = places_on(surface, task)
     parts, x = explained(places, point + offset, approach)
     assert len(parts) > 0
-    return Known(arrays, places, q, parts, x)
+    return Known(arrays, places, place_at_rest(arrays, cell), q, parts, x)
+
+
+def with_roll(task, robot, surface, q, axis, approach, rng):
+    """The task with a range of roll that holds what q has, up to 0.1 percent."""
+    reference = surface.rotation.T @ rng.normal(size=3)
+    t, sine = projected(surface.rotation @ reference, approach)
+    if sine < 0.3 * np.linalg.norm(reference):
+        return task
+    turned = replace(robot, approach_axis=robot.reference_axis, reference_axis=robot.approach_axis)
+    (x,) = tools(turned, q[None])[1]
+    half = float(rng.choice([0.01, 0.5, 10.0, 60.0, 170.0]))
+    middle = np.degrees(roll_of(x, axis, t, approach)) + rng.choice([-0.999, 0.0, 0.999]) * half
+    middle = float(np.mod(middle + 180.0, 360.0) - 180.0)
+    limits = (middle - half, middle + half)
+    return replace(task, roll_deg=limits, roll_reference=tuple(reference.tolist()))
 
 
 def explained(places, point, approach):
     """The parts (k,) of which a target and an approach direction obey the model, and x (k, 2)."""
     at = np.concatenate([point, approach])
-    slopes = places.slopes.transpose(0, 2, 1)  # (K, 6, 2)
-    x = np.clip(np.einsum("kxd,kd->kx", np.linalg.pinv(slopes), at - places.centre), -1.0, 1.0)
-    off = at - places.centre - np.einsum("kdx,kx->kd", slopes, x)
+    slopes = places.slopes[..., :6].transpose(0, 2, 1)  # (K, 6, 2)
+    x = np.clip(
+        np.einsum("kxd,kd->kx", np.linalg.pinv(slopes), at - places.centre[:, :6]), -1.0, 1.0
+    )
+    off = at - places.centre[:, :6] - np.einsum("kdx,kx->kd", slopes, x)
     lengths = np.stack([np.linalg.norm(off[:, :3], axis=1), np.linalg.norm(off[:, 3:], axis=1)], 1)
-    parts = np.flatnonzero((lengths <= places.radius + 1e-12).all(axis=1))
+    parts = np.flatnonzero((lengths <= places.radius[:, :2] + 1e-12).all(axis=1))
     return parts, x[parts]
 
 
@@ -115,11 +139,16 @@ def loses(known, rng):
     low, high = np.minimum(low, y), np.maximum(high, y)
     space = box_work(n, 2)
     static_levers(known.arrays, space.longest)
+    places, part = known.places, int(known.parts[k])
+    if rng.random() < 0.3:
+        places, part, low, high, y = known.at_rest, 0, low[:n].copy(), high[:n].copy(), y[:n]
+        space = box_work(n, 0)
+        static_levers(known.arrays, space.longest)
     code, _ = shrink(
         known.arrays,
         work_for(n),
-        known.places,
-        int(known.parts[k]),
+        places,
+        part,
         random_slabs(known.q, rng),
         DIRECTIONS,
         space,

@@ -6,10 +6,10 @@ import numpy as np
 from oracle_build import built
 from random_cases import read
 
-from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.cuts import Prover, components_of, places_on
 from feasibility.roadmap.cuts.gaps import Component
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import seed_middle
 
 

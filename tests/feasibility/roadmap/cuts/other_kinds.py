@@ -11,9 +11,9 @@ from oracle_build import built, surface_of
 from oracle_cases import Problem
 from scipy.interpolate import make_interp_spline
 
-from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.cuts import Prover, components_of, places_on
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import seed_middle
 from surfaces import bspline, cylinder, hyperboloid, mesh, piecewise, plane, revolution, sphere
 from surfaces.meshes.triangle_mesh import TriangleMesh

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from feasibility.cut_tree import Cut, Leaf
-from feasibility.roadmap.arrays import arrays_of
 from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
 from feasibility.roadmap.cuts import Prover, components_of, places_on
 from feasibility.roadmap.cuts.counting import Counted, Statement
 from feasibility.roadmap.cuts.regions import limits_of, turn_from
 from feasibility.roadmap.exploration import Exploration, wound
+from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import improve, seed_middle
 
 
@@ -75,7 +75,7 @@ def statement_of(prover, region, node):
     """What a node states: where the tool is said to be nowhere."""
     if isinstance(node, Leaf):
         arrays = prover.arrays
-        places = place_at_rest(arrays.points[node.cell], arrays.approaches[node.cell])
+        places = place_at_rest(arrays, node.cell)
         return Statement(region, places, 0)
     return Statement(region.on(np.array(node.weights), node.value), prover.places, 2)
 

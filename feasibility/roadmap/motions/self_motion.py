@@ -1,8 +1,8 @@
 """Self-motions over one cell: motions on the manifold of the configurations that are valid there.
 
-The tool point stays at one target, the axis stays inside the cone, and the free directions (roll,
-tilt, redundancy) move. A motion that `connect` returns is certified as it is made, see
-`feasibility.roadmap.segment_bound`.
+The tool point stays at one target, axis and roll stay inside cone and range, and the free
+directions (roll, tilt, redundancy) move. A motion that `connect` returns is certified as it is
+made, see `feasibility.roadmap.motions.segment_bound`.
 """
 
 from __future__ import annotations
@@ -12,27 +12,28 @@ from numpy.typing import NDArray
 
 from feasibility.collisions import clearance_gradient
 from feasibility.compiled import inlined, kernel, put
-from feasibility.roadmap.arrays import (
-    HERE,
-    NEXT,
-    OVERFLOW,
-    SearchArrays,
-    Work,
-    accept,
-    copy_slot,
-    look_at,
-    place,
-)
-from feasibility.roadmap.off_target import STEPS_FROM_NEAR, project_off_target
-from feasibility.roadmap.projection import (
+from feasibility.roadmap.motions.aiming import look_at
+from feasibility.roadmap.motions.arrays import OVERFLOW, SearchArrays
+from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
+from feasibility.roadmap.motions.projection import (
     PROJECTION_STEPS,
     linearise,
     project,
     project_onto_cell,
 )
-from feasibility.roadmap.segment_bound import segment_holds
+from feasibility.roadmap.motions.segment_bound import segment_holds
+from feasibility.roadmap.motions.working_memory import (
+    HERE,
+    NEXT,
+    OF_CONE,
+    OF_ROLL,
+    Work,
+    accept,
+    copy_slot,
+    place,
+)
 
-CONE_SLACK = 1e-3  # [1] share of the cone chord kept free by a full step; less by a shorter one
+CONE_SLACK = 1e-3  # [1] share of cone and roll kept free by a full step; less by a shorter one
 NEWTON_STEPS = np.int64(6)  # of one step of a self-motion
 SETTLE_STEPS = np.int64(40)  # of `settle`
 
@@ -43,6 +44,7 @@ def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
 
     Joint differences weighted in this way measure how much a motion moves the tool: the free roll
     of a wrist, or opposite turns of two joints about a common axis at a singularity, weigh little.
+    Where roll is limited, a joint that turns it weighs by as much; so windings are far apart.
     """
     for j in range(out.shape[0]):
         if arrays.chain.prismatic[j]:
@@ -56,13 +58,27 @@ def effects(arrays, work, slot, out):  # type: ignore[no-untyped-def]
         x, y, z = work.axis[slot, 0], work.axis[slot, 1], work.axis[slot, 2]
         s = (zy * z - zz * y) ** 2 + (zz * x - zx * z) ** 2 + (zx * y - zy * x) ** 2
         out[j] = np.sqrt(r) / arrays.scale + np.sqrt(s)
+        if arrays.roll[1] < np.inf:
+            out[j] += abs(zx * x + zy * y + zz * z)
+
+
+@kernel
+def _push_back(work, which, size, share):  # type: ignore[no-untyped-def]
+    """Add to `work.secondary_step` a step down a gradient, by its share (-1 to 1) of a range."""
+    norm = 0.0
+    for j in range(work.step.shape[0]):
+        norm += work.gradients[which, j] ** 2
+    if norm > 1e-12 and abs(share) < np.inf:
+        push = size * min(max(share, -1.0), 1.0) ** 5 / np.sqrt(norm)
+        for j in range(work.step.shape[0]):
+            work.secondary_step[j] -= push * work.gradients[which, j]
 
 
 @kernel
 def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
-    """Set `work.secondary_step` away from limits, the cone's boundary, and what the arm may hit.
+    """Set `work.secondary_step` away from limits, boundaries, and what the arm may hit.
 
-    The cone's row is that of slot 1.
+    The boundaries are those of cone and roll; their gradients are those of slot 1.
     """
     n = q.shape[0]
     for j in range(n):
@@ -72,14 +88,9 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
             x = (q[j] - arrays.lower[j]) / half - 1.0
             x2 = x * x
             work.secondary_step[j] = -size * x * x2 * x2
-    share = work.error[1, 1] / arrays.cone_chord
-    norm = 0.0
-    for j in range(n):
-        norm += work.rows[3, j] ** 2
-    if norm > 1e-12 and share < np.inf:
-        push = size * min(share, 1.0) ** 5 / np.sqrt(norm)
-        for j in range(n):
-            work.secondary_step[j] -= push * work.rows[3, j]
+    _push_back(work, OF_CONE, size, work.error[1, 1] / arrays.cone_chord)
+    if arrays.roll[1] < np.inf:
+        _push_back(work, OF_ROLL, size, work.error[1, 2] / arrays.roll[1])
     if arrays.collisions.shape[0] > 0:
         clearance_gradient(arrays.collisions, q, work.secondary_step, size)
 
@@ -87,7 +98,7 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
 @inlined
 def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ignore[no-untyped-def]
     """Put a share of the way from q to the goal, projected, into `work.trial`; True on success."""
-    copy_slot(work)
+    copy_slot(arrays, work)
     for j in range(q.shape[0]):
         work.trial[j] = q[j]
         work.secondary_step[j] = share * (goal[j] - q[j])
@@ -102,8 +113,8 @@ def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ign
 
 
 @kernel
-def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
-    """Self-motion over one target from q (in place) towards the configuration `goal`.
+def connect(arrays, work, q, goal, waypoints, first, most):  # type: ignore[no-untyped-def]
+    """Self-motion over `work.target`, at rest, from q (in place) towards the configuration `goal`.
 
     Each step heads for the goal and is projected back onto the manifold. The motion ends early when
     it falls behind: a step that brings the goal nearer by only a small part of its length means
@@ -115,7 +126,6 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
         the last one is `goal`.
     """
     n = q.shape[0]
-    look_at(arrays, work, target, approach)
     place(arrays, work, HERE, q)
     size, written = 0.3, 0
     left = 0.0
@@ -171,16 +181,16 @@ def connect(arrays, work, target, approach, q, goal, waypoints, first, most):  #
 
 
 @kernel
-def settle(arrays, work, target, approach, q, most):  # type: ignore[no-untyped-def]
-    """Self-motion over one target (q in place) away from the limits and the cone's boundary."""
+def settle(arrays, work, cell, q, most):  # type: ignore[no-untyped-def]
+    """Self-motion over a cell's centre (q in place) away from limits and boundaries."""
     n = q.shape[0]
-    look_at(arrays, work, target, approach)
+    look_at(arrays, work, cell)
     place(arrays, work, HERE, q)
     off_target = work.error[HERE, 0] > arrays.near
     size = 0.3
     for _ in range(most):
-        copy_slot(work)
-        linearise(arrays, work, NEXT, arrays.cone_chord)
+        copy_slot(arrays, work)
+        linearise(arrays, work, NEXT)
         margin_objective(arrays, work, q, size)
         for j in range(n):
             work.trial[j] = q[j]
@@ -222,10 +232,11 @@ def margin_shares(
     for g, q in enumerate(guesses):
         if not project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
-        settle(arrays, work, arrays.points[cell], arrays.approaches[cell], q, SETTLE_STEPS)
+        settle(arrays, work, cell, q, SETTLE_STEPS)
         off_middle = np.abs((q - arrays.lower)[ranged] / half[ranged] - 1.0)
         margins[g] = min(
             max(0.0, 1.0 - work.error[0, 1] / arrays.cone_chord),
+            max(0.0, 1.0 - abs(work.error[0, 2]) / arrays.roll[1]),
             (1.0 - off_middle).min(initial=np.inf),
         )
     return margins

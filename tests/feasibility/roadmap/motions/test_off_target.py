@@ -8,7 +8,7 @@ from random_arms import finite_limits, planar_arm, tools
 
 from feasibility import Search, Task, check
 from feasibility.roadmap import arrays_of, work_for
-from feasibility.roadmap.off_target import project_near_cell
+from feasibility.roadmap.motions.off_target import project_near_cell
 from robots import load_robot
 from surfaces import plane, sphere
 

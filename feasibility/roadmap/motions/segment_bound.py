@@ -26,22 +26,41 @@ at most kappa |p - T|, kappa the largest curvature of the target surface:
 
 (`Work.allowance` is already less by what this adds at the ends for tool points within `near` of
 their targets, and `cone_used` adds what it costs further off.) Limits are convex: the ends decide.
+
+Where roll is limited, psi of `motions.roll` obeys the same kind of bound. With d_j the absolute
+steps of the revolute joints, B_j = sum_{i<j} d_i, turn = sum_j d_j, and
+
+    G = sum_j s_j d_j B_j,      W = sum_j d_j B_j,      A = sum_j s_j d_j
+
+differentiate psi' = (om - Om) . k. As om' = sum_{i<j} d_i d_j z_i x z_j and |(z_i x z_j) . a| <=
+s_j, |om' . (a + b)| <= 2 G + W |a - b|; and c = a . b has |c'| <= (A + |b'|) sin theta. So
+
+    |psi''| <= (2 G + W |a - b|) / (1 + c) + (|Om'| + |Om| turn) / cos(theta / 2)
+               + (turn + |Om|) / cos(theta / 2) (A + |b'|) tan(theta / 2)
+
+with the peak of |a - b| for the tilt theta: 1 + c = 2 - |a - b|^2 / 2. Both ends of the range are
+tested with the signed values of psi, that of the frame at the tool point's closest point included.
+They are principal values: a whole turn between them is ruled out by its own test, that roll changes
+by less than is left of a turn, (turn + |Om|) / cos(theta / 2) < 2 pi - |psi1 - psi0|.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from feasibility.collisions import segment_clear
+from feasibility.collisions import blamed, segment_clear
 from feasibility.compiled import kernel
-from feasibility.roadmap.arrays import HERE, NEXT, cone_used
-
-COLLIDES = np.inf  # in place of the cone bound
+from feasibility.roadmap.motions.arrays import COLLISION, CONE, ROLL
+from feasibility.roadmap.motions.roll import TURN
+from feasibility.roadmap.motions.working_memory import HERE, NEXT, cone_used, roll_lost
 
 
 @kernel
 def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
-    """D and Da of the module's bound for the segment from q0 (slot 0) to q1 (slot 1)."""
+    """D and Da of the module's bound for the segment from q0 (slot 0) to q1 (slot 1).
+
+    `work.turning` receives turn, A, G and W.
+    """
     n = q0.shape[0]
     behind = 0.0  # how far the tool point moves by the joints behind j
     behind_axis = 0.0
@@ -49,7 +68,8 @@ def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     for j in range(n):
         if not arrays.chain.prismatic[j]:
             before += abs(q1[j] - q0[j])
-    total, total_axis = 0.0, 0.0
+    turn = before
+    total, total_axis, paired, mixed = 0.0, 0.0, 0.0, 0.0
     for j in range(n - 1, -1, -1):
         d = abs(q1[j] - q0[j])
         if arrays.chain.prismatic[j]:
@@ -70,8 +90,12 @@ def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
         s = min(np.sqrt(s) + 0.5 * behind_axis, 1.0)
         total += r * d * (d + 2.0 * before)
         total_axis += s * d * (d + 2.0 * before)
+        paired += s * d * before
+        mixed += d * before
         behind += r * d
         behind_axis += s * d
+    work.turning[0], work.turning[1] = turn, behind_axis
+    work.turning[2], work.turning[3] = paired, mixed
     return total, total_axis
 
 
@@ -85,14 +109,52 @@ def peak(a, b, most):  # type: ignore[no-untyped-def]
 
 
 @kernel
+def roll_spread(work, chord, longer):  # type: ignore[no-untyped-def]
+    """Bounds on |psi'| and |psi''| on a segment, rad; after `spread`.
+
+    Args:
+        work: as everywhere.
+        chord: the peak of |a - b|.
+        longer: how much further the frame may run, see `segment_holds`.
+    """
+    turn, axis, paired, mixed = work.turning[0], work.turning[1], work.turning[2], work.turning[3]
+    approach, frame = longer * work.derivative_bound[5], longer * work.derivative_bound[6]
+    bend = longer * longer * work.derivative_bound[7]
+    along = 2.0 - 0.5 * chord * chord  # 1 + c
+    cosine = np.sqrt(0.5 * along)
+    rate = (turn + frame) / cosine
+    most = (2.0 * paired + mixed * chord) / along + (bend + frame * turn) / cosine
+    return rate, most + rate * (axis + approach) * 0.5 * chord / cosine
+
+
+@kernel
+def roll_bound(arrays, work, chord, longer, aside):  # type: ignore[no-untyped-def]
+    """How far off the middle of its range roll may be on a segment, at most, rad.
+
+    Args:
+        arrays, work, chord, longer: as in `segment_holds` and `roll_spread`.
+        aside: m, second derivative of the tool point off its target.
+    """
+    rate, most = roll_spread(work, chord, longer)
+    if aside > 0.0:
+        most += work.derivative_bound[8] * aside
+    before, after = work.error[HERE, 2], work.error[NEXT, 2]
+    if not rate < TURN - abs(after - before):
+        return np.inf
+    lost, left = roll_lost(arrays, work, HERE), roll_lost(arrays, work, NEXT)
+    return max(peak(before + lost, after + left, most), peak(lost - before, left - after, most))
+
+
+@kernel
 def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
-    """Do point and cone hold everywhere on the straight segment from q0 (slot 0) to q1 (slot 1)?
+    """Do the constraints hold everywhere on the straight segment from q0 (slot 0) to q1 (slot 1)?
 
     Slot 0 holds the errors against the target at the start of the segment, slot 1 at its end.
 
-    Returns the position bound over the allowance of the tolerance, and the cone bound over that of
-    the cone chord: both must be at most 1. NaN compares false, so it never certifies. Where both
-    hold, but the arm is not certified clear, the second is COLLIDES.
+    Returns the position bound over the allowance of the tolerance, and the larger one of the cone's
+    bound and the roll's, each over its allowance: both must be at most 1. NaN compares false, so it
+    never certifies. The second is inf where roll does not hold, or the arm is not certified clear.
+    Where the position holds, `work.stop_reason` is told which one does not.
     """
     total, total_axis = spread(arrays, work, q0, q1)
     # The replay matches the ends to the curve's closest points, up to twice the errors from those
@@ -110,8 +172,18 @@ def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     cone = peak(
         cone_used(arrays, work, HERE), cone_used(arrays, work, NEXT), total_axis + approach + normal
     )
-    position, cone = position / work.allowance[0], cone / work.allowance[1]
-    asked = arrays.collisions.shape[0] > 0 and position <= 1.0 and cone <= 1.0
-    if asked and not segment_clear(arrays.collisions, q0, q1) > 0.0:
-        cone = COLLIDES
-    return position, cone
+    position, turned = position / work.allowance[0], cone / work.allowance[1]
+    if not (position <= 1.0 and turned <= 1.0):
+        if position <= 1.0:
+            work.stop_reason[0] = CONE
+        return position, turned
+    if arrays.roll[1] < np.inf:
+        roll = roll_bound(arrays, work, cone, longer, total + target) / work.allowance[2]
+        if not roll <= 1.0:
+            work.stop_reason[0] = ROLL
+            return position, np.inf
+        turned = max(turned, roll)
+    if arrays.collisions.shape[0] > 0 and not segment_clear(arrays.collisions, q0, q1) > 0.0:
+        work.stop_reason[0], work.stop_reason[1] = COLLISION, blamed(arrays.collisions)
+        return position, np.inf
+    return position, turned

@@ -7,7 +7,7 @@ import pytest
 from random_arms import QUESTIONS, finite_limits, planar_arm, question, tools
 
 from feasibility import Task
-from feasibility.roadmap import arrays_of, look_at, place, project, work_for
+from feasibility.roadmap import arrays_of, place, project, stand_still, work_for
 from surfaces import plane
 
 SLACK = 1e-6  # [1] share of the cone chord kept free
@@ -16,7 +16,8 @@ DOWN = np.array([0.0, 0.0, -1.0])
 
 def solve(arrays, work, target, approach, q, most=60):
     """Newton from q (in place) onto a target point, inside the cone about a direction."""
-    look_at(arrays, work, target, approach)
+    work.target[0], work.target[1] = target, approach
+    stand_still(arrays, work)
     place(arrays, work, 1, q)
     work.secondary_step[:] = 0.0
     return project(arrays, work, q, SLACK, np.inf, most)

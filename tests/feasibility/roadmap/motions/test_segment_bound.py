@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from arm_urdfs import joint
@@ -19,9 +21,10 @@ from random_arms import (
 )
 
 from feasibility import Task
-from feasibility.roadmap import arrays_of, look_at, place, project, segment_holds, work_for
-from feasibility.roadmap.arrays import aim, bounds_between
-from feasibility.roadmap.segment_bound import peak, spread
+from feasibility.roadmap import arrays_of, place, project, segment_holds, stand_still, work_for
+from feasibility.roadmap.motions.aiming import aim, bounds_between
+from feasibility.roadmap.motions.segment_bound import peak, spread
+from feasibility.roll import Roll, projected, roll_of
 from surfaces import cylinder, sphere
 from surfaces.patches import GridCells, plane
 
@@ -157,9 +160,14 @@ def surface_segment(rng, robot, kind, task, share, offsets, longest, onto):
     closest = surface.closest(np.array([surface.point(u, v), away]))
     cells = two_cells(surface, np.column_stack([closest.u, closest.v]))
     arrays, work = arrays_of(robot, cells, task), work_for(robot.n)
+    if task.roll is not None:
+        aim(arrays, work, 0, 0.0)
+        place(arrays, work, 0, q0)
+        middle = arrays.roll[0] + work.error[0, 2] + rng.uniform(-1.0, 1.0) * task.roll.half
+        arrays = arrays._replace(roll=np.array([middle, task.roll.half]))
+    bounds_between(arrays, work, 0, 0.0, 1.0)
     aim(arrays, work, 0, 1.0)
     place(arrays, work, 1, q1)
-    bounds_between(arrays, work, 0, 0.0, 1.0)
     if onto:
         work.secondary_step[:] = 0.0
         if not project(arrays, work, q1, 1e-6, np.inf, 60):
@@ -224,6 +232,56 @@ def test_a_segment_that_is_accepted_holds_everywhere(kind):
     assert worst > 0.5
 
 
+def off_middle(arrays, cells, task, x, axes, normals):
+    """|roll - middle| (k,) of reference axes and axes (k, 3) over places with these normals."""
+    b = -cells.surface.side_sign * normals
+    t, sine = projected(np.broadcast_to(task.fixed_reference(cells), b.shape), b)
+    roll = Roll(float(arrays.roll[0]), float(arrays.roll[1]))
+    return np.where(sine > 0.02, np.abs(roll.off(roll_of(x, axes, t, b))), 0.0)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_roll_holds_on_a_segment_that_is_accepted(kind):
+    """160 segments as above, ranges of 0.5 to 300 deg about a random reference.
+
+    Roll stays in its range at every sample, over the curve and over the tool point's own foot.
+    """
+    rng = np.random.default_rng(20 + KINDS.index(kind))
+    passed = 0
+    for _ in range(10):
+        robot = random_arm(rng)
+        turned = replace(
+            robot, approach_axis=robot.reference_axis, reference_axis=robot.approach_axis
+        )
+        for _ in range(16):
+            half = float(rng.choice([0.25, 2.0, 15.0, 150.0]))
+            task = Task(
+                float(rng.choice([0.0, 0.05])),
+                float(rng.choice([2.0, 20.0, 60.0, 90.0])),
+                10.0 ** rng.uniform(-3.5, -2.0),
+                roll_deg=(-half, half),
+                roll_reference=tuple(rng.normal(size=3).tolist()),
+            )
+            made = surface_segment(rng, robot, kind, task, rng.random(), (0.0, 0.02), -0.3, True)
+            if made is None:
+                continue
+            arrays, work, cells, q0, q1 = made
+            position, orientation = segment_holds(arrays, work, q0, q1)
+            if not (position <= 1.0 and orientation <= 1.0):
+                continue
+            passed += 1
+            s, q = between(q0, q1, 20)
+            (points, axes), (_, x) = tools(robot, q), tools(turned, q)
+            _, normals = cells.curves.at(np.zeros(len(s), dtype=np.int64), s)
+            along = off_middle(arrays, cells, task, x, axes, normals)
+            assert along.max() <= orientation * work.allowance[2] + arrays.frame_deviations[0, 1]
+            assert along.max() <= arrays.roll[1]
+            if max(work.error[0, 0], work.error[1, 0]) <= arrays.near:
+                own = cells.surface.closest(points).normal
+                assert off_middle(arrays, cells, task, x, axes, own).max() <= arrays.roll[1]
+    assert passed > 25
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_cone_holds_on_long_segments(kind):
     """450 segments with a tolerance of 0.15 m, so that they may be long, and cones beyond 90 deg.
@@ -282,7 +340,8 @@ def test_nothing_that_is_not_a_number_passes():
     robot = planar_arm(3)
     arrays, work = arrays_of(robot, far_plane(), Task(0.0, 180, 1.0)), work_for(3)
     q = np.array([0.1, 0.2, 0.3])
-    look_at(arrays, work, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    work.target[0], work.target[1] = np.zeros(3), np.array([0.0, 0.0, 1.0])
+    stand_still(arrays, work)
     place(arrays, work, 0, q)
     place(arrays, work, 1, q)
     position, cone = segment_holds(arrays, work, q, q)

@@ -4,38 +4,25 @@ The target moves along the curve between the centres (`surfaces.cell_curves`), s
 depends on the kind of surface.
 
 The arm follows: a predictor step, Newton on the tool point, and the free directions used to stay
-away from limits and from the boundary of the cone, or to head for a goal configuration. A step is
-kept only when `feasibility.roadmap.segment_bound` shows that the straight joint segment obeys every
-constraint between its ends too; otherwise it is shortened. Where no step is short enough, the tool
-point may leave its target, within the tolerance. (Step 6 of the complete search.)
+away from limits and from the boundaries of cone and roll, or to head for a goal configuration. A
+step is kept only when `feasibility.roadmap.motions.segment_bound` shows that the straight joint
+segment obeys every constraint between its ends too; otherwise it is shortened. Where no step is
+short enough, the tool point may leave its target, within the tolerance.
+(Step 6 of the complete search.)
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from feasibility.collisions import blamed
 from feasibility.compiled import inlined, kernel, put
-from feasibility.roadmap.arrays import (
-    COLLISION,
-    CONE,
-    FOLD,
-    HERE,
-    LONG,
-    NEXT,
-    OVERFLOW,
-    SINGULAR,
-    STOPPED,
-    accept,
-    aim,
-    bounds_between,
-    copy_slot,
-    place,
-)
-from feasibility.roadmap.off_target import STEPS_FROM_NEAR, project_off_target
-from feasibility.roadmap.projection import linearise, project
-from feasibility.roadmap.segment_bound import COLLIDES, segment_holds
-from feasibility.roadmap.self_motion import CONE_SLACK, margin_objective
+from feasibility.roadmap.motions.aiming import aim, bounds_between
+from feasibility.roadmap.motions.arrays import FOLD, LONG, OVERFLOW, SINGULAR, STOPPED
+from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
+from feasibility.roadmap.motions.projection import linearise, project
+from feasibility.roadmap.motions.segment_bound import segment_holds
+from feasibility.roadmap.motions.self_motion import CONE_SLACK, margin_objective
+from feasibility.roadmap.motions.working_memory import HERE, NEXT, accept, copy_slot, place
 
 SMALLEST_STEP = 2.0**-7  # [1] of the curve between two centres: a shorter step ends the motion
 OFF_TARGET_STEP = 2.0**-4  # [1] of the curve: the first step with the tool point off its target
@@ -63,7 +50,7 @@ def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
     good = project(arrays, work, work.trial, CONE_SLACK * dt, work.error[0, 1], NEWTON_STEPS)
     if not good and off_target:
         put(work.trial, q)
-        copy_slot(work)
+        copy_slot(arrays, work)
         good = project_off_target(arrays, work, work.trial, STEPS_FROM_NEAR)
     if not good:
         return np.inf, np.inf
@@ -72,12 +59,17 @@ def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def _blame(arrays, work, cone):  # type: ignore[no-untyped-def]
-    """What stopped a step that kept to the tolerance: the cone, or a pair that would collide."""
-    work.stop_reason[0] = CONE
-    if cone == COLLIDES:
-        work.stop_reason[0] = COLLISION
-        work.stop_reason[1] = blamed(arrays.collisions)
+def _something_left(arrays, work):  # type: ignore[no-untyped-def]
+    """Is anything left of tolerance, cone and roll on the present step?"""
+    left = work.allowance[0] > 0.0 and work.allowance[1] > 0.0
+    return left and (work.allowance[2] > 0.0 or not arrays.roll[1] < np.inf)
+
+
+@inlined
+def _starts_inside(arrays, work):  # type: ignore[no-untyped-def]
+    """Does slot 0 obey tolerance, cone and roll?"""
+    inside = work.error[0, 0] <= work.allowance[0] and work.error[0, 1] <= work.allowance[1]
+    return inside and (abs(work.error[0, 2]) <= work.allowance[2] or not arrays.roll[1] < np.inf)
 
 
 @kernel
@@ -101,9 +93,8 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
     aim(arrays, work, curve, begin)
     place(arrays, work, HERE, q)
     bounds_between(arrays, work, curve, begin, begin)
-    allowance = work.allowance
-    if not (work.error[0, 0] <= allowance[0] and work.error[0, 1] <= allowance[1]):
-        work.stop_reason[0] = SINGULAR if allowance[0] > 0.0 and allowance[1] > 0.0 else FOLD
+    if not _starts_inside(arrays, work):
+        work.stop_reason[0] = SINGULAR if _something_left(arrays, work) else FOLD
         return STOPPED
     t, dt, written = 0.0, 1.0, 0
     off_target = work.error[HERE, 0] > arrays.near
@@ -113,16 +104,16 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
             dt = 1.0 - t  # no tiny step at the end
         here, there = begin + t * (end - begin), begin + (t + dt) * (end - begin)
         bounds_between(arrays, work, curve, here, there)
-        if not (work.derivative_bound[0] < np.inf and allowance[0] > 0.0 and allowance[1] > 0.0):
+        if not (work.derivative_bound[0] < np.inf and _something_left(arrays, work)):
             work.stop_reason[0] = FOLD
             return STOPPED
         aim(arrays, work, curve, there)
-        copy_slot(work)
+        copy_slot(arrays, work)
         if has_goal:
             for j in range(n):
                 work.secondary_step[j] = dt / (1.0 - t) * (goal[j] - q[j])
         else:
-            linearise(arrays, work, NEXT, arrays.cone_chord)
+            linearise(arrays, work, NEXT)
             margin_objective(arrays, work, q, 2.0 * size * dt)
         position, cone = _step_from(arrays, work, q, dt, off_target)
         if position <= 1.0 and cone <= 1.0:
@@ -142,8 +133,6 @@ def track(arrays, work, curve, begin, end, q, goal, has_goal, waypoints, first):
             dt *= max(0.2, min(0.7, 0.85 / np.sqrt(position)))
         else:
             dt *= 0.5
-            if position < np.inf:
-                _blame(arrays, work, cone)
         if dt < SMALLEST_STEP:
             if off_target:
                 return STOPPED

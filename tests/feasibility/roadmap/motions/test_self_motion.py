@@ -9,9 +9,9 @@ from random_arms import QUESTIONS, finite_limits, question, robot_of, tools
 
 from feasibility import Task, check
 from feasibility.certification import replay
-from feasibility.roadmap import Exploration, arrays_of, connect, margin_shares, work_for
-from feasibility.roadmap.arrays import OVERFLOW
-from feasibility.roadmap.self_motion import settle
+from feasibility.roadmap import Exploration, arrays_of, connect, look_at, margin_shares, work_for
+from feasibility.roadmap.motions.arrays import OVERFLOW
+from feasibility.roadmap.motions.self_motion import settle
 from feasibility.verdict import Walk
 from surfaces import plane
 
@@ -58,9 +58,8 @@ def test_connect_ends_exactly_at_its_goal(over_a_cell):
     for a in found[:10]:
         for b in found[:10]:
             q = a.copy()
-            rows, reached = connect(
-                arrays, work, arrays.points[cell], arrays.approaches[cell], q, b, waypoints, 3, 60
-            )
+            look_at(arrays, work, cell)
+            rows, reached = connect(arrays, work, q, b, waypoints, 3, 60)
             assert rows >= 0
             motion = np.vstack([a[None], waypoints[3 : 3 + rows]])
             assert (q == motion[-1]).all()
@@ -72,17 +71,7 @@ def test_connect_ends_exactly_at_its_goal(over_a_cell):
             # Half of a motion that was made can be made again.
             goal = motion[len(motion) // 2]
             q = a.copy()
-            rows, reached = connect(
-                arrays,
-                work,
-                arrays.points[cell],
-                arrays.approaches[cell],
-                q,
-                goal,
-                waypoints,
-                0,
-                60,
-            )
+            rows, reached = connect(arrays, work, q, goal, waypoints, 0, 60)
             assert not refusal(robot, cells, task, np.vstack([a[None], waypoints[:rows]]), cell)
             assert not reached or (waypoints[rows - 1] == goal).all()
             halves += 1
@@ -96,9 +85,8 @@ def test_connect_reports_that_the_waypoints_are_full(over_a_cell):
     robot, _, _, arrays, work, cell, found, _ = over_a_cell
     waypoints = np.full((5, robot.n), 7.0)
     q = found[0].copy()
-    rows, reached = connect(
-        arrays, work, arrays.points[cell], arrays.approaches[cell], q, q.copy(), waypoints, 5, 60
-    )
+    look_at(arrays, work, cell)
+    rows, reached = connect(arrays, work, q, q.copy(), waypoints, 5, 60)
     assert (rows, reached) == (OVERFLOW, False)
     assert (waypoints == 7.0).all()
 
@@ -108,7 +96,7 @@ def test_settling_obeys_every_constraint(over_a_cell):
     robot, cells, task, arrays, work, cell, found, _ = over_a_cell
     for a in found[:10]:
         q = a.copy()
-        settle(arrays, work, arrays.points[cell], arrays.approaches[cell], q, 40)
+        settle(arrays, work, cell, q, 40)
         assert not refusal(robot, cells, task, q[None], cell)
         assert (q >= robot.lower).all()
         assert (q <= robot.upper).all()

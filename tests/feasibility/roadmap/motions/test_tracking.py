@@ -17,8 +17,8 @@ from feasibility.roadmap import (
     track,
     work_for,
 )
-from feasibility.roadmap.arrays import STOPPED
 from feasibility.roadmap.graph import EDGES
+from feasibility.roadmap.motions.arrays import STOPPED
 from feasibility.verdict import Walk
 
 
