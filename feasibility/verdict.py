@@ -92,8 +92,9 @@ class Certificate:
     min_limit_margin: float
     """rad or m, smallest distance of a joint from a limit."""
     min_clearance: float | None = None
-    """m, bound on the distance of any pair of bodies along the walk; None where collisions are not
-    checked, or there is no pair."""
+    """m, lower bound on the distance of any pair of bodies along the walk, of the exact shapes: it
+    is certified, and may be up to a third below the truth. None where collisions are not checked,
+    or there is no pair."""
     nearest_pair: tuple[str, str] | None = None
     """Links, objects of the scene, 'tool' or 'surface': the two that this bound is of."""
     max_roll: float | None = None

@@ -301,6 +301,7 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
         "seats",
         "settings",
         "shapes",
+        "standing",
         "triangles",
         "words",
     )  # of collisions: no bound, no kernel

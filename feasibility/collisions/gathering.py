@@ -14,6 +14,7 @@ from feasibility.collisions.outer_bodies import polytopes_of, soup_of, tool_poly
 from feasibility.collisions.scene import ToolShape
 from feasibility.collisions.seats import Seat, carried_bodies, furthest, seats_of
 from feasibility.collisions.settings import Collision
+from feasibility.collisions.standing import overlapping
 from feasibility.collisions.words import SURFACE, TOOL
 from robots import Robot
 from robots.shapes import (
@@ -93,6 +94,7 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
             *shapes.notes,
             *found.notes,
             *(note for one in collision.scene for note in one.notes),
+            *overlapping([body for body in polytopes if body.joint == 0], found.at_rest),
             *collision.notes_on(standoff),
             *_beyond([r for r in arm.reaches if r.owner in found.tool], found.asked, standoff),
         ),
@@ -128,7 +130,8 @@ def _arm(
 
     @cache
     def pairs() -> LinkPairs:
-        return link_pairs(robot, shapes, allow, srdf, bodies, [*scene, SURFACE, TOOL])
+        others = [*scene, SURFACE, TOOL]
+        return link_pairs(robot, shapes, allow, srdf, bodies, others, tool_solids(tool, robot))
 
     return _Arm(shapes, tuple(bodies), tuple(tool_reach(robot, shapes, bodies)), pairs)
 
@@ -200,6 +203,8 @@ class _Pairs:
         self.asked = list[Pair]()
         self.left_out = list[LeftOut]()
         self.notes: tuple[str, ...] = ()
+        self.at_rest = list[tuple[str, str]]()
+        """Links and objects that are rigid to each other, and not allowed to meet."""
 
     def add_links(self, links: LinkPairs) -> None:
         """Links against each other, and against the tool."""
@@ -237,6 +242,8 @@ class _Pairs:
     def _ask(self, first: str, second: str, clearance: float, why: str = "") -> None:
         """Ask for a pair, unless there is a reason why not."""
         names = frozenset((first, second))
+        if why == "rigid" and second != SURFACE and names not in self.allowed:
+            self.at_rest.append((first, second))
         why = why or ("allowed" if names in self.allowed else "")
         if why:
             self.left_out.append(LeftOut(first, second, why))

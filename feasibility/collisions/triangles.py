@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import Checks, CoverableError, Fault
-from robots.shapes import Triangles
+from robots.shapes import Triangles, solid_faces
 
 MOST_FACES = 500_000
 SMALLEST_EXTENT, LARGEST_EXTENT = 1e-6, 1e4  # [m], of the widest side
 _AREA = 1e-14  # [1], of the widest side squared: a face below is none
-_VOLUME = 1e-9  # [1], of the widest side cubed: triangles around less bound no solid
 
 Points = NDArray[np.float64]
 Faces = NDArray[np.int64]
@@ -27,8 +26,8 @@ PLACEHOLDER = Triangles(
 def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> Triangles:
     """The triangles of a mesh file, in metres.
 
-    Unlike a surface that is to be covered, an object may have edges with any number of faces, holes
-    and faces that disagree about the outer side: then it is no solid, but a sheet.
+    Unlike a surface that is to be covered, an object may have holes, and edges with any number of
+    faces: then it is no solid, but a sheet.
 
     Args:
         path: STL, OBJ, PLY, OFF or GLB, of at most 500,000 faces.
@@ -65,8 +64,8 @@ def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> 
 def object_triangles(checks: Checks, vertices: Any, faces: Any) -> Triangles:
     """Triangles that nothing chokes on: welded, without faces that have no area.
 
-    They are `closed` where every edge has two faces that agree about the outer side, and they
-    bound a volume; faces that look inwards are then turned over.
+    They are `closed` where they bound a solid, see `solid_faces`; faces that look inwards are
+    then turned over.
     """
     before = len(checks.faults)
     points, corners = _arrays(checks, vertices, faces)
@@ -89,9 +88,8 @@ def object_triangles(checks: Checks, vertices: Any, faces: Any) -> Triangles:
         return PLACEHOLDER
     used, corners = np.unique(corners, return_inverse=True)
     points, corners = points[used], corners.reshape(-1, 3)
-    volume = _volume(points, corners)
-    closed = abs(volume) > _VOLUME * wide**3 and _is_closed(corners)
-    return Triangles(points, corners[:, ::-1] if closed and volume < 0.0 else corners, closed)
+    solid = solid_faces(points, corners)
+    return Triangles(points, corners if solid is None else solid, solid is not None)
 
 
 def _arrays(checks: Checks, vertices: Any, faces: Any) -> tuple[Points, Faces]:
@@ -115,18 +113,3 @@ def _arrays(checks: Checks, vertices: Any, faces: Any) -> tuple[Points, Faces]:
     else:
         corners = given.astype(np.int64)
     return points, corners
-
-
-def _volume(points: Points, corners: Faces) -> float:
-    """m^3, that the faces enclose; negative where they look inwards."""
-    a, b, c = (points[corners[:, k]] - points[0] for k in range(3))
-    return float(np.einsum("ki,ki->", a, np.cross(b, c)) / 6.0)
-
-
-def _is_closed(corners: Faces) -> bool:
-    """Does each edge have two faces, which run along it in opposite directions?"""
-    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])
-    count = int(corners.max()) + 1
-    there, back = ends[:, 0] * count + ends[:, 1], ends[:, 1] * count + ends[:, 0]
-    there.sort()
-    return bool((np.diff(there) > 0).all() and (there == np.sort(back)).all())

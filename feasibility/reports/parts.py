@@ -156,7 +156,10 @@ class Clearance(Protocol):
 
 
 def clearance_json(certificate: Clearance) -> dict[str, Any]:
-    """How near which pair came along a motion; no keys where collisions were not checked."""
+    """How near which pair came along a motion; no keys where collisions were not checked.
+
+    `min_clearance_m` is a lower bound: certified, and up to a third below the truth.
+    """
     if certificate.min_clearance is None:
         return {}
     pair = certificate.nearest_pair

@@ -11,6 +11,7 @@ from .links import outer_bodies as outer_bodies
 from .pairs import LinkPairs as LinkPairs
 from .pairs import PairLeftOut as PairLeftOut
 from .pairs import link_pairs as link_pairs
+from .solids import solid_faces as solid_faces
 from .tool import Reach as Reach
 from .tool import tool_reach as tool_reach
 from .triangles import checked_triangles as checked_triangles

@@ -21,7 +21,7 @@ class Triangles:
     faces: NDArray[np.int64]
     """(m, 3) indices of vertices."""
     closed: bool
-    """True where they bound a solid: every edge has two triangles. Else it is a sheet."""
+    """True where they bound a solid, see `solid_faces`; they look outwards then. Else a sheet."""
 
 
 Fineness = Literal["hulls", "pieces", "meshes"]

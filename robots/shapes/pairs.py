@@ -14,7 +14,7 @@ from coverable_errors import Fault
 from robots.errors import RobotError
 from robots.joint_selection import suggestion
 from robots.robot import Robot
-from robots.shapes.bodies import Polytope
+from robots.shapes.bodies import Polytope, Solid
 from robots.shapes.links import LinkShapes
 from robots.shapes.sampling import Pair, PairSampling, random_configurations
 from robots.urdf import read_srdf
@@ -53,14 +53,16 @@ def link_pairs(
     srdf: str | os.PathLike[str] | None = None,
     tool: Sequence[Polytope] = (),
     others: Iterable[str] = (),
+    tool_solids: Sequence[Solid] = (),
 ) -> LinkPairs:
     """Sort the pairs of links, and of links and tool, into those that are asked for and others.
 
     A pair is left out where no motion changes the distance ("rigid"), where nothing with a shape
     lies between the two along the arm ("adjacent": they meet at their joint, and what keeps them
     apart otherwise are its limits), where the user says so ("allowed"), where an SRDF does
-    ("srdf"), and where the convex bodies collide in each of 1,000 random configurations and at zero
-    ("always"). A pair that never collided in these is asked for: samples prove nothing.
+    ("srdf"), and where both the convex bodies and the exact shapes collide in each of 1,000 random
+    configurations and at zero ("always"). A pair that never collided in these is asked for: samples
+    prove nothing.
 
     Args:
         robot: the arm.
@@ -69,6 +71,7 @@ def link_pairs(
         srdf: path of an SRDF.
         tool: bodies on the last joint that are no link's.
         others: names that are known besides links and the owner of `tool`.
+        tool_solids: the exact shapes that `tool` holds.
 
     Raises:
         RobotError: `allow` names what does not exist, or the SRDF is of another robot.
@@ -104,11 +107,15 @@ def link_pairs(
 
     order = sorted(joint, key=lambda owner: joint[owner])
     reasons = {pair: reason(*pair) for pair in combinations(order, 2)}
-    return _measured(robot, bodies, reasons, notes)
+    return _measured(robot, bodies, (*shapes.solids, *tool_solids), reasons, notes)
 
 
 def _measured(
-    robot: Robot, bodies: Sequence[Polytope], reasons: dict[Pair, Why | None], notes: list[str]
+    robot: Robot,
+    bodies: Sequence[Polytope],
+    solids: Sequence[Solid],
+    reasons: dict[Pair, Why | None],
+    notes: list[str],
 ) -> LinkPairs:
     """Find the pairs that always collide, and how often the others that are left out do."""
     sampling = PairSampling(robot, bodies)
@@ -120,8 +127,24 @@ def _measured(
     moving = [pair for pair, why in reasons.items() if why not in (None, "rigid")] + suspects
     rates = dict(zip(moving, sampling.collisions(moving, q).mean(axis=0).tolist(), strict=True))
     found = dict(reasons)
+    alike = [pair for pair in suspects if rates[pair] == 1.0]
+    exact = {solid.owner for solid in solids}
+    known = [pair for pair in alike if exact.issuperset(pair)]
+    parted = set[Pair]()
+    if known:
+        hits = np.all(PairSampling(robot, solids).collisions(known, q), axis=0).tolist()
+        parted = {pair for pair, hit in zip(known, hits, strict=True) if not hit}
     for pair in suspects:
-        found[pair] = "always" if rates[pair] == 1.0 else None
+        found[pair] = "always" if rates[pair] == 1.0 and pair not in parted else None
+    if parted:
+        named = _listed(
+            [f"{first} - {second}" for first, second in alike if (first, second) in parted]
+        )
+        notes.append(
+            f"asked for, though their convex bodies collide in each of {len(q):,} random "
+            f"configurations, where their exact shapes do not: {named}; the search finds nothing "
+            'unless finer shapes, such as shapes = "pieces", part them'
+        )
     left_out = [
         PairLeftOut(*pair, why, rates.get(pair)) for pair, why in found.items() if why is not None
     ]

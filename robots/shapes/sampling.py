@@ -1,4 +1,4 @@
-"""How often pairs of convex bodies collide in random configurations of an arm, by coal."""
+"""How often pairs of bodies collide in random configurations of an arm, by coal."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from robots.kinematics import Kinematics
 from robots.robot import Robot
-from robots.shapes.bodies import Polytope
+from robots.shapes.bodies import Polytope, Solid, Triangles
 from robots.shapes.hulls import thickened
+from robots.urdf import Box, Capsule, Cylinder, Sphere
 
 SAMPLES = 1000
 SEED = 0
@@ -35,19 +36,23 @@ def random_configurations(robot: Robot, count: int = SAMPLES) -> NDArray[np.floa
 class PairSampling:
     """Asks coal which pairs of owners collide."""
 
-    def __init__(self, robot: Robot, bodies: Sequence[Polytope]) -> None:
+    def __init__(self, robot: Robot, bodies: Sequence[Polytope | Solid]) -> None:
         """Build coal's shapes.
 
         Args:
             robot: whose joints carry the bodies.
-            bodies: of links and tool; those of one owner count as one.
+            bodies: of links and tool; those of one owner count as one. Of an exact mesh the
+                triangles count, so what is wholly inside of it does not collide.
         """
         self._robot = robot
         self._kinematics = Kinematics(robot)
         self._geometry = pin.GeometryModel()
         self._of_owner: dict[str, list[int]] = {}
         for number, body in enumerate(bodies):
-            shape, placement = _coal_shape(body)
+            if isinstance(body, Solid):
+                shape, placement = _exact_shape(body)
+            else:
+                shape, placement = _coal_shape(body)
             title = f"{number} {body.owner}"
             entry = pin.GeometryObject(title, body.joint, 0, placement, shape)
             index = int(self._geometry.addGeometryObject(entry))
@@ -101,3 +106,28 @@ def _coal_shape(body: Polytope) -> tuple[Any, pin.SE3]:
     shape = coal.Convex(points, faces)
     shape.setSweptSphereRadius(body.radius)
     return shape, place
+
+
+def _exact_shape(solid: Solid) -> tuple[Any, pin.SE3]:
+    """The same of a shape as the URDF has it."""
+    import coal
+
+    place, shape = pin.SE3(np.array(solid.placement)), solid.geometry
+    match shape:
+        case Box(size):
+            return coal.Box(*size), place
+        case Sphere(radius):
+            return coal.Sphere(radius), place
+        case Capsule(radius, length):
+            return coal.Capsule(radius, length), place
+        case Cylinder(radius, length):
+            return coal.Cylinder(radius, length), place
+        case Triangles(vertices, faces):
+            points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+            points.extend(list(np.ascontiguousarray(vertices)))
+            triangles.extend([coal.Triangle(*face) for face in faces.tolist()])
+            model = coal.BVHModelOBBRSS()
+            model.beginModel(len(faces), len(vertices))
+            model.addSubModel(points, triangles)
+            model.endModel()
+            return model, place

@@ -12,6 +12,7 @@ from coverable_files import FileFault, read_regular
 from coverable_meshes import MeshError, MeshFiles
 from robots.errors import RobotError
 from robots.shapes.bodies import Triangles
+from robots.shapes.solids import solid_faces
 from robots.urdf import MeshFile
 
 LARGEST = 1e4  # [m] a coordinate beyond it is no link's
@@ -27,7 +28,8 @@ def checked_triangles(
 ) -> Triangles:
     """Triangles that a native library may see.
 
-    Vertices that are equal are joined, and triangles that name a vertex twice are dropped.
+    Vertices that are equal are joined, and triangles that name a vertex twice are dropped. Those
+    of a solid look outwards.
 
     Args:
         vertices: (k, 3) m.
@@ -61,8 +63,10 @@ def checked_triangles(
     p, q, r = (joined[kept[:, k]] for k in range(3))
     if not np.linalg.norm(np.cross(q - p, r - p), axis=1).any():
         raise RobotError(f"{what} has no triangle with an area")
+    solid = solid_faces(joined, kept)
+    kept = kept if solid is None else solid
     joined.flags.writeable = kept.flags.writeable = False
-    return Triangles(joined, kept, closed=_is_closed(kept))
+    return Triangles(joined, kept, closed=solid is not None)
 
 
 def _joined(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -74,13 +78,6 @@ def _joined(points: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     number = np.empty(len(points), dtype=np.int64)
     number[order] = np.cumsum(is_new) - 1
     return sorted_points[is_new], number
-
-
-def _is_closed(faces: NDArray[np.int64]) -> bool:
-    """Does every edge have two triangles?"""
-    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    _, counts = np.unique(edges[:, 0] * (int(edges.max()) + 1) + edges[:, 1], return_counts=True)
-    return bool((counts == 2).all())
 
 
 class MeshBodies:

@@ -70,7 +70,7 @@ def built_scene(name: str, seed: int) -> BuiltScene | None:
     """The scene of that number; None where the plate cannot be covered without obstacles either."""
     rng = np.random.default_rng([seed, zlib.crc32(name.encode())])
     robot = arm(name)
-    cells, task = _plate(rng, robot)
+    cells, task = a_plate(rng, robot)
     blind = check(robot, cells, task)
     if blind.witness is None:
         return None
@@ -114,7 +114,7 @@ def _another_motion(
     return None if found.witness is None else found.witness.q
 
 
-def _plate(rng: np.random.Generator, robot: Robot) -> tuple[Cells, Task]:
+def a_plate(rng: np.random.Generator, robot: Robot) -> tuple[Cells, Task]:
     """A plate that looks up, or at the arm, or between, somewhere around the arm."""
     reach = min(robot.reach, 1.0)
     away, turn = rng.uniform(0.4, 0.65) * reach, rng.uniform(-60.0, 60.0)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
+from built_scenes import CLEARANCE, a_plate, arm
 from foreign_clearances import ForeignScene
 
 from feasibility import Task
@@ -183,3 +184,47 @@ def random_over(seed: int) -> Over:
     )  # fmt: skip
     task = Task(0.02, float(rng.uniform(1.0, 90.0)), 0.001, collision=asked)
     return Over.cell(UR5, CELLS, task)
+
+
+def planted_over(name: str, seed: int) -> Over | None:
+    """A pose that an arm gets to, and a target that it covers, among objects; None if it collides.
+
+    The target is off the tool point by up to the tolerance, and the axis by up to the cone.
+    """
+    rng, robot = np.random.default_rng([seed, 1]), arm(name)
+    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    data, model = robot.model.createData(), robot.model
+    pin.framesForwardKinematics(
+        model, data, pin.integrate(model, pin.neutral(model), rng.uniform(low, high))
+    )
+    tool = data.oMf[robot.tool_frame_id]
+    tilt = np.cross(tool.rotation @ robot.approach_axis, rng.normal(size=3))
+    cone_deg = float(rng.uniform(1.0, 60.0))
+    tilt *= np.radians(cone_deg) * rng.uniform() / np.linalg.norm(tilt)
+    off = rng.normal(size=3)
+    off *= 0.001 * rng.uniform() / np.linalg.norm(off)
+    around = tool.translation
+    scene = tuple(random_object(rng, f"object{k}", around) for k in range(rng.integers(1, 4)))
+    asked = Collision(surface=False, clearance=float(rng.choice([0.0, 0.005])), scene=scene)
+    task = Task(0.02, cone_deg, 0.001, collision=asked)
+    approach = pin.exp3(tilt) @ tool.rotation @ robot.approach_axis
+    over = Over(robot, CELLS.surface, task, around + off, approach)
+    joint = model.frames[robot.tool_frame_id].parentJoint
+    return over if ToolPoses(robot, over.bodies).clear(data.oMi[joint]) else None
+
+
+def with_an_object_over_a_cell(name: str, seed: int) -> tuple[Robot, Cells, Task, int]:
+    """A plate before an arm, and a body around the target of one of its cells."""
+    rng, robot = np.random.default_rng([seed, 2]), arm(name)
+    cells, task = a_plate(rng, robot)
+    cell = int(rng.integers(len(cells)))
+    place = task.targets(cells).points[cell] + rng.uniform(-0.02, 0.02, 3)
+    size, turn = rng.uniform(0.1, 0.2, 3).tolist(), tuple(rng.uniform(-180.0, 180.0, 3))
+    kinds = (
+        Obstacle.box("thing", size, place, turn),
+        Obstacle.sphere("thing", 0.5 * size[0], place),
+        Obstacle.capsule("thing", 0.5 * size[0], size[1], place, turn),
+        Obstacle.cylinder("thing", 0.5 * size[0], size[1], place, turn),
+    )
+    scene = (kinds[int(rng.integers(len(kinds)))],)
+    return robot, cells, replace(task, collision=Collision(clearance=CLEARANCE, scene=scene)), cell

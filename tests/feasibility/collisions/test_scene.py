@@ -114,22 +114,22 @@ def test_closed_meshes_are_solids_and_look_outwards():
     welded = Obstacle("part", Triangles(soup, np.arange(36).reshape(-1, 3), False), np.eye(4))
     assert welded.geometry.closed
     assert len(welded.geometry.vertices) == 8
+    turned = solid.faces.copy()
+    turned[0] = turned[0, ::-1]  # as in careless files
     solid.invert()
-    outwards = obstacle_of(solid).geometry
-    assert outwards.closed
-    assert trimesh.Trimesh(outwards.vertices, outwards.faces).volume == pytest.approx(6.0)
+    for mesh in (solid, trimesh.Trimesh(solid.vertices, turned, process=False)):
+        outwards = obstacle_of(mesh).geometry
+        assert outwards.closed
+        assert trimesh.Trimesh(outwards.vertices, outwards.faces).volume == pytest.approx(6.0)
 
 
 def test_open_and_tangled_meshes_are_sheets_and_say_so():
     solid = trimesh.creation.box((1, 2, 3))
     tangled = np.concatenate([solid.faces, solid.faces[:1]])
-    turned = solid.faces.copy()
-    turned[0] = turned[0, ::-1]
     double = Triangles(FLAT, np.array([[0, 1, 2], [0, 2, 1]]), True)  # closed, but no inside
     for shape in (
         Triangles(solid.vertices, solid.faces[:-1], True),
         Triangles(solid.vertices, tangled, True),
-        Triangles(solid.vertices, turned, True),
         double,
     ):
         obstacle = Obstacle("part", shape, np.eye(4))

@@ -4,10 +4,20 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+import trimesh
 
 from robots import RobotError, load_robot
-from robots.shapes import Polytope, link_pairs, link_shapes, tool_reach
+from robots.shapes import (
+    Polytope,
+    Solid,
+    checked_triangles,
+    link_pairs,
+    link_shapes,
+    outer_bodies,
+    tool_reach,
+)
 from robots.shapes.sampling import PairSampling, random_configurations
+from robots.urdf import Sphere
 
 SRDF = '<robot name="x">{}</robot>'
 PAIR = '<disable_collisions link1="{}" link2="{}" {}/>'
@@ -75,6 +85,30 @@ def test_pairs_that_always_collide_are_left_out_and_said(tmp_path):
     (note,) = pairs.notes
     assert "in each of 1,000 random configurations: l0 - l2;" in note
     assert ("l0", "l3") in pairs.asked, "folded up it is inside, stretched out it is not"
+
+
+def test_hulls_alone_leave_no_pair_out(tmp_path):
+    """A ring around the arm: its hull holds all of it, the ring itself is never touched."""
+    trimesh.creation.annulus(2.0, 2.1, 4.0).export(tmp_path / "ring.stl")
+    ring = '<collision><geometry><mesh filename="ring.stl"/></geometry></collision>'
+    robot = arm(tmp_path, ("", ring), ball(), ball(), ball())
+    shapes = link_shapes(robot)
+    pairs = link_pairs(robot, shapes)
+    assert set(pairs.asked) == {("l0", "l2"), ("l0", "l3"), ("l1", "l3")}
+    (note,) = pairs.notes
+    assert "exact shapes do not: l0 - l2, l0 - l3; the search finds nothing" in note
+
+
+def test_tools_that_always_collide_are_asked_for_exactly(tmp_path):
+    """A bar through the base, and a ring around it, both on the last link."""
+    annulus = trimesh.creation.annulus(2.0, 2.1, 4.0)
+    robot = arm(tmp_path, ball(0.5), ball(), ball(0.01))
+    shapes, joint = link_shapes(robot), robot.n
+    ring = checked_triangles(annulus.vertices, annulus.faces)
+    for geometry, why in ((ring, None), (Sphere(0.4), "always")):
+        solid = Solid("tool", joint, np.eye(4), geometry)
+        pairs = link_pairs(robot, shapes, tool=outer_bodies(solid), tool_solids=[solid])
+        assert sorted_out(pairs).get(("l0", "tool")) == why
 
 
 def test_users_and_srdfs_leave_pairs_out_with_their_rates(tmp_path):

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from tool_scenes import CELLS, UR5, Over, bracket, random_over
+from tool_scenes import CELLS, UR5, Over, bracket, planted_over, random_over
 
 from feasibility import Answer, CauseKind, Evidence, Task, check
 from feasibility.certification import verify_proof
@@ -45,6 +45,16 @@ def test_what_is_claimed_is_confirmed_and_no_pose_is_clear(seed: int) -> None:
 def test_random_scenes_hold_both_answers() -> None:
     claims = [random_over(seed).claimed() is not None for seed in SCENES]
     assert 4 <= sum(claims) <= len(SCENES) - 4
+
+
+@pytest.mark.parametrize("name", ["ur5", "puma560"])
+def test_a_cell_with_a_known_pose_is_never_proved(name: str) -> None:
+    scenes = [planted_over(name, seed) for seed in range(20)]
+    known = [one for one in scenes if one is not None]
+    assert len(known) >= 3
+    for one in known:
+        assert one.claimed() is None
+        assert not one.confirmed().confirmed
 
 
 @pytest.mark.parametrize("gap", [-0.002, 0.002])
