@@ -8,8 +8,11 @@ NOTEBOOKS := $(wildcard notebooks/*.ipynb)
 CANDIDATES := python3.11 python3 python3.12 python3.13 python3.14 python
 IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 
+# Many tests start processes, which should not compile our modules each time anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint kernels bench campaign clean distclean
+.PHONY: help demo test lint kernels greedy bench campaign clean distclean
 
 help:
 	@sed -n '1,4s/^# //p' Makefile
@@ -41,15 +44,18 @@ lint: .venv/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# Compiles the kernels of both searches, and of collisions, into the cache; one processor is enough for that.
+# Compiles kernels into the cache; one processor is enough for that: the complete search and collisions,
+# and by itself the paper's search.
 kernels: .venv/installed
 	@$(BIN)/coverable check paper/4a >/dev/null
 	@$(BIN)/coverable check paper/5e --set collision.clearance=0.005 >/dev/null
+
+greedy: .venv/installed
 	@$(BIN)/coverable check paper/4f --set search.method=greedy >/dev/null || test $$? -eq 1
 
 test: .venv/installed
-	@$(MAKE) --no-print-directory --jobs=2 lint kernels
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder -p no:nbmake
 ifneq ($(NOTEBOOKS),)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --nbmake --nbmake-timeout=900 $(NOTEBOOKS)
 endif

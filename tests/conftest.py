@@ -1,7 +1,8 @@
-"""What all tests share: made-up inputs that do not depend on what ran before, and Ctrl-C."""
+"""What all tests share: made-up inputs that do not depend on what ran before, Ctrl-C, the order."""
 
 import signal
 
+import pytest
 from hypothesis.internal.conjecture import providers
 
 # Hypothesis mixes numbers out of the project's source into its examples, of those modules that
@@ -13,3 +14,19 @@ providers.is_local_module_file = lambda path: False
 # a command they started wait for it in vain, unless it starts with Python's own handler.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+# Files that take longest come first: of two processes, neither is left with one at the end.
+LONGEST = (
+    "test_docs", "test_study", "test_placement", "test_explain", "test_mesh_witness",
+    "test_checking", "test_new_kinds", "test_timing", "test_greedy_cases", "test_division",
+    "test_mesh_verdicts", "test_creases", "test_study_dask", "test_other_kinds", "test_oracles",
+    "test_planted", "test_segment_bound", "test_cli", "test_coverage", "test_proof_verification",
+    "test_known_feasible", "test_refinement", "test_metamorphic", "test_trajectory_files",
+    "test_set_cover", "test_complete", "test_placement_view", "test_kept_kernels",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files that take longest first."""
+    place = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))

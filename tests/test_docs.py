@@ -81,7 +81,7 @@ def test_commands_of_the_readme_run(
         if arguments[0] == "show":  # without it, a browser window
             arguments += ["--html", "shown.html"]
         # Fewer cells and placements, and no processes but for the study, to save time.
-        if arguments[0] == "path":
+        if arguments[0] in ("path", "compare", "explain"):
             arguments += ["--set", "surface.cells=[3, 4]"]
         if arguments[:2] == ["place", "case.toml"]:
             arguments += ["--set", "surface.cells=[2, 2]"]

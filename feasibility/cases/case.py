@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -115,6 +115,7 @@ class Case:
         if robot is not None and task is not None and task.collision is not None:
             unknown = task.collision.unknown_names(robot.link_names)
             faults += [fault.renamed({}, "collision") for fault in unknown]
+        faults += [] if robot is None else self._faults_of_srdf(robot.link_names)
         if robot is None or cells is None or task is None or faults:
             raise CaseError(faults, self.name)
         try:
@@ -123,6 +124,15 @@ class Case:
             named = [fault.renamed({}, "task") for fault in error.faults]
             raise CaseError(named, self.name) from error
         return Setup(robot, cells, task, self.search)
+
+    def _faults_of_srdf(self, links: Sequence[str]) -> list[Fault]:
+        """What is wrong with the SRDF that the case may name, for an arm with these links."""
+        if self.collision is None or self.collision.srdf is None:
+            return []
+        from robots.shapes import faults_of_srdf
+
+        found = faults_of_srdf(self.collision.srdf, links)
+        return [fault.renamed({}, "collision.srdf") for fault in found]
 
     def to_tables(self) -> Tables:
         """The case as the tables of its TOML; what is None is left out."""

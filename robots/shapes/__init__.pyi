@@ -10,6 +10,7 @@ from .links import link_shapes as link_shapes
 from .links import outer_bodies as outer_bodies
 from .pairs import LinkPairs as LinkPairs
 from .pairs import PairLeftOut as PairLeftOut
+from .pairs import faults_of_srdf as faults_of_srdf
 from .pairs import link_pairs as link_pairs
 from .solids import solid_faces as solid_faces
 from .tool import Reach as Reach

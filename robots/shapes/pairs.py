@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Literal
@@ -17,7 +17,7 @@ from robots.robot import Robot
 from robots.shapes.bodies import Polytope, Solid
 from robots.shapes.links import LinkShapes
 from robots.shapes.sampling import Pair, PairSampling, random_configurations
-from robots.urdf import read_srdf
+from robots.urdf import DisabledPairs, UrdfError, read_srdf
 
 Why = Literal["rigid", "adjacent", "always", "allowed", "srdf"]
 FIRST_LOOK = 30  # configurations after which most pairs are known not to collide always
@@ -181,21 +181,39 @@ def _of_srdf(
 ) -> tuple[set[frozenset[str]], list[str], list[Fault]]:
     """The pairs that an SRDF leaves out, what is to be said, and what is wrong."""
     pairs = read_srdf(path)
-    unknown = sorted(pairs.named - known)
-    if unknown:
-        links = ", ".join(sorted(known)[:MOST_LISTED])
-        what = f"names links that this robot does not have: {_listed(unknown)}"
-        return (
-            set(),
-            [],
-            [Fault("", what, os.fspath(path), f"is it of another robot? It has {links}")],
-        )
+    faults = _strangers(path, pairs, known)
+    if faults:
+        return set(), [], faults
     notes = []
     for reason, count in pairs.ignored:
         why = f"the reason {reason!r}" if reason else "no reason"
         plural = "s are" if count > 1 else " is"
         notes.append(f"{count} pair{plural} not taken from the SRDF, which gives {why}")
     return {frozenset(pair) for pair in pairs.taken}, notes, []
+
+
+def _strangers(
+    path: str | os.PathLike[str], pairs: DisabledPairs, known: Collection[str]
+) -> list[Fault]:
+    """A fault where an SRDF names links that an arm does not have."""
+    unknown = sorted(pairs.named.difference(known))
+    links = ", ".join(sorted(known)[:MOST_LISTED])
+    what = f"names links that this robot does not have: {_listed(unknown)}"
+    fault = Fault("", what, os.fspath(path), f"is it of another robot? It has {links}")
+    return [fault] if unknown else []
+
+
+def faults_of_srdf(path: str | os.PathLike[str], links: Collection[str]) -> list[Fault]:
+    """What is wrong with an SRDF, to be told with other faults before any shape is made.
+
+    Args:
+        path: of the file.
+        links: all links of the arm.
+    """
+    try:
+        return _strangers(path, read_srdf(path), links)
+    except UrdfError as error:
+        return [fault._replace(place=error.source) for fault in error.faults]
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -12,7 +12,7 @@ from feasibility import CauseKind, Search, Verdict, check
 from feasibility.verdict import Answer as Said
 from robots import load_robot
 
-CHUNKS = 8
+CHUNKS = 16
 ARMS = ("puma560", "ur5")
 
 
@@ -26,7 +26,7 @@ class Checked(NamedTuple):
 
 @pytest.fixture(scope="module", params=(1, 5))
 def checked(request) -> list[Checked]:
-    """An eighth of the stored problems; `make campaign NAME=stored_cases` has all of them."""
+    """Two sixteenths of the stored problems; `make campaign NAME=stored_cases` has all of them."""
     found = []
     for name in ARMS:
         arm = load_robot(name)

@@ -28,7 +28,8 @@ from feasibility.roadmap.exploration import BUDGET
 from robots import load_robot
 from surfaces import plane, sphere
 
-DRAWN = [("puma560", number) for number in range(24)] + [("ur5", number) for number in range(12)]
+ALL = [("puma560", number) for number in range(24)] + [("ur5", number) for number in range(12)]
+DRAWN = ALL[::2]  # all: make campaign NAME=larger_samples
 
 
 def drawn(arm: str, number: int) -> Problem:
@@ -174,7 +175,7 @@ def test_another_process_finds_the_same_motion() -> None:
     assert other.stdout.strip() == here
 
 
-@pytest.mark.parametrize(("arm", "number"), DRAWN[::2])
+@pytest.mark.parametrize(("arm", "number"), DRAWN[::3])
 def test_the_seed_does_not_decide(arm: str, number: int) -> None:
     first = verdict_of(arm, number)
     for seed in (1, 2):
@@ -218,7 +219,7 @@ def aligned(name: str, limits: str) -> np.ndarray:
     return grid[:: -1 if flip_u else 1, :: -1 if flip_v else 1]
 
 
-@pytest.mark.parametrize("limits", ["set-1", "set-2", "set-3", "set-4"])
+@pytest.mark.parametrize("limits", ["set-1", "set-3"])
 @pytest.mark.parametrize("name", list(ONE_PATCH)[1:])
 def test_the_order_of_cells_does_not_decide(name: str, limits: str) -> None:
     """One patch, parametrised in four ways."""
@@ -268,7 +269,7 @@ class Clock:
         return 0.0 if self.looks < self.enough else np.inf
 
 
-@pytest.mark.parametrize("looks", [1, 2, 5, 40, 120])
+@pytest.mark.parametrize("looks", [1, 2, 5, 40])
 def test_a_time_limit_is_honoured(looks: int, monkeypatch) -> None:
     warm_up()
     clock = Clock(looks)

@@ -7,18 +7,14 @@ import ur5_oracle
 from oracle_cases import Answer, Problem
 from random_cases import TABLE_1, read
 
-DOME = ("sphere", (1.0,), (10, 90), (10, 180))
 TUBE = ("cylinder", (0.5,), (-60, 60), (0, 0.9))
 CENTRED = (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize(
-    ("surface", "limits", "best"), [(DOME, 1, 90), (TUBE, 3, 60)], ids=["4a", "4d"]
-)
-def test_two_of_the_papers_cases_have_their_known_answers(surface, limits, best):
-    limits_deg = TABLE_1[limits - 1]
-    problem = Problem(*surface, CENTRED, CENTRED, "inside", (9, 10), 0.005, 45, limits_deg)
-    assert puma_oracle.solve(problem, "patch") == Answer(best == 90, best, best)
+def test_one_of_the_papers_cases_has_its_known_answer():
+    """4d; the others take longer: `make campaign NAME=oracle`."""
+    problem = Problem(*TUBE, CENTRED, CENTRED, "inside", (9, 10), 0.005, 45, TABLE_1[2])
+    assert puma_oracle.solve(problem, "patch") == Answer(False, 60, 60)
 
 
 @pytest.mark.parametrize(("arm", "oracle"), [("puma560", puma_oracle), ("ur5", ur5_oracle)])

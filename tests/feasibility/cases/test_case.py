@@ -137,7 +137,7 @@ def cases(draw):
 
 
 @given(cases())
-@settings(max_examples=250, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_toml_gives_back_the_same_case(case):
     text = case.to_toml()
     again = Case.from_toml(text)

@@ -394,7 +394,7 @@ def spoiled(draw):
 
 
 @given(spoiled())
-@settings(max_examples=400, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_whatever_a_table_holds_it_is_read_or_refused_with_places(table):
     faults = []
     part = read_surface(table, faults)

@@ -17,7 +17,7 @@ from feasibility import Answer, Task, check
 from robots import load_robot
 from surfaces.meshes import TriangleMesh, mesh
 
-PER_SEGMENT = 20
+PER_SEGMENT = 10
 
 
 def roof(angle_deg):

@@ -285,19 +285,6 @@ def test_what_a_library_says_of_an_interrupt_is_no_error(ask, monkeypatch, plate
     assert ask("check", plate) == (130, "", "coverable: interrupted\n")
 
 
-def test_ctrl_c_ends_a_running_search(tmp_path):
-    slow = "import sys, time, feasibility.checking as c; from feasibility.cli.main import main\n"
-    slow += "def wait(*a, **k): print('ready', flush=True); time.sleep(600)\n"
-    slow += "c.check = wait; sys.exit(main(['check', 'paper/4a']))"
-    child = subprocess.Popen(
-        [sys.executable, "-c", slow], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert child.stdout.readline() == "ready\n"
-    child.send_signal(signal.SIGINT)
-    out, err = child.communicate(timeout=GUARD_S)
-    assert (child.returncode, out, err) == (130, "", "coverable: interrupted\n")
-
-
 # outputs
 
 

@@ -97,6 +97,8 @@ DEAR = [
     ("ur5 pipe", 15),
     ("panda plate", 10),
     ("panda dome", 7),
+    ("panda dome", 9),
+    ("puma560 dome", 21),
 ]
 """Those that take most of the time: `make campaign NAME=moved_surfaces` tries them too."""
 

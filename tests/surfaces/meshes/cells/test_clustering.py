@@ -198,7 +198,7 @@ def test_subdivision_keeps_the_surface(name, parts):
     check_subdivision(mesh, areas_of(*mesh).sum() / parts)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     st.lists(st.floats(-1, 1), min_size=4, max_size=4),
     st.floats(1e-4, 1.0),
