@@ -144,7 +144,7 @@ def place(
         >>> plate = plane((-0.1, 0.1), (-0.1, 0.1), position=(1.2, 0, 0.3), side="outside")
         >>> region = Region.around(Pose.of_surface(plate), {"x": (0.3, 1.2), "yaw_deg": (0, 90)})
         >>> task = Task(standoff=0.02, cone_deg=30)
-        >>> placements = place(load_robot("ur5"), plate.cells(3, 3), task, region, count=16, keep=1)
+        >>> placements = place(load_robot("ur5"), plate.cells(3, 3), task, region, count=8, keep=1)
         >>> placements.answer, region.holds(placements.best.pose)
         (<Answer.FEASIBLE: 'feasible'>, True)
     """
