@@ -8,23 +8,29 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification import collision_replay
-from feasibility.collisions import Bodies, gather
+from feasibility.certification import CollisionReplay, collision_replay
+from feasibility.collisions import Bodies, collision_buffer, gather
 from feasibility.division.free_motion import FreeSpace, free_motion
+from feasibility.division.lifting import LIFT, lift
 from feasibility.division.reconfiguration import Reconfiguration
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
+
+Floats = NDArray[np.float64]
 
 
 def clear_moves(
     robot: Robot,
     cells: Cells,
     task: Task,
-    buffer: NDArray[np.float64],
+    buffer: Floats,
     moves: Iterable[Reconfiguration],
 ) -> tuple[Reconfiguration, ...]:
     """The same moves led around what is in their way; as they are where nothing is checked.
+
+    A tool that touches the surface is lifted first, and set down at the end: in between it has to
+    stay clear of the surface too.
 
     Args:
         robot: the arm.
@@ -36,18 +42,58 @@ def clear_moves(
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is None:
         return tuple(moves)
-    return tuple(_clear(robot, bodies, buffer, move) for move in moves)
+    if not any(one.why == "contact" for one in bodies.left_out):
+        return tuple(_clear(robot, bodies, buffer, move) for move in moves)
+    lifted = gather(robot, cells.surface, task.collision, LIFT)
+    if lifted is None:
+        return tuple(moves)
+    return tuple(_clear_of_contact(robot, bodies, lifted, move) for move in moves)
 
 
-def _clear(
-    robot: Robot, bodies: Bodies, buffer: NDArray[np.float64], move: Reconfiguration
-) -> Reconfiguration:
+def _clear(robot: Robot, bodies: Bodies, buffer: Floats, move: Reconfiguration) -> Reconfiguration:
     """A move that the judge accepts; the straight one, judged, where none was found."""
     rows = free_motion(FreeSpace(robot, buffer), move.start, move.end, seed=0)
     if rows is not None:
         replayed = collision_replay(robot, bodies, rows)
         if replayed.accepted:
             return replace(move, via=rows[1:-1], replayed=replayed)
-    straight = np.stack([move.start, move.end])
-    replayed = collision_replay(robot, bodies, straight)
+    return _straight(robot, bodies, move)
+
+
+def _straight(robot: Robot, bodies: Bodies, move: Reconfiguration) -> Reconfiguration:
+    """A move without a way around, judged."""
+    replayed = collision_replay(robot, bodies, np.stack([move.start, move.end]))
     return replace(move, via=np.zeros((0, robot.n)), replayed=replayed)
+
+
+def _clear_of_contact(
+    robot: Robot, touching: Bodies, lifted: Bodies, move: Reconfiguration
+) -> Reconfiguration:
+    """The same of a tool that touches at both ends; the straight move where it cannot be lifted.
+
+    Args:
+        robot: the arm.
+        touching: without the pairs of tool and surface.
+        lifted: with them.
+        move: a straight line.
+    """
+    up, down = lift(robot, move.start), lift(robot, move.end)
+    if up is None or down is None:
+        return _straight(robot, lifted, move)
+    space = FreeSpace(robot, collision_buffer(lifted, robot))
+    between = free_motion(space, up[-1], down[-1], seed=0)
+    if between is None:
+        return _straight(robot, lifted, move)
+    via = np.concatenate([up[:-1], between, down[-2::-1]])
+    found = [
+        collision_replay(robot, touching, np.vstack([move.start, *via, move.end])),
+        collision_replay(robot, lifted, between),
+    ]
+    if not all(one.accepted for one in found):
+        return _straight(robot, lifted, move)
+    return replace(move, via=via, replayed=min(found, key=_nearest))
+
+
+def _nearest(replayed: CollisionReplay) -> float:
+    """m, of what was found; inf where there is no pair."""
+    return np.inf if replayed.min_clearance is None else replayed.min_clearance
