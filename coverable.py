@@ -92,7 +92,7 @@ if TYPE_CHECKING:
         view_placements,
         view_study,
     )
-    from robots import Robot, RobotError, list_robots, load_robot
+    from robots import Axis, Robot, RobotError, list_robots, load_robot
     from surfaces import (
         Cells,
         MeshSurface,
@@ -122,7 +122,7 @@ if TYPE_CHECKING:
 
 # fmt: off
 __all__ = [
-    "Answer", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Collision", "Comparison",
+    "Answer", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Collision", "Comparison",
     "CoveragePath", "Division", "Evidence", "Explanation", "Local", "LocalEvaluator", "MeshSurface",
     "Obstacle", "Patch", "PathError", "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot",
     "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError", "Task", "ToolShape",

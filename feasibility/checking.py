@@ -68,9 +68,10 @@ def check(
         TypeError: an argument is something else, such as a surface that is not cut into cells.
         RobotError: the arm is no serial chain of one-dof joints.
         SurfaceError: the greedy search does not know this kind of surface.
-        ArgumentError: the seeds fit neither arm nor cells; seeds, collisions, limits of the roll or
-            approaches that are no normals are given to the greedy search; a pair names something
-            that is not there; or the surface has no reference direction for the roll.
+        ArgumentError: the arm's start is not on the motion set; the seeds fit neither arm nor
+            cells; seeds, collisions, limits of the roll or approaches that are no normals are given
+            to the greedy search; a pair names something that is not there; or the surface has no
+            reference direction for the roll.
 
     Example:
         >>> from robots import load_robot
@@ -92,7 +93,8 @@ def check(
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
         _refuse_for_greedy(problem)
-        return _decided(problem, search, progress, greedy_search, clock)
+        from_start = partial(greedy_search, start=robot.start)
+        return _decided(problem, search, progress, from_start, clock)
     return _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
 
 

@@ -30,6 +30,8 @@ from feasibility.verdict import Answer, Certificate, Evidence, Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
+AT_START = 1e-9  # [rad] or [m]: a first row this near to the start is at it
+
 
 class NothingToVerifyError(CoverableError):
     """A verdict that holds neither a motion nor a proof: why."""
@@ -155,9 +157,18 @@ def _of_motion(claim: Literal["motion", "witness"], problem: Problem, q: Any) ->
     """The replay of a motion over the surface."""
     robot, cells, task = problem.robot, problem.cells, problem.task
     found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies)
-    return Verification(
-        claim, robot, cells, task, found.faults, found.certificate, q, found.reached
-    )
+    faults = (*found.faults, *_begun_elsewhere(robot, q))
+    return Verification(claim, robot, cells, task, faults, found.certificate, q, found.reached)
+
+
+def _begun_elsewhere(robot: Robot, q: Any) -> tuple[MotionFault, ...]:
+    """The fault of a motion that does not begin at the arm's start."""
+    if robot.start is None or len(q) == 0 or np.shape(q[0]) != robot.start.shape:
+        return ()
+    off = float(np.abs(q[0] - robot.start).max())
+    if off <= AT_START:
+        return ()
+    return (MotionFault(0, 0.0, f"it begins {off:.3g} rad or m off the start"),)
 
 
 def _of_witness(problem: Problem, walk: Walk) -> Verification:
@@ -168,7 +179,7 @@ def _of_witness(problem: Problem, walk: Walk) -> Verification:
     robot, cells, task = problem.robot, problem.cells, problem.task
     every = np.ones(len(cells), dtype=bool)
     along = replay(robot, cells, task, walk, every)
-    if not along.accepted:
+    if not along.accepted or _begun_elsewhere(robot, walk.q):
         return found
     return replace(found, faults=(), certificate=along.certificate, reached=every)
 

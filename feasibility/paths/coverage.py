@@ -16,6 +16,7 @@ import operator
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
@@ -109,13 +110,23 @@ def coverage_path(
     needed = _needed(verdict, only)
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     found = _least_revisiting(motion_graph_of(verdict), cells, order, needed)
-    walk = found.graph.walk(found.nodes)
+    walk = found.graph.walk(_from_start(found, robot.start))
     replayed = replay(robot, cells, task, walk, needed)
     if not replayed.accepted:
         raise PathError(f"the independent replay refuses the path: {replayed.refusal}")
     certificate = replayed.certificate
     figures = figures_of(robot, cells, task, walk, certificate, needed)
     return CoveragePath(robot, cells, task, order, needed, walk, certificate, figures)
+
+
+def _from_start(found: JointRoute, start: NDArray[np.float64] | None) -> list[int]:
+    """The nodes of a route, with the way to it from the arm's start before them."""
+    if start is None:
+        return found.nodes
+    graph = found.graph
+    begin = int(np.argmin([np.abs(q - start).max() for q in graph.q]))
+    way = nx.shortest_path(graph.edges, begin, found.nodes[0], weight="length")
+    return [*way[:-1], *found.nodes]
 
 
 def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:

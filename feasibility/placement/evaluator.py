@@ -118,6 +118,7 @@ class LocalEvaluator:
 
     def __init__(self, robot: Robot, cells: Cells, task: Task, search: Search) -> None:
         """Compute what all placements share."""
+        robot = replace(robot, start=None)  # elsewhere it is not over the surface
         self.robot, self.cells, self.task, self.search = robot, cells, task, search
         self.problem = arrays_of(robot, cells, task)
         self.reach = Reach.of(robot, cells, task)

@@ -6,9 +6,10 @@ from functools import partial
 
 import numpy as np
 
-from coverable_errors import Checks
+from coverable_errors import ArgumentError, Checks, Fault
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
+from feasibility.collisions import segment_clear
 from feasibility.found import Found
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
@@ -29,6 +30,7 @@ from feasibility.roadmap.tool_alone import tool_alone_of
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
+from feasibility.targets import start_cell
 from feasibility.verdict import Replay, Walk
 from robots import Kinematics
 
@@ -46,11 +48,13 @@ def complete_search(
         seeds: a motion to begin from, see `check`.
 
     Raises:
-        ArgumentError: the seeds do not fit the arm or the cells.
+        ArgumentError: the seeds do not fit the arm or the cells, or the arm's start is not on the
+            motion set.
         OutOfTime: a command's time ran out before the search began.
     """
     if seeds is not None:
         _check_seeds(problem, seeds)
+    begin = start_cell(problem.robot, problem.cells, problem.task)
     with compiling_notice(), clock.enforced():  # loading kernels takes a second or two
         warm_up()
     with clock.enforced():
@@ -65,6 +69,9 @@ def complete_search(
     try:
         if seeds is not None:
             known = _known(problem, seeds)
+        if begin is not None and known is None:
+            _begin(exploration, begin)
+        if seeds is not None:
             _plant(exploration, seeds)
         if known is None:
             explore(exploration, between_rounds(exploration, proving, problem.searched))
@@ -93,7 +100,23 @@ def _check_seeds(problem: Problem, seeds: Walk) -> None:
 def _known(problem: Problem, seeds: Walk) -> Walk | None:
     """The seeds where they cover all cells already, marked and replayed; None otherwise."""
     marked = np.isin(np.arange(len(problem.cells)), seeds.cell)
+    start = problem.robot.start
+    if start is not None and not (len(seeds.q) and np.array_equal(seeds.q[0], start)):
+        return None
     return seeds if marked.all() and _replayed(problem, seeds).accepted else None
+
+
+def _begin(exploration: Exploration, cell: int) -> None:
+    """Begin the search at the arm's start, which is over a cell.
+
+    Raises:
+        ArgumentError: bodies are nearer to each other there than they may be.
+    """
+    arrays, start = exploration.arrays, np.array(exploration.robot.start)
+    if len(arrays.collisions) and not segment_clear(arrays.collisions, start, start) > 0.0:
+        what = "collides, or is nearer than the clearances allow; choose another start"
+        raise ArgumentError([Fault("start", what)])
+    exploration.begin_at(cell, start)
 
 
 def _plant(exploration: Exploration, seeds: Walk) -> None:
@@ -123,7 +146,8 @@ def _found(
     """The best component, and the sentences about it; `known` is a motion that covers all cells."""
     total = len(problem.cells)
     complete = exploration.complete and total > 0
-    walk = covering_walk(exploration.roadmap, exploration.best) if complete else known
+    node = None if exploration.begun is None else exploration.begun[0]
+    walk = covering_walk(exploration.roadmap, exploration.best, node) if complete else known
     proof = None if walk is not None else proof_of(exploration)
     nodes, motions = (int(count) for count in exploration.roadmap.counters[:2])
     return Found(

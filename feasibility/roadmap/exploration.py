@@ -22,6 +22,7 @@ from feasibility.roadmap.graph import (
     TAIL,
     WAYPOINTS,
     Roadmap,
+    add_node,
     empty_roadmap,
     grown,
     joined_pairs,
@@ -71,6 +72,9 @@ class Exploration:
     parts: NDArray[np.int64] = field(init=False)
     """(N,) which part of the surface each cell is in, as the curves join them."""
 
+    begun: tuple[int, int] | None = None
+    """Node and component of the arm's start, where it has one: the motion has to begin there."""
+
     def __post_init__(self) -> None:
         """Set up the empty roadmap, the random numbers and the neighbours."""
         n = self.robot.n
@@ -100,7 +104,9 @@ class Exploration:
 
     @property
     def best(self) -> int:
-        """Root of the component that covers most cells (0 when there is none)."""
+        """Root of the component that covers most cells, or of the start (0 when there is none)."""
+        if self.begun is not None:
+            return int(root_of(self.roadmap, self.begun[1]))
         return int(root_of(self.roadmap, self.roadmap.counters[BEST]))
 
     @property
@@ -194,7 +200,7 @@ class Exploration:
         return self.rng.uniform(self.low, self.high, (k, self.robot.n))
 
     def spread(self) -> bool:
-        """Spread all queued nodes; True when one component covers every cell."""
+        """Spread all queued nodes; True when one component (of the start) covers every cell."""
         while True:
             status = spread_out(
                 self.arrays,
@@ -205,7 +211,7 @@ class Exploration:
                 self.links,
                 self.budget(),
             )
-            if status == COVERED:
+            if status == COVERED and (self.begun is None or self.complete):
                 return True
             if status == DONE:
                 self.roadmap.counters[HEAD] = self.roadmap.counters[TAIL] = 0
@@ -213,6 +219,15 @@ class Exploration:
             if status == FULL:
                 self.roadmap = grown(self.roadmap)
             self.tick("spreading over the surface")
+
+    def begin_at(self, cell: int, q: NDArray[np.float64]) -> None:
+        """Make the start, a configuration over a cell, the first node, and spread from it."""
+        self.roadmap = grown(self.roadmap)
+        component = int(self.roadmap.counters[COMPONENTS])
+        self.roadmap.counters[COMPONENTS] += 1
+        node = add_node(self.arrays, self.work, self.roadmap, cell, q, component)
+        self.begun = int(node), component
+        self.spread()
 
     def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
         """Seed a cell and spread the new nodes; returns how many guesses could be projected."""

@@ -96,8 +96,11 @@ def exhausted_words(problem: Problem, exploration: Exploration, proving: Proving
     if proving.attempts:
         tried.append(f"{proving.attempts} attempts at a proof, {proving.boxes} boxes")
     nodes = int(exploration.roadmap.counters[0])
+    none, best = "by no single component", "the best"
+    if exploration.begun is not None:
+        none, best = "not all from the start", "that of the start"
     return (
         f"The search ended without a covering motion {problem.within}: every cell is reached, but "
-        f"by no single component; the best covers {exploration.n_covered} of "
+        f"{none}; {best} covers {exploration.n_covered} of "
         f"{len(problem.cells)} cells ({nodes} nodes, {', '.join(tried)}, seed {exploration.seed})."
     )

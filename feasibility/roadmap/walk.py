@@ -207,19 +207,21 @@ def links_of(roadmap: Roadmap, component: int) -> Links:
     return Links(*_adjacency(roadmap, component))
 
 
-def covering_walk(roadmap: Roadmap, component: int) -> Walk:
+def covering_walk(roadmap: Roadmap, component: int, start: int | None = None) -> Walk:
     """One continuous motion through every cell that a component covers.
 
     Args:
         roadmap: the roadmap.
         component: a root component that covers at least one cell.
+        start: the node to begin at; any by default.
 
     Returns:
         The walk; consecutive waypoints lie on certified segments of the roadmap's edges.
     """
     links = links_of(roadmap, component)
-    # Start at a node with the fewest steps: corners are best visited first.
-    start = int(np.argmin(np.where(links.inside, np.diff(links.indptr), len(links.steps) + 1)))
+    if start is None:  # a node with the fewest steps: corners are best visited first
+        steps = np.where(links.inside, np.diff(links.indptr), len(links.steps) + 1)
+        start = int(np.argmin(steps))
     wanted = roadmap.cover[component].astype(bool)
     return Walk(*_string(roadmap, start, _route(roadmap, links, wanted, start, True)))
 

@@ -92,6 +92,7 @@ def explain(
     clock = (Clock(search.time_limit) if clock is None else clock).start()
     reporting = progress and (lambda *_: progress(0, None, AS_GIVEN))
     first = clock.part(VERDICT_SHARE, reporting)
+    robot = replace(robot, start=None)  # with other numbers it is not on the motion set
     verdict = check(robot, cells, task, search, clock=first)
     began = time.monotonic()
     if len(cells) == 0:

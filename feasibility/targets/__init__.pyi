@@ -7,3 +7,4 @@ from .parts import target_parts as target_parts
 from .references import check_references as check_references
 from .references import reference_directions as reference_directions
 from .references import u_directions as u_directions
+from .starting import start_cell as start_cell

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.collisions import TOOL, Bodies, HalfSpace, Obstacle
+from feasibility.collisions import TOOL, Bodies, HalfSpace, Obstacle, Seat
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import CREASE, Mesh, as_mesh, moved, shaded, solid_mesh, thinned
@@ -31,17 +31,20 @@ TRIANGLES = 30_000  # of the whole scene; more are thinned
 WIDE = 1.1  # [1] of the reach: half the width of the square that stands for a half space
 
 
-def scene_layers(scene: Sequence[Obstacle], robot: Robot) -> list[Layer]:
+def scene_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
     """The objects of the scene, half transparent; each has a switch where they are not many."""
-    meshes = thinned([_mesh_of(one, robot) for one in scene], TRIANGLES)
+    seats = [*(Seat(one, 0) for one in bodies.scene), *bodies.carried]
+    meshes = thinned([_mesh_of(seat.obstacle, robot) for seat in seats], TRIANGLES)
+    groups = joint_paths(robot)
     parts = []
-    for number, (one, mesh) in enumerate(zip(scene, meshes, strict=True)):
+    for number, (seat, mesh) in enumerate(zip(seats, meshes, strict=True)):
         if not len(mesh.faces):
             continue
-        path = f"/scene/{number} {threejs.safe_name(one.name)}"
+        name = threejs.safe_name(seat.obstacle.name)
+        path = f"{groups[seat.joint] if seat.joint else ''}/scene/{number} {name}"
         lines = threejs.segments(f"{path}/edges", _edges(mesh), EDGES)
         drawn = (_command(f"{path}/body", mesh), lines)
-        parts.append(Layer(drawn, Entry(one.name, SCENE, path), 1))
+        parts.append(Layer(drawn, Entry(seat.obstacle.name, SCENE, path), 1))
     if len(parts) <= MOST_ENTRIES:
         return parts
     every = tuple(command for part in parts for command in part.commands)
@@ -63,7 +66,7 @@ def tool_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
 
 def hull_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
     """The convex bodies that the search takes for the links and the tool, off at first."""
-    scene = {one.name for one in bodies.scene}
+    scene = {one.name for one in bodies.scene} | {one.obstacle.name for one in bodies.carried}
     paths = joint_paths(robot, HULLS)
     commands = []
     for number, body in enumerate(bodies.polytopes):

@@ -119,12 +119,15 @@ def _drawing(robot: Robot, parts: dict[tuple[int, str], list[Mesh]], notes: list
     fewer = thinned([mesh for _, mesh in owned], TRIANGLES)
     paths = joint_paths(robot)
     commands, lowest = [], 0.0
+    world = robot.model.frames[robot.world_frame_id]
+    upwards = world.placement.inverse().homogeneous[2]  # heights in the world
     for number, (((joint, link), _), mesh) in enumerate(zip(owned, fewer, strict=True)):
         if len(mesh.faces) == 0:
             continue
         mesh, normals = shaded(mesh)
-        if joint == 0:
-            lowest = min(lowest, float(mesh.vertices[:, 2].min()))
+        if joint == world.parentJoint:
+            heights = mesh.vertices @ upwards[:3] + upwards[3]
+            lowest = min(lowest, float(heights.min()))
         path = f"{paths[joint]}/link {threejs.safe_name(link)}/part {number}"
         looks: dict[str, Any] = {"normals": normals, "opacity": mesh.opacity}
         commands.append(threejs.mesh(path, mesh.vertices, mesh.faces, mesh.colour, **looks))
@@ -138,7 +141,7 @@ def _visuals(robot: Robot) -> tuple[list[Visual], list[str]]:
     from robots.urdf import check_urdf
 
     try:
-        checked = check_urdf(robot.urdf, package_dirs=robot.package_dirs)
+        checked = check_urdf(robot.urdf, robot.package_dirs, robot.axes)
     except (RobotError, OSError) as error:
         return [], [f"not drawn: {robot.urdf} cannot be read: {error}"]
     bodies = {frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY}

@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
+from feasibility.viewer.frames import in_world, triad
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.threejs import Command
 from robots import Robot
@@ -15,12 +16,20 @@ from surfaces import Cells
 Array = NDArray[np.float64]
 
 THICKNESS = 0.12  # [1] of the reach: by how much links may stand out beyond their joints
+STILL = np.eye(4)
 FRAMED = 0.34  # [rad]: half the angle that arm and surface fill, of a lens of 42 degrees
 
 
-def ground(robot: Robot, cells: Cells, floor: float) -> list[Command]:
-    """Background, a ground grid at the height of the lowest thing, and the root frame's axes."""
-    box = _extent(cells)
+def ground(robot: Robot, cells: Cells, floor: float, place: Array = STILL) -> list[Command]:
+    """Background, a ground grid at the height of the lowest thing, and the world's axes.
+
+    Args:
+        robot: the arm.
+        cells: what it works on.
+        floor: m, height of the ground.
+        place: (4, 4) m, the root frame in the world.
+    """
+    box = in_world(_extent(cells), place)
     size = max(robot.reach if np.isfinite(robot.reach) else 1.0, 0.2)
     spacing = _round_below(size / 5.0)
     extent = np.abs(box[:, :2]).max(initial=size)
@@ -28,16 +37,13 @@ def ground(robot: Robot, cells: Cells, floor: float) -> list[Command]:
     lines = np.arange(-half, half + spacing / 2.0, spacing)
     z = min(floor, float(box[:, 2].min(initial=0.0)))
     ends = [[(x, -half, z), (x, half, z), (-half, x, z), (half, x, z)] for x in lines]
-    axis = 0.25 * size
-    frame = [(0, 0, 0), (axis, 0, 0), (0, 0, 0), (0, axis, 0), (0, 0, 0), (0, 0, axis)]
-    colours = np.repeat([(0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9)], 2, axis=0)
     return [
         threejs.set_property("/Background", "top_color", [1.0, 1.0, 1.0]),
         threejs.set_property("/Background", "bottom_color", [0.93, 0.95, 0.97]),
         threejs.set_property("/Grid", "visible", False),
         threejs.set_property("/Axes", "visible", False),
         threejs.segments("/ground", np.reshape(ends, (-1, 3)), (0.78, 0.80, 0.83)),
-        threejs.segments("/root frame", np.array(frame), (0, 0, 0), colours=colours),
+        triad("/root frame", np.eye(4), 0.25 * size),
     ]
 
 
@@ -48,7 +54,12 @@ def _round_below(value: float) -> float:
 
 
 def camera_on(
-    robot: Robot, cells: Cells, q: Array, floor: float, around: Array | None = None
+    robot: Robot,
+    cells: Cells,
+    q: Array,
+    floor: float,
+    around: Array | None = None,
+    place: Array = STILL,
 ) -> Camera:
     """Look at arm and surface from the tool's side, a little from above.
 
@@ -58,18 +69,18 @@ def camera_on(
         q: (n,) its configuration.
         floor: m, height of the ground.
         around: (k, 3) m, what else is to be in the picture.
+        place: (4, 4) m, the root frame in the world.
     """
     # Links are thick, and reach beyond their joints.
     thick = THICKNESS * robot.reach if np.isfinite(robot.reach) else 0.0
     round_joints = np.vstack([np.eye(3), -np.eye(3)]) * thick
     links = (joint_points(robot, q)[:, None] + round_joints).reshape(-1, 3)
     foot = round_joints * [1.0, 1.0, 0.0] + [0.0, 0.0, floor]
-    points = np.concatenate([_extent(cells), links, foot])
-    if around is not None:
-        points = np.concatenate([points, around])
+    seen = [_extent(cells), links] if around is None else [_extent(cells), links, around]
+    points = np.concatenate([in_world(np.concatenate(seen), place), foot])
     toward = np.zeros(3)
     if len(cells):
-        toward = cells.surface.side_sign * cells.normals.mean(axis=0)
+        toward = place[:3, :3] @ (cells.surface.side_sign * cells.normals.mean(axis=0))
     heading = np.arctan2(toward[1], toward[0]) if np.hypot(*toward[:2]) > 0.1 else -np.pi / 3.0
     heading, height = heading + np.radians(25.0), np.radians(24.0)
     level = np.cos(height)

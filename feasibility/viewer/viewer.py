@@ -26,11 +26,12 @@ from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
+from feasibility.viewer.frames import carried, root_in_world, triads, world_tracks
 from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
 from feasibility.viewer.nearest import draw_nearest
 from feasibility.viewer.obstacles import HULLS, hull_layers, points_of, scene_layers, tool_layers
-from feasibility.viewer.playback import Motion, animate, motion_of
+from feasibility.viewer.playback import Motion, animate, key_times, motion_of
 from feasibility.viewer.readout import readout_of, with_nearest
 from feasibility.viewer.scene import Layer, counted, layers, trail
 from feasibility.viewer.stage import camera_on, ground
@@ -179,14 +180,13 @@ def compose(
         task: what was asked, for what the arm had to stay clear of.
     """
     drawing, roots = robot_visuals.draw(robot), [robot_visuals.ROOT]
-    commands = ground(robot, cells, drawing.lowest) + list(drawing.commands)
     q, readout, start, around = resting, None, 0.0, None
     moving = list[Command]()
     parts, tracks = list(parts), list(tracks)
     asked = None if task is None else task.collision
     bodies = None if task is None else gather(robot, cells.surface, asked, task.standoff)
     if bodies is not None:
-        parts += tool_layers(bodies, robot) + scene_layers(bodies.scene, robot)
+        parts += tool_layers(bodies, robot) + scene_layers(bodies, robot)
         parts += hull_layers(bodies, robot)
         around, roots = points_of(bodies.scene, robot), [*roots, HULLS]
     if motion is not None:
@@ -196,18 +196,23 @@ def compose(
             parts.append(near.layer)
             tracks += near.tracks
             readout = with_nearest(readout, near.distances, near.names)
+        times = key_times(motion)
+        tracks += world_tracks(robot, times, motion.at(times))
         moving = [animate(robot, motion, play=play, tracks=tracks, roots=roots)]
         q = motion.at(np.array([start]))[0]
     entries = [Entry(robot.name, ARM, robot_visuals.ROOT), *(part.entry for part in parts)]
     drawn = [command for part in parts for command in part.commands]
     poses = [command for root in roots for command in robot_visuals.pose(robot, q, root)]
+    every = (*drawing.commands, *triads(robot), *drawn, *moving, *poses)
+    seen, entries = carried(robot, every, entries, q)
+    place = root_in_world(robot, q)[0]
     return View(
         robot=robot,
-        commands=(*commands, *drawn, *moving, *poses),
+        commands=(*ground(robot, cells, drawing.lowest, place), *seen),
         legend=Legend(
             title, " · ".join([text, *drawing.notes]), tuple(entries), checked_words(asked)
         ),
-        camera=camera_on(robot, cells, q, drawing.lowest, around),
+        camera=camera_on(robot, cells, q, drawing.lowest, around, place),
         motion=motion,
         notes=drawing.notes,
         readout=readout,

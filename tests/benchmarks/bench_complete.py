@@ -19,8 +19,9 @@ from oracle_build import built
 from oracle_cases import Problem
 from paper_cases import PAPER_CASES
 
-from feasibility import Evidence, Verdict, check
-from robots import load_robot
+from feasibility import Evidence, Task, Verdict, check
+from robots import Axis, load_robot
+from surfaces import plane
 
 ROOT = Path(__file__).resolve().parents[2]
 DISCONNECTED = ROOT / "tests" / "oracle" / "puma560_disconnected.json"
@@ -171,6 +172,26 @@ def process_row(fk_us: float, repeats: int) -> dict[str, object]:
     return row("process: check paper/4a", ms, fk_us, "1800 ms")
 
 
+def composed_rows(fk_us: float, repeats: int) -> list[dict[str, object]]:
+    """An arm alone over a plate, and the same arm on a rail beside a turntable that carries it."""
+    where, grid = (0.55, 0.0, 0.1), (9, 10)
+    rail = Axis("rail", "prismatic", (0, 1, 0), limits=(-0.5, 0.5))
+    table = Axis("table", "revolute", limits_deg=(-180, 180), position=where, carries="surface")
+    plate, task = ((-0.15, 0.15), (-0.25, 0.25)), Task(0.005, 20)
+    setups = {
+        "ur5 over a plate": (load_robot("ur5"), plane(*plate, position=where).cells(*grid), task),
+        "ur5 on a rail, plate on a table": (
+            load_robot("ur5", axes=[rail, table]), plane(*plate).cells(*grid), task,
+        ),
+    }  # fmt: skip
+    table_rows, alone = [], ""
+    for what, setup in setups.items():
+        ms, verdict = median_ms(lambda setup=setup: check(*setup), repeats)
+        table_rows.append(row(what, ms, fk_us, alone, **of_verdict(verdict)))
+        alone = f"{3.0 * ms:.0f} ms"
+    return table_rows
+
+
 def rows(repeats: int = 9) -> tuple[str, list[dict[str, object]]]:
     """One row for each thing that a target is set for."""
     fk_us = pinocchio_fk_us()
@@ -178,6 +199,7 @@ def rows(repeats: int = 9) -> tuple[str, list[dict[str, object]]]:
         *paper_rows(fk_us, repeats),
         *exhausted_rows(fk_us),
         *grid_rows(fk_us),
+        *composed_rows(fk_us, repeats),
         process_row(fk_us, 5),
     ]
     title = (

@@ -11,7 +11,6 @@ from robots import Axis, load_robot
 from surfaces import plane
 
 TASK = Task(standoff=0.01, cone_deg=25)
-DOWN = (180.0, 0.0, 0.0)
 TABLE = Axis(
     "table", "revolute", limits_deg=(-180, 180), carries="surface", position=(0.6, 0.1, 0.1)
 )
@@ -65,3 +64,16 @@ def test_an_arm_on_a_rail_with_a_turntable_has_a_witness_that_holds():
     assert verdict.feasible
     assert verify(robot, verdict.cells, TASK, verdict.witness.q).holds
     assert np.ptp(verdict.witness.q[:, 0]) > 0.0
+
+
+def test_two_more_axes_cost_at_most_three_times_as_much():
+    """Evaluations of the arm, over a plate that it covers by itself."""
+    where = (0.55, 0.0, 0.1)
+    rail = Axis("rail", "prismatic", (0, 1, 0), limits=(-0.5, 0.5))
+    table = Axis("table", "revolute", limits_deg=(-180, 180), position=where, carries="surface")
+    plate = (-0.15, 0.15), (-0.25, 0.25)
+    alone = check(load_robot("ur5"), plane(*plate, position=where).cells(9, 10), TASK)
+    both = check(load_robot("ur5", axes=[rail, table]), plane(*plate).cells(9, 10), TASK)
+    assert alone.feasible
+    assert both.feasible
+    assert both.statistics["fk"] <= 3 * alone.statistics["fk"]

@@ -1,0 +1,45 @@
+"""Three short lines for a frame: x red, y green, z blue."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.viewer import threejs
+from feasibility.viewer.robot import joint_paths
+from robots import Robot
+
+AXES = ((0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9))
+SMALL = 0.1  # [1] of the reach: length of an axis
+
+
+def triad(path: str, place: NDArray[np.float64], length: float) -> threejs.Command:
+    """The axes of a frame.
+
+    Args:
+        path: where in the scene tree.
+        place: (4, 4) m, the frame in the group that it stands in.
+        length: m, of an axis.
+    """
+    ends = place[:3, 3] + length * place[:3, :3].T
+    points = np.stack([np.broadcast_to(place[:3, 3], (3, 3)), ends], axis=1).reshape(-1, 3)
+    return threejs.segments(path, points, (0, 0, 0), colours=np.repeat(AXES, 2, axis=0))
+
+
+def triads(robot: Robot) -> list[threejs.Command]:
+    """The frames of the TCP, of the arm's base, and of the link that carries the surface."""
+    import pinocchio as pin
+
+    reach = robot.reach if np.isfinite(robot.reach) else 1.0
+    model, body = robot.model, pin.FrameType.BODY
+    base = model.getFrameId(robot.root_link or robot.link_names[0], body)
+    shown = {"TCP": robot.tool_frame_id, "base": base}
+    if robot.surface_link is not None:
+        shown["surface frame"] = model.getFrameId(robot.surface_link, body)
+    paths = joint_paths(robot)
+    drawn = []
+    for name, number in shown.items():
+        frame = model.frames[number]
+        path = f"{paths[int(frame.parentJoint)]}/frame of the {name}"
+        drawn.append(triad(path, frame.placement.homogeneous, SMALL * max(reach, 0.2)))
+    return drawn

@@ -1,0 +1,99 @@
+"""A start: the motion begins there, and has to cover everything from there."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from oracle_build import built
+from oracle_cases import Problem
+
+from coverable_errors import ArgumentError
+from feasibility import Search, Task, check, verify
+from feasibility.collisions import Collision, Obstacle
+from feasibility.paths import coverage_path
+from robots import RobotError, load_robot
+from surfaces import plane
+
+DISCONNECTED = Path(__file__).parents[1] / "oracle" / "puma560_disconnected.json"
+UR5 = load_robot("ur5")
+PLATE = plane((0.4, 0.6), (-0.15, 0.15), position=(0, 0, 0.2)).cells(3, 4)
+TASK = Task(standoff=0.01, cone_deg=25)
+
+
+@pytest.fixture(scope="module")
+def anywhere():
+    verdict = check(UR5, PLATE, TASK)
+    assert verdict.feasible
+    return verdict
+
+
+@pytest.fixture(scope="module")
+def started(anywhere):
+    """In the middle of the motion that is found without a start, a little off the target."""
+    walk = anywhere.witness
+    row = np.flatnonzero(walk.cell == 5)[0]
+    start = walk.q[row] + 2e-4
+    return replace(UR5, start=start)
+
+
+def test_the_motion_begins_at_the_start(anywhere, started):
+    verdict = check(started, PLATE, TASK)
+    assert verdict.feasible
+    np.testing.assert_array_equal(verdict.witness.q[0], started.start)
+    assert verdict.witness.cell[0] == 5
+    assert verify(started, PLATE, TASK, verdict.witness.q).holds
+    assert verify(verdict).holds
+    path = coverage_path(verdict, "rows")
+    np.testing.assert_array_equal(path.walk.q[0], started.start)
+    assert set(path.visits) == set(range(12))
+    judged = verify(started, PLATE, TASK, anywhere.witness.q)
+    assert not judged.holds
+    assert "off the start" in str(judged.faults[-1])
+
+
+def test_the_greedy_search_begins_there_too(started):
+    search = Search(method="greedy", step_deg=0.2)
+    verdict = check(started, PLATE, replace(TASK, tolerance=0.004), search)
+    np.testing.assert_allclose(verdict.graph.nodes[verdict.start]["q"], started.start)
+
+
+def test_a_start_off_the_motion_set_is_refused_with_its_distance(anywhere):
+    row = np.flatnonzero(anywhere.witness.cell == 5)[0]
+    start = anywhere.witness.q[row].copy()
+    start[2] += 0.05
+    with pytest.raises(ArgumentError, match=r"start is not on .* nearest cell, \[1, 1\], is .* mm"):
+        check(replace(UR5, start=start), PLATE, TASK)
+    with pytest.raises(ArgumentError, match=r"the tool axis .* deg off the approach direction"):
+        check(replace(UR5, start=anywhere.witness.q[row]), PLATE, replace(TASK, cone_deg=1e-3))
+
+
+def test_a_start_that_collides_is_refused(started):
+    ball = Obstacle.sphere("ball", 0.3, position=(0.5, 0.0, 0.5))
+    with pytest.raises(ArgumentError, match="start collides"):
+        check(started, PLATE, replace(TASK, collision=Collision(scene=(ball,))))
+
+
+def test_only_what_the_start_leads_to_counts():
+    """A stored problem whose configurations fall into two parts: 14 and 11 of 15 cells."""
+    stored = json.loads(DISCONNECTED.read_text())[10]
+    plain = {key: stored[key] for key in Problem.__dataclass_fields__}
+    arm, cells, task = built(Problem.read(plain), load_robot("puma560"))
+    free = check(arm, cells, task)
+    sizes = [len(covered) for covered in free.components]
+    assert len(sizes) > 1
+    assert sizes[-1] < sizes[0] == free.n_covered
+    for posture, covered in zip(free.postures, free.components, strict=True):
+        bound = check(replace(arm, start=posture), cells, task)
+        assert np.flatnonzero(bound.covered).tolist() == covered.tolist()
+        assert bound.answer == free.answer
+
+
+def test_starts_that_fit_no_arm():
+    with pytest.raises(RobotError, match=r"start has shape \(5,\)"):
+        replace(UR5, start=np.zeros(5))
+    with pytest.raises(RobotError, match="start must be finite"):
+        replace(UR5, start=np.full(6, np.nan))
+    with pytest.raises(RobotError, match="start puts joint 'elbow_joint' at 9, outside its limits"):
+        replace(UR5, start=[0, 0, 9, 0, 0, 0])
