@@ -52,6 +52,7 @@ kernels: .venv/installed
 
 greedy: .venv/installed
 	@$(BIN)/coverable check paper/4f --set search.method=greedy >/dev/null || test $$? -eq 1
+	@$(BIN)/coverable check tests/feasibility/paper/greedy_on_a_torus.toml >/dev/null
 
 test: .venv/installed
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy

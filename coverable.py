@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from feasibility.certification import replay
     from feasibility.collisions import Collision, Obstacle, ToolShape
     from feasibility.division import Division, divide
-    from feasibility.paper import starts
+    from feasibility.paper import LiteralSearch, starts
     from feasibility.paths import CoveragePath, PathError, coverage_path
     from feasibility.paths import coverage_path as path
     from feasibility.placement import (
@@ -123,20 +123,21 @@ if TYPE_CHECKING:
 # fmt: off
 __all__ = [
     "Answer", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Collision", "Comparison",
-    "CoveragePath", "Division", "Evidence", "Explanation", "Local", "LocalEvaluator", "MeshSurface",
-    "Obstacle", "Patch", "PathError", "Piecewise", "Placements", "Plot", "Pose", "Region", "Robot",
-    "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError", "Task", "ToolShape",
-    "Trajectory", "Verdict", "Verification", "View", "__version__", "bspline", "builtin_cases",
-    "check", "compare", "comparison_chart", "comparison_text", "cone", "coverage_path", "cut_box",
-    "cut_plane", "cylinder", "divide", "division_text", "ellipsoid", "explain", "explanation_text",
-    "faces_within_cone", "greedy_check", "hyperboloid", "list_robots", "load_case", "load_motion",
-    "load_result", "load_robot", "load_study", "load_trajectory", "mesh", "motion_limits",
-    "open_workers", "path", "path_text", "piecewise", "place", "placement_map", "placement_text",
-    "plane", "plot_causes", "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view",
-    "plot_views", "read_net", "read_study", "replay", "revolution", "run_tasks", "save_result",
-    "save_trajectory", "settings_of", "show", "sphere", "starts", "station_plan", "study_text",
-    "take_faces", "torus", "trajectory", "unrolled_edges", "verify", "view", "view_division",
-    "view_path", "view_placements", "view_study",
+    "CoveragePath", "Division", "Evidence", "Explanation", "LiteralSearch", "Local",
+    "LocalEvaluator", "MeshSurface", "Obstacle", "Patch", "PathError", "Piecewise", "Placements",
+    "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface",
+    "SurfaceError", "Task", "ToolShape", "Trajectory", "Verdict", "Verification", "View",
+    "__version__", "bspline", "builtin_cases", "check", "compare", "comparison_chart",
+    "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane", "cylinder", "divide",
+    "division_text", "ellipsoid", "explain", "explanation_text", "faces_within_cone",
+    "greedy_check", "hyperboloid", "list_robots", "load_case", "load_motion", "load_result",
+    "load_robot", "load_study", "load_trajectory", "mesh", "motion_limits", "open_workers", "path",
+    "path_text", "piecewise", "place", "placement_map", "placement_text", "plane", "plot_causes",
+    "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view", "plot_views",
+    "read_net", "read_study", "replay", "revolution", "run_tasks", "save_result", "save_trajectory",
+    "settings_of", "show", "sphere", "starts", "station_plan", "study_text", "take_faces", "torus",
+    "trajectory", "unrolled_edges", "verify", "view", "view_division", "view_path",
+    "view_placements", "view_study",
 ]
 # fmt: on
 

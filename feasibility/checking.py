@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 
 NOT_BEGUN = "The time limit of {:g} s ran out while the search was prepared; nothing was searched."
-GREEDY = 'the greedy search knows no {}; use search.method = "complete"'
 NOT_REPLAYED = (
     "A motion over every cell was found, but the time limit of {:g} s ran out before the "
     "independent replay had judged it."
@@ -67,11 +66,11 @@ def check(
     Raises:
         TypeError: an argument is something else, such as a surface that is not cut into cells.
         RobotError: the arm is no serial chain of one-dof joints.
-        SurfaceError: the greedy search does not know this kind of surface.
+        SurfaceError: the greedy search needs a surface, which poses have not.
         ArgumentError: the arm's start is not on the motion set; the seeds fit neither arm nor
-            cells; seeds, collisions, limits of the roll or approaches that are no normals are given
-            to the greedy search; a pair names something that is not there; or the surface has no
-            reference direction for the roll.
+            cells; seeds, collisions or cells with approaches of their own are given to the greedy
+            search; a pair names something that is not there; or the surface has no reference
+            direction for the roll.
 
     Example:
         >>> from robots import load_robot
@@ -92,7 +91,6 @@ def check(
     if search.method == "greedy":
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
-        _refuse_for_greedy(problem)
         from_start = partial(greedy_search, start=robot.start)
         return _decided(problem, search, progress, from_start, clock)
     return _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
@@ -109,7 +107,7 @@ def greedy_check(
     """The verdict of the paper's search, from one start configuration if one is given.
 
     Args:
-        robot, cells, task: see `check`; cells of a grid on a closed-form patch.
+        robot, cells, task: see `check`.
         search: step, moves, starts, cap and seed.
         progress: called as progress(cells touched by the running tree, cells, text).
         start: (n,) the start configuration over one of the cells, rad or m; without it, `check`.
@@ -123,21 +121,7 @@ def greedy_check(
         return greedy_search(problem, search, clock, start)
 
     search = Search(method="greedy") if search is None else search
-    problem = Problem.of(robot, cells, task)
-    _refuse_for_greedy(problem)
-    return _decided(problem, search, progress, from_start)
-
-
-def _refuse_for_greedy(problem: Problem) -> None:
-    """Refuse what the greedy search would pass over.
-
-    Raises:
-        ArgumentError: the approach is not the normal, or the roll is limited.
-    """
-    if not problem.task.along_normals(problem.cells):
-        raise ArgumentError(GREEDY.format("approaches that are not the normal"), "task")
-    if problem.task.roll is not None:
-        raise ArgumentError(GREEDY.format("limits of the roll"), "task")
+    return _decided(Problem.of(robot, cells, task), search, progress, from_start)
 
 
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."

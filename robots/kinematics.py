@@ -80,6 +80,18 @@ class Kinematics:
             rotations[k] = self._rotation
         return points, rotations @ self._approach
 
+    def rotation(self, q: ArrayLike) -> NDArray[np.float64]:
+        """(3, 3) axes of the TCP's frame, as columns, in the root frame, at q (n,).
+
+        Example:
+            >>> from robots import load_robot
+            >>> Kinematics(load_robot("puma560")).rotation(np.zeros(6)).round(6).tolist()
+            [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, -1.0]]
+        """
+        pin.forwardKinematics(self._model, self._data, self.configuration(q))
+        pin.updateFramePlacement(self._model, self._data, self._frame)
+        return self._rotation.copy()
+
     def joints(self, q: ArrayLike) -> JointFrames:
         """Frames of the joints in the root frame at configurations q (m, n).
 

@@ -1,5 +1,7 @@
 from .adjacency import components as components
 from .arguments import check_pose as check_pose
+from .cell_triangles import Triangulation as Triangulation
+from .cell_triangles import triangulation as triangulation
 from .cells import Cells as Cells
 from .cells import Finer as Finer
 from .cells import Triangles as Triangles
@@ -30,3 +32,6 @@ from .surface import Surface as Surface
 from .surface import SurfaceError as SurfaceError
 from .surface import max_principal_curvature as max_principal_curvature
 from .surface import rotation_from_rpy as rotation_from_rpy
+from .triangle_kernel import TriangleKernel as TriangleKernel
+from .triangle_kernel import cell_under as cell_under
+from .triangle_kernel import u_direction_under as u_direction_under

@@ -18,6 +18,8 @@ from surfaces.patches import Patch
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
+HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 MOST_ROUNDS = 60
 _AIM = 0.97  # of the deviation: what a cut aims at, since errors shrink only nearly as is assumed
 _AT_ONCE = 8  # cuts along one parameter that errors foretell well
@@ -29,10 +31,31 @@ class Tiles(NamedTuple):
     models: PartModels
     twist: Array
     """(k, 3) t; see `Twisted`. Zero where normals count."""
+    piece: Ints
+    """(k,) which of the patches each is of."""
+    low: Array
+    """(k, 2) u and v at x = (-1, -1)."""
+    high: Array
+    """(k, 2) u and v at x = (1, 1)."""
 
     def rows(self, some: NDArray[np.bool_]) -> Tiles:
         """Some of them."""
-        return Tiles(self.models.rows(some), self.twist[some])
+        return Tiles(
+            self.models.rows(some), self.twist[some], self.piece[some], self.low[some],
+            self.high[some],
+        )  # fmt: skip
+
+    def halves(self) -> Array:
+        """(2 k, 3, 6) the two triangles of each: points (m) and normals at their corners."""
+        corners = self.models.centre[:, None] + CORNERS @ self.models.slopes
+        corners[..., :3] += CORNERS.prod(axis=1)[:, None] * self.twist[:, None]
+        return np.asarray(corners[:, HALVES].reshape(-1, 3, 6))
+
+    def parameters(self) -> Array:
+        """(2 k, 3, 2) u and v at the corners of the two triangles of each."""
+        high = (CORNERS > 0.0)[HALVES]
+        ends = np.where(high, self.high[:, None, None], self.low[:, None, None])
+        return ends.reshape(-1, 3, 2)
 
     def deviations(self, depth: float) -> Array:
         """(k,) m, r_f + depth r_n."""
@@ -54,10 +77,11 @@ def tiles(
         The tiles; None where more would be needed.
     """
     found, count = list[Tiles](), 0
-    for patch, sign in pieces:
+    for piece, (patch, sign) in enumerate(pieces):
         low, high = patch.part_roots
         for number in range(MOST_ROUNDS):
-            made = _tiles(patch, low, high, sign, twisted=depth == 0.0)
+            models, twist = _models(patch, low, high, sign, twisted=depth == 0.0)
+            made = Tiles(models, twist, np.full(len(low), piece), low, high)
             rough = made.deviations(depth)
             fine = rough <= deviation
             found.append(made.rows(fine))
@@ -70,21 +94,22 @@ def tiles(
             if count + counts.prod(axis=1).sum() > most or number == MOST_ROUNDS - 1:
                 return None
             low, high = _cut(low, high, counts)
-    models = zip(*(each.models for each in found), strict=True)
-    return Tiles(
-        PartModels(*map(np.concatenate, models)), np.concatenate([each.twist for each in found])
-    )
+    columns = list(zip(*found, strict=True))
+    joined = PartModels(*map(np.concatenate, zip(*columns[0], strict=True)))
+    return Tiles(joined, *map(np.concatenate, columns[1:]))
 
 
-def _tiles(patch: Patch, low: Array, high: Array, sign: float, twisted: bool) -> Tiles:
-    """The models over boxes of parameters, in the root frame."""
+def _models(
+    patch: Patch, low: Array, high: Array, sign: float, twisted: bool
+) -> tuple[PartModels, Array]:
+    """The models over boxes of parameters, in the root frame, and t."""
     if not twisted:
         models = patch.placed_models(low, high, sign).guarded()
-        return Tiles(models, np.zeros_like(models.centre[:, :3]))
+        return models, np.zeros_like(models.centre[:, :3])
     found, twist = patch.twisted_models(low, high)
     models = found.guarded()
     known = np.isfinite(models.radius[:, 0]) & np.isfinite(twist).all(axis=1)
-    return Tiles(models, np.where(known[:, None], twist, 0.0))
+    return models, np.where(known[:, None], twist, 0.0)
 
 
 def _counts(shares: Array, rough: Array, sides: Array, aim: float) -> Ints:

@@ -32,12 +32,12 @@ surfaces: protected parts surface part_growth cells adjacency cell_curves curve_
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.piecewise
-surfaces.meshes: triangle_mesh normals closest_point facets mesh_parts
+surfaces.meshes: triangle_mesh normals closest_point face_tree facets mesh_parts
 surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
-surfaces: sheet tiles
+surfaces: sheet tiles triangle_kernel cell_triangles
 surfaces.passes
 surfaces.places
 feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only roll safe_files search version

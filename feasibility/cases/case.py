@@ -9,10 +9,9 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from coverable_errors import MISSING, ArgumentError, Fault, alternatives, close, printable
+from coverable_errors import MISSING, ArgumentError, Fault, close, printable
 from feasibility.cases.collision_table import CollisionPart, faults_of_meshes, read_collision
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
-from feasibility.cases.surface_keys import CLOSED_FORM_KINDS
 from feasibility.cases.surface_table import (
     SurfacePart,
     faults_of_building,
@@ -268,10 +267,6 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     task = _read_task(tables["task"], faults) if "task" in tables else None
     collision = read_collision(tables["collision"], faults) if "collision" in tables else None
     search = _read_search(tables.get("search", {}), faults)
-    if surface and search and search.method == "greedy" and surface.kind not in CLOSED_FORM_KINDS:
-        kinds = alternatives(CLOSED_FORM_KINDS)
-        known = f'"greedy" works on {kinds} only, not on a surface of kind {surface.kind}'
-        faults.append(Fault("search.method", f'{known}; use "complete"'))
     if faults and "robot" in tables:
         faults += faults_of_loading(tables["robot"])
     if faults and "surface" in tables:

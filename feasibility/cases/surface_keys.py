@@ -41,7 +41,7 @@ PATCHES: Mapping[str, Mapping[str, str]] = MappingProxyType(
 WHOLE = ("degree", "faces", "pieces")
 """Keys whose values hold no real numbers."""
 CLOSED_FORM_KINDS = ("sphere", "cylinder", "hyperboloid", "plane")
-"""The kinds that the greedy search knows."""
+"""The kinds that compiled loops know by formulas; of those were the first result files."""
 
 
 def read_patch(section: Section, kind: str) -> dict[str, Any]:

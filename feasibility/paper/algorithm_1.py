@@ -22,6 +22,7 @@ from feasibility.paper.jcell_grid import (
     place_joints,
     place_tool,
 )
+from feasibility.paper.jcell_roll import rolls_within
 
 RUNNING, FOUND, EXHAUSTED, CAPPED, FULL = 0, 1, 2, 3, 4  # what a call is doing: counters[STATE]
 STATE, DEPTH, NODES, PLACED, CALL = 0, 1, 2, 3, 4  # places in `Memory.counters`
@@ -129,7 +130,21 @@ def _inside(lowest, highest, offsets, delta):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
+def _placed_for(  # type: ignore[no-untyped-def]
+    delta, rotations, translations, prismatic, origin, step, offsets, placed, base
+):
+    """Bring the joint frames in `base` up to date up to the last that moves; how many are."""
+    top = delta.shape[0] - 1
+    while delta[top] == 0:
+        top -= 1
+    if top < placed:
+        return placed
+    place_joints(rotations, translations, prismatic, origin, step, offsets, placed, top, base)
+    return top + 1
+
+
+@njit(cache=True, error_model="numpy")
+def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, budget, cap, memory):  # type: ignore[no-untyped-def]
     """Go on with a call of Algorithm 1 for at most `budget` more neighbours.
 
     Leaves counters[STATE] at FOUND (the stack and the last node are the path), EXHAUSTED (no
@@ -137,7 +152,8 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
     FULL (enlarge the memory, and call again).
 
     Args:
-        chain, patch_kernel, grid: a `Chain`, a `PatchKernel` and a `Grid`.
+        chain, grid: a `Chain` and a `Grid`.
+        patch_kernel, triangles: a `PatchKernel` or a `TriangleKernel`, and None for the other.
         target, target_cell: (3,) p_T, m, and the flat index of ec_T.
         budget, cap: neighbours to look at now, and J-cells that the call may check in all.
         memory: started by `begin_search`.
@@ -145,16 +161,15 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
     # Arrays are read out of their tuples once, here: numba counts references each time it is done.
     rotations, translations, prismatic = chain.rotations, chain.translations, chain.prismatic
     origin, step, sine, cosine = grid.origin, grid.step, grid.sine, grid.cosine
-    lowest, highest, height = grid.lowest, grid.highest, grid.height
-    moves_all, tolerance, cone_cosine = grid.moves_all, grid.tolerance, grid.cone_cosine
+    side, height, tolerance, moves_all = grid.side, grid.height, grid.tolerance, grid.moves_all
+    lowest, highest, facing, approach = grid.lowest, grid.highest, grid.cone_cosine, grid.approach
     counters, table, nodes = memory.counters, memory.table, memory.nodes
     stack_node, stack_next, stack_tool = memory.stack_node, memory.stack_next, memory.stack_tool
-    n = nodes.shape[1]
+    n, placed, state = nodes.shape[1], 0, EXHAUSTED  # placed: frames in `base` of this J-cell
     base, partial = np.empty((n, 12)), np.empty((n + 1, 6))
     offsets, delta, held = np.zeros(n, np.int64), np.zeros(n, np.int64), np.zeros(n, np.int64)
     call, count, depth = counters[CALL], counters[NODES], counters[DEPTH]
     tool, last = partial[0], min(cap + 1, nodes.shape[0])
-    placed, state = 0, EXHAUSTED  # placed: joints whose frames in `base` are of this J-cell
     while depth >= 0:
         shared = _expand(nodes, stack_node[depth], stack_tool[depth], offsets, held, partial)
         placed = min(placed, shared)
@@ -171,17 +186,17 @@ def extend_search(chain, patch_kernel, grid, target, target_cell, budget, cap, m
             ):
                 continue
             count += 1
-            top = n - 1  # the last joint that moves
-            while delta[top] == 0:
-                top -= 1
-            if top >= placed:
-                place_joints(
-                    rotations, translations, prismatic, origin, step, offsets, placed, top, base
-                )
-                counters[PLACED] += top + 1 - placed
-                placed = top + 1
+            counters[PLACED] -= placed
+            placed = _placed_for(
+                delta, rotations, translations, prismatic, origin, step, offsets, placed, base
+            )
+            counters[PLACED] += placed
             move_tool(prismatic, step, sine, cosine, base, delta, held, partial)
-            cell = cell_of(patch_kernel, height, tolerance, cone_cosine, tool)
+            cell = cell_of(patch_kernel, triangles, side, height, tolerance, facing, approach, tool)
+            if cell >= 0 and grid.roll[1] < np.inf:
+                counters[PLACED] += n
+                row = nodes[count - 1]
+                cell = cell if rolls_within(chain, patch_kernel, triangles, grid, row, tool) else -1
             if cell == target_cell:
                 state = FOUND
                 break

@@ -9,10 +9,10 @@ import numpy as np
 from feasibility.clock import Clock
 from feasibility.paper.continuity import JSpace, Outcome
 from feasibility.paper.tree_and_graph import Tree
-from surfaces.patches import GridCells
+from surfaces import Cells
 
 
-def tree_search(space: JSpace, cells: GridCells, start: int, clock: Clock | None = None) -> Tree:
+def tree_search(space: JSpace, cells: Cells, start: int, clock: Clock | None = None) -> Tree:
     """Algorithm 2: grow T and G from the start configuration of `space`, which lies over `start`.
 
     The recursion of the paper's TREESEARCH is the list `waiting`: the cells from ec_1 to the one in
@@ -45,6 +45,8 @@ def tree_search(space: JSpace, cells: GridCells, start: int, clock: Clock | None
 def _try_edge(tree: Tree, cell: int, neighbour: int, clock: Clock) -> bool:
     """Call Algorithm 1 for one pair that has no edge yet; True when it leads to a new cell of T."""
     if not tree.complete or (cell, neighbour) in tree.edges or (neighbour, cell) in tree.edges:
+        return False
+    if (min(cell, neighbour), max(cell, neighbour)) in tree.space.steps.barred:
         return False
     found = tree.space.continuity(tree.jcell[cell], neighbour, clock)
     tree.calls += 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,11 +13,17 @@ from coverable_errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.paper import algorithm_1 as jcells
 from feasibility.paper.jcell_grid import Grid, cell_of, place_tool
+from feasibility.paper.jcell_roll import rolls_within
 from feasibility.paper.jcell_steps import Steps
 from feasibility.search import Search
 from feasibility.task import Task
 from robots import Robot
+from surfaces import Cells
 from surfaces.patches import GridCells
+
+if TYPE_CHECKING:
+    from surfaces import TriangleKernel
+    from surfaces.patches import PatchKernel
 
 CAP = 20_000  # J-cells of one call at the step below, unless the search says otherwise
 CAP_STEP_DEG = 0.01
@@ -67,7 +74,7 @@ class JSpace:
     def __init__(
         self,
         robot: Robot,
-        cells: GridCells,
+        cells: Cells,
         task: Task,
         start: ArrayLike,
         search: Search | None = None,
@@ -90,10 +97,15 @@ class JSpace:
                 f"start must be {robot.n} finite joint values, got {origin.tolist()}"
             )
         self.start = origin
-        self.steps = Steps.of(robot, cells.closed_form, task, search) if steps is None else steps
-        size = self.steps.size
-        self._chain = robot.chain
-        self._patch_kernel = cells.patch_kernel
+        self.steps = Steps.of(robot, cells, task, search) if steps is None else steps
+        size, triangles = self.steps.size, self.steps.triangles
+        self._chain, self._cells = robot.chain, cells
+        self._place: tuple[PatchKernel | None, TriangleKernel | None] = (
+            None if triangles is not None else _patch_kernel(cells),
+            None if triangles is None else triangles.kernel,
+        )
+        approach, reference = task.fixed_approach(cells), task.fixed_reference(cells)
+        room, cosine = self.steps.tolerance - self.steps.sag, self.steps.cone_cosine
         self._points = task.targets(cells).points
         cap = search.cap or round(CAP * max(1.0, CAP_STEP_DEG / search.step_deg))
         self._cap = min(cap, MOST_JCELLS)
@@ -105,9 +117,15 @@ class JSpace:
             lowest=-_last_offset(-origin, size, -robot.lower),
             highest=_last_offset(origin, size, robot.upper),
             moves_all=search.moves == "all",
+            side=float(cells.surface.side_sign),
             height=float(cells.surface.side_sign) * task.standoff,
-            tolerance=self.steps.tolerance - self.steps.sag,
-            cone_cosine=self.steps.cone_cosine,
+            tolerance=_least(room) if triangles is None else np.append(room, _least(room)),
+            cone_cosine=-_least(-cosine)
+            if triangles is None
+            else np.append(cosine, -_least(-cosine)),
+            approach=np.empty(0) if approach is None else approach,
+            roll=self.steps.roll,
+            reference=np.empty(0) if reference is None else reference,
         )
         self._memory = _memory(robot.n, nodes=4096, stack=4096)
 
@@ -118,7 +136,7 @@ class JSpace:
         target = np.zeros(3)
         jcells.begin_search(self._chain, self._grid, here, target, self._memory)
         jcells.extend_search(
-            self._chain, self._patch_kernel, self._grid, target, 0, 0, self._cap, self._memory
+            self._chain, *self._place, self._grid, target, 0, 0, self._cap, self._memory
         )
 
     def q(self, jcells: ArrayLike) -> NDArray[np.float64]:
@@ -132,7 +150,13 @@ class JSpace:
             return -1
         tool, grid = np.empty(6), self._grid
         place_tool(self._chain, grid, offsets, tool)
-        return int(cell_of(self._patch_kernel, grid.height, grid.tolerance, grid.cone_cosine, tool))
+        limits = grid.side, grid.height, grid.tolerance, grid.cone_cosine, grid.approach
+        cell = int(cell_of(*self._place, *limits, tool))
+        if cell >= 0 and grid.roll[1] < np.inf:
+            within = rolls_within(self._chain, *self._place, grid, offsets, tool)
+            cell = cell if within else -1
+        on_border = cell == len(self._cells)
+        return int(self._cells.locate(tool[None, :3])[0]) if on_border else cell
 
     def continuity(
         self, jcell: ArrayLike, target_cell: int, clock: Clock | None = None
@@ -149,7 +173,7 @@ class JSpace:
         jcells.begin_search(self._chain, self._grid, offsets, target, self._memory)
         while True:
             jcells.extend_search(
-                self._chain, self._patch_kernel, self._grid, target, target_cell, BUDGET, self._cap,
+                self._chain, *self._place, self._grid, target, target_cell, BUDGET, self._cap,
                 self._memory,
             )  # fmt: skip
             state = self._memory.counters[jcells.STATE]
@@ -177,6 +201,16 @@ class JSpace:
             checked=int(counters[jcells.NODES]) - 1,
             fk=float(counters[jcells.PLACED]) / memory.nodes.shape[1],
         )
+
+
+def _patch_kernel(cells: Cells) -> PatchKernel | None:
+    """The closed form of a grid."""
+    return cells.patch_kernel if isinstance(cells, GridCells) else None
+
+
+def _least(values: NDArray[np.float64]) -> float:
+    """The least; inf of none."""
+    return float(values.min(initial=np.inf))
 
 
 def _last_offset(

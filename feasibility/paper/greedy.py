@@ -6,8 +6,6 @@ What the greedy search finds depends on where it starts, and its "no" speaks for
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,20 +18,22 @@ from feasibility.notices import GREEDY, compiling_notice
 from feasibility.paper.algorithm_2 import tree_search
 from feasibility.paper.continuity import JSpace
 from feasibility.paper.jcell_steps import Steps
-from feasibility.paper.starts import DRY_SEEDS, starts
+from feasibility.paper.starts import candidates
 from feasibility.paper.tree_and_graph import Tree, graph_of, tree_of
 from feasibility.paper.tree_replay import Path, replay_tree
 from feasibility.problem import Problem
 from feasibility.search import Search
 from feasibility.verdict import Cause, CauseKind, Replay
 from robots import Robot
-from surfaces.patches import GridCells, closed_form_grid
-
-FEW_SEEDS = 10  # random configurations to try over each cell once the middle one had no start
 
 KNOWS_NO_COLLISIONS = (
     "the greedy search, which is the paper's, knows no collisions: leave out [collision], or take "
     "the complete search"
+)
+
+KNOWS_NO_POSES = (
+    "the greedy search, which is the paper's, moves over a surface with one approach for all of it "
+    'or its normals: set task.approach, or use search.method = "complete"'
 )
 
 
@@ -77,21 +77,25 @@ def greedy_search(
             are searched over the middle cell, or the next that has some; one for each branch.
 
     Raises:
-        SurfaceError: the cells are no grid on a patch that the compiled loops know.
-        ArgumentError: `start` is not a feasible configuration over one of the cells, or collisions
-            are to be checked.
+        SurfaceError: nothing is known of the surface between its places.
+        ArgumentError: `start` is not a feasible configuration over one of the cells; or collisions
+            are to be checked, or cells have approaches of their own.
     """
-    robot, task = problem.robot, problem.task
+    robot, cells, task = problem.robot, problem.cells, problem.task
     if problem.bodies is not None:
         raise ArgumentError(KNOWS_NO_COLLISIONS)
-    cells = closed_form_grid(problem.cells)
-    steps = Steps.of(robot, cells.closed_form, task, search)
+    if task.approach is None and cells.approaches is not None:
+        raise ArgumentError(KNOWS_NO_POSES)
+    steps = Steps.of(robot, cells, task, search)
     with compiling_notice(notice=GREEDY):
         space = JSpace(robot, cells, task, np.zeros(robot.n), search, steps)
         space.load()
     clock.start()
     run = _Run(Tree(space, start=None))
-    for q in _starts(problem, cells, search, clock, start):
+    given = None if start is None else [np.array(start, dtype=float)]
+    for q in (
+        candidates(robot, cells, task, search, steps.usable, clock) if given is None else given
+    ):
         space = JSpace(robot, cells, task, q, search, steps)
         at = space.cell_of(np.zeros(robot.n, dtype=np.int32))
         if at >= 0:
@@ -103,12 +107,12 @@ def greedy_search(
         if len(run.best.jcell) == len(cells) or not run.complete:
             break
     run.complete &= len(run.best.jcell) == len(cells) or not clock.out_of_time
-    return _found(problem, cells, search, steps, run)
+    return _found(problem, search, steps, run)
 
 
-def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run: _Run) -> Found:
+def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> Found:
     """The best tree, and what is to be said of it."""
-    best, count = run.best, len(cells)
+    cells, best, count = problem.cells, run.best, len(problem.cells)
     settings = (
         f"{search.moves} moves of {search.step_deg:g} degrees, tolerance "
         f"{1e3 * steps.tolerance:.3g} mm; {run.calls} calls of Algorithm 1 from {run.trees} start"
@@ -158,33 +162,6 @@ def _found(problem: Problem, cells: GridCells, search: Search, steps: Steps, run
     )
 
 
-def _starts(
-    problem: Problem, cells: GridCells, search: Search, clock: Clock, start: ArrayLike | None
-) -> Iterator[NDArray[np.float64]]:
-    """Start configurations (n,), as many as the search asks for.
-
-    The start cell is the one in the middle of the list (cell 45 of 90), from where this search
-    touches more cells of the paper's cases than from the first; or the next to it with a start.
-    """
-    if start is not None:
-        yield np.array(start, dtype=float)
-        return
-    robot, task = problem.robot, problem.task
-    points, approaches, _ = task.targets(cells)
-    middle = len(cells) // 2
-    within = np.flatnonzero(_beyond(robot, points) <= 0.0).tolist()
-    for cell in sorted(within, key=lambda cell: abs(cell - middle)):
-        found = 0
-        patience = DRY_SEEDS if cell == middle else FEW_SEEDS
-        for q in starts(robot, points[cell], approaches[cell], task.cone, search.seed, patience):
-            yield q
-            found += 1
-            if found == search.starts:
-                break
-        if found or clock.out_of_time:
-            return
-
-
 def _touched(run: _Run, count: int) -> str:
     """How many cells the best tree touches, for a message."""
     return f"the best tree touches {len(run.best.jcell)} of {count} cells"
@@ -192,13 +169,25 @@ def _touched(run: _Run, count: int) -> str:
 
 def _why_not(run: _Run, steps: Steps, count: int) -> str:
     """What kept the best tree from touching all cells."""
-    if not math.isfinite(steps.sag):
+    usable = steps.usable
+    if not np.isfinite(steps.sag).any():
         return "the motion between J-cells cannot be bounded here (the offset surface folds)"
-    if steps.sag >= steps.tolerance or steps.cone_cosine >= 1.0:
-        return "the step is too coarse for the tolerance or the cone"
+    if not usable.any():
+        return f"the step is too coarse for {steps.allowed}"
     if not run.best.jcell:
         return "no configuration was found over any cell"
-    return _touched(run, count)
+    words, closed = _touched(run, count), count - int(usable.sum())
+    if closed:
+        words += (
+            f"; over {closed} of them, where the surface is creased or bends most, the step is too "
+            f"coarse for {steps.allowed}"
+        )
+    if steps.barred:
+        words += (
+            f"; {len(steps.barred)} pairs of cells on both sides of a crease were left out, "
+            "because no motion is certified to cross it"
+        )
+    return words
 
 
 def _beyond(robot: Robot, points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from coverable_kernels import njit
 from robots import frames
+from surfaces import cell_under
 from surfaces.patches import cell_at, closest_on_patch
 
 HAIR = 1e-12  # [m], [1]: required beyond the task, so that another rounding of the same q agrees
@@ -44,12 +45,22 @@ class Grid(NamedTuple):
     """(n,) greatest offset inside the joint limits."""
     moves_all: bool
     """True: any joints may move at once (3^n - 1 neighbours); False: one of them (2 n)."""
+    side: float
+    """-1.0 inside, +1.0 outside."""
     height: float
     """m, signed height of the tool point over the surface: side sign times standoff."""
-    tolerance: float
-    """m, allowed distance of a J-cell from the offset surface."""
-    cone_cosine: float
-    """Least cosine between approach axis and approach direction; -2 when any angle will do."""
+    tolerance: float | NDArray[np.float64]
+    """m, allowed distance of a J-cell from the offset surface; on triangles (N + 1,), over each
+    cell and over the border of several."""
+    cone_cosine: float | NDArray[np.float64]
+    """Least cosine between approach axis and approach direction, -2 when any angle will do; on
+    triangles likewise (N + 1,)."""
+    approach: NDArray[np.float64]
+    """(3,) the approach direction where it is one for all of the surface; (0,) for its normals."""
+    roll: NDArray[np.float64]
+    """(2,) rad, middle and half width of the range of the roll; half is inf where it is free."""
+    reference: NDArray[np.float64]
+    """(3,) the direction that it is measured from; (0,) for the u direction."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -98,26 +109,46 @@ def _turn(x, y, z, vx, vy, vz, sine, cosine):  # type: ignore[no-untyped-def]
     )
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _facing(side, approach, nx, ny, nz, tool):  # type: ignore[no-untyped-def]
+    """a.b over a place with the normal (nx, ny, nz)."""
+    if approach.shape[0] == 3:
+        return tool[3] * approach[0] + tool[4] * approach[1] + tool[5] * approach[2]
+    return -side * (tool[3] * nx + tool[4] * ny + tool[5] * nz)
+
+
 @njit(cache=True, error_model="numpy")
-def cell_of(patch_kernel, height, tolerance, cosine, tool):  # type: ignore[no-untyped-def]
+def cell_of(patch_kernel, triangles, side, height, tolerance, cosine, approach, tool):  # type: ignore[no-untyped-def]
     """E-cell of a tool point and axis (6,) that satisfy the task constraints; -1 where they do not.
 
-    The paper's eqs. (5) and (7), with a tolerance, and with the angle of its prose: a.b >= cos.
+    The paper's eqs. (5) and (7), with a tolerance, and with the angle of its prose: a.b >= cos. N
+    for what is feasible on the border of several cells.
 
     Args:
-        patch_kernel: a `PatchKernel`.
-        height: m, signed height of the tool point over the surface; of a `Grid`, as the next two.
+        patch_kernel: a `PatchKernel`, or None.
+        triangles: a `TriangleKernel` where there is no patch kernel; else None. What is None is
+            left out by numba.
+        side: -1.0 inside, 1.0 outside; of a `Grid`, as the next four.
+        height: m, signed height of the tool point over the surface.
         tolerance: m.
         cosine: least cosine of the angle between axis and approach direction.
+        approach: (3,) that direction, or (0,).
         tool: (6,) tool point and axis.
     """
-    side = patch_kernel.side_sign
-    u, v, over, nx, ny, nz = closest_on_patch(patch_kernel, tool[0], tool[1], tool[2])
-    if not abs(over - height) <= tolerance - HAIR:
-        return -1
-    if not -side * (tool[3] * nx + tool[4] * ny + tool[5] * nz) >= cosine + HAIR:
-        return -1
-    return cell_at(patch_kernel, u, v)
+    if triangles is not None:
+        cell, over, nx, ny, nz = cell_under(triangles, tool[0], tool[1], tool[2])
+        if cell < 0 or not abs(over - height) <= tolerance[cell] - HAIR:
+            return -1
+        facing = _facing(side, approach, nx, ny, nz, tool)
+        return cell if facing >= cosine[cell] + HAIR else -1
+    if patch_kernel is not None:
+        u, v, over, nx, ny, nz = closest_on_patch(patch_kernel, tool[0], tool[1], tool[2])
+        if not abs(over - height) <= tolerance - HAIR:
+            return -1
+        if not _facing(side, approach, nx, ny, nz, tool) >= cosine + HAIR:
+            return -1
+        return cell_at(patch_kernel, u, v)
+    return -1
 
 
 @njit(cache=True, error_model="numpy")

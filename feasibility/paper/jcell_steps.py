@@ -15,58 +15,126 @@ the tool point and the chord |a - approach direction| leave the values at the tw
 
 so J-cells that keep this margin hold the constraints between them, too. It is small: of the second
 order in the step, where the tolerance is of the first.
+
+That is for closed forms, whose k and b are proved. On any other surface b is not known, and a
+normal that turns by at most k L leaves the straight line between its ends by half of that at most:
+turn = Da / 8 + k L / 2. (Where the approach is one direction, turn = Da / 8.) On a mesh with edges
+of length e the height has a kink over each: its slope changes by k (L + e) at most along a step,
+and never by more than 2, so sag = D / 8 + L / 4 times that. There k is what the triangles of each
+cell have, which is not proved; the replay of the tree judges what comes of it between J-cells.
+Besides, these surfaces are searched on triangles (`surfaces.triangle_kernel`), and how far these
+may be off is taken off too.
+
+Where the roll is limited, a step changes it by (W + k_t L) / cos(cone / 2) at most, with W, the sum
+of s_j, for the tool, and k_t for how fast the frame on the surface turns (`FrameCurves`). So half
+of that is taken off both ends of its range.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.cone import chord_of
 from feasibility.search import Search
+from feasibility.targets import target_curves
 from feasibility.task import Task
 from robots import Robot
-from surfaces.patches import ClosedFormPatch
+from surfaces import Cells, Triangulation, triangulation
+from surfaces.patches import ClosedFormPatch, GridCells
+from surfaces.piecewise import PieceCells
+
+Array = NDArray[np.float64]
 
 TOLERANCE_STEPS = 0.5
 """Default tolerance, in steps times reach: half of what the tool can move in one step."""
+CROSSED = 0.5
+"""[1] of the tolerance or the cone: creases that take more of it are not crossed."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Steps:
-    """Moves between neighbouring J-cells."""
+    """Moves between neighbouring J-cells over N cells."""
 
-    size: NDArray[np.float64]
+    size: Array
     """(n,) delta q, rad; for a prismatic joint the length (m) that angle sweeps at the reach."""
     moves: Literal["single", "all"]
     tolerance: float
     """m, the task's; where it has none, step times reach times `TOLERANCE_STEPS`. The offset
     surface is never met exactly on a grid of joint values (paper, eq. 5)."""
-    sag: float
-    """m, margin for the tool point between J-cells; inf where it cannot be bounded."""
-    turn: float
-    """Margin for |a - approach direction| between J-cells."""
-    cone_cosine: float
-    """Least cosine of the angle between axis and approach direction at a J-cell: -2 where any angle
-    will do, 2 where the cone is too narrow for a step."""
+    sag: Array
+    """(N,) m, margin for the tool point between J-cells; inf where it cannot be bounded."""
+    turn: Array
+    """(N,) margin for |a - approach direction| between J-cells."""
+    cone_cosine: Array
+    """(N,) least cosine of the angle between axis and approach direction at a J-cell: -2 where any
+    angle will do, 2 where the cone is too narrow for a step."""
+    roll: Array
+    """(2,) rad, middle and half width of the range of the roll at a J-cell, with a margin between
+    J-cells taken off; half is inf where the roll is free."""
+    triangles: Triangulation | None
+    """What is searched in place of the surface; None for closed forms."""
+    barred: frozenset[tuple[int, int]]
+    """Pairs of cells, the lower first, on both sides of a crease that no motion is certified to
+    cross: the place that the tool is over would jump, by more than the tolerance."""
+
+    @property
+    def allowed(self) -> str:
+        """What a step may be too coarse for, in words."""
+        roll = np.isfinite(self.roll[1])
+        return "the tolerance, the cone or the roll" if roll else "the tolerance or the cone"
+
+    @property
+    def usable(self) -> NDArray[np.bool_]:
+        """(N,) cells over which some J-cell may be feasible: step and surface leave room."""
+        room = (self.sag < self.tolerance) & (self.cone_cosine < 1.0)
+        return np.asarray(room & bool(self.roll[1] > 0.0))
 
     @staticmethod
-    def of(robot: Robot, surface: ClosedFormPatch, task: Task, search: Search) -> Steps:
-        """The steps of a search."""
+    def of(robot: Robot, cells: Cells, task: Task, search: Search) -> Steps:
+        """The steps of a search.
+
+        Raises:
+            SurfaceError: nothing is known of the surface between its places.
+        """
         step = math.radians(search.step_deg)
         reach = _extent(robot)
         size = np.where(robot.prismatic, step * reach, step)
         tolerance = TOLERANCE_STEPS * step * reach if task.tolerance is None else task.tolerance
-        sag, turn = _margins(robot, surface, task, size, tolerance, search.moves == "all")
-        chord = chord_of(task.cone) - turn
-        cosine = 1.0 - 0.5 * chord * chord if chord > 0.0 else 2.0
+        bends = _bends(robot, size, search.moves == "all")
+        height = cells.surface.side_sign * task.standoff
+        triangles = None
+        if isinstance(cells, GridCells) and isinstance(cells.surface, ClosedFormPatch):
+            both = _margins_of_patch(cells.surface, bends, height, tolerance)
+            sags, turns = (np.full(len(cells), margin) for margin in both)
+        else:
+            by_u = task.roll is not None and task.roll_reference is None
+            triangles = triangulation(cells, height, tolerance, tangents=by_u)
+            sags, turns = _margins_of_triangles(triangles, bends)
+        jump, bend, barred = _creases(cells, task, tolerance)
+        sags, turns = sags + jump, turns + bend
+        if task.fixed_approach(cells) is not None:
+            turns = np.full(len(cells), bends.axis / 8.0)
+        chord = chord_of(task.cone) - turns
+        cosine = np.where(chord > 0.0, 1.0 - 0.5 * np.minimum(chord, 4.0) ** 2, 2.0)
         if task.cone_deg >= 180.0:
-            cosine = -2.0
-        return Steps(size, search.moves, tolerance, sag, turn, cosine)
+            cosine = np.full(len(cells), -2.0)
+        off = 0.0 if triangles is None else 2.0 * (triangles.turn + triangles.swerve)
+        roll = _roll(cells, task, bends, off)
+        return Steps(size, search.moves, tolerance, sags, turns, cosine, roll, triangles, barred)
+
+
+class _Bends(NamedTuple):
+    """Bounds along a step: |p''|, |a''| and |p'|, and by how much the tool turns."""
+
+    point: float
+    axis: float
+    length: float
+    turning: float
 
 
 def _extent(robot: Robot) -> float:
@@ -76,15 +144,8 @@ def _extent(robot: Robot) -> float:
     return float(np.linalg.norm(robot.chain.translations[1:], axis=1).sum())
 
 
-def _margins(
-    robot: Robot,
-    surface: ClosedFormPatch,
-    task: Task,
-    size: NDArray[np.float64],
-    tolerance: float,
-    together: bool,
-) -> tuple[float, float]:
-    """Sag (m) and turn between J-cells, as in the module's docstring."""
+def _bends(robot: Robot, size: Array, together: bool) -> _Bends:
+    """D (m), Da, L (m) and W of the module's docstring; inf on a rail without end."""
     prismatic = robot.prismatic
     stroke = np.where(prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
     links = np.linalg.norm(robot.chain.translations[1:], axis=1)
@@ -96,11 +157,69 @@ def _margins(
     point = size * np.where(prismatic, 2.0 * before, lever * (size + 2.0 * before))
     axis = angle * (angle + 2.0 * before)
     total = np.sum if together else np.max
-    d, da, length = float(total(point)), float(total(axis)), float(total(reach * size))
-    bounds = surface.bounds(surface.side_sign * task.standoff, tolerance)
+    return _Bends(*(float(total(part)) for part in (point, axis, reach * size, angle)))
+
+
+def _margins_of_patch(
+    surface: ClosedFormPatch, bends: _Bends, height: float, tolerance: float
+) -> tuple[float, float]:
+    """Sag (m) and turn between J-cells over a closed form."""
+    d, da, length, _ = bends
+    bounds = surface.bounds(height, tolerance)
     if not math.isfinite(d + bounds.curvature + bounds.bend):
         return math.inf, math.inf  # the offset surface folds, or a rail has no end
     return (
         (d + bounds.curvature * length**2) / 8.0,
         (da + bounds.bend * length**2 + bounds.curvature * d) / 8.0,
     )
+
+
+def _margins_of_triangles(triangles: Triangulation, bends: _Bends) -> tuple[Array, Array]:
+    """(N,) sag (m) and turn between J-cells over triangles, and what these may be off."""
+    d, da, length, _ = bends
+    k, edge = triangles.curvature, triangles.edge
+    if not math.isfinite(d):
+        return np.full(len(k), math.inf), np.full(len(k), math.inf)
+    bent = k * length**2 / 8.0
+    if edge > 0.0:
+        bent = np.minimum(k * (length + edge), 2.0) * length / 4.0
+    return (
+        d / 8.0 + bent + triangles.off,
+        da / 8.0 + k * length / 2.0 + triangles.turn,
+    )
+
+
+def _roll(cells: Cells, task: Task, bends: _Bends, off: float) -> Array:
+    """(2,) rad, see `Steps.roll`; `off` is how far the roll may be by normals and frames."""
+    if task.roll is None:
+        return np.array([0.0, np.inf])
+    frames = target_curves(cells, task).frames
+    turning = np.zeros(0) if frames is None else frames.curvature
+    by_metre = float(turning[np.isfinite(turning)].max(initial=0.0))
+    rate = (bends.turning + by_metre * bends.length) / math.cos(0.5 * task.cone)
+    return np.array([task.roll.middle, task.roll.half - 0.5 * rate - off])
+
+
+def _creases(
+    cells: Cells, task: Task, tolerance: float
+) -> tuple[float, float, frozenset[tuple[int, int]]]:
+    """How far targets (m) and normals jump over seams, and the pairs over those where they cannot.
+
+    There it is more than half of the tolerance, or of the cone.
+    """
+    if not isinstance(cells, PieceCells):
+        return 0.0, 0.0, frozenset()
+    sharp, least = set[tuple[int, int]](), 0.0
+    for seam in cells.surface.seams:
+        chord = 2.0 * math.sin(0.5 * seam.crease)
+        if chord * task.standoff > CROSSED * tolerance or chord > CROSSED * task.cone_chord:
+            sharp.add(seam.pieces)
+        else:
+            least = max(least, chord)
+    owner = np.sort(cells.piece[cells.pairs], axis=1)
+    barred = (
+        (i, j)
+        for (i, j), pieces in zip(cells.pairs.tolist(), owner.tolist(), strict=True)
+        if tuple(pieces) in sharp
+    )
+    return least * task.standoff, least, frozenset(barred)

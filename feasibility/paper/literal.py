@@ -22,12 +22,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_errors import ArgumentError
+from feasibility.paper.exact_rolls import rolls_at
 from feasibility.paper.jcell_grid import HAIR
 from feasibility.paper.jcell_steps import Steps
+from feasibility.paper.starts import candidates
+from feasibility.search import Search
 from feasibility.task import Task
 from robots import Kinematics, Robot
 from surfaces import Cells
 
+Array = NDArray[np.float64]
 JCell = tuple[int, ...]
 """A J-cell, by its offsets from the one at the start, in steps of delta q."""
 
@@ -51,7 +56,17 @@ class Continuity:
 
 
 class LiteralSearch:
-    """Algorithms 1 and 2 for one arm, one surface cut into E-cells, and one first J-cell."""
+    """Algorithms 1 and 2 for one arm, one surface cut into E-cells, and one first J-cell.
+
+    Example:
+        >>> from robots import load_robot
+        >>> from surfaces import plane
+        >>> cells = plane((0.5, 0.6), (0.0, 0.1), side="outside").cells(2, 2)
+        >>> search = Search(method="greedy", step_deg=2.0)
+        >>> literal = LiteralSearch.of(load_robot("ur5"), cells, Task(0.1, 30), search)
+        >>> literal.algorithm_2().exists_feasible_path(len(cells))
+        True
+    """
 
     def __init__(
         self, robot: Robot, cells: Cells, task: Task, start: ArrayLike, steps: Steps
@@ -67,13 +82,36 @@ class LiteralSearch:
                 constraints between two J-cells too.
         """
         self.start = np.array(start, dtype=float)
-        self.robot, self.cells, self.steps = robot, cells, steps
-        self.height = cells.surface.side_sign * task.standoff
-        self.targets = task.targets(cells).points
+        self.robot, self.cells, self.task, self.steps = robot, cells, task, steps
+        self.targets, self.b = task.targets(cells).points, task.fixed_approach(cells)
         self.kinematics = Kinematics(robot)
         self.found = Continuity()
 
-    def q(self, jc: JCell) -> NDArray[np.float64]:
+    @staticmethod
+    def of(
+        robot: Robot, cells: Cells, task: Task, search: Search, start: ArrayLike | None = None
+    ) -> LiteralSearch:
+        """The search that `check` makes compiled: its delta q, margins, and first start.
+
+        Args:
+            robot, cells, task: see `check`.
+            search: step and moves; a cap is not known here.
+            start: (n,) q of jc_1, rad or m; without it the arm's, or one over the middle cell.
+
+        Raises:
+            ArgumentError: no start was found over any cell.
+        """
+        start = robot.start if start is None else start
+        steps = Steps.of(robot, cells, task, search)
+        found = candidates(robot, cells, task, search, steps.usable) if start is None else [start]
+        for q in found:
+            literal = LiteralSearch(robot, cells, task, q, steps)
+            if start is not None or literal.ecell((0,) * robot.n)[0] >= 0:
+                literal.found = Continuity()
+                return literal
+        raise ArgumentError("no start was found over any cell; give one")
+
+    def q(self, jc: JCell) -> Array:
         """The configuration (n,) of a J-cell."""
         return np.asarray(self.start + np.array(jc) * self.steps.size)
 
@@ -92,23 +130,27 @@ class LiteralSearch:
             moves = ((0, 1, -1)[number // 3**i % 3] for i in range(n))
             yield tuple(offset + move for offset, move in zip(jc, moves, strict=True))
 
-    def ecell(self, jc: JCell) -> tuple[int, NDArray[np.float64]]:
+    def ecell(self, jc: JCell) -> tuple[int, Array]:
         """The E-cell of a J-cell by forward kinematics, and p (3,) m; -1 where it is not feasible.
 
-        A J-cell is feasible where it satisfies the joint limits, eq. (5) and inequality (7).
+        A J-cell is feasible where it satisfies the joint limits, eq. (5) and inequality (7), and
+        eq. (6) where the roll is limited.
         """
-        q, steps = self.q(jc), self.steps
+        q, task, steps, cells = self.q(jc), self.task, self.steps, self.cells
         if (q < self.robot.lower).any() or (q > self.robot.upper).any():
             return -1, np.full(3, np.nan)
         self.found.checked += 1
         p, a = self.kinematics.tool(q)
-        below = self.cells.surface.closest(p)
-        b = -self.cells.surface.side_sign * below.normal
-        on_manifold = abs(float(below.height) - self.height) <= steps.tolerance - steps.sag - HAIR
-        in_cone = float(a @ b) >= steps.cone_cosine + HAIR
-        if not (on_manifold and in_cone):
-            return -1, p
-        return int(self.cells.locate(p[None])[0]), p
+        ec = int(cells.locate(p[None])[0])
+        below, side, b = cells.surface.closest(p), cells.surface.side_sign, self.b
+        b = -side * below.normal if b is None else b
+        error = abs(float(below.height) - side * task.standoff)
+        feasible = error <= steps.tolerance - steps.sag[ec] - HAIR  # eq. (5)
+        feasible &= float(a @ b) >= steps.cone_cosine[ec] + HAIR  # inequality (7)
+        if feasible and task.roll is not None:  # eq. (6)
+            off = task.roll.off(rolls_at(self.kinematics, cells, task, q[None]))
+            feasible = abs(float(off[0])) <= steps.roll[1] - HAIR
+        return (ec if feasible else -1), p
 
     def algorithm_1(self, jc: JCell, ec_T: int) -> tuple[JCell, ...]:
         """Continuity check in joint space between neighbouring E-cells.
@@ -125,9 +167,7 @@ class LiteralSearch:
         _, p = self.ecell(jc)
         return self.CONT(jc, p, ec_T, checked)
 
-    def CONT(
-        self, jc: JCell, p: NDArray[np.float64], ec_T: int, checked: set[JCell]
-    ) -> tuple[JCell, ...]:
+    def CONT(self, jc: JCell, p: Array, ec_T: int, checked: set[JCell]) -> tuple[JCell, ...]:
         """The procedure of Algorithm 1; as deep as Python's recursion goes, so keep cells small."""
         p_T = self.targets[ec_T]
         for jc_N in self.neighbouring_jcells(jc):
@@ -165,7 +205,7 @@ class LiteralSearch:
         ec, _ = self.ecell(jc)
         for ec_N in self.cells.neighbours.of(ec).tolist():
             edge = frozenset((ec, ec_N))
-            if edge in G:
+            if edge in G or (min(edge), max(edge)) in self.steps.barred:
                 continue
             path = self.algorithm_1(jc, ec_N)
             self.found.calls.append((ec, ec_N, bool(path)))

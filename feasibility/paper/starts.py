@@ -18,7 +18,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.clock import Clock
+from feasibility.search import Search
+from feasibility.task import Targets, Task
 from robots import Kinematics, Robot
+from surfaces import Cells
+from surfaces.patches import GridCells
 
 ACCURACY = 1e-9  # [m], [1]: of a start's tool point and axis
 CLOSE = 1e-3  # [rad], [m]: configurations nearer than this are taken as one
@@ -27,6 +32,7 @@ LONGEST_STEP = 0.5  # [rad], [m]: of one joint, per Newton step
 STRIDE = 0.2  # [rad], [m]: of one joint, per step of a self-motion
 STRIDES = 60  # at most, in one self-motion
 DRY_SEEDS = 40  # random configurations in a row that bring nothing new, before the search ends
+FEW_SEEDS = 10  # random configurations to try over each cell once the middle one had no start
 MOST_STARTS = 32  # windings of joints with several turns make branches without end
 
 
@@ -34,13 +40,20 @@ class StartProjection:
     """The configurations that hold the tool at one target: projection onto it, motion along it."""
 
     def __init__(
-        self, robot: Robot, point: NDArray[np.float64], approach: NDArray[np.float64], cone: float
+        self,
+        robot: Robot,
+        point: NDArray[np.float64],
+        approach: NDArray[np.float64],
+        cone: float,
+        reference: NDArray[np.float64] | None = None,
     ) -> None:
         """Configurations of `robot` with the tool at `point` (3,) m, its axis at `approach` (3,).
 
-        The `cone` is the angle (rad) by which the axis may deviate where it cannot be aligned.
+        The `cone` is the angle (rad) by which the axis may deviate where it cannot be aligned;
+        `reference` (3,) is where the TCP's reference axis has to point beside it, if anywhere.
         """
         self._kinematics = Kinematics(robot)
+        self._reference, self._own_reference = reference, robot.reference_axis
         self._point, self._approach = point, approach
         self._cone_cosine = float(np.cos(0.98 * cone))  # starts keep off the cone's boundary
         self._lower, self._upper = robot.lower, robot.upper
@@ -55,9 +68,15 @@ class StartProjection:
         point_rows, axis_rows = self._kinematics.jacobians(q)
         error = self._point - point
         if align:
+            off, rows = [self._approach - axis], [axis_rows]
+            if self._reference is not None:
+                across = self._kinematics.rotation(q) @ self._own_reference
+                turns = self._kinematics.twists(q[None])[0, 3:]
+                off.append(self._reference - across)
+                rows.append(np.cross(turns, across, axis=0))
             return (
-                np.concatenate([error, self._length * (self._approach - axis)]),
-                np.vstack([point_rows, self._length * axis_rows]),
+                np.concatenate([error, *(self._length * part for part in off)]),
+                np.vstack([point_rows, *(self._length * part for part in rows)]),
             )
         short = self._cone_cosine - self._approach @ axis
         if short <= 0.0:
@@ -139,6 +158,7 @@ def starts(
     cone: float,
     seed: int = 0,
     patience: int = DRY_SEEDS,
+    reference: NDArray[np.float64] | None = None,
 ) -> Iterator[NDArray[np.float64]]:
     """Configurations (n,) over one target, one per distinct branch, as they are found.
 
@@ -149,10 +169,12 @@ def starts(
         cone: angle (rad) the tool axis may deviate from it.
         seed: of the random configurations.
         patience: random configurations to try before the first is found.
+        reference: (3,) where the TCP's reference axis points in all of them; None for anywhere.
     """
-    projection, window = StartProjection(robot, point, approach, cone), _window(robot)
+    projection = StartProjection(robot, point, approach, cone, reference)
+    window = _window(robot)
     middle = window.mean(axis=0)  # of the limits; zero for endless joints
-    for align in (True, False):
+    for align in (True, False) if reference is None else (True,):
         rng = np.random.default_rng(seed)
         found: list[NDArray[np.float64]] = []
         left = patience
@@ -170,6 +192,59 @@ def starts(
                 yield q
         if found:
             return
+
+
+def candidates(
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    search: Search,
+    usable: NDArray[np.bool_],
+    clock: Clock | None = None,
+) -> Iterator[NDArray[np.float64]]:
+    """Start configurations (n,) over the start cell, as many as the search asks for.
+
+    The start cell of a grid is the one in the middle of the list (cell 45 of 90), from where this
+    search touches more cells of the paper's cases than from the first; elsewhere the one nearest to
+    the middle of the surface. Where it has no start, the next to it that has some.
+
+    Args:
+        robot, cells, task, search: see `check`.
+        usable: (N,) cells that may be the start cell.
+        clock: when to give up.
+    """
+    targets = task.targets(cells)
+    away = np.abs(np.arange(len(cells)) - len(cells) // 2).astype(float)
+    if not isinstance(cells, GridCells) and len(cells):
+        away = np.linalg.norm(cells.centres - cells.centres[cells.middle], axis=1)
+    order = np.argsort(away, kind="stable")
+    within = usable & (robot.distance_from_base(targets.points) <= robot.reach)
+    for number, cell in enumerate(order):
+        if not within[cell]:
+            continue
+        found, patience = 0, FEW_SEEDS if number else DRY_SEEDS
+        aim = targets.points[cell], targets.approaches[cell], task.cone, search.seed, patience
+        for reference in _references(task, targets, int(cell)):
+            if found:
+                break
+            for q in starts(robot, *aim, reference):
+                yield q
+                found += 1
+                if found == search.starts:
+                    break
+        if found or (clock is not None and clock.out_of_time):
+            return
+
+
+def _references(task: Task, targets: Targets, cell: int) -> tuple[NDArray[np.float64] | None, ...]:
+    """Where the TCP's reference axis may point at the start: at the middle roll, or else anywhere.
+
+    Anywhere alone where the roll is free.
+    """
+    if task.roll is None or targets.references is None:
+        return (None,)
+    t, b, psi = targets.references[cell], targets.approaches[cell], task.roll.middle
+    return (np.cos(psi) * t + np.sin(psi) * np.cross(b, t), None)
 
 
 def _window(robot: Robot) -> NDArray[np.float64]:

@@ -96,12 +96,12 @@ def tree_walk(verdict: Verdict) -> Walk | None:
     """
     if verdict.tree is None or verdict.start is None:
         return None
-    q = _corners(_there_and_back(verdict.tree, verdict.start))
+    q = corners(there_and_back(verdict.tree, verdict.start))
     return Walk(q=q, cell=_at_centres(verdict, q))
 
 
-def _there_and_back(tree: nx.DiGraph, root: int) -> NDArray[np.float64]:
-    """(k, n) the tree's configurations depth first, up to the last cell; rad or m."""
+def there_and_back(tree: nx.DiGraph, root: int) -> NDArray[np.float64]:
+    """(k, n) one motion along the tree depth first, up to the last cell; rad or m."""
     import networkx as nx
 
     parts: list[NDArray[np.float64]] = [np.atleast_2d(tree.nodes[root]["q"])]
@@ -114,7 +114,7 @@ def _there_and_back(tree: nx.DiGraph, root: int) -> NDArray[np.float64]:
     return np.concatenate(parts[: max(last, 1)])
 
 
-def _corners(q: NDArray[np.float64]) -> NDArray[np.float64]:
+def corners(q: NDArray[np.float64]) -> NDArray[np.float64]:
     """The rows of q (k, n) where the motion turns: equal moves in a row are one straight line."""
     if len(q) < 3:
         return q

@@ -1,24 +1,30 @@
 """Replay of the greedy search's paths by Pinocchio, J-cell by J-cell.
 
 Nothing of the search is used here: tool points come from Pinocchio, not from the compiled chain,
-and what is checked are the paper's definitions.
+and what is checked are the paper's definitions, on the surface itself.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification import replay_over_surface
 from feasibility.cone import angle_of
+from feasibility.paper.exact_rolls import approaches_at, rolls_at
 from feasibility.paper.jcell_steps import Steps
+from feasibility.paper.tree_and_graph import corners, there_and_back
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.verdict import Certificate, Replay, Verdict
 from robots import Kinematics, Robot
-from surfaces.patches import GridCells, closed_form_grid
+from surfaces import Cells
+from surfaces.patches import GridCells
+
+Array = NDArray[np.float64]
 
 SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one number meet
 
@@ -34,15 +40,18 @@ class Path:
 
 
 def replay_tree(
-    robot: Robot, cells: GridCells, task: Task, steps: Steps, paths: Sequence[Path]
+    robot: Robot, cells: Cells, task: Task, steps: Steps, paths: Sequence[Path]
 ) -> Replay:
     """Check that each path is what the search says: every J-cell, every step, both end cells.
 
     - each step is one J-cell move: of one joint, or of any for all moves;
-    - every J-cell is inside the joint limits, the tolerance, the cone and the patch, with the
-      margin that makes this true between J-cells too;
+    - every J-cell is inside the joint limits, the tolerance, the cone and the surface, and so is
+      the motion between them;
     - a path begins in its cell, where and how that cell was first entered, and ends in the
       neighbour.
+
+    Between J-cells, closed forms have a margin that makes this true; any other surface is judged
+    by the replay of motions over a surface.
 
     The `paths` are the edges of a tree, each after the edge that enters its cell.
     """
@@ -63,12 +72,42 @@ def replay_tree(
     if not margin >= 0.0:
         faults.append(f"a joint passes its limit by {-margin:.3g}")
 
-    points, axes = Kinematics(robot).tools(q)
+    kinematics = Kinematics(robot)
+    points, axes = kinematics.tools(q)
+    begins = _over_cells(cells, points[first], [path.cell for path in paths])
+    ends = _over_cells(cells, points[last], [path.neighbour for path in paths])
+    if not begins.all() or not ends.all():
+        faults.append("a path does not begin or end in the cell it claims")
+    if not _continuous(paths):
+        faults.append("a path does not begin where its cell was entered")
+    roll = None
+    if task.roll is not None:
+        off = task.roll.off(rolls_at(kinematics, cells, task, q))
+        roll = float(np.abs(off).max(initial=0.0))
+        if not roll <= steps.roll[1] + SAME:
+            faults.append("the tool rolls out of its range")
+    if steps.triangles is None:
+        error, angle, more = _by_margins(cells, task, steps, points, axes)
+    else:
+        error, angle, more = _by_surface(robot, cells, task, steps, [] if faults else paths)
+    certificate = Certificate(len(q), error, angle, float(margin))
+    if roll is not None and task.roll is not None:
+        between = task.roll.half - float(steps.roll[1])
+        certificate = replace(certificate, max_roll=roll + between)
+    return Replay(certificate, "; ".join(faults + more))
+
+
+def _by_margins(
+    cells: Cells, task: Task, steps: Steps, points: Array, axes: Array
+) -> tuple[float, float, list[str]]:
+    """Error (m), tilt (rad) and faults of J-cells over a closed form, with the margin between."""
+    faults = []
     closest_point = cells.surface.closest(points)
-    sign = cells.surface.side_sign
-    error = np.abs(closest_point.height - sign * task.standoff).max(initial=0.0) + steps.sag
-    chord = np.linalg.norm(axes + sign * closest_point.normal, axis=1).max(initial=0.0) + steps.turn
-    angle = angle_of(float(chord))
+    sign, approaches = cells.surface.side_sign, approaches_at(cells, task, points)
+    sag, turn = (float(margin.max(initial=0.0)) for margin in (steps.sag, steps.turn))
+    error = float(np.abs(closest_point.height - sign * task.standoff).max(initial=0.0) + sag)
+    chord = float(np.linalg.norm(axes - approaches, axis=1).max(initial=0.0) + turn)
+    angle = angle_of(chord)
     if not closest_point.inside.all():
         faults.append("the tool point leaves the patch")
     if not error <= steps.tolerance:
@@ -77,16 +116,33 @@ def replay_tree(
         )
     if task.cone_deg < 180.0 and not angle <= task.cone:
         faults.append(f"the tool axis tilts {np.degrees(angle):.4f} degrees out of the cone")
+    return error, angle, faults
 
-    at = np.column_stack([closest_point.u, closest_point.v])
-    begins = within_cells(cells, at[first], [path.cell for path in paths])
-    ends = within_cells(cells, at[last], [path.neighbour for path in paths])
-    if not begins.all() or not ends.all():
-        faults.append("a path does not begin or end in the cell it claims")
-    if not _continuous(paths):
-        faults.append("a path does not begin where its cell was entered")
-    certificate = Certificate(len(q), float(error), float(angle), float(margin))
-    return Replay(certificate, "; ".join(faults))
+
+def _by_surface(
+    robot: Robot, cells: Cells, task: Task, steps: Steps, paths: Sequence[Path]
+) -> tuple[float, float, list[str]]:
+    """Error (m), tilt (rad) and faults of one motion along all paths, there and back."""
+    import networkx as nx
+
+    if not paths:
+        return 0.0, 0.0, []
+    tree: nx.DiGraph = nx.DiGraph()
+    tree.add_node(paths[0].cell, q=paths[0].q[0])
+    tree.add_edges_from((path.cell, path.neighbour, {"motion": path.q}) for path in paths)
+    rows = corners(there_and_back(tree, paths[0].cell))
+    used = replace(task, tolerance=steps.tolerance)
+    found = replay_over_surface(robot, cells, used, rows, np.zeros(len(cells), dtype=bool))
+    certificate = found.certificate
+    return certificate.max_position_error, certificate.max_angle, list(map(str, found.faults))
+
+
+def _over_cells(cells: Cells, points: Array, which: Sequence[int]) -> NDArray[np.bool_]:
+    """(k,) whether points (k, 3) m are over the cells (k,)."""
+    if not isinstance(cells, GridCells):
+        return np.asarray(cells.locate(points) == np.asarray(which, dtype=np.int64))
+    found = cells.surface.closest(points)
+    return within_cells(cells, np.column_stack([found.u, found.v]), which)
 
 
 def within_cells(
@@ -122,8 +178,8 @@ def replay_stored(verdict: Verdict, search: Search) -> Replay:
 
     Besides, every cell has to be in its tree.
     """
-    cells = closed_form_grid(verdict.cells)
-    steps = Steps.of(verdict.robot, cells.closed_form, verdict.task, search)
+    cells = verdict.cells
+    steps = Steps.of(verdict.robot, cells, verdict.task, search)
     edges = [] if verdict.tree is None else verdict.tree.edges(data="motion")
     paths = [Path(a, b, motion) for a, b, motion in edges]
     found = replay_tree(verdict.robot, cells, verdict.task, steps, paths)

@@ -1,4 +1,5 @@
-from .closest_point import nearest_of_each as nearest_of_each
+from .face_tree import FaceTree as FaceTree
+from .face_tree import nearest_face as nearest_face
 from .mesh_surface import MeshSurface as MeshSurface
 from .mesh_surface import mesh as mesh
 from .normals import WIDTH as WIDTH

@@ -82,23 +82,6 @@ def nearest_of(corners, middles, radii, some, p, weights):  # type: ignore[no-un
 
 
 @njit(cache=True, error_model="numpy")
-def nearest_of_each(corners, middles, radii, candidates, indptr, points, faces, weights):  # type: ignore[no-untyped-def]
-    """`nearest_of` for points (m, 3), each with its own candidates; fills faces (m,), weights.
-
-    Args:
-        corners: see `nearest_of`, as for middles and radii.
-        candidates: faces of all points, one list behind the other.
-        indptr: (m + 1,) where each list begins.
-        points: (m, 3) m.
-        faces: (m,) receives the nearest face.
-        weights: (m, 3) receives the weights of its nearest point.
-    """
-    for i in range(points.shape[0]):
-        some = candidates[indptr[i] : indptr[i + 1]]
-        faces[i], _ = nearest_of(corners, middles, radii, some, points[i], weights[i])
-
-
-@njit(cache=True, error_model="numpy")
 def _around(pair, members, indptr, near, near_indptr):  # type: ignore[no-untyped-def]
     """Faces of two cells, and of those that touch both: the straight line may cut their corners."""
     cells = np.empty(2 + near_indptr[pair[0] + 1] - near_indptr[pair[0]], dtype=np.int64)

@@ -30,12 +30,12 @@ from surfaces.surface import ClosestPoint, Side, Surface, points_of
 
 if TYPE_CHECKING:
     from surfaces.meshes.cells import MeshCells
+    from surfaces.meshes.face_tree import FaceTree
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 ON = 1e-9  # [1] of the mean edge length: a point so close to a face lies on it
-FIRST_CANDIDATES = 8  # faces tried for each point, before more are tried where these may miss
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,7 +74,7 @@ class MeshSurface(Surface):
         """
         points = points_of(points)
         flat = (points.reshape(-1, 3) - self.position) @ self.rotation
-        face, weights = self._nearest(flat)
+        face, weights = self.face_tree.nearest(flat)
         corners = self.mesh.vertices[self.mesh.faces[face]]
         off = flat - np.einsum("kc,kci->ki", weights, corners)
         normals = self.normals_at(face, weights)
@@ -98,7 +98,7 @@ class MeshSurface(Surface):
 
     def nearest(self, points: Array) -> tuple[Ints, Array]:
         """Faces (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m."""
-        return self._nearest((points - self.position) @ self.rotation)
+        return self.face_tree.nearest((points - self.position) @ self.rotation)
 
     def beside(self, points: Array, face: Ints, weights: Array) -> tuple[Array, Array]:
         """Distances (k,) m of points (k, 3) m from places of faces, and outward directions (k, 3).
@@ -182,6 +182,22 @@ class MeshSurface(Surface):
         return MeshSurface(self.rotation, self.position, self.side, mesh, own, crease)
 
     @cached_property
+    def on_border(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """(F, 3) sides of faces, by the corner across, and corners: those on the mesh's border."""
+        faces, edges = self.mesh.faces, self.mesh.edges
+        sides = np.zeros(faces.shape, dtype=bool)
+        ends = edges.border_vertices[:, None]
+        across = (faces[edges.border_faces][..., None] != ends).all(axis=2)
+        np.logical_or.at(sides, edges.border_faces, across)
+        return sides, np.isin(faces, edges.border_vertices)
+
+    def beyond_border(self, face: Ints, weights: Array) -> NDArray[np.bool_]:
+        """(k,) which places nearest to points lie on the border, so that the points are beyond."""
+        sides, corners = self.on_border
+        off = (weights == 0.0) & sides[face] | (weights == 1.0) & corners[face]
+        return np.asarray(off.any(axis=1))
+
+    @cached_property
     def on_crease(self) -> NDArray[np.bool_]:
         """(F, 3) corners of faces that lie on a crease."""
         return np.asarray((self.corner_normals != self.crease_normals).any(axis=2))
@@ -209,38 +225,11 @@ class MeshSurface(Surface):
         return np.ascontiguousarray(corners), middles, radii
 
     @cached_property
-    def _tree(self) -> Any:
-        """The middles of the faces, for queries of neighbours."""
-        from scipy.spatial import cKDTree
+    def face_tree(self) -> FaceTree:
+        """The faces in the own frame, for whoever asks which is nearest."""
+        from surfaces.meshes.face_tree import FaceTree
 
-        return cKDTree(self.face_balls[1])
-
-    def _nearest(self, points: Array) -> tuple[Ints, Array]:
-        """Nearest face (k,) and weights (k, 3) of its nearest point, of points in the own frame."""
-        from surfaces.meshes.closest_point import nearest_of_each
-
-        faces = np.full(len(points), -1, dtype=np.int64)
-        weights = np.full((len(points), 3), np.nan)
-        left, wanted = np.flatnonzero(np.isfinite(points).all(axis=1)), FIRST_CANDIDATES
-        corners, middles, radii = self.face_balls
-        while len(left):
-            wanted = min(wanted, len(middles))
-            away, some = self._tree.query(points[left], k=wanted)
-            away, some = away.reshape(len(left), wanted), some.reshape(len(left), wanted)
-            found, at = np.empty(len(left), dtype=np.int64), np.empty((len(left), 3))
-            indptr = np.arange(len(left) + 1) * wanted
-            nearest_of_each(
-                corners, middles, radii, some.astype(np.int64).ravel(), indptr, points[left],
-                found, at,
-            )  # fmt: skip
-            faces[left], weights[left] = found, at
-            spot = np.einsum("kc,kci->ki", at, corners[found])
-            # A face that was not tried is at least this far off.
-            least = away[:, -1] - radii.max()
-            sure = np.linalg.norm(points[left] - spot, axis=1) <= least
-            left = left[~sure] if wanted < len(middles) else left[:0]
-            wanted *= 2
-        return faces, weights
+        return FaceTree.of(self.face_balls[0])
 
     def __repr__(self) -> str:
         """One line."""

@@ -1,10 +1,11 @@
+from .closed_form_kernels import PatchKernel as PatchKernel
 from .closed_form_kernels import cell_at as cell_at
 from .closed_form_kernels import closest_on_patch as closest_on_patch
+from .closed_form_kernels import u_direction as u_direction
 from .cone import cone as cone
 from .cylinder import cylinder as cylinder
 from .ellipsoid import ellipsoid as ellipsoid
 from .grid_cells import GridCells as GridCells
-from .grid_cells import closed_form_grid as closed_form_grid
 from .grid_cells import grid_counts as grid_counts
 from .hyperboloid import hyperboloid as hyperboloid
 from .nurbs import bspline as bspline

@@ -171,6 +171,22 @@ def closest_on_patch(patch, x, y, z):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
+def u_direction(patch, u, v):  # type: ignore[no-untyped-def]
+    """(x, y, z), the unit direction in the root frame in which u grows at u, v (rad or m)."""
+    a, b, c = -math.sin(u), math.cos(u), 0.0
+    if patch.code == SPHERE:
+        a, b, c = math.cos(u) * math.cos(v), math.cos(u) * math.sin(v), -math.sin(u)
+    elif patch.code == PLANE:
+        a, b = 1.0, 0.0
+    r = patch.rotation
+    return (
+        r[0] * a + r[1] * b + r[2] * c,
+        r[3] * a + r[4] * b + r[5] * c,
+        r[6] * a + r[7] * b + r[8] * c,
+    )
+
+
+@njit(cache=True, error_model="numpy")
 def on_patch(patch, u, v):  # type: ignore[no-untyped-def]
     """True where u and v (rad or m, as `closest_on_patch` wraps them) lie in the patch's ranges."""
     (u0, v0), (u1, v1) = patch.low, patch.high

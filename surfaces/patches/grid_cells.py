@@ -16,7 +16,7 @@ from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Finer, Triangles, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.patches.patch import ClosedFormPatch, Patch
-from surfaces.surface import SurfaceError, max_principal_curvature
+from surfaces.surface import max_principal_curvature
 
 if TYPE_CHECKING:
     from surfaces.patches.closed_form_kernels import PatchKernel
@@ -25,7 +25,6 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 DIFFERENCE = 1e-4  # [1], share of a patch: step of differences
-CLOSED_FORM_KINDS = "a sphere, cylinder, hyperboloid or plane"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -132,21 +131,13 @@ class GridCells(Cells):
         """The cell in the middle row and column."""
         return self.index(self.shape[0] // 2, self.shape[1] // 2)
 
-    @property
-    def closed_form(self) -> ClosedFormPatch:
-        """The patch, for the greedy search.
-
-        Raises:
-            SurfaceError: the patch is of a kind that its compiled loops do not know.
-        """
-        if not isinstance(self.surface, ClosedFormPatch):
-            raise _no_closed_form(self.surface.kind)
-        return self.surface
-
     @cached_property
-    def patch_kernel(self) -> PatchKernel:
-        """What compiled loops of the greedy search need of these cells; see `closed_form`."""
-        return self.closed_form.patch_kernel(*self.shape)
+    def patch_kernel(self) -> PatchKernel | None:
+        """What compiled loops need of these cells; None for kinds that they know no formulas of."""
+        surface = self.surface
+        if not isinstance(surface, ClosedFormPatch):
+            return None
+        return surface.patch_kernel(*self.shape)
 
     def index(self, i: int, j: int) -> int:
         """Flat index of the cell in row i (u) and column j (v).
@@ -260,25 +251,6 @@ class GridCells(Cells):
     def __repr__(self) -> str:
         """One line: how many cells of what."""
         return f"Cells({self.shape[0]} x {self.shape[1]} of {self.surface!r})"
-
-
-def closed_form_grid(cells: Cells) -> GridCells:
-    """The cells, for the greedy search.
-
-    Raises:
-        SurfaceError: they are no grid on a patch that its compiled loops know.
-    """
-    if not isinstance(cells, GridCells) or not isinstance(cells.surface, ClosedFormPatch):
-        raise _no_closed_form(cells.surface.kind)
-    return cells
-
-
-def _no_closed_form(kind: str) -> SurfaceError:
-    """The error for a surface that the greedy search does not know."""
-    return SurfaceError(
-        f"the greedy search works on {CLOSED_FORM_KINDS} only, not on a {kind}; use "
-        'search.method = "complete"'
-    )
 
 
 def _bin(values: Array, limits: tuple[float, float], count: int) -> Ints:

@@ -1,7 +1,7 @@
 """Patch: a surface with parameters u and v, in ranges; and the two families of its kinds.
 
-A `ClosedFormPatch` has formulas in compiled loops, which the paper's greedy search needs; any other
-is a `SmoothPatch`, with formulas in NumPy or a search for closest points.
+A `ClosedFormPatch` has formulas in compiled loops, which make the paper's greedy search quick; any
+other is a `SmoothPatch`, with formulas in NumPy or a search for closest points.
 """
 
 from __future__ import annotations

@@ -9,15 +9,17 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from surfaces.meshes import WIDTH, MeshSurface
 from surfaces.places.places import Array, Ints
 
+if TYPE_CHECKING:
+    from surfaces.meshes import FaceTree
+
 SLICES = 4  # of the strip along a crease
-FIRST_CANDIDATES = 8  # triangles tried for each point, before more are tried where these may miss
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,47 +55,19 @@ class OffsetTriangles:
         return OffsetTriangles(np.ascontiguousarray(corners), face, weight)
 
     @cached_property
-    def _balls(self) -> tuple[Array, Array]:
-        """Middles (G, 3) and radii (G,) of the triangles, m."""
-        middles = self.corners.mean(axis=1)
-        return middles, np.linalg.norm(self.corners - middles[:, None], axis=2).max(axis=1)
+    def _tree(self) -> FaceTree:
+        from surfaces.meshes import FaceTree  # compiled: loaded when it is needed
 
-    @cached_property
-    def _tree(self) -> Any:
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self._balls[0])
+        return FaceTree.of(self.corners)
 
     def nearest(self, points: Array) -> tuple[Ints, Array]:
         """Faces (k,) and weights (k, 3) under the points nearest to `points` (k, 3) m.
 
         -1 and NaN for points that are not finite.
         """
-        from surfaces.meshes import nearest_of_each  # compiled: loaded when it is needed
-
-        faces = np.full(len(points), -1, dtype=np.int64)
-        weights = np.full((len(points), 3), np.nan)
-        left, wanted = np.flatnonzero(np.isfinite(points).all(axis=1)), FIRST_CANDIDATES
-        middles, radii = self._balls
-        while len(left):
-            wanted = min(wanted, len(middles))
-            away, some = self._tree.query(points[left], k=wanted)
-            away, some = away.reshape(len(left), wanted), some.reshape(len(left), wanted)
-            found, at = np.empty(len(left), dtype=np.int64), np.empty((len(left), 3))
-            indptr = np.arange(len(left) + 1) * wanted
-            nearest_of_each(
-                self.corners, middles, radii, some.astype(np.int64).ravel(), indptr,
-                np.ascontiguousarray(points[left]), found, at,
-            )  # fmt: skip
-            spot = np.einsum("kc,kci->ki", at, self.corners[found])
-            faces[left] = self.face[found]
-            weights[left] = np.einsum("kc,kcj->kj", at, self.weights[found])
-            # A triangle that was not tried is at least this far off.
-            least = away[:, -1] - radii.max()
-            sure = np.linalg.norm(points[left] - spot, axis=1) <= least
-            left = left[~sure] if wanted < len(middles) else left[:0]
-            wanted *= 2
-        return faces, weights
+        found, at = self._tree.nearest(points)
+        face = np.where(found >= 0, self.face[found], -1)
+        return face, np.einsum("kc,kcj->kj", at, self.weights[found])
 
 
 def _slices(flagged: int) -> Array:

@@ -126,7 +126,7 @@ def test_every_stored_path_replays(name: str, moves: str) -> None:
     verdict = verdict_of(name, moves)
     robot, cells, task = verdict.robot, verdict.cells, verdict.task
     search = Search(method="greedy", moves=moves, step_deg=STEP_DEG[moves])
-    steps = Steps.of(robot, cells.surface, task, search)
+    steps = Steps.of(robot, cells, task, search)
     kinematics = Kinematics(robot)
     stored = [(a, b, d["motion"]) for a, b, d in verdict.tree.edges(data=True)]
     for a, b, _ in stored:

@@ -205,8 +205,10 @@ class MeshCells(Cells):
         return local @ self.surface.rotation.T + self.surface.position
 
     def locate(self, points: ArrayLike) -> Ints:
-        """See `Cells.locate`."""
-        return self.labels[self.surface.nearest(points_of(points))[0]]
+        """See `Cells.locate`; beyond the border of the mesh there is no cell."""
+        face, weights = self.surface.nearest(points_of(points))
+        off = (face < 0) | self.surface.beyond_border(face, weights)
+        return np.where(off, -1, self.labels[face])
 
     def borders(self, samples: int = 8) -> Array:
         """See `Cells.borders`: the edges between faces of different cells, and the mesh's own."""

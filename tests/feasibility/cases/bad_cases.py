@@ -453,11 +453,6 @@ BAD_CASES = {
     "no faces": more("mesh", "faces = []", "faces", "an array of whole numbers"),
     "faces negative": more("mesh", "faces = [0, -1]", "faces[1]", "got -1"),
     "faces beyond reason": more("mesh", f"faces = [{2**70}]", "faces[0]", "whole number >= 0"),
-    "greedy on a mesh": Bad(
-        surface(SURFACES["mesh"]) + '[search]\nmethod = "greedy"\n',
-        "search.method",
-        ("hyperboloid or plane only", 'use "complete"'),
-    ),
     # task
     "standoff missing": changed("standoff = 0.005\n", "", "task.standoff", "is missing"),
     "standoff negative": changed("0.005", "-0.005", "task.standoff", ">= 0"),

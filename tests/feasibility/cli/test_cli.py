@@ -143,7 +143,6 @@ def test_the_greedy_search_can_be_asked_for(ask):
         "radius NaN",
         "misspelt kind",
         "missing mesh",
-        "greedy on a mesh",
     ],
 )
 def test_a_bad_case_is_status_2_and_one_message(name, ask, tmp_path):

@@ -88,9 +88,6 @@ def test_a_cell_of_a_mesh_is_one_index(ask, tmp_path):
 def test_a_mesh_may_stay_undecided_or_be_misread(ask, tmp_path):
     case = mesh_case(tmp_path)
     assert ask("check", case, "--set", "search.time_limit=1e-9")[0] == 3
-    status, out, err = ask("check", case, "--set", "search.method=greedy")
-    assert (status, out) == (2, "")
-    assert "search.method" in err
     status, out, err = ask("check", case, "--set", "surface.cells=[3, 4]")
     assert (status, out, "a whole number in 1 .. 20,000" in err) == (2, "", True)
 

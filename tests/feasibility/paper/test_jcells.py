@@ -126,7 +126,7 @@ def test_gantry_over_a_plane(tmp_path: Path, moves: str) -> None:
     assert verdict.statistics["capped"] == 0
     assert verdict.certificate is not None
     assert verdict.certificate.max_angle == 0.0
-    step = Steps.of(arm, cells.surface, Task(0.05, 30), greedy(step_deg=0.2)).size
+    step = Steps.of(arm, cells, Task(0.05, 30), greedy(step_deg=0.2)).size
     np.testing.assert_allclose(step, math.radians(0.2) * arm.reach)
 
 
@@ -145,7 +145,7 @@ def reference(
 ) -> tuple[str, list[tuple[int, ...]], int]:
     """Algorithm 1 from the paper's text: recursion, a set of checked J-cells, Pinocchio."""
     kinematics = Kinematics(robot)
-    steps = Steps.of(robot, cells.surface, task, search)
+    steps = Steps.of(robot, cells, task, search)
     p_target = task.targets(cells).points[target]
     sign = cells.surface.side_sign
     n = robot.n
@@ -164,8 +164,8 @@ def reference(
         closest_point = cells.surface.closest(point)
         error = abs(float(closest_point.height) - sign * task.standoff)
         good = (
-            error <= steps.tolerance - steps.sag
-            and -sign * float(closest_point.normal @ axis) >= steps.cone_cosine
+            error <= steps.tolerance - steps.sag[0]
+            and -sign * float(closest_point.normal @ axis) >= steps.cone_cosine[0]
             and bool(closest_point.inside)
         )
         nu, nv = cells.shape

@@ -1,0 +1,104 @@
+"""The paper's search beside the complete one, over random surfaces of every kind before a UR5.
+
+What the greedy search calls feasible its replay has accepted, so no proof may say otherwise; and a
+tree over all cells that its replay refuses would be a margin that is too small.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from feasibility import Answer, Evidence, Search, Task, check, greedy_check
+from feasibility.paper.literal import LiteralSearch
+from robots import load_robot
+from surfaces import (
+    Cells,
+    bspline,
+    cone,
+    ellipsoid,
+    mesh,
+    piecewise,
+    plane,
+    revolution,
+    sphere,
+    torus,
+)
+from surfaces.meshes import TriangleMesh
+
+ARM = load_robot("ur5")
+KINDS = ("torus", "cone", "ellipsoid", "revolution", "bspline", "piecewise", "mesh", "creased mesh")
+
+
+def cells_of(kind: str, rng: np.random.Generator) -> Cells:
+    """Cells of a random surface of a kind, somewhere in front of the arm."""
+    position = rng.uniform((0.35, -0.3, -0.2), (0.55, 0.3, 0.2)).tolist()
+    pose = {"side": "outside", "position": position}
+    axes, height = rng.uniform(0.15, 0.4, 3).tolist(), 0.08 * rng.normal(size=(3, 3))
+    if kind == "torus":
+        return torus(0.25, rng.uniform(0.08, 0.15), (-50, 50), (50, 130), **pose).cells(4, 5)
+    if kind == "cone":
+        return cone(0.3, rng.uniform(-0.5, 0.5), (-40, 40), (0.0, 0.3), **pose).cells(4, 5)
+    if kind == "ellipsoid":
+        return ellipsoid(axes, (0, 60), (0, 360), **pose).cells(4, 5)
+    if kind == "revolution":
+        profile = [(0.0, 0.2), (0.1, rng.uniform(0.15, 0.19)), (0.2, 0.1), (0.25, 0.0)]
+        return revolution(profile, (0, 360), **pose).cells(4, 5)
+    if kind == "bspline":
+        places = np.stack(np.meshgrid([0.0, 0.2, 0.4], [-0.2, 0.0, 0.2], indexing="ij"), axis=-1)
+        net = np.concatenate([places, height[..., None]], axis=-1).tolist()
+        return bspline(net, degree=(2, 2), **pose).cells(4, 5)
+    if kind == "piecewise":
+        bands = [sphere(0.4, polar, (-60, 60)) for polar in ((10, 30), (30, 50))]
+        halves = [
+            plane((-0.2, 0.0), (-0.2, 0.2)),
+            plane((0.0, 0.2), (-0.2, 0.2), rpy_deg=(0, rng.uniform(-15, 15), 0)),
+        ]
+        return piecewise(bands if rng.random() < 0.5 else halves, **pose).cells((2, 3))
+    u, v = np.meshgrid(np.linspace(0, 0.3, 16), np.linspace(-0.15, 0.15, 16), indexing="ij")
+    z = 0.04 * rng.normal() * np.sin(9 * u) * np.cos(8 * v)
+    if kind == "creased mesh":
+        z = np.tan(np.radians(rng.uniform(-30, 30))) * np.minimum(u, 0.3 - u)
+    corner = (16 * np.arange(15)[:, None] + np.arange(15)).ravel()
+    faces = np.concatenate([
+        np.column_stack([corner, corner + 16, corner + 17]),
+        np.column_stack([corner, corner + 17, corner + 1]),
+    ])  # fmt: skip
+    points = np.stack([u, v, z], axis=-1).reshape(-1, 3)
+    return mesh(TriangleMesh(points, faces), **pose).cells(count=16)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", KINDS)
+def test_greedy_beside_complete(kind: str, seed: int) -> None:
+    rng = np.random.default_rng([seed, *map(ord, kind)])
+    cells = cells_of(kind, rng)
+    limited = {} if rng.random() < 0.5 else {"roll_deg": (-60, 60), "roll_reference": (0.2, 1, 0.1)}
+    tolerance = [None, 1e-3, 3e-3][seed % 3]
+    task = Task(rng.uniform(0.003, 0.03), rng.uniform(15, 45), tolerance, **limited)
+    search = Search(
+        method="greedy",
+        step_deg=float(rng.choice([0.1, 0.3])),
+        moves=str(rng.choice(["single", "all"])),  # type: ignore[arg-type]
+        cap=2000,
+        starts=3,
+    )
+    greedy = greedy_check(ARM, cells, task, search)
+    assert greedy.answer is not Answer.UNDECIDED, greedy.message
+    complete = check(ARM, cells, task, Search(time_limit=60.0))
+    print(kind, seed, greedy.n_covered, complete.n_covered, len(cells), complete.answer)
+    if greedy.feasible:
+        assert complete.evidence is not Evidence.PROOF, complete.message
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_both_readings_agree_on_the_tree(kind: str) -> None:
+    """The first cells of each kind, at a coarse step: the same cells as printed."""
+    rng = np.random.default_rng([99, *map(ord, kind)])
+    cells = cells_of(kind, rng)
+    task, search = Task(0.01, 45), Search(method="greedy", step_deg=1.0, starts=1)
+    literal = LiteralSearch.of(ARM, cells, task, search)
+    compiled = greedy_check(ARM, cells, task, search, start=literal.start)
+    found = literal.algorithm_2()
+    assert compiled.statistics["capped"] == 0
+    assert {(a, b) for b, a in found.T.items() if a is not None} == set(compiled.tree.edges)
