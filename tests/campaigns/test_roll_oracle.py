@@ -1,0 +1,84 @@
+"""100 random planes with a fixed orientation or a range of rolls, against closed-form kinematics.
+
+The oracle looks at straight ways between centres with the axis along the normal, and at rolls on a
+grid. With limits a little narrower what it covers can be covered; with limits a little wider, what
+it does not can not, up to what a cone of half a degree and the tolerance allow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from roll_oracle import Poses, Question, covered, puma, ur5
+
+from feasibility import Answer, Search, Task, check, verify
+from feasibility.verdict import Evidence
+from robots import Kinematics, load_robot
+from surfaces import plane
+
+SLACK = np.radians(2.0)
+COUNT = 50  # of each arm
+FIXED_DEG = 0.5
+
+
+def question(arm, seed):
+    """(robot, cells, task, question) at random."""
+    rng = np.random.default_rng([seed, len(arm)])
+    robot = load_robot(arm)
+    near, far = (0.3, 0.7) if arm == "ur5" else (0.5, 1.0)
+    angle, out = rng.uniform(-np.pi, np.pi), rng.uniform(near, far)
+    size = rng.uniform(0.05, 0.25) * (1.0 if arm == "ur5" else 1.5)
+    place = (out * np.cos(angle), out * np.sin(angle), rng.uniform(-0.1, 0.4))
+    turn = (*rng.uniform(-25, 25, 2), rng.uniform(-180, 180))
+    patch = plane((-size, size), (-size, size), position=place, rpy_deg=turn, side="outside")
+    middle = rng.uniform(-180, 180)
+    half = FIXED_DEG if rng.random() < 0.6 else rng.uniform(2.0, 12.0)
+    task = Task(0.005, FIXED_DEG, roll_deg=(middle - half, middle + half))
+    limits = {}
+    for j in rng.choice(robot.n, rng.integers(0, 4), replace=False):
+        width = rng.uniform(1.5, 4.5)
+        centre = rng.uniform(-1.5, 1.5)
+        low, high = max(robot.lower[j], centre - width / 2), min(robot.upper[j], centre + width / 2)
+        if low < high:
+            limits[robot.joint_names[j]] = (low, high)
+    robot, cells = robot.with_limits(limits), patch.cells(4, 4)
+    targets = task.targets(cells)
+    axis, reference = targets.approaches[0], targets.references[0]
+    # What the cone allows is not the oracle's; of the range of rolls it looks at all but that.
+    rolls = tuple(np.radians([middle - half + FIXED_DEG, middle + half - FIXED_DEG]))
+    rolls = rolls if half > 1.0 else (np.radians(middle),) * 2
+    return robot, cells, task, Question(robot, targets.points, cells.pairs, axis, reference, rolls)
+
+
+@pytest.mark.parametrize("arm", ["ur5", "puma560"])
+def test_the_oracle_knows_every_configuration(arm):
+    rng, robot = np.random.default_rng(1), load_robot(arm)
+    kinematics, solve = Kinematics(robot), ur5 if arm == "ur5" else puma
+    tool = robot.model.frames[robot.tool_frame_id].placement.rotation
+    for _ in range(60):
+        q = rng.uniform(-3.0, 3.0, robot.n)
+        point, _ = kinematics.tool(q)
+        frame = kinematics.joints(q[None]).rotations[0, -1] @ tool
+        found = solve(robot, Poses(point[None], frame[None]))
+        apart = np.abs((found - q + np.pi) % (2 * np.pi) - np.pi).max(axis=1)
+        assert apart.min() < 1e-6
+        assert len(found) <= 8
+        frames = kinematics.joints(found).rotations[:, -1] @ tool
+        assert np.abs(frames - frame).max() < 1e-7
+        assert np.abs(kinematics.tools(found)[0] - point).max() < 1e-7
+
+
+@pytest.mark.parametrize("seed", range(COUNT))
+@pytest.mark.parametrize("arm", ["ur5", "puma560"])
+def test_verdicts_agree_with_closed_form_kinematics(arm, seed):
+    robot, cells, task, asked = question(arm, seed)
+    verdict = check(robot, cells, task, Search(seed=0))
+    narrower, wider = covered(asked, -SLACK), covered(asked, SLACK)
+    if verdict.feasible:
+        assert wider == len(cells), (wider, verdict.message)
+        assert verify(verdict).holds
+    if verdict.answer is Answer.INFEASIBLE:
+        assert narrower < len(cells), (narrower, verdict.message)
+        if verdict.evidence is Evidence.PROOF:
+            assert covered(asked, 0.0) < len(cells)
+    assert verdict.answer is not Answer.UNDECIDED, verdict.message
