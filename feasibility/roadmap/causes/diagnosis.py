@@ -1,10 +1,11 @@
 """Why a cell is missed: which constraint must be relaxed for the arm to cover it, and by how much.
 
-For a cell that no component reaches three relaxed problems are solved, each by Newton from random
+For a cell that no component reaches four relaxed problems are solved, each by Newton from random
 starts and a descent on the constraint that was dropped:
 
-- joint limits and cone dropped: how near does the tool point get?   -> out of reach, by how much
-- only the cone dropped: how small does the angle get?               -> orientation, which angle
+- limits, cone and roll dropped: how near does the tool point get?   -> out of reach, by how much
+- cone and roll dropped: how small does the angle get?               -> orientation, which angle
+- only the range of the roll dropped: at which rolls can the arm be there?   -> orientation
 - only the limits dropped: how little does a joint have to pass its limit?  -> which joint, how far
 
 Where dropping either the cone or the limits would be enough, the cause is the cone if the tool
@@ -26,43 +27,27 @@ from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.causes.collision import blocked, colliding
 from feasibility.roadmap.causes.disconnection import disconnected
+from feasibility.roadmap.causes.relaxed import STARTS, solve, with_cone
+from feasibility.roadmap.causes.roll import other_rolls
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions import (
     NEXT,
-    PROJECTION_STEPS,
     SearchArrays,
-    Work,
     cholesky_solve,
     connect,
     look_at,
     place,
-    project_onto_cell,
+    with_free_roll,
 )
 from feasibility.roadmap.search import evenly
 from feasibility.verdict import Cause, CauseKind
 from robots import Kinematics, Robot, jacobians
 
-STARTS = 16  # Newton starts for each relaxed problem
 MOST_EXAMINED = 400  # cells that are diagnosed one by one
 ENOUGH = 5  # solutions among which the least violation is taken
 UNPROVED = "not proved: off its target, within the tolerance, the tool point may do better"
 MOST_DECIMALS = 6
-
-
-def _solve(
-    arrays: SearchArrays, work: Work, cell: int, guesses: NDArray[np.float64],
-    solutions: NDArray[np.float64],
-) -> int:  # fmt: skip
-    """Fill `solutions` with configurations of a relaxed problem over one cell; returns how many."""
-    found = 0
-    for guess in guesses:
-        solutions[found] = guess
-        if project_onto_cell(arrays, work, cell, solutions[found], PROJECTION_STEPS):
-            found += 1
-            if found == len(solutions):
-                break
-    return found
 
 
 @kernel
@@ -118,11 +103,6 @@ def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
     return best
 
 
-def _within(arrays: SearchArrays, cone_chord: float) -> SearchArrays:
-    """The same arrays with another cone, for one cell's centre: no curve deviates there."""
-    return arrays._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord)
-
-
 def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
     """q with each revolute joint at the winding that passes its limits least."""
     best, least = q, np.full(robot.n, np.inf)
@@ -162,15 +142,15 @@ def _smallest_angle(exploration: Exploration, relaxed: SearchArrays, cell: int) 
     """Smallest angle (rad) between tool axis and approach direction with the point reached."""
     approach = relaxed.approaches[cell]
     found = np.empty((STARTS, exploration.robot.n))
-    count = _solve(relaxed, exploration.work, cell, exploration.guesses(2 * STARTS), found)
+    count = solve(relaxed, exploration.work, cell, exploration.guesses(2 * STARTS), found)
     _, axes = Kinematics(exploration.robot).tools(found[:count])
     chords = [float(np.linalg.norm(axis - approach)) for axis in axes]
     low, high = 0.0, 2.0 * np.arcsin(min(0.5 * min(chords, default=2.0), 1.0))
     # Bisect on the cone: is there a configuration inside a narrower one?
     for _ in range(9):
         middle = 0.5 * (low + high)
-        narrowed = _within(relaxed, 2.0 * np.sin(0.5 * middle))
-        if _solve(narrowed, exploration.work, cell, exploration.guesses(STARTS), _one(exploration)):
+        narrowed = with_cone(relaxed, 2.0 * np.sin(0.5 * middle))
+        if solve(narrowed, exploration.work, cell, exploration.guesses(STARTS), _one(exploration)):
             high = middle
         else:
             low = middle
@@ -236,13 +216,13 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
         lower=np.where(revolute, -np.inf, robot.lower),
         upper=np.where(revolute, np.inf, robot.upper),
     )
-    slack_cone = _within(arrays, np.inf)
-    anything = _within(unlimited, np.inf)
+    slack_cone = with_free_roll(with_cone(arrays, np.inf))
+    anything = with_free_roll(with_cone(unlimited, np.inf))
     guesses = exploration.guesses(STARTS)
     if not arrays.cone_chord > 0.0 and not proved:
         detail = "a cone of 0 degrees leaves no margin in which a motion could be certified"
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
-    if not _solve(anything, work, cell, guesses, _one(exploration)):
+    if not solve(anything, work, cell, guesses, _one(exploration)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
         away = float(robot.distance_from_base(arrays.points[cell]))
         reach = robot.reach
@@ -258,13 +238,17 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
             "tool point there"
         )
         return Cause(cell, CauseKind.OUT_OF_REACH, proved, detail)
-    found = _solve(unlimited, work, cell, guesses, solutions)
+    found = solve(unlimited, work, cell, guesses, solutions)
     past = ""
     if found:
         past = _past_limits(
             robot, _nearest_to_limits(exploration, unlimited, cell, solutions[:found])
         )
-    if _solve(slack_cone, work, cell, guesses, _one(exploration)):
+    rolls = other_rolls(exploration, cell)
+    if rolls:
+        detail = f"{rolls}; or {past}" if past else rolls
+        return Cause(cell, CauseKind.ORIENTATION, proved, detail)
+    if solve(slack_cone, work, cell, guesses, _one(exploration)):
         angle = np.degrees(_smallest_angle(exploration, slack_cone, cell))
         alpha = np.degrees(2.0 * np.arcsin(min(0.5 * arrays.cone_chord, 1.0)))
         if angle <= alpha and not proved:
@@ -276,7 +260,7 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
             detail += f"; or {past}"
         return Cause(cell, CauseKind.ORIENTATION, proved, detail)
     if not past:
-        found = _solve(anything, work, cell, guesses, solutions)
+        found = solve(anything, work, cell, guesses, solutions)
         past = _past_limits(
             robot, _nearest_to_limits(exploration, anything, cell, solutions[:found])
         )

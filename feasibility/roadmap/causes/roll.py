@@ -1,0 +1,70 @@
+"""Where the range of the roll alone prevents a cell: at which rolls the arm has it."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.rolls import reference_axes
+from feasibility.roadmap.causes.relaxed import STARTS, solve, with_cone
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions import with_free_roll
+from feasibility.roll import Roll, roll_of
+from robots import Kinematics
+
+MANY = 32  # configurations whose rolls are looked at
+GAP = np.radians(15.0)  # between neighbouring rolls of one range
+HALVINGS = 9  # of the way from the range to the nearest roll that was seen
+
+
+def other_rolls(exploration: Exploration, cell: int) -> str:
+    """The nearest rolls at which the arm has the cell, in words; empty where others prevent it."""
+    arrays, work = exploration.arrays, exploration.work
+    middle, half = arrays.roll.tolist()
+    if not half < np.inf:
+        return ""
+    free = with_cone(with_free_roll(arrays), arrays.cone_chord)
+    q = np.empty((MANY, exploration.robot.n))
+    count = solve(free, work, cell, exploration.guesses(4 * MANY), q)
+    off = np.sort(_off_middle(exploration, cell, q[:count]))
+    if not count or np.abs(off).min() <= half:
+        return ""
+    nearest = float(off[np.argmin(np.abs(off))])
+    one, low, high = np.empty((1, exploration.robot.n)), half, abs(nearest)
+    for _ in range(HALVINGS):
+        tried = 0.5 * (low + high)
+        wider = free._replace(roll=np.array([middle, tried]))
+        if solve(wider, work, cell, exploration.guesses(STARTS), one):
+            found = float(_off_middle(exploration, cell, one)[0])
+            nearest = found if half < abs(found) < abs(nearest) else nearest
+            high = min(tried, abs(nearest))
+        else:
+            low = tried
+    ends = sorted((nearest, _far_end(off, nearest)))
+    first, last, least, most = (
+        f"{np.degrees(middle + end):.1f}".removesuffix(".0") for end in (*ends, -half, half)
+    )
+    where = f"from {first} to {last} deg" if first != last else f"at {first} deg"
+    return f"roll: could be had {where}; {least} to {most} deg are allowed"
+
+
+def _off_middle(exploration: Exploration, cell: int, q: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(k,) rad, rolls of configurations (k, n) over a cell, from the middle of the range."""
+    arrays, robot = exploration.arrays, exploration.robot
+    _, axes = Kinematics(robot).tools(q)
+    at = np.ones((len(q), 1))
+    rolls = roll_of(
+        reference_axes(robot, q), axes, at * arrays.references[cell], at * arrays.approaches[cell]
+    )
+    return Roll(float(arrays.roll[0]), 0.0).off(rolls)
+
+
+def _far_end(off: NDArray[np.float64], nearest: float) -> float:
+    """The furthest of rolls (k,) that follow the nearest one without a gap."""
+    beyond = np.sort(np.abs(off[np.sign(off) == np.sign(nearest)]))
+    end = abs(nearest)
+    for roll in beyond[beyond > end]:
+        if roll - end > GAP:
+            break
+        end = float(roll)
+    return float(np.copysign(end, nearest))
