@@ -243,7 +243,7 @@ def critical_cone(
         if good <= below + 1:
             return case.task.cone_deg
         return min(last_true(holds, good, below) * CONE_STEP_DEG, case.task.cone_deg)
-    widest = round(180.0 / CONE_STEP_DEG)
+    widest = round((180.0 if own.roll is None else 90.0) / CONE_STEP_DEG)
     failed = max(below, math.floor(case.task.cone_deg / CONE_STEP_DEG))
     if failed >= widest or not holds(widest):
         return None

@@ -7,6 +7,8 @@ it does not can not, up to what a cone of half a degree and the tolerance allow.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from roll_oracle import Poses, Question, covered, puma, ur5
@@ -82,3 +84,15 @@ def test_verdicts_agree_with_closed_form_kinematics(arm, seed):
         if verdict.evidence is Evidence.PROOF:
             assert covered(asked, 0.0) < len(cells)
     assert verdict.answer is not Answer.UNDECIDED, verdict.message
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("arm", ["ur5", "puma560"])
+def test_a_wider_range_never_covers_less(arm, seed):
+    robot, cells, task, _ = question(arm, seed)
+    low, high = task.roll_deg
+    wider = replace(task, roll_deg=(low - 5.0, high + 5.0))
+    free = replace(task, roll_deg=None)
+    answers = [check(robot, cells, one, Search(seed=0)).answer for one in (task, wider, free)]
+    feasible = [answer is Answer.FEASIBLE for answer in answers]
+    assert feasible == sorted(feasible), answers
