@@ -7,10 +7,7 @@ from dataclasses import replace
 import pytest
 from bad_cases import GOOD
 
-from coverable_errors import ArgumentError
-from feasibility import Search, check
 from feasibility.cases import Case, CaseError
-from feasibility.checking import greedy_check
 from feasibility.problem import Problem
 from robots import load_robot
 from surfaces import sphere
@@ -35,21 +32,6 @@ def test_a_reference_that_shows_nothing_is_a_fault_of_the_case():
         CaseError, match=r"task.roll_reference: the direction is along the approach"
     ):
         case.build()
-
-
-def test_the_greedy_search_refuses_what_it_would_pass_over():
-    robot, cells = load_robot("puma560"), sphere(1.0, (10, 90), (10, 180)).cells(2, 2)
-    task = Case.from_toml(GOOD).task
-    for change, said in (
-        ({"roll_deg": (-5, 5)}, "limits of the roll"),
-        ({"approach": (0, 0, 1)}, "no"),
-    ):
-        for ask in (
-            lambda t: check(robot, cells, t, Search("greedy")),
-            lambda t: greedy_check(robot, cells, t),
-        ):
-            with pytest.raises(ArgumentError, match=f"the greedy search knows no .*{said}"):
-                ask(replace(task, **change))
 
 
 def test_the_search_keeps_to_a_little_less_of_the_range():
