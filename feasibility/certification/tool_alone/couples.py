@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 
 from feasibility.certification.collisions import Piece, piece_of, sheet_piece
 from feasibility.certification.tool_alone.erosion import eroded
-from feasibility.collisions import Bodies, HalfSpace
+from feasibility.collisions import Bodies, HalfSpace, Obstacle
 from robots import Robot
-from robots.shapes import Triangles
+from robots.shapes import Solid, Triangles
 from robots.urdf import Box, Capsule, Cylinder
 
 Array = NDArray[np.float64]
@@ -20,6 +21,7 @@ Array = NDArray[np.float64]
 SLACK = 1e-5  # [m] more than coal is off
 SLABS = 4  # that long shapes of the tool are cut into
 LEAST = 1e-6  # [m] left of a shape, that coal is asked about
+KEPT = 64  # bodies that are remembered, with what is left of them
 
 
 class Body:
@@ -100,13 +102,11 @@ def couples_of(robot: Robot, bodies: Bodies, axis: Array) -> list[Couple]:
     moving, still = dict[str, list[Body]](), dict[str, list[tuple[Body, float]]]()
     for solid in bodies.solids:
         if solid.joint == int(frame.parentJoint):
-            parts = _parts(solid.geometry, solid.placement, tip)
-            moving.setdefault(solid.owner, []).extend(parts)
+            moving.setdefault(solid.owner, []).extend(_parts(solid, tuple(tip.tolist())))
         elif solid.joint == 0:
-            body = Body(solid.geometry, solid.placement)
-            still.setdefault(solid.owner, []).append((body, 0.0))
+            still.setdefault(solid.owner, []).append((_at_rest(solid), 0.0))
     for thing in bodies.scene:
-        still[thing.name] = [(Body(thing.geometry, thing.placement), 0.0)]
+        still[thing.name] = [(_at_rest(thing), 0.0)]
     for soup in bodies.soups:
         if soup.owner not in still:
             sheet = sheet_piece(soup.triangles, soup.closed)
@@ -123,11 +123,21 @@ def couples_of(robot: Robot, bodies: Bodies, axis: Array) -> list[Couple]:
     return found
 
 
-def _parts(shape: Any, placement: Array, tip: Array) -> list[Body]:
+@lru_cache(maxsize=KEPT)
+def _at_rest(thing: Solid | Obstacle) -> Body:
+    """A body that does not move."""
+    return Body(thing.geometry, thing.placement)
+
+
+@lru_cache(maxsize=KEPT)
+def _parts(solid: Solid, tip: tuple[float, ...]) -> list[Body]:
     """A shape in slabs across its longest side, or a mesh as it is and in groups of triangles."""
+    shape: Any = solid.geometry
+    placement = solid.placement
     if isinstance(shape, Triangles):
         whole = Body(shape, placement)
-        return [whole, *(Body(None, placement, part) for part in _groups(whole.whole, tip))]
+        groups = _groups(whole.whole, np.array(tip))
+        return [whole, *(Body(None, placement, part) for part in groups)]
     axis, length = 2, getattr(shape, "length", 0.0)
     if isinstance(shape, Box):
         axis, length = int(np.argmax(shape.size)), max(shape.size)

@@ -9,6 +9,7 @@ where they are exact, and only the exact distance is bounded further on.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +66,7 @@ def _of_primitive(shape: object, x: Array) -> Array:
     return np.asarray(outside + np.minimum(past.max(axis=-1), 0.0))
 
 
+@lru_cache(maxsize=64)
 def _of_mesh(mesh: Triangles) -> Distance:
     """Of a solid its inside too, as far as it is known."""
     near, planes = distance_from_triangles(mesh.vertices[mesh.faces]), face_planes(mesh)

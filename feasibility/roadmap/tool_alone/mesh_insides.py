@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 FLUSH = 1e-9  # [1] of the widest side: a vertex may stand out of a face's plane as far
 SOLID = 1e-6  # [1] of the widest side cubed: what encloses less is flat
-MOST_FACES = 4_000  # of a mesh that balls are laid into
+MOST_FACES = 3_000  # of a mesh that balls are laid into
 ACROSS = 9  # places along each side of the box around a mesh, where balls may have their centres
 BALLS = 40
 ROUNDING = 1e-9  # [m] that a ball is smaller than its distance from the faces

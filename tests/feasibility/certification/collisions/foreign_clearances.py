@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from itertools import pairwise
 
 import fcl
@@ -15,6 +16,7 @@ from robots.urdf import Box, Capsule, Cylinder, Sphere
 DEEP = 20.0  # m, a box in place of a half space
 
 
+@lru_cache(maxsize=256)
 def fcl_model(geometry):
     """One shape for fcl; its tree of triangles for a mesh."""
     match geometry:
