@@ -47,7 +47,8 @@ class Problem:
             *others,
         )
         check_references(cells, task)
-        return cls(robot, cells, task, task)
+        asked = task_over(cells, task)
+        return cls(robot, cells, asked, asked)
 
     @property
     def bodies(self) -> Bodies | None:
@@ -86,12 +87,21 @@ class Problem:
         return f"{words}, at a roll of {low:g} to {high:g} deg"
 
 
+def task_over(cells: Cells, task: Task) -> Task:
+    """The task without collisions with a surface where there is none: between poses."""
+    collision = task.collision
+    if collision is None or not (cells.surface.bare and collision.surface):
+        return task
+    return replace(task, collision=collision.without_surface)
+
+
 def _cells_wanted(given: object) -> str:
     """What the cells should be, for whom gave a surface that is not cut, or a function."""
     if callable(given):
         return (
-            "a surface cut into cells; a surface of your own formula is given by points of it, "
-            "bspline(points).cells(9, 10), or by triangles, mesh(triangles).cells(100)"
+            "a surface cut into cells; a function g(u, v) of your own becomes one by "
+            "parametric(g, u=(0, 1), v=(0, 1)).cells(9, 10), triangles by "
+            "mesh(triangles).cells(100)"
         )
     how = {"mesh": "count=100", "piecewise": "[(3, 4), (3, 4)]"}
     kind = given.kind if isinstance(given, Surface) else ""

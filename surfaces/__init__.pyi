@@ -6,6 +6,9 @@ from .cells import Cells as Cells
 from .cells import Finer as Finer
 from .cells import Triangles as Triangles
 from .curve_fitting import fit_directions as fit_directions
+from .fitted import grid as grid
+from .fitted import parametric as parametric
+from .fitted import read_grid as read_grid
 from .meshes import MeshSurface as MeshSurface
 from .meshes import cut_box as cut_box
 from .meshes import cut_plane as cut_plane
@@ -13,7 +16,9 @@ from .meshes import faces_within_cone as faces_within_cone
 from .meshes import mesh as mesh
 from .meshes import take_faces as take_faces
 from .parts import SurfaceParts as SurfaceParts
+from .patches import LocalClosestPoints as LocalClosestPoints
 from .patches import Patch as Patch
+from .patches import SmoothPatch as SmoothPatch
 from .patches import bspline as bspline
 from .patches import cone as cone
 from .patches import cylinder as cylinder
@@ -21,6 +26,7 @@ from .patches import ellipsoid as ellipsoid
 from .patches import hyperboloid as hyperboloid
 from .patches import plane as plane
 from .patches import read_net as read_net
+from .patches import rectangle_areas as rectangle_areas
 from .patches import revolution as revolution
 from .patches import sphere as sphere
 from .patches import torus as torus
@@ -32,6 +38,9 @@ from .surface import Surface as Surface
 from .surface import SurfaceError as SurfaceError
 from .surface import max_principal_curvature as max_principal_curvature
 from .surface import rotation_from_rpy as rotation_from_rpy
+from .toolpaths import PoseCells as PoseCells
+from .toolpaths import poses as poses
+from .toolpaths import read_poses as read_poses
 from .triangle_kernel import TriangleKernel as TriangleKernel
 from .triangle_kernel import cell_under as cell_under
 from .triangle_kernel import u_direction_under as u_direction_under

@@ -91,6 +91,11 @@ class Cells(Protected, ABC):
         return None
 
     @property
+    def in_order(self) -> bool:
+        """Whether they have to be visited in their order, never going back: a toolpath."""
+        return False
+
+    @property
     @abstractmethod
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""

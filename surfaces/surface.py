@@ -79,6 +79,16 @@ class Surface(Protected, ABC):
         return ()
 
     @property
+    def deviations(self) -> tuple[float, float]:
+        """How far points (m) and normals (1) may be from those of the surface meant, at most."""
+        return (0.0, 0.0)
+
+    @property
+    def bare(self) -> bool:
+        """Whether there is nothing but the courses between cells, and so no surface to look at."""
+        return False
+
+    @property
     def mean_edge_length(self) -> float:
         """m, typical length of a mesh's edges; 0 where the surface is smooth."""
         return 0.0

@@ -31,7 +31,9 @@ robots.shapes
 surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
 surfaces.patches.nurbs
+surfaces.fitted
 surfaces.piecewise
+surfaces.toolpaths
 surfaces.meshes: triangle_mesh normals closest_point face_tree facets mesh_parts
 surfaces.meshes.repair
 surfaces.meshes.files
@@ -50,7 +52,7 @@ feasibility.certification: faults kinematic_bounds
 feasibility.certification.collisions
 feasibility.certification.tool_alone
 feasibility.certification.rolls
-feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region lever_bounds linear_models motion_replay parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
+feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region lever_bounds linear_models motion_replay order parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
 feasibility.paper
 feasibility.cases
 feasibility.roadmap.motions
@@ -60,7 +62,9 @@ feasibility.roadmap.cuts
 feasibility.roadmap.tool_alone
 feasibility.roadmap: bridging expansion exploration proving search seeding
 feasibility.roadmap.causes
-feasibility.roadmap: between_rounds complete graph_g outcome refinement walk warmup
+feasibility.roadmap: walk
+feasibility.roadmap.forward
+feasibility.roadmap: between_rounds complete graph_g outcome refinement warmup
 feasibility: checking
 feasibility.paths
 feasibility.timing

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import MISSING, alternatives, shown
+from feasibility.cases.given_files import build_grid, read_given
 from feasibility.cases.keys import kinds, own_keys
 from feasibility.cases.table_reader import (
     DEG,
@@ -34,7 +35,7 @@ PATCHES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         kind: {key.name: key.argument for key in own_keys(kind).values() if key.name != "file"}
         for kind in kinds()
-        if kind not in ("piecewise", "mesh")
+        if kind not in ("piecewise", "mesh", "poses")
     }
 )
 """The keys of each kind of patch, and the arguments of its constructor that they stand for."""
@@ -46,6 +47,8 @@ CLOSED_FORM_KINDS = ("sphere", "cylinder", "hyperboloid", "plane")
 
 def read_patch(section: Section, kind: str) -> dict[str, Any]:
     """The values of a kind's own keys, as they are written."""
+    if kind == "grid":
+        return read_given(section, kind)
     values = section.take(*PATCHES[kind])
     file = section.text("file") if kind == "bspline" else None
     if file is not None:
@@ -87,6 +90,8 @@ def build_patch(
     """
     import surfaces
 
+    if kind == "grid":
+        return build_grid(values, pose, place)
     file = values.get("file")
     arguments = {
         argument: values.get(key, MISSING)
@@ -124,7 +129,7 @@ def try_patch(
     """Keep what building a patch would say; where a file would be read, its pose alone."""
     from surfaces import check_pose
 
-    if "file" in values:
+    if "file" in values or kind == "grid":
         section.make(check_pose, pose)
     elif section.is_table:
         try:
@@ -160,6 +165,6 @@ def foreign_keys(kind: str) -> dict[str, str]:
 
 def _a(kind: str) -> str:
     """The kind with its article."""
-    if kind == "piecewise":
-        return "a piecewise surface"
+    if kind in ("piecewise", "poses"):
+        return "a piecewise surface" if kind == "piecewise" else "poses"
     return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from coverable_errors import MISSING, Fault, alternatives, close, shown
+from feasibility.cases.given_files import KINDS, UNITS, build_poses, check_side, read_given
 from feasibility.cases.mesh_keys import build_mesh, cut_mesh, read_count, read_mesh_keys
 from feasibility.cases.surface_keys import (
     MOST_CELLS,
@@ -30,8 +31,8 @@ if TYPE_CHECKING:
 
 MOST_PIECES = 200  # as `surfaces.piecewise` has it
 OWN_FORMULA = (
-    "a surface of your own formula r(u, v) is given by points of it, as a bspline, or by "
-    "triangles, as a mesh"
+    "a surface of your own formula g(u, v) is given by points of it, as a grid, by triangles, as a "
+    "mesh, or in Python by surfaces.parametric(g, u, v)"
 )
 
 
@@ -152,7 +153,7 @@ class SurfacePart:
     """The kind's own keys, in the units of the case; arrays as tuples, paths absolute."""
     cells: tuple[int, int] | int | None
     """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given; None
-    for pieces, which have their own."""
+    for pieces, which have their own, and for poses, each of which is one."""
     side: Literal["inside", "outside"] = "inside"
     position: Triple = ORIGIN
     rpy_deg: Triple = ORIGIN
@@ -199,6 +200,8 @@ class SurfacePart:
             return build_mesh(self.values, pose)
         if self.kind == "piecewise":
             return build_pieces(self.values, pose)
+        if self.kind == "poses":
+            return build_poses(self.values, pose).surface
         return build_patch(self.kind, self.values, pose)
 
     def cut(self) -> Cells:
@@ -207,6 +210,9 @@ class SurfacePart:
         Raises:
             CaseError: there is no such surface, or it cannot be cut so.
         """
+        if self.kind == "poses":
+            pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
+            return build_poses(self.values, pose)
         surface = self.build()
         if self.kind == "mesh":
             count = cast("int | None", self.cells)
@@ -237,7 +243,11 @@ def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
     hints = foreign_keys(kind)
     if kind == "piecewise":
         hints["cells"] = "is given for each piece; write cells = [3, 4] in each of surface.pieces"
+    if kind == "poses":
+        hints["cells"] = "is not needed: each pose is a cell; leave it out"
     section.refuse_others(hints)
+    if kind in KINDS:
+        check_side(section, kind)
     if kind in PATCHES:
         try_patch(section, kind, values, pose)
     else:
@@ -268,10 +278,14 @@ def faults_of_building(part: SurfacePart) -> list[Fault]:
 
 def named_file(table: Any) -> SurfacePart | None:
     """The surface in the file that a faulty table names, if it names one."""
-    if not isinstance(table, Mapping) or table.get("kind") not in ("mesh", "bspline"):
+    kind = table.get("kind") if isinstance(table, Mapping) else None
+    if kind not in ("mesh", "bspline", *KINDS):
         return None
-    plain: dict[str, Any] = {"kind": table["kind"], "file": table.get("file"), "side": "outside"}
-    plain["cells"] = 1 if table["kind"] == "mesh" else [1, 1]
+    plain: dict[str, Any] = {"kind": kind, "file": table.get("file"), "side": "outside"}
+    if kind != "poses":
+        plain["cells"] = 1 if kind == "mesh" else [1, 1]
+    if kind in KINDS:
+        plain["units"] = table["units"] if table.get("units") in UNITS else "m"
     if table["kind"] == "mesh" and "scale" in table:
         plain["scale"] = table["scale"]
     known = read_surface(plain, [])
@@ -285,6 +299,8 @@ def _values(section: Section, kind: str) -> tuple[dict[str, Any], tuple[int, int
         return read_mesh_keys(section), read_count(section)
     if kind == "piecewise":
         return read_pieces(section), None
+    if kind == "poses":
+        return read_given(section, kind), None
     return read_patch(section, kind), read_grid(section)
 
 

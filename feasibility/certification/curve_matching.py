@@ -79,7 +79,8 @@ def match_to_curves(cells: Cells, task: Task, walk: Walk, points: Array, axes: A
         names = " to ".join(str(list(cells.unravel(int(c)))) for c in (start[k], end[k]))
         return replace(unmatched, fault=f"the motion goes from cell {names}, which do not touch")
     curves = target_curves(cells, task)
-    way = _way(task, curves, walk, points, marks, curve)
+    tools = np.hstack([points, axes]) if cells.surface.bare else points
+    way = _way(task, curves, walk, tools, marks, curve)
     places, t0, t1 = way.places, *way.ends
 
     aims = task.targets(cells)
@@ -121,7 +122,10 @@ def _way(
     marks: NDArray[np.int64],
     curve: NDArray[np.int64],
 ) -> _Way:
-    """Match the waypoints between marks to the curve (k - 1,) between each two of the k marks."""
+    """Match the waypoints between marks to the curve (k - 1,) between each two of the k marks.
+
+    By their tool points (m, 3); between poses by their axes too (m, 6).
+    """
     m = len(points)
     start, end = walk.cell[marks[:-1]], walk.cell[marks[1:]]
     # Each segment, and each waypoint between marks, belongs to one section from mark to mark.
@@ -130,7 +134,8 @@ def _way(
     inner = np.flatnonzero(walk.cell < 0)
     along = inner[curve[section[inner]] != STAYS]
     t, arrived = np.zeros(m), walk.cell >= 0
-    t[along], arrived[along] = _matched_parameters(
+    matched = _matched_parameters if points.shape[1] == 3 else _matched_between_poses
+    t[along], arrived[along] = matched(
         curves, curve[section[along]], points[along], ARRIVED * task.effective_tolerance
     )
     t0, t1 = t[:-1].copy(), t[1:].copy()
@@ -175,8 +180,7 @@ def _pieces(
 
 def _at(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
     """Target points and approach directions (k, 3) at t."""
-    piece, s, _ = _pieces(curves, curve, t)
-    values = np.einsum("kp,kpd->kd", _powers(s), curves.cubics[piece])
+    values = _values(curves, curve, t, 6)
     return values[:, :3], values[:, 3:]
 
 
@@ -203,16 +207,36 @@ def _matched_parameters(
     return t, arrived
 
 
-def _slopes(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> Array:
-    """(k, 3) m, derivatives of target points by t."""
+def _matched_between_poses(
+    curves: TargetCurves, curve: NDArray[np.int64], tools: Array, lean: float
+) -> tuple[Array, NDArray[np.bool_]]:
+    """(k,) t on each course for a tool point and its axis (k, 6); none is taken to be at a pose.
+
+    The axis tells places apart where the tool turns on the spot; elsewhere it hardly counts: an
+    axis off by 1 as much as a point off by `lean` (m).
+    """
+    scale = np.array([1.0, 1.0, 1.0, lean, lean, lean])
+    t = _nearest(curves._replace(cubics=scale * curves.cubics), curve, scale * tools)
+    return t, np.zeros(len(t), dtype=bool)
+
+
+def _slopes(curves: TargetCurves, curve: NDArray[np.int64], t: Array, axes: int) -> Array:
+    """(k, axes) derivatives by t of target points (m), and perhaps of directions."""
     piece, s, count = _pieces(curves, curve, t)
     by_s = _powers(s)[:, :3] * [1.0, 2.0, 3.0]
-    slopes = np.einsum("kp,kpd->kd", by_s, curves.cubics[piece, 1:, :3])
+    slopes = np.einsum("kp,kpd->kd", by_s, curves.cubics[piece, 1:, :axes])
     return np.asarray(slopes * count[:, None])
 
 
+def _values(curves: TargetCurves, curve: NDArray[np.int64], t: Array, axes: int) -> Array:
+    """(k, axes) target points (m) at t, and perhaps directions."""
+    piece, s, _ = _pieces(curves, curve, t)
+    return np.asarray(np.einsum("kp,kpd->kd", _powers(s), curves.cubics[piece, :, :axes]))
+
+
 def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> Array:
-    """(k,) t of the point on each curve that is closest to a tool point."""
+    """(k,) t of the place on each curve that is closest to a tool point (k, 3), or more numbers."""
+    axes = points.shape[1]
     t = np.empty(len(curve))
     counts = np.diff(curves.first)[curve]
     for count in np.unique(counts):
@@ -222,21 +246,22 @@ def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> A
         grid = np.concatenate([[0.0], inner, [1.0]])
         for first in range(0, len(alike), BLOCK):
             some = alike[first : first + BLOCK]
-            tried, _ = _at(curves, np.repeat(curve[some], len(grid)), np.tile(grid, len(some)))
-            away = tried.reshape(len(some), len(grid), 3) - points[some, None]
+            places = np.repeat(curve[some], len(grid)), np.tile(grid, len(some))
+            tried = _values(curves, *places, axes)
+            away = tried.reshape(len(some), len(grid), axes) - points[some, None]
             t[some] = grid[np.argmin((away**2).sum(axis=2), axis=1)]
     # Newton steps, shortened where one leads further away: they overshoot next to a point where a
     # curve has zero speed.
     left, width = np.arange(len(t)), 1.0 / (GUESSES * counts)
-    off = _at(curves, curve, t)[0] - points
+    off = _values(curves, curve, t, axes) - points
     for _ in range(NEWTON_STEPS):
-        slope = _slopes(curves, curve[left], t[left])
+        slope = _slopes(curves, curve[left], t[left], axes)
         square = (slope**2).sum(axis=1)
         step = (off[left] * slope).sum(axis=1)
         step = np.divide(step, square, out=np.zeros(len(left)), where=square > 0.0)
         step = np.clip(step, -width[left], width[left])
         tried = np.clip(t[left] - step, 0.0, 1.0)
-        there = _at(curves, curve[left], tried)[0] - points[left]
+        there = _values(curves, curve[left], tried, axes) - points[left]
         nearer = (there**2).sum(axis=1) < (off[left] ** 2).sum(axis=1)
         t[left[nearer]], off[left[nearer]] = tried[nearer], there[nearer]
         width[left[~nearer]] = 0.25 * np.abs(step[~nearer])
@@ -272,8 +297,10 @@ def _deviations(
     half a tolerance apart, and the targets are compared with the triangles themselves too, which
     may be nearer to them than the standoff: a thorn beside the curve, another part of the mesh, or
     facets that are not square to the interpolated normal. An approach that is not the normal
-    deviates as `targets` say.
+    deviates as `targets` say. Between poses there is no surface.
     """
+    if cells.surface.bare:
+        return targets.deviations[used], ""
     curves, surface = cells.curves, cells.surface
     standoff, tolerance = task.standoff, task.effective_tolerance
     owner, t = _samples(cells, used, 0.5 * tolerance)
@@ -286,6 +313,7 @@ def _deviations(
         return deviations, "the curve between two cells is not known"
     if not closest.inside.all():
         return deviations, "the curve between two cells leaves the surface"
+    deviations += surface.deviations
     deviations[:, 0] += standoff * deviations[:, 1]
     if surface.mean_edge_length > 0.0:
         found = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.curve_matching import CurveMatch, match_to_curves
 from feasibility.certification.kinematic_bounds import peaks, placements, second_derivatives
+from feasibility.certification.order import order_of_marks
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.rolls import (
     off_middle,
@@ -94,6 +95,9 @@ def _replay_of_tool(
     robot: Robot, cells: Cells, task: Task, walk: Walk, needed: NDArray[np.bool_]
 ) -> Replay:
     """`replay` of limits, tool and cells alone."""
+    disorder = order_of_marks(cells, walk)
+    if disorder:
+        return Replay(Certificate(len(walk.q), np.nan, np.nan, np.nan), disorder)
     along_curves = replay_along_curves(robot, cells, task, walk, needed)
     if along_curves.accepted or _malformed(robot, cells, walk):
         return along_curves

@@ -151,7 +151,8 @@ class Judge:
         The second guess is where the tool looks.
         """
         tolerance = self.task.effective_tolerance
-        places = self.offset.nearest(points, points + self.task.standoff * axes, tolerance)
+        look = max(self.task.standoff, self.offset.least_look)
+        places = self.offset.nearest(points, points + look * axes, tolerance)
         target, normal = self.offset.at(places)
         error = np.linalg.norm(points - target, axis=1)
         approaches = self._held.approaches(normal)

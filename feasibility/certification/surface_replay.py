@@ -25,6 +25,7 @@ from feasibility.certification.cells_reached import cells_reached, in_order, mis
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.certification.kinematic_bounds import placements
+from feasibility.certification.order import order_of_places
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
 from feasibility.collisions import Bodies
@@ -32,8 +33,9 @@ from feasibility.cone import angle_of
 from feasibility.task import Task
 from feasibility.verdict import Certificate
 from robots import Robot
-from surfaces import Cells
+from surfaces import Cells, Surface
 from surfaces.places import offset_surface
+from surfaces.toolpaths import PoseSurface
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -80,7 +82,10 @@ def replay_over_surface(
         unknown = Certificate(len(rows) if rows.ndim else 0, np.nan, np.nan, np.nan)
         return MotionReplay(unknown, (fault,), nowhere)
     height = cells.surface.side_sign * task.standoff
-    judge = Judge(robot, task, offset_surface(cells.surface, height), cells)
+    surface = cells.surface
+    if isinstance(surface, PoseSurface) and task.approach == "normal":
+        surface = replace(surface, axes=None)  # those of the poses' own do not count
+    judge = Judge(robot, _within(task, surface), offset_surface(surface, height), cells)
     margin, faults = _limits(robot, rows)
     poses = placements(robot, rows)
     count = np.arange(len(rows))
@@ -96,6 +101,7 @@ def replay_over_surface(
     missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
     if len(missed):
         faults.append(MotionFault(-1, 0.0, missed_text(cells, task, missed, samples)))
+    faults += order_of_places(judge.offset, samples, task.effective_tolerance)
     error = max(looked.error, float(np.max(samples.error, initial=0.0)))
     chord = max(looked.chord, float(np.max(samples.chord, initial=0.0)))
     roll = max(looked.roll, float(np.max(samples.roll, initial=0.0)))
@@ -109,6 +115,16 @@ def replay_over_surface(
             certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
         )
     return MotionReplay(certificate, tuple(faults), reached)
+
+
+def _within(task: Task, surface: Surface) -> Task:
+    """The task less what the surface may deviate from the one meant."""
+    off, leans = surface.deviations
+    if not (off or leans):
+        return task
+    tolerance = task.effective_tolerance - off - task.standoff * leans
+    cone_deg = task.cone_deg - float(np.degrees(2.0 * np.arcsin(min(leans / 2.0, 1.0))))
+    return replace(task, tolerance=max(tolerance, 1e-12), cone_deg=max(cone_deg, 0.0))
 
 
 class _Between:

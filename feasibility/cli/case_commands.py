@@ -25,12 +25,11 @@ from feasibility.safe_files import check_writable, shown_path
 if TYPE_CHECKING:
     from feasibility.cases import Case
     from feasibility.cli.command import OpenCase
-    from feasibility.paths import Order
     from feasibility.sensitivity import Explanation
     from feasibility.verdict import Verdict, Walk
 
 INSIDE = "-"  # in place of a file: in the object that is printed
-ORDERS = ("rows", "columns", "spiral", "shortest")
+ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
 LATER_STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a patch,
 1 cells are left out, 3 undecided"""
@@ -104,7 +103,9 @@ def add(subcommands: argparse._SubParsersAction) -> None:
 def _add_timing(parser: argparse.ArgumentParser) -> None:
     """How a path is ordered, timed and written."""
     parser.add_argument(
-        "--order", choices=ORDERS, help="default: rows on a grid of cells, shortest on others"
+        "--order",
+        choices=ORDERS,
+        help="default: rows on a grid of cells, given of a toolpath, shortest on others",
     )
     parser.add_argument(
         "--speed", type=positive, default=0.1, metavar="M_PER_S",
@@ -236,11 +237,10 @@ def path(args: argparse.Namespace, began: float) -> int:
         verdict = check(*opened.setup, clock=opened.clock)
         if not verdict.feasible:
             return _no_path(args, opened.case.name, verdict, loaded)
-        order: Order = args.order or ("rows" if len(verdict.cells.shape) == 2 else "shortest")
         try:
             with opened.clock.enforced():
                 opened.progress(0, None, "planning the path")
-                found = coverage_path(verdict, order)
+                found = coverage_path(verdict, args.order)
                 opened.progress(0, None, "timing the path")
                 run = trajectory(
                     found, args.speed, velocity=args.velocity, acceleration=args.acceleration,

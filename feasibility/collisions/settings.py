@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, get_args
 
 from coverable_errors import Checks, Fault
@@ -98,6 +98,16 @@ class Collision:
     def checked(self) -> tuple[str, ...]:
         """What is asked for: some of 'self', 'surface' and 'scene'."""
         return asked_for(self.self_, self.surface, bool(self.scene))
+
+    @property
+    def without_surface(self) -> Collision:
+        """The same where there is no surface, only poses, and nothing that is said of it."""
+        return replace(
+            self,
+            surface=False,
+            allow=tuple(pair for pair in self.allow if SURFACE not in pair),
+            clearances=tuple(row for row in self.clearances if SURFACE not in row[:2]),
+        )
 
     def unknown_names(self, links: Sequence[str]) -> list[Fault]:
         """Faults of names that are neither links of the arm nor objects, to be raised with others.

@@ -29,9 +29,11 @@ from feasibility.paths.order import (
     Order,
     PathError,
     check_order,
+    check_run,
     closed_sides,
     grid_order,
     route,
+    usual_order,
 )
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
@@ -75,15 +77,16 @@ class CoveragePath(ReadOnlyArrays):
 
 
 def coverage_path(
-    verdict: Verdict, order: Order = "rows", only: Iterable[int] | None = None
+    verdict: Verdict, order: Order | None = None, only: Iterable[int] | None = None
 ) -> CoveragePath:
     """A path over the surface of a feasible verdict.
 
     Args:
         verdict: of the complete search.
         order: "rows" runs along the grid's rows (v), back and forth, "columns" along its columns
-            (u), "spiral" from outside to the middle; "shortest" is the shortest order found and
-            the only one for cells that are no grid.
+            (u), "spiral" from outside to the middle; "shortest" is the shortest order found, for
+            any cells; "given" is that of poses, and the only one of a toolpath. None for rows of a
+            grid, the given order of a toolpath, and else the shortest.
         only: flat indices of the cells to visit; all by default. They may be cells that the best
             motion of an infeasible verdict covers.
 
@@ -106,11 +109,17 @@ def coverage_path(
         >>> round(path.figures.length, 3), round(path.figures.revisited_share, 3)
         (0.367, 0.0)
     """
-    check_order(order, verdict.cells.surface.kind, len(verdict.cells.shape) == 2)
+    cells = verdict.cells
+    order = usual_order(cells) if order is None else order
+    check_order(order, cells.surface.kind, len(cells.shape) == 2)
+    check_run(cells, order)
     needed = _needed(verdict, only)
-    robot, cells, task = verdict.robot, verdict.cells, verdict.task
-    found = _least_revisiting(motion_graph_of(verdict), cells, order, needed)
-    walk = found.graph.walk(_from_start(found, robot.start))
+    robot, task = verdict.robot, verdict.task
+    if cells.in_order:
+        walk = _run(verdict, needed)
+    else:
+        found = _least_revisiting(motion_graph_of(verdict), cells, order, needed)
+        walk = found.graph.walk(_from_start(found, robot.start))
     replayed = replay(robot, cells, task, walk, needed)
     if not replayed.accepted:
         raise PathError(f"the independent replay refuses the path: {replayed.refusal}")
@@ -175,6 +184,20 @@ def _needed(verdict: Verdict, only: Iterable[int] | None) -> NDArray[np.bool_]:
     return needed
 
 
+def _run(verdict: Verdict, needed: NDArray[np.bool_]) -> Walk:
+    """The part of a toolpath's witness from the first needed pose to the last.
+
+    Raises:
+        PathError: there is no witness.
+    """
+    walk = verdict.witness
+    if walk is None:
+        raise PathError("no run of this toolpath in its order is known, nor of parts of it")
+    over = (walk.cell >= 0) & needed[walk.cell]
+    first, last = np.flatnonzero(over)[[0, -1]]
+    return Walk(q=walk.q[first : last + 1], cell=walk.cell[first : last + 1])
+
+
 def _least_revisiting(
     graph: MotionGraph, cells: Cells, order: Order, needed: NDArray[np.bool_]
 ) -> JointRoute:
@@ -184,6 +207,9 @@ def _least_revisiting(
         PathError: no motion leads from cell to cell.
     """
     attempts = _Attempts(graph, cells, needed)
+    if order == "given":
+        attempts.along(route(cells, order, needed))
+        return attempts.best()
     if order != "shortest":
         attempts.along_grid(order)
         return attempts.best()

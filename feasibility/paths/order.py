@@ -1,4 +1,5 @@
-"""The order in which a path visits cells: rows, columns, a spiral, or the shortest that was found.
+"""The order in which a path visits cells: rows, columns, a spiral, the shortest that was found, or
+the one in which poses are given.
 
 Only cells and the steps between them are known here, nothing of an arm. A step between two cells
 that touch costs the distance of their centres; cells that do not touch are joined by the shortest
@@ -20,8 +21,9 @@ from coverable_errors import CoverableError
 from feasibility.paths.two_opt import improved, tour_length
 from surfaces import Cells
 
-Order = Literal["rows", "columns", "spiral", "shortest"]
-ORDERS: tuple[Order, ...] = get_args(Order)
+Order = Literal["rows", "columns", "spiral", "shortest", "given"]
+ORDERS: tuple[Order, ...] = ("rows", "columns", "spiral", "shortest")  # of cells on a surface
+POSES = "poses"  # the kind of surface that has an order of its own
 GRID_ORDERS: tuple[Order, ...] = ("rows", "columns", "spiral")
 
 MOST_IMPROVED = 600  # cells up to which an order is improved; it takes their cube
@@ -103,13 +105,38 @@ def check_order(order: str, kind: str, grid: bool) -> None:
     Raises:
         PathError: there is no such order, or these cells do not have it.
     """
-    if order not in ORDERS:
-        raise PathError(f"there is no order {order!r}; the orders are {', '.join(ORDERS)}")
+    if order not in get_args(Order):
+        names = ", ".join(get_args(Order))
+        raise PathError(f"there is no order {order!r}; the orders are {names}")
     if order in GRID_ORDERS and not grid:
         raise PathError(
             f"the order {order!r} follows the rows and columns of a grid, which the cells of a "
             f"{kind} surface are not; use order 'shortest'"
         )
+    if order == "given" and kind != POSES:
+        raise PathError(
+            f"the order 'given' is that of a list of poses; the cells of a {kind} have none"
+        )
+
+
+def check_run(cells: Cells, order: Order) -> None:
+    """Refuse another order of a toolpath than its own.
+
+    Raises:
+        PathError: it is one.
+    """
+    if cells.in_order and order != "given":
+        raise PathError(
+            f"a toolpath is run in its order, 'given', not {order!r}; to visit its poses in "
+            "another, give them a radius as neighbours"
+        )
+
+
+def usual_order(cells: Cells) -> Order:
+    """The order where none is asked for."""
+    if cells.in_order:
+        return "given"
+    return "rows" if len(cells.shape) == 2 else "shortest"
 
 
 def route(
@@ -135,6 +162,8 @@ def route(
     grid = len(cells.shape) == 2
     check_order(order, cells.surface.kind, grid)
     wanted = np.ones(len(cells), dtype=bool) if needed is None else needed
+    if order == "given":
+        return np.flatnonzero(wanted)
     names = GRID_ORDERS if order == "shortest" else (order,)
     orders = [grid_order(name, int(cells.shape[0]), int(cells.shape[1])) for name in names if grid]
     candidates = [found[wanted[found]] for found in orders]

@@ -256,6 +256,10 @@ def _narrower(verdict: Verdict) -> str:
         return f"a narrower {' or '.join(ranges)}"
     if kind == "piecewise":
         return "a narrower or smaller choice of surface.pieces"
+    if kind in ("grid", "poses", "parametric"):
+        return {"poses": "a part of the poses", "grid": "a part of the grid"}.get(
+            kind, "a narrower u or v"
+        )
     return "a part of the mesh (surface.box, cut, facing or faces)"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -16,6 +17,7 @@ from feasibility.problem import Problem
 from feasibility.roadmap.between_rounds import between_rounds
 from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
+from feasibility.roadmap.forward import Run, changes_in_place, run_in_order
 from feasibility.roadmap.graph_g import graph_of
 from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.outcome import (
@@ -33,6 +35,8 @@ from feasibility.search import Search
 from feasibility.targets import start_cell
 from feasibility.verdict import Replay, Walk
 from robots import Kinematics
+
+IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
 
 
 def complete_search(
@@ -65,7 +69,7 @@ def complete_search(
     alone = tool_alone_of(problem.robot, problem.cells.surface, problem.task)
     exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock, alone)
     proving = Proving(exploration, problem.task)
-    in_time, known = True, None
+    in_time, known, run = True, None, None
     try:
         if seeds is not None:
             known = _known(problem, seeds)
@@ -76,10 +80,13 @@ def complete_search(
         if known is None:
             explore(exploration, between_rounds(exploration, proving, problem.searched))
         close(exploration)
+        if problem.cells.in_order and exploration.complete and known is None:
+            run = run_in_order(exploration)
     except OutOfTime:
         in_time = False
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
-    return _found(problem, exploration, proving, in_time, known)
+    found = _found(problem, exploration, proving, in_time, known)
+    return found if run is None else _in_order(found, run, problem, exploration)
 
 
 def _check_seeds(problem: Problem, seeds: Walk) -> None:
@@ -110,8 +117,12 @@ def _begin(exploration: Exploration, cell: int) -> None:
     """Begin the search at the arm's start, which is over a cell.
 
     Raises:
-        ArgumentError: bodies are nearer to each other there than they may be.
+        ArgumentError: bodies are nearer to each other there than they may be; or it is not over the
+            first pose of a toolpath.
     """
+    if exploration.cells.in_order and cell != 0:
+        what = f"is over pose {cell}; a toolpath is run from its first pose, so begin there"
+        raise ArgumentError([Fault("start", what)])
     arrays, start = exploration.arrays, np.array(exploration.robot.start)
     if len(arrays.collisions) and not segment_clear(arrays.collisions, start, start) > 0.0:
         what = "collides, or is nearer than the clearances allow; choose another start"
@@ -145,7 +156,7 @@ def _found(
 ) -> Found:
     """The best component, and the sentences about it; `known` is a motion that covers all cells."""
     total = len(problem.cells)
-    complete = exploration.complete and total > 0
+    complete = exploration.complete and total > 0 and not problem.cells.in_order
     node = None if exploration.begun is None else exploration.begun[0]
     walk = covering_walk(exploration.roadmap, exploration.best, node) if complete else known
     proof = None if walk is not None else proof_of(exploration)
@@ -178,6 +189,25 @@ def _found(
         make_graph=lambda: graph_of(exploration),
         make_causes=lambda: causes_of(exploration, proof, problem.pairs),
     )
+
+
+def _in_order(found: Found, run: Run, problem: Problem, exploration: Exploration) -> Found:
+    """The same of a toolpath, all of whose poses one component covers."""
+    total, walk = len(problem.cells), run.walk
+    counts = {**found.counts, "fk": int(exploration.work.counts[0])}
+    if walk is None:
+        return replace(
+            found, counts=counts, covered=run.covered(total), unfinished="",
+            exhausted=run.failed_words(total), make_causes=lambda: run.causes(total),
+        )  # fmt: skip
+    near = IN_PLACE * problem.task.effective_tolerance
+    counts["in_place"] = changes_in_place(problem.robot, exploration.arrays.points, walk, near)
+    return replace(
+        found, counts=counts, start=0, motion=walk, replay=partial(_replayed, problem, walk),
+        accepted=f"One motion of {{waypoints}} waypoints runs the {total} poses in order, without "
+        f"going back; {counts['in_place']} times it changes the posture in place. Pinocchio's "
+        f"replay holds it {problem.within}, between waypoints too.",
+    )  # fmt: skip
 
 
 def _replayed(problem: Problem, walk: Walk) -> Replay:

@@ -226,6 +226,17 @@ def covering_walk(roadmap: Roadmap, component: int, start: int | None = None) ->
     return Walk(*_string(roadmap, start, _route(roadmap, links, wanted, start, True)))
 
 
+def route_walk(roadmap: Roadmap, start: int, route: NDArray[np.int64]) -> Walk:
+    """The motion from a node along a route.
+
+    Args:
+        roadmap: the roadmap.
+        start: a node.
+        route: edges + 1, negative where one is run backwards, each from where the last one ends.
+    """
+    return Walk(*_string(roadmap, start, route))
+
+
 def patch_walk(roadmap: Roadmap, links: Links, wanted: NDArray[np.bool_], start: int) -> Walk:
     """One continuous motion through the wanted cells: the motion that covers one patch.
 

@@ -13,6 +13,7 @@ from feasibility.targets.directions import approach_curves
 from feasibility.targets.frames import FrameCurves, frame_curves
 from feasibility.task import Task
 from surfaces import Cells
+from surfaces.toolpaths import straight
 
 RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows how the surface bends
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
@@ -47,6 +48,8 @@ def folded_curves(cells: Cells, height: float) -> NDArray[np.bool_]:
     At a signed height (m) beyond a radius of curvature the offset surface runs backwards, but in
     the direction of that curvature only; curves across it do not show it, their neighbours do.
     """
+    if cells.surface.bare:
+        return np.zeros(len(cells.curves), dtype=bool)
     folded = cells.curves.folds(height)
     cell = np.zeros(len(cells), dtype=bool)
     # Those over creases, or with larger deviations, show nothing about their neighbours.
@@ -102,8 +105,11 @@ def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     cubics[..., 3:] = -sign * curves.cubics[..., 3:]
     derivative_bounds = curves.derivative_bounds.copy()
     derivative_bounds[:, 0] += standoff * derivative_bounds[:, 1]
-    deviations = curves.deviations.copy()
+    deviations = curves.deviations + cells.surface.deviations
     deviations[:, 0] += standoff * deviations[:, 1]
+    if cells.surface.bare:
+        cubics[..., :3] = straight(task.targets(cells).points, cells.pairs, curves.first)
+        derivative_bounds[:, 0] = deviations[:, 0] = 0.0
     if cells.surface.mean_edge_length > 0.0:
         _see_facets(cells, standoff, tolerance, deviations)
     curvature, at_centre = _normal_curvature(cells, standoff, tolerance)
@@ -139,6 +145,8 @@ def _normal_curvature(
 
     To the side of a curve the normal may turn faster than along it.
     """
+    if cells.surface.bare:
+        return np.zeros(len(cells.curves.cubics)), 0.0
     height = cells.surface.side_sign * standoff
     most = cells.parallel_curvature(height)
     if standoff > 0.0:  # over an edge it turns as over a ball of the standoff

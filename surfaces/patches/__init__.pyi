@@ -1,3 +1,4 @@
+from .affine_models import SpaceModel as SpaceModel
 from .closed_form_kernels import PatchKernel as PatchKernel
 from .closed_form_kernels import cell_at as cell_at
 from .closed_form_kernels import closest_on_patch as closest_on_patch
@@ -11,8 +12,11 @@ from .hyperboloid import hyperboloid as hyperboloid
 from .nurbs import bspline as bspline
 from .nurbs import read_net as read_net
 from .patch import ClosedFormPatch as ClosedFormPatch
+from .patch import LocalClosestPoints as LocalClosestPoints
 from .patch import Patch as Patch
+from .patch import SmoothPatch as SmoothPatch
 from .plane import plane as plane
+from .quadrature import rectangle_areas as rectangle_areas
 from .revolution import revolution as revolution
 from .sphere import sphere as sphere
 from .torus import torus as torus

@@ -66,6 +66,7 @@ class Piecewise(Surface):
             for (a, b), angle in creases.items()
             if angle > CREASE
         ]
+        words += [f"pieces[{k}]: {note}" for k, one in enumerate(self.pieces) for note in one.notes]
         groups = self.groups
         if len(groups) > 1:
             lists = "; ".join(", ".join(map(str, group)) for group in groups)
@@ -76,6 +77,12 @@ class Piecewise(Surface):
                 "gap."
             )
         return tuple(words)
+
+    @property
+    def deviations(self) -> tuple[float, float]:
+        """See `Surface.deviations`: the largest of the pieces."""
+        points, normals = zip(*(piece.deviations for piece in self.pieces), strict=True)
+        return max(points), max(normals)
 
     @property
     def groups(self) -> tuple[tuple[int, ...], ...]:

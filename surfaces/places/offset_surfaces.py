@@ -30,9 +30,13 @@ def offset_surface(surface: Surface, height: float) -> OffsetSurface:
     from surfaces.piecewise import Piecewise
     from surfaces.places.mesh_places import MeshPlaces
     from surfaces.places.piece_places import PiecePlaces
+    from surfaces.places.pose_places import PosePlaces
+    from surfaces.toolpaths import PoseSurface
 
     if isinstance(surface, Piecewise):
         return PiecePlaces(height, surface)
     if isinstance(surface, MeshSurface):
         return MeshPlaces(height, surface)
+    if isinstance(surface, PoseSurface):
+        return PosePlaces(height, surface)
     raise SurfaceError(f"a surface of kind {surface.kind} has no places to follow")

@@ -30,12 +30,12 @@ BoxBounds = Callable[[Any, Array, Array], Array]
 
 
 def box_bounds(patch: Any) -> BoxBounds:
-    """The function for a kind of patch.
+    """The function for a kind of patch; of one that is not known here nothing is bounded."""
+    return _KINDS.get(patch.kind, _unknown)
 
-    Raises:
-        KeyError: the kind is not known here.
-    """
-    return _KINDS[patch.kind]
+
+def _unknown(patch: Any, low: Array, high: Array) -> Array:
+    return np.full((len(low), 3, 2), np.inf)
 
 
 def _table(point: tuple[Any, Any, Any], normal: tuple[Any, Any, Any], count: int) -> Array:
@@ -192,4 +192,6 @@ _KINDS: dict[str, BoxBounds] = {
     "ellipsoid": _ellipsoid,
     "revolution": _revolution,
     "bspline": spline_bounds,
+    "parametric": spline_bounds,
+    "grid": spline_bounds,
 }

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.patches import Patch
+from surfaces.patches.nurbs import SplinePatch
 from surfaces.places.patch_bounds import BoxBounds, box_bounds
 from surfaces.places.places import ROUNDING, Array, OffsetSurface, PlacePaths, Places
 from surfaces.places.spline_bounds import kinks
@@ -36,7 +37,7 @@ class PatchPlaces(OffsetSurface):
 
     @cached_property
     def _kinks(self) -> tuple[Array, Array]:
-        if self.patch.kind != "bspline":
+        if not isinstance(self.patch, SplinePatch):
             return np.empty(0), np.empty(0)
         return kinks(self.patch, 0), kinks(self.patch, 1)
 

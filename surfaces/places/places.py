@@ -144,6 +144,15 @@ class OffsetSurface(ABC):
         """
         return np.full(len(start.chart), np.inf)
 
+    @property
+    def least_look(self) -> float:
+        """m, how far ahead of a tool point the second guess of `nearest` has to lie."""
+        return 0.0
+
+    def along(self, places: Places) -> Array | None:
+        """(k,) m, how far along a toolpath places are; None where there is no order."""
+        return None
+
     @abstractmethod
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """Continuous paths from places to places, meant for such that are near to each other."""

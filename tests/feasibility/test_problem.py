@@ -17,7 +17,7 @@ SQUARE = plane((0, 1), (0, 1))
         (SQUARE, "surface.cells(9, 10)"),
         (mesh(TriangleMesh(np.eye(3), [[0, 1, 2]])), "surface.cells(count=100)"),
         (piecewise([SQUARE]), "surface.cells([(3, 4)"),
-        (lambda u, v: (u, v, 0.0), "bspline(points)"),
+        (lambda u, v: (u, v, 0.0), "parametric(g, u=(0, 1), v=(0, 1)).cells(9, 10)"),
         (lambda u, v: (u, v, 0.0), "mesh(triangles)"),
         (5, "surface.cells(9, 10)"),
         (None, "surface.cells(9, 10)"),

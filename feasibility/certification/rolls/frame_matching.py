@@ -108,7 +108,7 @@ def _deviations(
     owner = np.repeat(owner, len(SAMPLES))
     deviations = frames.deviations[used].copy()
     approach = _at(curves.first, curves.cubics[..., 3:], used[owner], t)
-    if task.along_normals(cells):
+    if task.along_normals(cells) and not cells.surface.bare:
         closest = cells.surface.closest(cells.curves.at(used[owner], t)[0])
         approach = -cells.surface.side_sign * closest.normal
     own, _ = projected(reference_directions(cells, task, used[owner], t), approach)

@@ -1,0 +1,188 @@
+"""A run of a toolpath: from the first pose to the last in one motion, and never back.
+
+The complete search joins configurations whichever way the tool goes between poses. Where one
+component covers all poses there may still be no run in order: the motion may have to go back to
+where it can change its posture. So where the layers of the roadmap hold no run, more is tried from
+the furthest pose that a run reaches: other configurations over it and over the poses before it, by
+self-motions of what a run reaches there, each followed ahead as far as it goes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.roadmap.expansion import CONNECT_STEPS
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.forward.layers import Layers, layers_of
+from feasibility.roadmap.graph import (
+    HEAD,
+    NODES,
+    TAIL,
+    WAYPOINTS,
+    add_edge,
+    add_node,
+    root_of,
+    unite,
+)
+from feasibility.roadmap.motions import MOST_STEPS, OVERFLOW, connect, look_at, track
+from feasibility.roadmap.walk import route_walk
+from feasibility.verdict import Cause, CauseKind, Walk
+from robots import Kinematics, Robot
+
+DRY_ROUNDS = 8  # rounds without gain after which no run is found
+MOST_ROUNDS = 60
+BACK = (0, 1, 2, 4, 8, 16, 32, 64)  # poses before the furthest over which is looked in a round
+SEEDS = 8  # guesses over the first pose, each round
+MEETINGS = 2  # nodes over each pose that a motion ahead tries to join
+
+
+class Run(NamedTuple):
+    """What was found of a run in order."""
+
+    walk: Walk | None
+    """From the first pose to the last; None where no run gets there."""
+    furthest: int
+    """The last pose that a run reaches."""
+    rounds: int
+    """How often more was tried."""
+
+    def covered(self, poses: int) -> NDArray[np.bool_]:
+        """(poses,) those that the run passes."""
+        return np.arange(poses) <= self.furthest
+
+    def failed_words(self, poses: int) -> str:
+        """What was tried in vain."""
+        return (
+            f"One motion reaches all {poses} poses, but none was found that runs them in order, "
+            f"without going back: the best run ends over pose {self.furthest}, where the arm can "
+            f"neither go on nor change its posture in place ({self.rounds} rounds of other "
+            "configurations were tried)."
+        )
+
+    def causes(self, poses: int) -> tuple[Cause, ...]:
+        """Why the poses behind the furthest are missed."""
+        detail = (
+            f"reached only by going back: runs in order end over pose {self.furthest}, where the "
+            "arm cannot change its posture in place"
+        )
+        missed = range(self.furthest + 1, poses)
+        return tuple(Cause(pose, CauseKind.DISCONNECTED, False, detail) for pose in missed)
+
+
+def run_in_order(exploration: Exploration) -> Run:
+    """The run that gets furthest; more is tried where it does not reach the last pose.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    last = len(exploration.cells) - 1
+    best, rounds, dry = _layers(exploration), 0, 0
+    while best.furthest < last and dry < DRY_ROUNDS and rounds < MOST_ROUNDS:
+        rounds += 1
+        _try_more(exploration, best)
+        found = _layers(exploration)
+        dry = 0 if found.furthest > best.furthest else dry + 1
+        best = found
+    walk = None
+    if best.furthest == last:
+        walk = route_walk(exploration.roadmap, best.start, np.array(best.route, dtype=np.int64))
+    return Run(walk, best.furthest, rounds)
+
+
+def changes_in_place(robot: Robot, targets: NDArray[np.float64], walk: Walk, near: float) -> int:
+    """How often a motion changes its posture over a pose.
+
+    Args:
+        robot: the arm.
+        targets: (N, 3) m, of the poses.
+        walk: the motion, marked at the poses.
+        near: m, how near to a target the tool point is over it.
+    """
+    marks = np.flatnonzero(walk.cell >= 0)
+    points, _ = Kinematics(robot).tools(walk.q)
+    section = np.searchsorted(marks, np.arange(len(walk.q)))
+    ahead = walk.cell[marks[np.minimum(section, len(marks) - 1)]]
+    over = np.linalg.norm(points - targets[ahead], axis=1) <= near
+    apart = np.linalg.norm(np.diff(targets, axis=0, prepend=np.nan), axis=1)
+    turns = apart <= 2.0 * near  # it turns on the spot from the pose before: that is no change
+    still = over[1:] & over[:-1] & (ahead[1:] == ahead[:-1]) & ~turns[ahead[1:]]
+    return len(np.unique(ahead[1:][still]))
+
+
+def _layers(exploration: Exploration) -> Layers:
+    """How far runs get, from the arm's start where it has one."""
+    begun = exploration.begun
+    return layers_of(exploration.roadmap, None if begun is None else int(begun[0]))
+
+
+def _try_more(exploration: Exploration, best: Layers) -> None:
+    """One round: new configurations over the last poses that a run reaches, followed ahead."""
+    exploration.tick("looking for a run in order")
+    known = int(exploration.roadmap.counters[NODES])
+    exploration.add_seeds(0, exploration.guesses(SEEDS))
+    for cell in sorted({max(best.furthest - back, 0) for back in BACK}):
+        exploration.explore_self_motions(cell)
+    ahead = _layers(exploration).ahead
+    for node in range(known, int(exploration.roadmap.counters[NODES])):
+        if node in ahead:
+            exploration.tick("looking for a run in order")
+            _follow(exploration, node, len(exploration.cells))
+
+
+def _follow(exploration: Exploration, node: int, poses: int) -> None:
+    """Lead a node ahead from pose to pose, as far as it goes or until it meets what is known."""
+    while exploration.roadmap.cell[node] < poses - 1:
+        cell = int(exploration.roadmap.cell[node]) + 1
+        q = exploration.roadmap.q[node].copy()
+        rows = _tracked(exploration, cell, q)
+        if rows < 0:
+            return
+        roadmap = exploration.roadmap
+        over = _nodes_over(exploration, cell)
+        component = int(root_of(roadmap, roadmap.component[node]))
+        new = int(add_node(exploration.arrays, exploration.work, roadmap, cell, q, component))
+        add_edge(roadmap, node, new, rows)
+        # It need not be spread: it is followed here.
+        roadmap.counters[HEAD] = roadmap.counters[TAIL] = 0
+        _meet(exploration, new, over)
+        node = new
+
+
+def _tracked(exploration: Exploration, cell: int, q: NDArray[np.float64]) -> int:
+    """Follow the course to a pose from the one before; the rows of waypoints, or less than 0."""
+    roadmap = exploration.reserve(MOST_STEPS + 1)
+    rows = track(
+        exploration.arrays, exploration.work, exploration.curve(cell - 1, cell), 0.0, 1.0, q, q,
+        False, roadmap.waypoints, roadmap.counters[WAYPOINTS],
+    )  # fmt: skip
+    return OVERFLOW if rows == OVERFLOW else int(rows)
+
+
+def _nodes_over(exploration: Exploration, cell: int) -> list[int]:
+    """Nodes over a pose."""
+    found, node = list[int](), int(exploration.roadmap.first_node[cell])
+    while node >= 0:
+        found.append(node)
+        node = int(exploration.roadmap.following[node])
+    return found
+
+
+def _meet(exploration: Exploration, new: int, over: list[int]) -> None:
+    """Join a new node with the nearest known ones over its pose, where a self-motion does."""
+    q = exploration.roadmap.q[new].copy()
+    over = sorted(over, key=lambda x: float(np.abs(exploration.roadmap.q[x] - q).sum()))
+    for other in over[:MEETINGS]:
+        roadmap = exploration.reserve(int(CONNECT_STEPS) + 1)
+        arrays, cell = exploration.arrays, roadmap.cell[new]
+        here = q.copy()
+        look_at(arrays, exploration.work, cell)
+        rows, reached = connect(
+            arrays, exploration.work, here, roadmap.q[other], roadmap.waypoints,
+            roadmap.counters[WAYPOINTS], CONNECT_STEPS,
+        )  # fmt: skip
+        if reached:
+            add_edge(roadmap, new, other, rows)
+            unite(roadmap, roadmap.component[new], roadmap.component[other])

@@ -1,0 +1,70 @@
+"""Grids of points from NPY or CSV files, read with caps and taken for hostile."""
+
+from __future__ import annotations
+
+import io
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import CoverableError
+from coverable_files import read_regular
+from surfaces.arguments import Checks
+from surfaces.patches.nurbs import read_net
+from surfaces.surface import SurfaceError
+
+MOST_BYTES = 16 << 20
+UNITS = {"m": 1.0, "mm": 1e-3}
+
+
+def read_grid(path: str | os.PathLike[str], units: str = "m") -> NDArray[np.float64]:
+    """Read a grid of points.
+
+    A `.npy` file holds an array (m, n, 3), no pickle. A `.csv` file has the columns row, column, x,
+    y, z with a line for each point, in any order; rows and columns count from 0.
+
+    Args:
+        path: the file, at most 16 MB.
+        units: of the coordinates, "m" or "mm".
+
+    Returns:
+        (m, n, 3) m; not yet checked by `grid`.
+
+    Raises:
+        SurfaceError: the file cannot be read, or is not such a file.
+    """
+    checks = Checks("grid")
+    scale = UNITS[checks.choice("units", units, tuple(UNITS))]
+    checks.done()
+    file = Path(path)
+    name = repr(file.name if len(file.name) <= 100 else file.name[:100] + "...")
+    suffix = file.suffix.lower()
+    if suffix not in (".npy", ".csv"):
+        raise SurfaceError("a grid of points must be a .npy or a .csv file", name)
+    try:
+        data = read_regular(path, MOST_BYTES, "a grid of points (.npy or .csv)")
+    except CoverableError as error:
+        raise SurfaceError(error.faults, name) from error
+    if suffix == ".npy":
+        return scale * _from_npy(data, name)
+    net = read_net(path)
+    if net.weights is not None:
+        raise SurfaceError("has a column weight, which a grid of points has not", name)
+    return scale * np.array(net.points, dtype=float).reshape(len(net.points), -1, 3)
+
+
+def _from_npy(data: bytes, name: str) -> NDArray[np.float64]:
+    """The array of a .npy file."""
+    try:
+        found: Any = np.load(io.BytesIO(data), allow_pickle=False)
+    except (ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError) as error:
+        raise SurfaceError(f"is no .npy file that can be read: {str(error)[:120]}", name) from error
+    known = isinstance(found, np.ndarray) and found.dtype.kind in "fiu"
+    if not known or found.ndim != 3 or found.shape[2] != 3:
+        kind = isinstance(found, np.ndarray)
+        got = f"an array of shape {found.shape} and type {found.dtype}" if kind else "several"
+        raise SurfaceError(f"must hold numbers of shape (m, n, 3), got {got}", name)
+    return np.array(found, dtype=float)

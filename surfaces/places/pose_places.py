@@ -1,0 +1,233 @@
+"""Places of poses: how far along the course between two of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from surfaces.places.places import ROUNDING, Array, Ints, OffsetSurface, PlacePaths, Places
+from surfaces.toolpaths import PoseSurface, arc_angles, arc_at
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+NEAREST = 4  # poses around a point whose courses are looked at
+TURN = 1e-3  # m beside which a turn of the tool by 1 rad is none, unless nothing else tells places
+
+
+@dataclass(frozen=True, eq=False)
+class PosePlaces(OffsetSurface):
+    """The places on the courses of some poses; x is (t, 0) on the course of a pair.
+
+    Instead of normals these are the directions against the tool axis wanted ('outside'), or along
+    it ('inside'): what normals are to any other surface.
+    """
+
+    poses: PoseSurface
+
+    @property
+    def least_look(self) -> float:
+        """See `OffsetSurface.least_look`."""
+        return TURN
+
+    @cached_property
+    def _points(self) -> Array:
+        """(N, 3) m, target points."""
+        return self.poses.placed_points + self.height * self.poses.turned(self.poses.outward)
+
+    @cached_property
+    def _directions(self) -> Array:
+        """(N, 3) see the class."""
+        poses = self.poses
+        if poses.axes is None:
+            return poses.turned(poses.outward)
+        return -poses.side_sign * poses.turned(poses.axes)
+
+    @cached_property
+    def _tree(self) -> cKDTree:
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self._points)
+
+    @cached_property
+    def _around(self) -> tuple[Ints, Ints]:
+        """(N + 1,) and (2 M,): the courses of each pose."""
+        ends = self.poses.pairs.reshape(-1)
+        order = np.argsort(ends, kind="stable")
+        count = np.bincount(ends, minlength=len(self._points))
+        return np.concatenate([[0], np.cumsum(count)]), order // 2
+
+    @cached_property
+    def _same(self) -> Ints:
+        """(N,) the first of the poses that each is equal to: a course between two has no length."""
+        both = np.column_stack([self._points, self._directions])
+        _, first, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
+        return np.asarray(first[group.reshape(-1)])
+
+    def _ends(self, chart: Ints) -> tuple[Ints, Ints]:
+        i, j = self.poses.pairs[chart].T
+        return i, j
+
+    def at(self, places: Places) -> tuple[Array, Array]:
+        """See `OffsetSurface.at`."""
+        return self._at(places.chart, places.x[..., 0])
+
+    def _at(self, chart: Ints, t: Array) -> tuple[Array, Array]:
+        known = np.flatnonzero(chart >= 0)
+        points, directions = np.full((2, len(chart), 3), np.nan)
+        i, j = self._ends(chart[known])
+        share = t[known]
+        begin, ahead = self._points[i], self._points[j] - self._points[i]
+        points[known] = begin + share[:, None] * ahead
+        directions[known], _ = arc_at(self._directions[i], self._directions[j], share)
+        return points, directions
+
+    def nearest(self, points: Array, ahead: Array, within: float) -> Places:
+        """See `OffsetSurface.nearest`: on the courses of the poses around, by point and direction.
+
+        Where a tool looks `ahead` is, and tells places apart where it turns on the spot.
+        """
+        chart, t = np.full(len(points), -1, dtype=np.int64), np.zeros(len(points))
+        known = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(ahead).all(axis=1))
+        axes = -self.poses.side_sign * (ahead[known] - points[known])
+        length = np.linalg.norm(axes, axis=1, keepdims=True)
+        axes = np.divide(axes, length, out=np.zeros_like(axes), where=length > 0.0)
+        count = min(NEAREST, len(self._points))
+        around = self._tree.query(points[known], k=count)[1].reshape(len(known), count)
+        row, course = self._courses_of(around)
+        if not len(row):
+            return _placed(chart, t)
+        share, cost = self._closest(course, points[known[row]], axes[row])
+        order = np.lexsort((cost, row))
+        best = order[np.searchsorted(row[order], np.unique(row))]
+        found = known[row[best]]
+        chart[found], t[found] = course[best], share[best]
+        return _placed(chart, t)
+
+    def _courses_of(self, around: Ints) -> tuple[Ints, Ints]:
+        """Which row, and which course, of all courses of some poses (k, c)."""
+        starts, courses = self._around
+        pose = around.reshape(-1)
+        count = starts[pose + 1] - starts[pose]
+        row = np.repeat(np.repeat(np.arange(len(around)), around.shape[1]), count)
+        within = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
+        keys = np.unique(np.stack([row, courses[np.repeat(starts[pose], count) + within]]), axis=1)
+        return keys[0], keys[1]
+
+    def _closest(self, chart: Ints, points: Array, axes: Array) -> tuple[Array, Array]:
+        """(k,) t on each course, and its cost: the squared distance, with a little of the turn."""
+        i, j = self._ends(chart)
+        begin, ahead = self._points[i], self._points[j] - self._points[i]
+        angle = arc_angles(self._directions[i], self._directions[j])
+        square = (ahead**2).sum(axis=1)
+        known = np.linalg.norm(axes, axis=1) > 0.0
+        weight = np.where(known, (TURN * angle) ** 2, 0.0)
+        along = np.divide(((points - begin) * ahead).sum(axis=1), square,
+                          out=np.zeros(len(chart)), where=square > 0.0)  # fmt: skip
+        _, slope = arc_at(self._directions[i], self._directions[j], np.zeros(len(chart)))
+        turned = np.arctan2((axes * slope).sum(axis=1),
+                            angle * (axes * self._directions[i]).sum(axis=1))  # fmt: skip
+        turned = np.divide(turned, angle, out=np.zeros(len(chart)), where=angle > 0.0)
+        turned = np.clip(turned, 0.0, 1.0)
+        t = np.divide(square * along + weight * turned, square + weight,
+                      out=np.zeros(len(chart)), where=square + weight > 0.0)  # fmt: skip
+        t = np.clip(t, 0.0, 1.0)
+        target, direction = self._at(chart, t)
+        leans = np.where(known, ((axes - direction) ** 2).sum(axis=1), 0.0)
+        return t, ((points - target) ** 2).sum(axis=1) + TURN**2 * leans
+
+    def along(self, places: Places) -> Array | None:
+        """See `OffsetSurface.along`."""
+        if not self.poses.in_order:
+            return None
+        courses = np.arange(len(self.poses.pairs))
+        starts = np.concatenate([[0.0], np.cumsum(self._length(courses, np.ones(len(courses))))])
+        here = self._length(places.chart, places.x[:, 0])
+        return np.where(places.chart >= 0, starts[places.chart] + here, np.nan)
+
+    def paths(self, start: Places, end: Places) -> PlacePaths:
+        """See `OffsetSurface.paths`: along one course, or over the pose that two share."""
+        ends = self.at(start), self.at(end)
+        known = (start.chart >= 0) & (end.chart >= 0)
+        made = PlacePaths.straight(ends, np.full((len(start.chart), 2), np.inf), start, end)
+        same = np.flatnonzero(known & (start.chart == end.chart))
+        made.bends[same, 2] = self._bends(start.chart[same], start.x[same, 0], end.x[same, 0])
+        rest = np.flatnonzero(known & (start.chart != end.chart))
+        if len(rest):
+            self._over_poses(made, rest, start.of(rest), end.of(rest))
+        return made
+
+    def _bends(self, chart: Ints, t0: Array, t1: Array) -> Array:
+        """(k, 2) see `PlacePaths.bends`; a point that turns with the angle's speed."""
+        i, j = self._ends(chart)
+        turn = (t1 - t0) * arc_angles(self._directions[i], self._directions[j])
+        return np.stack([np.zeros(len(chart)), ROUNDING * turn**2], axis=1)
+
+    def _over_poses(self, made: PlacePaths, rows: Ints, start: Places, end: Places) -> None:
+        """Paths from one course to another, where they share a pose."""
+        one, other = (self._same[self.poses.pairs[places.chart]] for places in (start, end))
+        same = one[:, :, None] == other[:, None, :]
+        some = np.flatnonzero(same.any(axis=(1, 2)))
+        leave, enter = np.divmod(same[some].reshape(-1, 4).argmax(axis=1), 2)
+        start, end, rows = start.of(some), end.of(some), rows[some]
+        to, fro = leave.astype(float), enter.astype(float)
+        legs = [
+            self._length(chart, np.abs(t - at))
+            for chart, t, at in ((start.chart, start.x[:, 0], to), (end.chart, end.x[:, 0], fro))
+        ]
+        total = legs[0] + legs[1]
+        share = np.divide(legs[0], total, out=np.zeros_like(total), where=total > 0.0)
+        zero = np.zeros(len(some))
+        bends = [
+            self._bends(start.chart, start.x[:, 0], to),
+            np.zeros((len(some), 2)),
+            self._bends(end.chart, fro, end.x[:, 0]),
+        ]
+        four = [start, _placed(start.chart, to), _placed(end.chart, fro), end]
+        known = [self.at(places) for places in four]
+        over = PlacePaths(
+            np.stack([zero, share, share, zero + 1.0], axis=1),
+            np.stack([point for point, _ in known], axis=1),
+            np.stack([direction for _, direction in known], axis=1),
+            np.stack(bends, axis=1),
+            np.stack([places.chart for places in four], axis=1),
+            np.stack([places.x for places in four], axis=1),
+        )
+        made.put(rows, over)
+
+    def tangents(self, places: Places) -> Array:
+        """See `OffsetSurface.tangents`: on the way from the tangent of one pose to the next."""
+        found = super().tangents(places)
+        if self.poses.along is None:
+            return found
+        along = self.poses.turned(self.poses.along)
+        known = np.flatnonzero(places.chart >= 0)
+        i, j = self._ends(places.chart[known])
+        found[known], _ = arc_at(along[i], along[j], places.x[known, 0])
+        return found
+
+    def turning(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.turning`."""
+        if self.poses.along is None:
+            return super().turning(start, end)
+        along = self.poses.turned(self.poses.along)
+        i, j = self._ends(start.chart)
+        angle = arc_angles(along[i], along[j])
+        turn = np.abs(end.x[:, 0] - start.x[:, 0]) * angle * ROUNDING
+        return np.where((start.chart >= 0) & (start.chart == end.chart), turn, np.inf)
+
+    def _length(self, chart: Ints, share: Array) -> Array:
+        """(k,) m, of parts of courses; turns count a little."""
+        i, j = self._ends(chart)
+        turn = TURN * arc_angles(self._directions[i], self._directions[j])
+        return np.asarray(
+            share * np.hypot(np.linalg.norm(self._points[j] - self._points[i], axis=1), turn)
+        )
+
+
+def _placed(chart: Ints, t: Array) -> Places:
+    """Places at t (k,) of courses."""
+    return Places(chart, np.stack([t, np.zeros(len(t))], axis=1))

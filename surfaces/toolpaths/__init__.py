@@ -1,0 +1,5 @@
+"""Poses as cells: a toolpath, or a set of points with normals, and the courses between them."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

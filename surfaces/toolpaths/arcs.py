@@ -1,0 +1,96 @@
+"""Courses from pose to pose: points run straight, and directions along the great arc.
+
+As cubics: a straight line is one, and of a great arc cubics with its directions and slopes at both
+ends of pieces of at most 15 degrees are within angle^4 / 384 (1.2e-5).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surfaces.cell_curves import CellCurves
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+PIECE = math.radians(15.0)
+ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds
+STRAYS = 1e-14  # [1], of directions, by rounding
+
+
+def arc_angles(starts: Array, ends: Array) -> Array:
+    """(k,) rad, between unit vectors (k, 3)."""
+    across = np.linalg.norm(np.cross(starts, ends), axis=-1)
+    return np.asarray(np.arctan2(across, (starts * ends).sum(axis=-1)))
+
+
+def arc_at(starts: Array, ends: Array, t: Array) -> tuple[Array, Array]:
+    """Directions (k, 3) at t (k,) of the great arcs from unit vectors to others, and slopes by t.
+
+    The ends must not be opposite.
+    """
+    angle = arc_angles(starts, ends)[:, None]
+    across = ends - (starts * ends).sum(axis=1, keepdims=True) * starts
+    across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    turned = angle * t[:, None]
+    cos, sin = np.cos(turned), np.sin(turned)
+    return cos * starts + sin * across, angle * (cos * across - sin * starts)
+
+
+def arc_pieces(directions: Array, pairs: Ints) -> Ints:
+    """(M,) into how many cubics of at most 15 degrees the great arc of each pair is cut."""
+    angle = arc_angles(directions[pairs[:, 0]], directions[pairs[:, 1]])
+    return np.maximum(np.ceil(angle / PIECE), 1.0).astype(np.int64)
+
+
+def straight(points: Array, pairs: Ints, first: Ints) -> Array:
+    """(P, 4, 3) m, cubics of the straight lines between pairs (M, 2) of points (N, 3).
+
+    Args:
+        points: m.
+        pairs: which points.
+        first: (M + 1,) where the pieces of each line begin.
+    """
+    count = np.diff(first)
+    owner = np.repeat(np.arange(len(pairs)), count)
+    begin = (np.arange(len(owner)) - first[owner]) / count[owner]
+    start = points[pairs[owner, 0]]
+    along = points[pairs[owner, 1]] - start
+    cubics = np.zeros((len(owner), 4, 3))
+    cubics[:, 0] = start + begin[:, None] * along
+    cubics[:, 1] = along / count[owner][:, None]
+    return cubics
+
+
+def courses(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellCurves:
+    """The course between each pair of poses.
+
+    Args:
+        points: (N, 3) m.
+        directions: (N, 3) unit; those of a pair not opposite.
+        pairs: (M, 2).
+        count: (M,) into how many cubics each course is cut.
+
+    Returns:
+        Curves whose "normals" are the directions.
+    """
+    first = np.concatenate([[0], np.cumsum(count)])
+    owner = np.repeat(np.arange(len(pairs)), count)
+    begin = (np.arange(len(owner)) - first[owner]) / count[owner]
+    share = (1.0 / count)[owner]
+    i, j = pairs.T
+    ends = directions[i[owner]], directions[j[owner]]
+    (d0, m0), (d1, m1) = arc_at(*ends, begin), arc_at(*ends, begin + share)
+    m0, m1 = share[:, None] * m0, share[:, None] * m1
+    turns = np.stack([d0, m0, 3.0 * (d1 - d0) - 2.0 * m0 - m1, 2.0 * (d0 - d1) + m0 + m1], axis=1)
+    bent = 2.0 * turns[:, 2], 2.0 * turns[:, 2] + 6.0 * turns[:, 3]
+    bounds = np.zeros((len(owner), 2))
+    bounds[:, 1] = np.max([np.linalg.norm(one, axis=1) for one in bent], axis=0)
+    bounds[:, 1] *= ROUNDING * count[owner] ** 2
+    deviations = np.zeros((len(pairs), 2))
+    deviations[:, 1] = (arc_angles(directions[i], directions[j]) / count) ** 4 / 384.0 + STRAYS
+    cubics = np.concatenate([straight(points, pairs, first), turns], axis=2)
+    return CellCurves(first, cubics, bounds, deviations, np.zeros(len(owner), dtype=bool))

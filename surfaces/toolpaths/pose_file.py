@@ -1,0 +1,142 @@
+"""Poses from CSV text, read with caps and taken for hostile."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import os
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import CoverableError, Fault
+from coverable_files import read_regular
+from surfaces.arguments import Checks
+from surfaces.surface import SurfaceError
+from surfaces.toolpaths.given import MOST_POSES
+
+Array = NDArray[np.float64]
+
+MOST_BYTES = 16 << 20
+UNITS = {"m": 1.0, "mm": 1e-3}
+GROUPS = {"points": "xyz", "normals": "nx ny nz", "approaches": "ax ay az", "tangents": "tx ty tz"}
+MOST_FAULTS = 5  # lines that are named
+
+
+class PoseFile(NamedTuple):
+    """The arguments of `poses` as a file gives them; not yet checked."""
+
+    points: Array
+    """(N, 3) m."""
+    normals: Array
+    approaches: Array | None = None
+    tangents: Array | None = None
+
+
+def read_poses(path: str | os.PathLike[str], units: str = "m") -> PoseFile:
+    """Read poses from a CSV file with a header.
+
+    The columns are x, y, z, nx, ny, nz, and perhaps ax, ay, az (tool axis) and tx, ty, tz
+    (tangent), in any order; a line for each pose.
+
+    Args:
+        path: the file, at most 16 MB and 20,000 poses.
+        units: of x, y and z: "m" or "mm".
+
+    Returns:
+        The arguments: `poses(**read_poses("toolpath.csv", "mm")._asdict())`.
+
+    Raises:
+        SurfaceError: the file cannot be read, or is not such a file; several faults are named.
+    """
+    name = repr(os.path.basename(os.fspath(path))[:100])
+    checks = Checks("poses")
+    scale = UNITS[checks.choice("units", units, tuple(UNITS))]
+    checks.done()
+    try:
+        data = read_regular(path, MOST_BYTES, "a list of poses (.csv)")
+        rows = csv.reader(io.StringIO(data.decode("utf-8-sig"), newline=""), strict=True)
+        columns = _columns([word.strip().lower() for word in next(rows, [])])
+        values = _values(rows, sum(len(group) for group in columns.values()))
+    except UnicodeDecodeError as error:
+        raise SurfaceError(f"is not text in UTF-8, at byte {error.start}", name) from error
+    except csv.Error as error:
+        raise SurfaceError(f"is no CSV: {error}", name) from error
+    except CoverableError as error:
+        raise SurfaceError(error.faults, name) from error
+    found = {group: values[:, at] for group, at in columns.items()}
+    found["points"] = scale * found["points"]
+    return PoseFile(**found)
+
+
+def _columns(header: list[str]) -> dict[str, list[int]]:
+    """Where the columns of each group are.
+
+    Raises:
+        SurfaceError: there are others, or one is missing.
+    """
+    wanted = {group: words.split() if " " in words else list(words)
+              for group, words in GROUPS.items()}  # fmt: skip
+    faults = []
+    known = {word for words in wanted.values() for word in words}
+    foreign = [word for word in header if word not in known]
+    if foreign or len(set(header)) < len(header) or not header:
+        got = ", ".join(repr(word[:20]) for word in header[:12]) or "nothing"
+        faults.append(
+            f"must begin with a header of the columns x,y,z,nx,ny,nz, then perhaps ax,ay,az and "
+            f"tx,ty,tz, each once; got {got}"
+        )
+    for group, words in wanted.items():
+        missing = [word for word in words if word not in header]
+        needed = group in ("points", "normals")
+        if header and not foreign and missing and (needed or len(missing) < len(words)):
+            faults.append(f"lacks the column{'s' * (len(missing) > 1)} {', '.join(missing)}")
+    if faults:
+        raise SurfaceError([Fault("", text) for text in faults])
+    return {
+        group: [header.index(word) for word in words]
+        for group, words in wanted.items()
+        if words[0] in header
+    }
+
+
+def _values(lines: Any, width: int) -> Array:
+    """(N, width) the numbers of all lines.
+
+    Raises:
+        SurfaceError: with the first lines that are wrong.
+    """
+    found: list[list[float]] = []
+    faults: list[Fault] = []
+    for line in lines:
+        if not line:
+            continue
+        try:
+            numbers = [float(word) for word in line]
+        except ValueError:
+            numbers = [math.nan]
+        if len(line) != width:
+            faults.append(
+                Fault(f"line {lines.line_num}", f"must hold {width} numbers, got {len(line)}")
+            )
+        elif not all(map(math.isfinite, numbers)):
+            word = next(word for word in line if not _finite(word))
+            faults.append(Fault(f"line {lines.line_num}", f"{word[:40]!r} is not a finite number"))
+        found.append(numbers)
+        if len(faults) >= MOST_FAULTS:
+            break
+        if len(found) > MOST_POSES:
+            faults.append(Fault("", f"holds more than {MOST_POSES:,} poses; split the list"))
+            break
+    if faults:
+        raise SurfaceError(faults)
+    return np.array(found, dtype=float).reshape(len(found), width)
+
+
+def _finite(word: str) -> bool:
+    try:
+        return math.isfinite(float(word))
+    except ValueError:
+        return False

@@ -1,0 +1,104 @@
+"""PoseSurface: poses in place of a surface, with nothing known between them but their courses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from surfaces.parts import MOST_PARTS, SurfaceParts
+from surfaces.surface import ClosestPoint, Surface, SurfaceError, points_of
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseSurface(Surface):
+    """N poses: points with outward normals, perhaps with tool axes and tangents of their own.
+
+    There is no surface between them: no closest points but the poses' own planes, no bounds, and no
+    sheet that an arm could collide with.
+    """
+
+    kind: ClassVar[str] = "poses"
+
+    points: Array
+    """(N, 3) m, in the own frame."""
+    outward: Array
+    """(N, 3) unit normals, in the own frame."""
+    axes: Array | None
+    """(N, 3) unit tool axes, in the own frame; None where they follow from the normals."""
+    along: Array | None
+    """(N, 3) unit tangents, in the own frame; None where there are none."""
+    pairs: Ints
+    """(M, 2) i < j, sorted: between which poses the tool may move."""
+    in_order: bool
+    """Whether they are a toolpath, to be run from the first to the last."""
+
+    @property
+    def bare(self) -> bool:
+        """See `Surface.bare`."""
+        return True
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is not looked at; and how a toolpath is run."""
+        runs = (
+            "The poses are run in their order, from the first to the last and never back; the arm "
+            "may change its posture in place, over a pose."
+        )
+        return (
+            "Between poses the tool point runs straight and its direction along the great arc; "
+            "there is no surface between them that anything could be checked against.",
+            *([runs] if self.in_order else []),
+        )
+
+    @cached_property
+    def placed_points(self) -> Array:
+        """(N, 3) m, in the root frame."""
+        return self.points @ self.rotation.T + self.position
+
+    @cached_property
+    def tree(self) -> cKDTree:
+        """The poses' points in the root frame, for neighbours."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.placed_points)
+
+    def turned(self, directions: Array) -> Array:
+        """Directions (N, 3) of the own frame in the root frame."""
+        return directions @ self.rotation.T
+
+    def closest(self, points: ArrayLike) -> ClosestPoint:
+        """Where `points` (..., 3) m are over the planes of the poses nearest to them."""
+        points = points_of(points)
+        flat = points.reshape(-1, 3)
+        values = np.full((len(flat), 6), np.nan)
+        known = np.asarray(np.isfinite(flat).all(axis=1), dtype=np.bool_)
+        nearest = self.tree.query(flat[known])[1]
+        normals = self.turned(self.outward)[nearest]
+        values[known, 2] = ((flat[known] - self.placed_points[nearest]) * normals).sum(axis=1)
+        values[known, 3:] = normals
+        return ClosestPoint.of_rows(points.shape[:-1], values, known)
+
+    def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
+        """See `Surface.parts`; poses have none.
+
+        Raises:
+            SurfaceError: always.
+        """
+        raise SurfaceError("there is no surface between poses, so nothing can be proved of it",
+                           self.kind)  # fmt: skip
+
+    def __repr__(self) -> str:
+        """One line."""
+        what = "in order" if self.in_order else f"{len(self.pairs)} pairs"
+        at = f"side={self.side!r}, position={self.position.tolist()}"
+        return f"poses({len(self.points)}, {what}, {at})"
