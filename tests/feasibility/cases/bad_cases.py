@@ -67,6 +67,19 @@ def surface(text, *changes):
 
 # One good [surface] table of each kind that the paper does not have.
 SURFACES = {
+    "grid": """
+kind = "grid"
+file = "points.npy"
+units = "mm"
+side = "outside"
+cells = [3, 4]
+""",
+    "poses": """
+kind = "poses"
+file = "toolpath.csv"
+units = "mm"
+side = "outside"
+""",
     "cone": """
 kind = "cone"
 radius = 0.2
@@ -217,7 +230,13 @@ BAD_CASES = {
     "no kind": changed('kind = "sphere"\n', "", "surface.kind", "is missing", "'plane'"),
     "misspelt kind": changed('"sphere"', '"shpere"', "surface.kind", 'did you mean "sphere"?'),
     "a formula of one's own": changed(
-        '"sphere"', '"parametric"', "surface.kind", "r(u, v)", "as a bspline", "as a mesh"
+        '"sphere"',
+        '"parametric"',
+        "surface.kind",
+        "g(u, v)",
+        "as a grid",
+        "as a mesh",
+        "surfaces.parametric",
     ),
     "kind is a list": changed('"sphere"', '["sphere"]', "surface.kind", "must be"),
     "mesh key": added("surface", "cell_size = 0.1", "surface.cell_size", "belongs to a mesh"),
