@@ -1,5 +1,6 @@
 """What all tests share: made-up inputs that do not depend on what ran before, Ctrl-C, the order."""
 
+import gc
 import signal
 
 import pytest
@@ -30,3 +31,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the files that take longest first."""
     place = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))
+
+
+def pytest_collection_finish() -> None:
+    """What is loaded by now stays: collections of garbage need not look through it each time."""
+    gc.collect()
+    gc.freeze()

@@ -131,7 +131,12 @@ def _files() -> dict[str, Path]:
 
 
 FILES = _files()
-IMPORTS = {name: frozenset(imports(path.read_text("utf-8"))) for name, path in FILES.items()}
+
+
+@cache
+def imports_of(name: str) -> frozenset[Import]:
+    """All imports of a module; each file is read when it is first asked for."""
+    return frozenset(imports(FILES[name].read_text("utf-8")))
 
 
 @cache
@@ -165,7 +170,7 @@ def home(module: str, name: str) -> str:
 def homes(name: str, now_only: bool = False) -> set[str]:
     """The project's modules that a module imports from."""
     found: set[str] = set()
-    for i in IMPORTS[name]:
+    for i in imports_of(name):
         if (now_only and i.deferred) or not (
             i.module.split(".")[0] in PACKAGES or i.module in FILES
         ):
@@ -253,7 +258,7 @@ def test_rooms_are_entered_by_their_door() -> None:
     past = [
         f"{name} imports {i.module}"
         for name in FILES
-        for i in IMPORTS[name]
+        for i in imports_of(name)
         if i.module in FILES and room_of(i.module)
         and not f"{room_of(name)}.".startswith(f"{room_of(i.module)}.")
         and i.module not in door(room_of(i.module)).values()  # handed on as a module
@@ -321,19 +326,19 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
     assert {n for n in feasibility if room_of(n) not in rooms} <= words
     assert "robots.chain" not in ours
     judged = feasibility - {f"feasibility.collisions.{word}" for word in values}
-    assert not any(i.deferred and i.module in FILES for name in judged for i in IMPORTS[name])
+    assert not any(i.deferred and i.module in FILES for name in judged for i in imports_of(name))
 
 
 def test_surfaces_know_neither_pinocchio_nor_networkx() -> None:
     for name in (name for name in FILES if name.startswith("surfaces")):
-        now = {i.module.split(".")[0] for i in IMPORTS[name] if not i.deferred}
+        now = {i.module.split(".")[0] for i in imports_of(name) if not i.deferred}
         assert not now & {"pinocchio", "networkx"}, name
 
 
 def test_heavy_libraries_are_imported_where_they_are_used() -> None:
     """figures.py is matplotlib's own file; it is loaded when a plot is asked for."""
     for name in FILES:
-        now = {i.module.split(".")[0] for i in IMPORTS[name] if not i.deferred}
+        now = {i.module.split(".")[0] for i in imports_of(name) if not i.deferred}
         allowed = {"matplotlib"} if name == "feasibility.viewer.figures" else set()
         assert not now & HEAVY - allowed, name
 

@@ -191,8 +191,8 @@ REFUSED: dict[str, tuple[str | bytes, tuple[str, ...]]] = {
     "deep nesting": (urdf("<a>" * 100_000 + "</a>" * 100_000), ("nested", "64")),
     "many elements": (urdf("<a/>" * 200_000), ("50,000 XML elements",)),
     "many attributes": (
-        urdf("<a " + " ".join(f'a{i}=""' for i in range(500_000)) + "/>"),
-        ("500,000 attributes", "64"),
+        urdf("<a " + " ".join(f'a{i}=""' for i in range(100_000)) + "/>"),
+        ("100,000 attributes", "64"),
     ),
     "9 MB of comment": (
         urdf("<!--" + " " * 9_000_000 + "-->"),

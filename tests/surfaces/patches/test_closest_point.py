@@ -113,7 +113,7 @@ def test_closest_points_over_the_patch_are_those_of_the_closed_form(both):
 def test_points_anywhere_get_the_nearest_point_of_the_patch(both):
     exact, found = both
     rng = np.random.default_rng(6)
-    points = exact.position + rng.normal(scale=exact.radius, size=(25, 3))
+    points = exact.position + rng.normal(scale=exact.radius, size=(12, 3))
     closest_point = found.closest(points)
     placed = found.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
