@@ -20,7 +20,7 @@ from robots import load_robot
 from surfaces import cylinder, rotation_from_rpy
 from surfaces.meshes import TriangleMesh, mesh
 
-PER_SEGMENT = 10
+PER_SEGMENT = 6
 SETTLED = 1e-7  # m, how far the last iteration may move a closest point
 ITERATIONS = 60  # of the search for a closest point
 
@@ -193,15 +193,15 @@ TASKS = {
 @pytest.mark.parametrize(
     ("robot", "name", "task"),
     [
-        *(("ur5", name, "near") for name in PARTS),
-        *(("puma560", name, "near") for name in ("coarse hood", "noisy cap")),
+        *(("ur5", name, "near") for name in PARTS if name != "fine hood"),
+        ("puma560", "noisy cap", "near"),
         *(("ur5", name, "touching, wide") for name in ("irregular", "noisy plate")),
     ],
 )
 def test_a_witness_holds_over_the_triangles_as_given(robot, name, task):
     (vertices, faces), position = PARTS[name]
     surface = mesh(TriangleMesh(vertices, faces), side="outside", position=position)
-    verdict = check(load_robot(robot), surface.cells(90), TASKS[task])
+    verdict = check(load_robot(robot), surface.cells(60), TASKS[task])
     assert verdict.feasible
     assert_held(verdict, vertices, faces)
 
@@ -210,7 +210,7 @@ def test_a_witness_holds_over_the_triangles_as_given(robot, name, task):
 def test_a_witness_holds_over_a_hood_in_a_narrower_cone(robot):
     (vertices, faces), position = PARTS["fine hood"]
     surface = mesh(TriangleMesh(vertices, faces), side="outside", position=position)
-    verdict = check(load_robot(robot), surface.cells(90), Task(standoff=0.03, cone_deg=25))
+    verdict = check(load_robot(robot), surface.cells(60), Task(standoff=0.03, cone_deg=25))
     assert verdict.feasible
     assert_held(verdict, vertices, faces)
 

@@ -261,7 +261,7 @@ def test_nothing_helps_a_plate_that_leaves_the_room() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["plate", "stiff wrist", "deep plate", "4a", "4d", "4f", "5e", "cheap ur5", "cheap z1", "dome"],
+    ["plate", "stiff wrist", "deep plate", "4a", "4d", "5e", "cheap ur5", "cheap z1", "dome"],
 )
 def test_what_is_said_of_a_side_is_what_a_verdict_says(name: str) -> None:
     """Feasible sides are feasible, proved ones are not, in cases built from scratch."""
@@ -413,14 +413,14 @@ def test_the_greedy_search_is_refused() -> None:
 
 
 def test_the_same_question_gets_the_same_answer() -> None:
-    one = as_json(explained("4f"), "4f")
-    other = as_json(explain(*variant_of("4f")), "4f")
+    one = as_json(explained("4d"), "4d")
+    other = as_json(explain(*variant_of("4d")), "4d")
     for result in (one, other):
         result.pop("seconds")
     assert one == other
 
 
-@pytest.mark.parametrize("name", ["4a", "4d", "4f", "5e", "cheap ur5", "cheap z1", "dome"])
+@pytest.mark.parametrize("name", ["4a", "4d", "5e", "cheap ur5", "cheap z1", "dome"])
 def test_an_explanation_costs_at_most_forty_verdicts(name: str) -> None:
     """Where a verdict is cheap too: one search and no failure."""
     explanation = explained(name)
