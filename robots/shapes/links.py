@@ -101,6 +101,7 @@ class _Gathered:
 
     def __init__(self, robot: Robot, checked: CheckedUrdf) -> None:
         self.robot = robot
+        self.root = checked.root
         self.meshes = MeshBodies()
         self.solids: list[Solid] = []
         self.collisions: dict[str, list[CollisionShape]] = {}
@@ -171,7 +172,9 @@ class _Gathered:
     def unchecked(self) -> tuple[str, ...]:
         """See `LinkShapes.unchecked`."""
         carrying = {solid.joint for solid in self.solids}
-        gaps = [link for joint, link in self.carriers.items() if joint and joint not in carrying]
+        bare = {*carrying, 0}
+        gaps = [link for joint, link in self.carriers.items() if joint not in bare]
+        gaps = [link for link in gaps if link != self.root]  # moves only as seen from another link
         return tuple(dict.fromkeys([*self._lost(), *self.without, *gaps]))
 
     def notes(self) -> tuple[str, ...]:

@@ -63,6 +63,13 @@ def test_pairs_of_what_the_world_and_the_table_carry():
     assert ("base_link", "shelf") in rigid
 
 
+def test_the_world_is_no_link_without_a_shape():
+    rail = Axis("rail", "prismatic", limits=(0, 1))
+    lift = Axis("lift", "prismatic", limits=(0, 1))
+    robot = load_robot("ur5", axes=[rail, lift, TABLE])
+    assert gather(robot, plane(*PLATE), Collision(), 0.1).unchecked == ("rail",)
+
+
 def test_an_object_on_the_forearm_moves_with_it():
     ur5 = load_robot("ur5")
     guide = Obstacle.box("guide", (0.05, 0.05, 0.2), position=(0, 0.1, 0.2), frame="forearm_link")
