@@ -6,6 +6,8 @@ and shares no code with the search (`feasibility.collisions` holds its kernels).
 
 from __future__ import annotations
 
+import heapq
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -13,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.certification.collisions.first_look import Body, FirstLook
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
-from feasibility.certification.collisions.pieces import Below, Piece, piece_of, sheet_piece
+from feasibility.certification.collisions.pieces import Below, piece_of, sheet_piece
 from feasibility.certification.collisions.plane_search import NEAR
 from feasibility.certification.collisions.relative_motion import Motion
 from feasibility.certification.faults import Judged, MotionFault
@@ -51,15 +54,6 @@ class CollisionReplay(Judged):
     """How often coal was asked."""
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class _Body:
-    """One body with its owner's joint."""
-
-    joint: int
-    piece: Piece
-    deviation: float
-
-
 class BodiesOfOwners:
     """The bodies of one problem, ready for coal; not to be pickled."""
 
@@ -70,25 +64,25 @@ class BodiesOfOwners:
             ArgumentError: a pair names what has no body, or a body is malformed.
         """
         named = {name for pair in bodies.pairs for name in (pair.first, pair.second)}
-        self._of: dict[str, list[_Body]] = {name: [] for name in named}
+        self._of: dict[str, list[Body]] = {name: [] for name in named}
         for solid in bodies.solids:
             if solid.owner in named:
                 piece = piece_of(solid.geometry, solid.placement)
-                self._of[solid.owner].append(_Body(solid.joint, piece, 0.0))
+                self._of[solid.owner].append(Body(solid.joint, piece, 0.0))
         scene = {thing.name for thing in bodies.scene}
         for thing in bodies.scene:
             if thing.name in named:
                 piece = piece_of(thing.geometry, thing.placement, at_rest=True)
-                self._of[thing.name].append(_Body(0, piece, 0.0))
+                self._of[thing.name].append(Body(0, piece, 0.0))
         for soup in bodies.soups:
             if soup.owner in named and soup.owner not in scene:
                 piece = sheet_piece(soup.triangles, soup.closed)
-                self._of[soup.owner].append(_Body(0, piece, soup.deviation))
+                self._of[soup.owner].append(Body(0, piece, soup.deviation))
         empty = sorted(name for name, parts in self._of.items() if not parts)
         if empty:
             raise ArgumentError(f"pairs name what has no body: {', '.join(empty)}")
 
-    def couples(self, pair: Pair) -> list[tuple[_Body, _Body]]:
+    def couples(self, pair: Pair) -> list[tuple[Body, Body]]:
         """Each body of one owner with each of the other, the one nearer to the root first."""
         found = []
         for one in self._of[pair.first]:
@@ -140,59 +134,78 @@ def collision_replay(
     return _judged(bodies, ready, motion)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
 class _Asked:
     """Two bodies of a pair."""
 
-    pair: Pair
-    deviation: float
-    """m, how far they may stand out from what is known of them."""
-    pairing: Pairing
-
-    @property
-    def needed(self) -> float:
+    def __init__(self, pair: Pair, a: Body, b: Body) -> None:
+        """Nothing is known of them yet."""
+        self.pair, self.a, self.b = pair, a, b
+        self.deviation = a.deviation + b.deviation
+        """m, how far they may stand out from what is known of them."""
+        self.needed = pair.clearance + self.deviation
         """m, of what is known of them."""
-        return self.pair.clearance + self.deviation
+        self.low = -np.inf
+        """m, certified by balls."""
+        self.pairing: Pairing | None = None
+        """Made where balls do not tell enough."""
 
     @property
     def distance(self) -> float:
         """m, certified, or met where they are refused."""
-        place = self.pairing.place
-        return (self.pairing.bound - ROUNDING if place is None else place.distance) - self.deviation
+        if self.pairing is None:
+            return self.low - ROUNDING - self.deviation
+        place, bound = self.pairing.place, self.pairing.bound
+        return (bound - ROUNDING if place is None else place.distance) - self.deviation
 
 
 def _judged(bodies: Bodies, ready: BodiesOfOwners, motion: Motion) -> CollisionReplay:
-    """All pairs, first at a glance: how near they come sets what is aimed at."""
-    asked = [
-        _Asked(
-            pair,
-            a.deviation + b.deviation,
-            Pairing(a.piece, b.piece, (a.joint, b.joint), motion),
-        )
-        for pair in bodies.pairs
-        for a, b in ready.couples(pair)
-    ]
+    """All pairs, the nearest first: how near they come sets what is aimed at."""
+    asked = [_Asked(pair, a, b) for pair in bodies.pairs for a, b in ready.couples(pair)]
     asked.sort(key=_outermost)
-    nearest = np.inf
-    for one in asked:
-        met = one.pairing.glance(nearest + one.deviation) - one.deviation
-        nearest = min(nearest, met)
-    for one in asked:
-        one.pairing.certify(one.needed, max(one.needed, NEAR * nearest + one.deviation))
+    look = FirstLook(motion, [(one.a, one.b) for one in asked])
+    for one, low in zip(asked, look.low.min(axis=1).tolist(), strict=True):
+        one.low = low
+
+    def paired(number: int) -> Pairing:
+        one = asked[number]
+        if one.pairing is None:
+            joints, stretches = (one.a.joint, one.b.joint), look.stretches(number)
+            one.pairing = Pairing(one.a.piece, one.b.piece, joints, motion, stretches)
+        return one.pairing
+
+    nearest, heap = np.inf, [(one.low - one.deviation, k, False) for k, one in enumerate(asked)]
+    heapq.heapify(heap)
+    while heap and heap[0][0] < nearest:
+        low, number, guessed = heapq.heappop(heap)
+        if guessed:
+            nearest = min(nearest, paired(number).meet() - asked[number].deviation)
+        else:
+            seems = paired(number).guess() - asked[number].deviation
+            heapq.heappush(heap, (max(low, seems), number, True))
+    for number, one in enumerate(asked):
+        aim = max(one.needed, NEAR * nearest + one.deviation)
+        if one.pairing is not None or one.low < aim + ROUNDING:
+            paired(number).certify(one.needed, aim)
+    return _outcome(asked)
+
+
+def _outcome(asked: list[_Asked]) -> CollisionReplay:
+    """What was found, in words."""
     faults: dict[tuple[str, str], CollisionFault] = {}
+    pairings = [one.pairing for one in asked if one.pairing is not None]
     for one in asked:
-        if one.pairing.place is not None:
+        if one.pairing is not None and one.pairing.place is not None:
             fault = _fault(one.pair, one.pairing.place, one.distance)
             known = faults.get(fault.pair)
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
-    least = min(asked, key=lambda one: np.nan_to_num(one.distance, nan=np.inf))
-    ordered = sorted(faults.values(), key=lambda one: np.nan_to_num(one.distance, nan=np.inf))
+    least = min(asked, key=_decided)
+    ordered = sorted(faults.values(), key=_decided)
     return CollisionReplay(
         min_clearance=float(least.distance),
         nearest_pair=(least.pair.first, least.pair.second),
         faults=tuple(ordered),
-        calls=sum(one.pairing.calls for one in asked),
+        calls=sum(pairing.calls for pairing in pairings),
     )
 
 
@@ -201,8 +214,13 @@ def _outermost(one: _Asked) -> tuple[object, ...]:
 
     So the answer does not depend on the order in which bodies and pairs are given.
     """
-    pairing, names = one.pairing, sorted((one.pair.first, one.pair.second))
-    return (-pairing.joints[1], *names, *pairing.a.centre, *pairing.b.centre)
+    names, a, b = sorted((one.pair.first, one.pair.second)), one.a.piece, one.b.piece
+    return (-one.b.joint, *names, *a.centre, *b.centre)
+
+
+def _decided(one: _Asked | CollisionFault) -> float:
+    """m, its distance; infinite where that was not decided."""
+    return math.inf if math.isnan(one.distance) else one.distance
 
 
 def _fault(pair: Pair, place: Place, distance: float) -> CollisionFault:

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from feasibility.certification.collisions.coal_distances import coal_distance
 from feasibility.certification.collisions.collision_replay import ready_bodies
-from feasibility.certification.collisions.pieces import Below, Piece
-from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.first_look import Body, FirstLook
+from feasibility.certification.collisions.pieces import Below
+from feasibility.certification.collisions.relative_motion import Motion, Stretches
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
 
@@ -64,11 +65,15 @@ def nearest_along(robot: Robot, bodies: Bodies, q: Array) -> NearestAlong | None
         return None
     motion = Motion(robot, np.repeat(q, 2, axis=0) if len(q) == 1 else q)
     ready = ready_bodies(bodies)
-    couples = [
-        _Couple((pair.first, pair.second), a.piece, b.piece, (a.joint, b.joint), motion, less)
+    named = [
+        ((pair.first, pair.second), couple)
         for pair in bodies.pairs
-        for a, b in ready.couples(pair)
-        for less in (a.deviation + b.deviation,)
+        for couple in ready.couples(pair)
+    ]
+    look = FirstLook(motion, [couple for _, couple in named])
+    couples = [
+        _Couple(names, *couple, motion, look.stretches(k))
+        for k, (names, couple) in enumerate(named)
     ]
     distances, found = _searched(couples, len(q))
     names = list(dict.fromkeys(couples[k].names for k in found))
@@ -88,14 +93,14 @@ class _Couple:
     """One body of each owner of a pair, along one motion."""
 
     def __init__(
-        self, names: Names, a: Piece, b: Piece, joints: tuple[int, int], motion: Motion,
-        deviation: float,
-    ) -> None:  # fmt: skip
-        """Bodies a and b, carried by `joints` (i, j), i <= j."""
-        self.names, self.a, self.b, self.motion, self.deviation = names, a, b, motion, deviation
-        self.joints = joints
+        self, names: Names, first: Body, second: Body, motion: Motion, s: Stretches
+    ) -> None:
+        """Bodies a and b, carried by `joints` (i, j), i <= j, and the segments of the motion."""
+        self.names, self.motion = names, motion
+        self.a, self.b = a, b = first.piece, second.piece
+        self.deviation = deviation = first.deviation + second.deviation
+        self.joints = first.joint, second.joint
         self.exact = isinstance(a, Below) or (a.exact and b.exact)
-        s = motion.stretches(*joints, b.centre, b.ball)
         self.way = np.concatenate([[0.0], np.cumsum(s.moved)])
         centres = np.concatenate([s.first.moved(b.centre), s.last.moved(b.centre)[-1:]])
         apart = np.linalg.norm(centres - a.centre, axis=1) - a.ball - b.ball - deviation

@@ -32,6 +32,7 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
 FAILURES = 3  # of coal's directions in a row, after which another way is taken
+PATIENCE, TIRED = 4, 0.92  # stretches asked about, after which that share is aimed at
 HALVINGS = 3  # of stretches that no plane parts from a triangle, before coal is asked
 LOOKS = 3  # at stretches that no plane parts from triangles: are they too near?
 SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
@@ -69,8 +70,10 @@ class Met:
 class Pairing:
     """Two bodies, the stretches of one motion, and what is known of their distance."""
 
-    def __init__(self, a: Piece, b: Piece, joints: tuple[int, int], motion: Motion) -> None:
-        """Bodies a and b, carried by `joints` (i, j), i <= j."""
+    def __init__(
+        self, a: Piece, b: Piece, joints: tuple[int, int], motion: Motion, stretches: Stretches
+    ) -> None:
+        """Bodies a and b, carried by `joints` (i, j), i <= j, and the segments of the motion."""
         self.a, self.b, self.joints, self.motion = a, b, joints, motion
         self.calls = 0
         self.bound = np.inf
@@ -78,33 +81,30 @@ class Pairing:
         self.place: Place | None = None
         """Why it is refused."""
         self._most = CALLS[0] + CALLS[1] * len(motion.q)
-        stretches = motion.stretches(*joints, b.centre, b.ball)
-        self.stretches = replace(stretches, bound=by_balls(a, b, stretches))
+        self.stretches, self._hints = stretches, stretches.bound
 
-    def glance(self, nearest: float) -> float:
-        """Improve the bounds a little; a distance (m) at the row that seems worst.
+    def guess(self) -> float:
+        """Improve the bounds without coal; how near (m) the bodies seem to come, at least."""
+        s = self.stretches
+        if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
+            self._hints = glimpse(self.a.tree, self.b, s)
+            if not self.a.closed:
+                self.stretches = replace(s, bound=np.maximum(s.bound, self._hints))
+        else:
+            for n in guesses(self.a, self.b, s):
+                s = _raised(self.a, self.b, s, n)
+            self.stretches, self._hints = s, s.bound
+        return float(self._hints.min())
 
-        The distance is that of the hulls, a hint of how near the bodies are at all; infinite where
-        that is not less than `nearest` (m).
+    def meet(self) -> float:
+        """The distance (m) at the row that seemed worst when it was guessed, by coal.
+
+        That of the hulls of meshes: a hint of how near the bodies are at all.
         """
         s = self.stretches
-        if s.bound.min() >= nearest:
-            return np.inf
-        if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
-            low = glimpse(self.a.tree, self.b, s)
-            if not self.a.closed:
-                self.stretches = replace(s, bound=np.maximum(s.bound, low))
-            worst = int(np.argmin(low))
-            clear = low[worst] >= nearest
-            return np.inf if clear else self._asked(self.a, self.b, s, worst).distance
-        bound = s.bound
-        for guess in guesses(self.a, self.b, s):
-            bound = np.maximum(bound, parted(self.a, self.b, s, guess))
-        self.stretches = s = replace(s, bound=bound)
-        if bound.min() >= nearest:
-            return np.inf
-        met = self._asked(self.a, self.b, s, int(np.argmin(bound)))
-        self.stretches = _raised(self.a, self.b, s, met.n)
+        met = self._asked(self.a, self.b, s, int(np.argmin(self._hints)))
+        if not (isinstance(self.a, MeshPart) and self.a.triangles > FEW):
+            self.stretches = _raised(self.a, self.b, s, met.n)
         return met.distance
 
     def certify(self, needed: float, aim: float) -> None:
@@ -126,7 +126,7 @@ class Pairing:
         if isinstance(a, MeshPart) and a.triangles > FEW:
             inside = whole and self._begins_inside(s, needed)
             return [] if inside else self._box_by_box(a, b, s, needed, aim)
-        if not whole:
+        if not whole or (s.length < 1.0).any():
             s = self._cheaply(a, b, s, aim)
         s = self._by_coal(a, b, s, needed, aim)
         if self.place is not None or not len(s.row):
@@ -135,11 +135,13 @@ class Pairing:
             return []
         if can_be_cut(a, b):
             return [(*pieces, s) for pieces in cut(a, b)]
-        if not is_exact(a, b):
-            self._by_budget(a.truth, b.truth, s, needed, aim)
-            return []
         s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
-        if len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most):
+        if not is_exact(a, b):
+            bent = (s.length > 0.25) & (s.bound + s.delta >= needed)
+            if not bent.all():
+                self._by_budget(a.truth, b.truth, s.of(~bent), needed, aim)
+            s = s.of(bent)
+        elif len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most):
             self.place = _middle(s)
             return []
         return [(a, b, self.motion.halves(s, *self.joints))] if len(s.row) else []
@@ -153,17 +155,26 @@ class Pairing:
         return s.of(~good)
 
     def _cheaply(self, a: Piece, b: Piece, s: Stretches, aim: float) -> Stretches:
-        """Certify by balls and by guessed directions."""
+        """Certify by balls, the planes of longer stretches, and guessed directions."""
         s = self._accepted(replace(s, bound=np.maximum(s.bound, by_balls(a, b, s))), aim)
-        for n in guesses(a, b, s) if len(s.row) else ():
-            s = replace(s, bound=np.maximum(s.bound, parted(a, b, s, n)))
+        for n in (s.across, *guesses(a, b, s)) if len(s.row) else ():
+            s = _raised(a, b, s, n)
         return self._accepted(s, aim)
 
     def _by_coal(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> Stretches:
         """Certify by directions from coal; what is left, with its bounds. May set `place`."""
         exact, whole = is_exact(a, b), a is self.a and b is self.b
-        left, failures = [s.of(np.zeros(len(s.row), dtype=bool))], 0
+        left, failures, asked = [s.of(np.zeros(len(s.row), dtype=bool))], 0, 0
         while len(s.row) and not (failures >= FAILURES and (can_be_cut(a, b) or not exact)):
+            if not can_be_cut(a, b):  # a plane is there, and shorter stretches are less bent
+                bent = (s.bound < aim) & (s.bound + s.delta >= aim) & (s.delta > ROUNDING)
+                left.append(s.of(bent))
+                s = s.of(~bent)
+                if not len(s.row):
+                    break
+            asked += 1
+            if asked == PATIENCE:
+                aim = max(needed, TIRED * aim)
             worst = int(np.argmin(s.bound))
             for end in (False, True):
                 met = self._asked(a, b, s, worst, end)
@@ -265,8 +276,9 @@ class Pairing:
         moved = np.zeros(len(self.motion.q) - 1)
         moved[whole.row] = whole.moved
         budget = Budget(distance, moved, self._most - self.calls)
+        rows, first = np.unique(s.row, return_index=True)
         try:
-            bound = budget.certify(s.row, needed + s.stray, aim)
+            bound = budget.certify(rows, needed + s.stray[first], aim)
             self.bound = min(self.bound, bound - float(s.stray.max()))
         except TooNear as met:
             pose = self.motion.pose(*self.joints, met.row, met.share)
@@ -287,11 +299,13 @@ class Pairing:
 
 
 def _raised(a: Piece, b: Piece, s: Stretches, n: Array | None) -> Stretches:
-    """Stretches with the bounds that a plane across n (3,) gives."""
+    """Stretches with the bounds that planes across n, (3,) or (k, 3), give."""
     if n is None:
         return s
-    found = parted(a, b, s, np.broadcast_to(n, (len(s.row), 3)))
-    return replace(s, bound=np.maximum(s.bound, found))
+    across = np.broadcast_to(n, (len(s.row), 3))
+    found = parted(a, b, s, across)
+    better = (found > s.bound)[:, None]
+    return replace(s, bound=np.maximum(s.bound, found), across=np.where(better, across, s.across))
 
 
 def _all_of(parts: list[Stretches]) -> Stretches:

@@ -53,10 +53,10 @@ def by_balls(a: Piece, b: Piece, s: Stretches) -> Array:
 
 
 def nearest_points(start: Array, way: Array) -> Array:
-    """(k, 3) m, the points nearest to the origin of lines from `start` along all of `way`."""
-    square = np.maximum(np.einsum("ki,ki->k", way, way), TINY)
-    share = np.clip(-np.einsum("ki,ki->k", start, way) / square, 0.0, 1.0)
-    return np.asarray(start + share[:, None] * way)
+    """(..., 3) m, the points nearest to the origin of lines from `start` along all of `way`."""
+    square = np.maximum(np.einsum("...i,...i->...", way, way), TINY)
+    share = np.clip(-np.einsum("...i,...i->...", start, way) / square, 0.0, 1.0)
+    return np.asarray(start + share[..., None] * way)
 
 
 def unit(vectors: Array) -> Array:

@@ -19,6 +19,7 @@ point by another sum_j r_j e_j at most, with r_j enlarged by what the joints beh
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,6 +73,8 @@ class Stretches:
     """(k,) m, how far straying from straight joint motion may move it besides."""
     bound: Array
     """(k,) m, a lower bound of the distance along each that is known already."""
+    across: Array
+    """(k, 3) the normal of the plane that gave it, 0 where it is from elsewhere."""
 
     def of(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Stretches:
         """Some of them."""
@@ -85,7 +88,24 @@ class Stretches:
             self.moved[chosen],
             self.stray[chosen],
             self.bound[chosen],
+            self.across[chosen],
         )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Sways:
+    """How bodies, each within a ball on a joint, move along every segment, seen from any joint.
+
+    All arrays have the axes (n + 1, m - 1, B): the joint from which body b is seen, 0 for the root;
+    the segment; the body. They are 0 from the joint on that carries it.
+    """
+
+    delta: Array
+    """m, how far a point may leave its chord."""
+    moved: Array
+    """m, how far a point may move."""
+    stray: Array
+    """m, how far straying from straight joint motion may move it besides."""
 
 
 class Motion:
@@ -108,35 +128,71 @@ class Motion:
         self.strays = np.zeros((len(q) - 1, robot.n)) if strays is None else strays
         self._kinematics = Kinematics(robot)
         self._frames = self._kinematics.joints(q)
-        self._twists = self._kinematics.twists(q).transpose(0, 2, 1)
         self._relative: dict[tuple[int, int], Poses] = {}
-        self._levers: dict[tuple[int, bytes, float], Array] = {}
 
-    def levers(self, joint: int, centre: Array, ball: float) -> Array:
-        """(m, joint) m, r_j of a ball that `joint` carries, at each row; 1 for prismatic joints."""
-        key = (joint, centre.tobytes(), ball)
-        if key not in self._levers:
-            points = self._frames.rotations[:, joint] @ centre + self._frames.points[:, joint]
-            linear, angular = np.split(self._twists[:, :joint], 2, axis=2)
-            away = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
-            self._levers[key] = np.where(self.prismatic[:joint], 1.0, away + ball)
-        return self._levers[key]
+    def centres(self, joints: NDArray[np.intp], centres: Array) -> Array:
+        """(m, B, 3) m, points (B, 3) that `joints` (B,) carry, in the root frame at each row."""
+        turned = np.einsum("mbij,bj->mbi", self._frames.rotations[:, joints], centres)
+        return np.asarray(turned + self._frames.points[:, joints])
+
+    def seen_from(self, joint: int, points: Array) -> Array:
+        """(m, k, 3) m, points of the root frame at each row, as seen from a joint."""
+        apart = points - self._frames.points[:, None, joint]
+        return np.asarray(apart @ self._frames.rotations[:, joint])
+
+    def sways(self, joints: NDArray[np.intp], centres: Array, balls: Array) -> Sways:
+        """How balls with `centres` (B, 3) and radii `balls` (B,), m, on `joints` (B,) move."""
+        levers = self._levers(self.centres(joints, centres)) + balls
+        steps = np.abs(np.diff(self.q, axis=0))
+        return chord_bounds(steps, levers, self.prismatic, self.strays, joints)
+
+    def _levers(self, points: Array) -> Array:
+        """(m, n, B) m, distances of points (m, B, 3) from each joint's axis.
+
+        The velocity of a point that a joint alone turns at 1 rad/s: angular x point + linear.
+        """
+        linear, angular = np.split(self._twists, 2, axis=2)
+        x, y, z = np.moveaxis(angular, 2, 0)
+        nothing = np.zeros_like(x)
+        cross = np.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], axis=-1)
+        (m, n), count = x.shape, points.shape[1]
+        velocities = cross.reshape(m, 3 * n, 3) @ points.transpose(0, 2, 1)
+        velocities = velocities.reshape(m, n, 3, count) + linear[..., None]
+        return np.asarray(np.sqrt(np.einsum("mnib,mnib->mnb", velocities, velocities)))
+
+    @cached_property
+    def _twists(self) -> Array:
+        """(m, n, 6) unit twists of the joints in the root frame, linear part first.
+
+        In its own frame a joint's twist is always the same; Pinocchio says which at the first row.
+        """
+        rotations, points = self._frames.rotations[:, 1:], self._frames.points[:, 1:]
+        linear, angular = np.split(self._kinematics.twists(self.q[:1])[0].T, 2, axis=1)
+        back = rotations[0].transpose(0, 2, 1)
+        own = back @ (linear - np.cross(points[0], angular))[:, :, None]
+        along = rotations @ (back @ angular[:, :, None])
+        there = (rotations @ own + np.cross(points, along[..., 0])[..., None])[..., 0]
+        return np.concatenate([there, along[..., 0]], axis=2)
 
     def stretches(self, a: int, b: int, centre: Array, ball: float) -> Stretches:
-        """Every segment, as a body on joint b moves as seen from joint a <= b."""
-        poses = self._poses(a, b)
-        levers = self.levers(b, centre, ball)
-        count = len(self.q) - 1
-        steps = np.abs(np.diff(self.q, axis=0))
-        bounds = chord_bounds(steps, levers, self.prismatic, self.strays, a, b)
+        """Every segment, as a body on joint b within a ball moves as seen from joint a <= b."""
+        sways = self.sways(np.array([b]), centre[None], np.array([ball]))
+        return self.stretches_of(sways, a, b, 0, np.full(len(self.q) - 1, -np.inf))
+
+    def stretches_of(self, sways: Sways, a: int, b: int, body: int, bound: Array) -> Stretches:
+        """The same of a body of `sways` on joint b, with bounds (m - 1,) m that are known."""
+        poses, count = self._poses(a, b), len(self.q) - 1
         return Stretches(
             np.arange(count),
             np.zeros(count),
             np.ones(count),
             Poses(poses.rotations[:-1], poses.points[:-1]),
             Poses(poses.rotations[1:], poses.points[1:]),
-            *bounds,
-            np.full(count, -np.inf),
+            sways.delta[a, :, body],
+            sways.moved[a, :, body],
+            sways.stray[a, :, body],
+            bound,
+            np.zeros((count, 3)),
         )
 
     def halves(self, stretches: Stretches, a: int, b: int) -> Stretches:
@@ -172,36 +228,42 @@ def chord_bounds(
     levers: Array,
     prismatic: NDArray[np.bool_],
     strays: Array,
-    a: int,
-    b: int,
-) -> tuple[Array, Array, Array]:
-    """How far points of a body on joint b may be from their chords, and move, seen from joint a.
+    joints: NDArray[np.intp],
+) -> Sways:
+    """How far points of bodies may be from their chords, and move, seen from every joint.
+
+    With T_j the sum of the |d_i| of revolute joints i <= j, the sum in the module's first bound is
+
+        sum_j r_j |d_j| (|d_j| + 2 T_(j-1)) - 2 T_a sum_j r_j |d_j|,    j = a + 1 .. b,
+
+    so that running sums from the tip on give it for all a.
 
     Args:
         steps: (m - 1, n) |d_j|.
-        levers: (m, b) r_j at the ends of the segments, see `Motion.levers`.
+        levers: (m, n, B) m, r_j at the ends of the segments.
         prismatic: (n,) which joints slide.
         strays: (m - 1, n) e_j.
-        a, b: joints, 0 <= a <= b <= n; 0 is the root.
-
-    Returns:
-        (m - 1,) m from the chords, for straight segments; (m - 1,) m that they move; and (m - 1,)
-        m that straying adds.
+        joints: (B,) which joint carries each body, 0 for the root.
     """
+    count, n = steps.shape
     turns = np.where(prismatic, 0.0, steps)
-    second, rate, stray = (np.zeros(len(steps)) for _ in range(3))
-    for j in range(b - 1, a - 1, -1):
-        d, before = steps[:, j], turns[:, a:j].sum(axis=1)
+    before = np.cumsum(turns, axis=1) - turns
+    found = Sways(*(np.zeros((n + 1, count, len(joints))) for _ in range(3)))
+    second, first, rate, stray = (np.zeros((count, len(joints))) for _ in range(4))
+    for j in range(n - 1, -1, -1):
+        d, ahead, off = steps[:, j, None], before[:, j, None], strays[:, j, None]
+        carried = (joints > j).astype(float)
         if prismatic[j]:
-            second += 2.0 * d * before
-            rate += d
-            stray += strays[:, j]
-            continue
-        lever = 0.5 * (levers[:-1, j] + levers[1:, j] + rate)
-        second += lever * d * (d + 2.0 * before)
-        rate += lever * d
-        stray += (lever + stray) * strays[:, j]
-    return second / 8.0, rate, stray
+            second, first = second + carried * (2.0 * d * ahead), first + carried * d
+            rate, stray = rate + carried * d, stray + carried * off
+        else:
+            lever = 0.5 * carried * (levers[:-1, j] + levers[1:, j] + rate)
+            way = lever * d
+            second, first = second + way * (d + 2.0 * ahead), first + way
+            rate, stray = rate + way, stray + carried * (lever + stray) * off
+        found.delta[j] = np.maximum(second - 2.0 * ahead * first, 0.0) / 8.0
+        found.moved[j], found.stray[j] = rate, stray
+    return found
 
 
 def joined(one: Stretches, other: Stretches) -> Stretches:
@@ -216,6 +278,7 @@ def joined(one: Stretches, other: Stretches) -> Stretches:
         np.concatenate([one.moved, other.moved]),
         np.concatenate([one.stray, other.stray]),
         np.concatenate([one.bound, other.bound]),
+        np.concatenate([one.across, other.across]),
     )
 
 
