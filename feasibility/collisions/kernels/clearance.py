@@ -50,7 +50,7 @@ def collision_buffer(bodies: Bodies, robot: Robot) -> Array:
     Raises:
         RobotError: the arm is no serial chain.
     """
-    memory = packed(bodies, robot)
+    memory = packed(bodies, robot).copy()
     views(memory).state[0, BLAMED] = -1.0
     return with_address(memory)
 

@@ -1,9 +1,10 @@
 """Lower bounds of the distances of pairs, at one configuration or all along a segment.
 
-Two groups: the least over their pairs of polytopes. A group and a tree of triangles: nodes are
-opened, the nearer child first, until each is far enough or a triangle is too near. Balls decide
-what is far; `separation` decides the rest, and begins with the direction that separated the same
-two bodies the last time, or with a box's thinnest.
+Two groups: the least over their pairs of polytopes. Balls decide what is far; `separation` decides
+the rest, and begins with the direction that separated the same two bodies the last time. A group
+and a tree of triangles: the least over its polytopes (`tree_distances.py`), of which the one that
+was nearest the last time is first, since what is further off than others need not be looked at
+closely.
 
 For a segment the second body is the hull of its places at both ends. What this bounds is also a
 bound for the body at each of them.
@@ -15,35 +16,27 @@ import numpy as np
 
 from feasibility.collisions.kernels.inside import inside_tree
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
-from feasibility.collisions.kernels.separation import BEST, FEW_TURNS, MOST_TURNS, separation
+from feasibility.collisions.kernels.separation import BEST, MOST_TURNS, separation
 from feasibility.collisions.kernels.tables import (
-    AXES,
     BALL,
     CENTRE,
     CLOSED,
     DIRECTION,
     FIRST,
-    HALF,
     INNER,
     ITEM_A,
     ITEM_B,
     LAST,
-    LEFT,
-    MIDDLE,
-    NODES,
+    NEAREST,
     OUTER,
     POLYTOPE_COLUMNS,
     RADIUS,
     RELATIVE,
-    RIGHT,
-    STACK,
-    STATE,
     TREE,
 )
+from feasibility.collisions.kernels.tree_distances import of_tree
 from feasibility.collisions.kernels.witness import record
 from feasibility.compiled import kernel
-
-OPENED = 24  # nodes of a tree that are opened for a bound larger than needed
 
 
 @kernel
@@ -114,63 +107,6 @@ def of_groups(m, item, ends, need, want, least):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def from_box(m, node, x, y, z):  # type: ignore[no-untyped-def]
-    """Distance of a point from a node's box, m; on which side of it along its thinnest axis."""
-    x, y, z = x - m[node + MIDDLE], y - m[node + MIDDLE + 1], z - m[node + MIDDLE + 2]
-    square, side = 0.0, 1.0
-    for i in range(3):
-        k = node + AXES + 3 * i
-        along = x * m[k] + y * m[k + 1] + z * m[k + 2]
-        beyond = max(abs(along) - m[node + HALF + i], 0.0)
-        square += beyond * beyond
-        side = 1.0 if along >= 0.0 else -1.0
-    return np.sqrt(square), side
-
-
-@kernel
-def of_tree(m, root, b, best, ends, need, want, least):  # type: ignore[no-untyped-def]
-    """Lower bound of the distance of the triangles of a tree from polytope b, where below `best`.
-
-    `OPENED` boxes may be opened for a bound up to `want`, the others only up to `need`.
-    """
-    x, y, z, radius = swept_ball(m, b, ends)
-    around = m[b + RADIUS]
-    m[STACK] = root
-    top, opened, result = 1, 0, best
-    while top > 0:
-        top -= 1
-        node = np.int64(m[STACK + top])
-        goal = min(want if opened < OPENED else min(need, want), result)
-        left, right = np.int64(m[node + LEFT]), np.int64(m[node + RIGHT])
-        bound, side = from_box(m, node, x, y, z)
-        bound -= radius
-        if bound < goal:
-            enough = min(need, goal) + around
-            for k in range(3):
-                m[BEST + k] = side * m[node + AXES + 6 + k]
-            turns, given_up = MOST_TURNS, least + around
-            if left >= 0:
-                turns, given_up = FEW_TURNS, goal + around
-            better = separation(m, node, b, ends, enough, goal + around, given_up, turns)
-            m[STATE + NODES] += 1.0
-            bound = max(bound, better - around)
-        if left < 0 or bound >= goal:
-            if least == -np.inf and bound < goal:
-                record(m, 0.0, b, bound)
-            result = min(result, bound)
-            if result < least:
-                return result
-            continue
-        opened += 1
-        to_left, _ = from_box(m, left, x, y, z)
-        to_right, _ = from_box(m, right, x, y, z)
-        nearer, further = (left, right) if to_left <= to_right else (right, left)
-        m[STACK + top], m[STACK + top + 1] = further, nearer
-        top += 2
-    return result
-
-
-@kernel
 def of_item(m, item, here, there, need, want, least):  # type: ignore[no-untyped-def]
     """Lower bound, m, of an item's distance at slot `here`, or between two slots.
 
@@ -185,8 +121,17 @@ def of_item(m, item, here, there, need, want, least):  # type: ignore[no-untyped
     if m[item + TREE] < 0.0:
         return of_groups(m, item, ends, need, want, least)
     group, root, result = np.int64(m[item + ITEM_B]), np.int64(m[item + TREE]), np.inf
-    for b in range(np.int64(m[group + FIRST]), np.int64(m[group + LAST]), POLYTOPE_COLUMNS):
-        result = of_tree(m, root, b, result, ends, need, want, least)
+    first, last = np.int64(m[group + FIRST]), np.int64(m[group + LAST])
+    known = np.int64(m[item + DIRECTION])  # a row for each polytope; the first has the nearest
+    nearest = first + np.int64(m[known + NEAREST])
+    for k in range(first - POLYTOPE_COLUMNS, last, POLYTOPE_COLUMNS):
+        if k == nearest:
+            continue
+        b = k if k >= first else nearest
+        place = known + 3 * ((b - first) // POLYTOPE_COLUMNS)
+        bound = of_tree(m, root, b, place, result, ends, need, want, least)
+        if bound < result:
+            m[known + NEAREST], result = b - first, bound
         if result < least:
             return result
         if ends == 1 and m[item + CLOSED] > 0.0:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 from feasibility.collisions import Bodies
-from feasibility.collisions.kernels.box_tree import box_tree
+from feasibility.collisions.kernels.box_tree import BoxTree, box_tree
 from feasibility.collisions.kernels.tables import (
     DIRECTION,
     FIRST,
@@ -32,13 +34,15 @@ from feasibility.collisions.words import SURFACE
 from robots import Robot, joint_alignments
 from robots.shapes import Polytope
 
+KEPT = 16  # problems, and trees, that are remembered: a search is often run again
 INFLUENCE = 0.05  # m beyond its clearance: nearer pairs push
 TOOL_INFLUENCE = 0.002  # m, the same for the tool and the surface, which are always near
 OUTWARD = 1e-12  # m for each metre: balls and capsules hold their vertices in spite of rounding
 
 
+@lru_cache(maxsize=KEPT)
 def packed(bodies: Bodies, robot: Robot) -> Array:
-    """All tables in one array, without the function's address.
+    """All tables in one array, without the function's address; remembered: copy it, then write.
 
     Args:
         bodies: what can collide, and the pairs that are asked for.
@@ -57,9 +61,8 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
         start = len(polytopes)
         for part, cloud in zip(parts, clouds, strict=True):
             first = sum(map(len, vertices))
-            polytopes.append(
-                [0, first, first + len(cloud), part.radius, *_ball(cloud, part.radius)]
-            )
+            around = _around(cloud, part.radius)
+            polytopes.append([0, first, first + len(cloud), part.radius, *around])
             vertices.append(cloud)
         levers = [
             np.hypot(c[:, 0], c[:, 1]).max() + p.radius for c, p in zip(clouds, parts, strict=True)
@@ -75,7 +78,8 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
         relative=np.zeros((2, 12)),
         simplex=np.zeros((7, 8)),
         found=np.zeros((1, 10)),
-        stack=np.zeros((1, 64)),
+        placed=np.zeros((2, 12)),
+        stack=np.zeros((1, 128)),
         joints=_joints(robot),
         groups=_table(groups, GROUP_COLUMNS),
         polytopes=_table(polytopes, POLYTOPE_COLUMNS),
@@ -130,11 +134,22 @@ def _joints(robot: Robot) -> Array:
     return table
 
 
-def _ball(cloud: Array, radius: float) -> list[float]:
-    """Centre and radius of a ball around points with a radius."""
-    centre = 0.5 * (cloud.min(axis=0) + cloud.max(axis=0))
+def _around(cloud: Array, radius: float) -> list[float]:
+    """Centre and radius of a ball around points with a radius; half sides of a box around points.
+
+    The box is along the axes of the frame, or along the points' main directions: the smaller one.
+    """
+    off = cloud - cloud.mean(axis=0)
+    main = np.linalg.eigh(off.T @ off)[1].T
+    boxes = []
+    for axes in (np.eye(3), main):
+        along = cloud @ axes.T
+        low, high = along.min(axis=0), along.max(axis=0)
+        half = 0.5 * (high - low) + OUTWARD * (1.0 + np.abs(along).max())
+        boxes.append((float((half + radius).prod()), 0.5 * (low + high) @ axes, half, axes))
+    _, centre, half, axes = min(boxes, key=lambda box: box[0])
     far = np.linalg.norm(cloud - centre, axis=1).max() + radius
-    return [*centre, float(far + OUTWARD * (1.0 + far))]
+    return [*centre, float(far + OUTWARD * (1.0 + far)), *(half[:, None] * axes).ravel()]
 
 
 def _capsule(cloud: Array, radius: float) -> list[float]:
@@ -153,11 +168,17 @@ def _capsule(cloud: Array, radius: float) -> list[float]:
     return [*ends.ravel(), float(far + OUTWARD * (1.0 + far))]
 
 
+@lru_cache(maxsize=KEPT)
+def _tree(triangles: bytes) -> BoxTree:
+    """The tree of triangles, (k, 3, 3) floats, which many problems may share."""
+    return box_tree(np.frombuffer(triangles).reshape(-1, 3, 3))
+
+
 def _trees(bodies: Bodies, above: int) -> tuple[list[int], Array, Array]:
     """The root of each soup's tree, all nodes, and all corners (their rows begin at `above`)."""
     roots, nodes, corners = [], [np.empty((0, NODE_COLUMNS))], [np.empty((0, 3))]
     for soup in bodies.soups:
-        tree = box_tree(soup.triangles)
+        tree = _tree(soup.triangles.tobytes())
         root = sum(map(len, nodes))
         shifted = tree.nodes.copy()
         shifted[:, [1, 2]] += above + sum(map(len, corners))
@@ -196,6 +217,7 @@ def _items(
                 for b in first if soup.owner == pair.second else second:
                     joints = 0, owners[b][1]
                     works = joints[1] == n and soup.owner == SURFACE
-                    of_soup = -1, soup.closed, TOOL_INFLUENCE if works else INFLUENCE
+                    of_soup = directions, soup.closed, TOOL_INFLUENCE if works else INFLUENCE
                     items.append([-1, b, root, *joints, clearance, index, *of_soup, *unknown])
+                    directions += int(groups[b][2] - groups[b][1])
     return items, directions

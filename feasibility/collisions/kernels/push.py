@@ -17,6 +17,7 @@ from feasibility.collisions.kernels.tables import (
     BOUND,
     BOUNDS,
     CLEARANCE,
+    FOUND,
     INNER,
     ITEMS,
     JOINTS,
@@ -71,8 +72,9 @@ def push(m):  # type: ignore[no-untyped-def]
         if m[bound] >= enough:
             continue
         m[STATE + BOUNDS] += 1.0
-        found = of_item(m, item, here, here, -np.inf, enough, -np.inf)
-        m[bound] = max(m[bound], found)
+        m[FOUND] = np.inf
+        m[bound] = max(m[bound], of_item(m, item, here, here, -np.inf, enough, -np.inf))
+        found = m[FOUND]  # of what was met, where the bound is of boxes that were not opened
         if found < enough:
             share = min((enough - found) / wish, MOST)
             strongest = max(strongest, share)

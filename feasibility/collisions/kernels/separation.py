@@ -32,13 +32,24 @@ UPPER, POINTS = SIMPLEX + 6 * WIDTH, SIMPLEX + 6 * WIDTH + 1
 
 @kernel
 def support(m, body, x, y, z):  # type: ignore[no-untyped-def]
-    """The vertex of a body that is furthest along a direction, and how far it is."""
-    best, most = int(m[body + FIRST]), -np.inf
-    for k in range(np.int64(m[body + FIRST]), np.int64(m[body + LAST]), 3):
-        along = m[k] * x + m[k + 1] * y + m[k + 2] * z
+    """The vertex of a body that is furthest along a direction, and how far it is.
+
+    Every other vertex is compared with a most of its own, which the processor does side by side.
+    """
+    first, last = int(m[body + FIRST]), int(m[body + LAST])
+    best, most, other, more = first, -np.inf, first, -np.inf
+    for k in range(first, last - 3, 6):
+        along, beside = m[k] * x + m[k + 1] * y, m[k + 3] * x + m[k + 4] * y
+        along, beside = along + m[k + 2] * z, beside + m[k + 5] * z
         if along > most:
             best, most = k, along
-    return best, most
+        if beside > more:
+            other, more = k + 3, beside
+    if (last - first) % 2 == 1:
+        along = m[last - 3] * x + m[last - 2] * y + m[last - 1] * z
+        if along > most:
+            best, most = last - 3, along
+    return (other, more) if more > most else (best, most)
 
 
 @kernel
@@ -93,7 +104,7 @@ def separation(m, a, b, ends, need, want, least, turns):  # type: ignore[no-unty
         nx, length = 1.0, 1.0
     nx, ny, nz = nx / length, ny / length, nz / length
     lower, upper, size = -np.inf, FARTHEST, 0
-    for _ in range(turns):
+    for turn in range(turns):
         m[STATE + TRIED] += 1.0
         i, top = support(m, a, nx, ny, nz)
         j, bottom, pose = i, np.inf, int(RELATIVE)
@@ -109,7 +120,7 @@ def separation(m, a, b, ends, need, want, least, turns):  # type: ignore[no-unty
             lower = bottom - top
             m[BEST], m[BEST + 1], m[BEST + 2] = nx, ny, nz
         gap = COARSE if lower >= need else FINE
-        if lower >= want or upper - lower <= gap * upper:
+        if lower >= want or upper - lower <= gap * upper or turn + 1 == turns:
             break
         if not add_point(m, i, j, pose, size):
             break

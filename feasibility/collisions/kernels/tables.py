@@ -32,8 +32,9 @@ JOINT_COLUMNS = 13
 JOINT, FIRST, LAST, END_0, END_1, THICKNESS, OWN_LEVER, NUMBER = 0, 1, 2, 3, 6, 9, 10, 11
 GROUP_COLUMNS = 12
 # Columns of `polytopes`; FIRST and LAST are 1 and 2 here too, of its vertices.
-RADIUS, CENTRE, BALL = 3, 4, 7
-POLYTOPE_COLUMNS = 8
+# CENTRE and BALL are of a ball around it; SIDES halves of those of a box about the same centre.
+RADIUS, CENTRE, BALL, SIDES = 3, 4, 7, 8
+POLYTOPE_COLUMNS = 17
 # Columns of `nodes`: boxes around triangles. FIRST and LAST are 1 and 2, of its corners.
 LEFT, RIGHT, MIDDLE, AXES, HALF = 3, 4, 5, 8, 17
 NODE_COLUMNS = 20
@@ -42,6 +43,7 @@ NODE_COLUMNS = 20
 # the column after it are lower bounds of its distance in slots 0 and 1.
 ITEM_A, ITEM_B, TREE, INNER, OUTER, CLEARANCE, PAIR, DIRECTION, CLOSED, WISH, BOUND = range(11)
 ITEM_COLUMNS = 12
+NEAREST = 1  # column of `directions`: how far behind its group's first the nearest polytope was
 # Columns of `state`: counters, what was found, and what is asked for.
 CALLS, BOUNDS, SWEPT, DECIDED, BY_BUDGET, FRAMES, TRIED = range(7)
 BLAMED, FIRST_ASKED, SIZE, NODES, VALID = 7, 8, 9, 10, 11  # VALID: of slot 0, then of slot 1
@@ -51,7 +53,7 @@ SLOTS = 4  # 0 and 1: the ends of the last segment; 2 and 3: those of a part of 
 
 
 class Tables(NamedTuple):
-    """Views of the flat array. The first four are as large in every one."""
+    """Views of the flat array. The first six are as large in every one."""
 
     state: Array
     """(1, STATE_COLUMNS)"""
@@ -61,8 +63,10 @@ class Tables(NamedTuple):
     """(7, 8) working memory of `separation.py`."""
     found: Array
     """(1, 10) of the nearest bodies: bound, direction, a point of the first, one of the second."""
+    placed: Array
+    """(2, 12) the box around a polytope in its relative poses; see `tree_distances.py`."""
     stack: Array
-    """(1, 64) nodes of a tree that wait; one of 2^31 triangles needs half of it."""
+    """(1, 128) nodes of a tree that wait, with bounds; one of 2^31 triangles needs half of it."""
     joints: Array
     """(n, JOINT_COLUMNS)"""
     groups: Array
@@ -73,7 +77,8 @@ class Tables(NamedTuple):
     nodes: Array
     items: Array
     directions: Array
-    """(D, 3) the direction that last separated two bodies, in the frame of the first."""
+    """(D, 3) the direction that last separated two bodies, in the frame of the first. For a tree:
+    the place of the leaf that was nearest to a polytope; in the first row also NEAREST."""
     asked: Array
     """(3, n) the ends of the segment that is asked for; last the push that is made."""
     configurations: Array
@@ -91,7 +96,8 @@ class Tables(NamedTuple):
 NAMES = Tables._fields
 STATE, RELATIVE = np.int64(HEADER), np.int64(HEADER + STATE_COLUMNS)
 SIMPLEX, FOUND = RELATIVE + 24, RELATIVE + 80
-STACK = FOUND + 10
+PLACED = FOUND + 10
+STACK = PLACED + 24
 JOINTS, GROUPS, ITEMS, ASKED, CONFIGURATIONS, POSES, LEVERS, LARGEST, REACH = (
     np.int64(NAMES.index(name))
     for name in (

@@ -1,0 +1,139 @@
+"""Lower bounds of the distance of a polytope from a tree of triangles.
+
+Nodes are opened, the nearer child first, until each is far enough or a triangle is too near. What
+a node costs, the cheapest first: its box against the box around the polytope, along its own axes;
+the polytope itself along its thinnest; a few directions more where the node is small beside the
+polytope and the bound is needed. The triangle that was nearest the last time is asked first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from feasibility.collisions.kernels.link_frames import transformed
+from feasibility.collisions.kernels.separation import BEST, FEW_TURNS, MOST_TURNS, separation
+from feasibility.collisions.kernels.tables import (
+    AXES,
+    BALL,
+    CENTRE,
+    HALF,
+    LEFT,
+    MIDDLE,
+    NODES,
+    PLACED,
+    RADIUS,
+    RELATIVE,
+    RIGHT,
+    SIDES,
+    STACK,
+    STATE,
+)
+from feasibility.collisions.kernels.witness import record
+from feasibility.compiled import kernel
+
+OPENED = 6  # nodes that are opened for a bound larger than needed
+SEARCHED = 20  # the same where a nearest triangle is looked for and none is met yet
+ENOUGH = 0.5  # of the least distance that was met: a bound as large is not made sharper
+ONE_TURN = np.int64(1)
+
+
+@kernel
+def place_box(m, b, ends):  # type: ignore[no-untyped-def]
+    """Write the box around a polytope in its relative poses: centre, and halves of its sides."""
+    for end in range(ends):
+        p, out = RELATIVE + 12 * end, PLACED + 12 * end
+        m[out], m[out + 1], m[out + 2] = transformed(m, p, b + CENTRE)
+        for side in range(out + 3, out + 12, 3):
+            v = b + SIDES + side - out - 3
+            x, y, z = transformed(m, p, v)
+            m[side], m[side + 1], m[side + 2] = x - m[p + 9], y - m[p + 10], z - m[p + 11]
+
+
+@kernel
+def between_boxes(m, node, ends):  # type: ignore[no-untyped-def]
+    """Lower bound of the distance of a node's box from the placed boxes and all between them."""
+    square = 0.0
+    for i in range(3):
+        k = node + AXES + 3 * i
+        x, y, z = m[k], m[k + 1], m[k + 2]
+        at = x * m[node + MIDDLE] + y * m[node + MIDDLE + 1] + z * m[node + MIDDLE + 2]
+        beyond, below = np.inf, np.inf
+        for p in range(PLACED, PLACED + 12 * ends, 12):
+            middle = x * m[p] + y * m[p + 1] + z * m[p + 2] - at
+            half = m[node + HALF + i]
+            for side in range(p + 3, p + 12, 3):
+                half += abs(x * m[side] + y * m[side + 1] + z * m[side + 2])
+            beyond, below = min(beyond, middle - half), min(below, -middle - half)
+        square += max(beyond, below, 0.0) ** 2
+    return np.sqrt(square)
+
+
+@kernel
+def of_node(m, node, b, ends, bound, need, goal, least):  # type: ignore[no-untyped-def]
+    """Make the bound of a node larger: a leaf's up to `goal`, another one's as far as it is cheap.
+
+    The first direction is across its thinnest side.
+    """
+    axis, side, around = node + AXES + 6, 0.0, m[b + RADIUS]
+    for k in range(3):
+        side += m[axis + k] * (m[PLACED + k] - m[node + MIDDLE + k])
+    for k in range(3):
+        m[BEST + k] = m[axis + k] if side >= 0.0 else -m[axis + k]
+    turns, given_up = MOST_TURNS, least
+    if m[node + LEFT] >= 0.0:
+        small = m[node + HALF] < 0.5 * m[b + BALL]
+        turns, given_up = FEW_TURNS if small and bound < need else ONE_TURN, goal
+    m[STATE + NODES] += 1.0
+    enough = min(need, goal) + around
+    found = separation(m, node, b, ends, enough, goal + around, given_up + around, turns) - around
+    return bound if bound > found else found  # so that NaN is none
+
+
+@kernel
+def of_tree(m, root, b, known, best, ends, need, want, least):  # type: ignore[no-untyped-def]
+    """Lower bound of the distance of the triangles of a tree from polytope b, where below `best`.
+
+    `OPENED` boxes may be opened for a bound up to `want`, the others only up to `need`; where all
+    is asked for (`need` is infinite), the bound is sharp. `known` is the place of the triangle that
+    was nearest the last time.
+    """
+    place_box(m, b, ends)
+    around, result, nearest = m[b + RADIUS], best, best
+    floor, share = (need, ENOUGH) if need < np.inf else (-np.inf, 1.0)
+    before, asked = np.int64(m[known]), False
+    m[STACK], m[STACK + 1] = root, between_boxes(m, root, ends) - around
+    top, opened = 1, 0
+    if before > 0:
+        m[STACK + 2], m[STACK + 3] = before, between_boxes(m, before, ends) - around
+        top = 2
+    while top > 0:
+        top -= 1
+        node, bound = np.int64(m[STACK + 2 * top]), m[STACK + 2 * top + 1]
+        if node == before:
+            if asked:
+                continue
+            asked = True
+        searching = least == -np.inf and nearest == np.inf
+        goal = want if opened < (SEARCHED if searching else OPENED) else min(need, want)
+        goal = min(goal, max(floor, share * nearest if nearest > 0.0 else nearest))
+        if not bound >= goal:
+            bound = of_node(m, node, b, ends, bound, need, goal, least)
+        left, right = np.int64(m[node + LEFT]), np.int64(m[node + RIGHT])
+        if left < 0 or bound >= goal:
+            result = min(result, bound)
+            if left < 0 and bound < goal:
+                m[known], nearest = node, min(nearest, bound)
+                if least == -np.inf:
+                    record(m, 0.0, b, bound)
+            if result < least:
+                return result
+            continue
+        opened += 1
+        one, other = between_boxes(m, left, ends), between_boxes(m, right, ends)
+        if one > other:
+            left, right, one, other = right, left, other, one
+        place = STACK + 2 * top
+        m[place], m[place + 1] = right, max(other - around, bound)
+        m[place + 2], m[place + 3] = left, max(one - around, bound)
+        top += 2
+    return result
