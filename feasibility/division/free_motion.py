@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.collisions import segment_clear
+from feasibility.collisions import clearance_gradient, segment_clear
 from robots import Robot
 
 Floats = NDArray[np.float64]
@@ -22,6 +22,8 @@ MOST_LINES = 40_000  # that may be asked for, for one motion
 FIRST_LINE = 0.5  # [rad], what a way is tried in at first
 SHORTEST = 1e-3  # [rad], no line is halved below this
 LONGEST = 1.0  # [rad] towards a random place at once
+PUSHES, PUSH = 12, 0.1  # from what an end is near, and the length [rad] of one
+NEAR = 0.9  # how near what pushes may be: 1 at its clearance, 0 where it pushes no more
 SHORTCUTS = 150  # random places between which a straight line is tried
 TURN = 2.0 * np.pi
 
@@ -79,8 +81,13 @@ class _Tree:
     """Configurations, each reached by a straight line from the one before it."""
 
     def __init__(self, space: FreeSpace, root: Floats) -> None:
-        """A tree of one configuration."""
-        self.space, self.q, self.before = space, root[None], [-1]
+        """A tree of the way from one configuration to a place with more room.
+
+        Lines from where the arm all but touches something are hardly ever certified.
+        """
+        self.space = space
+        self.q = np.stack(_away(space, root))
+        self.before = list(range(-1, len(self.q) - 1))
 
     def towards(self, aim: Floats, most: float = np.inf) -> tuple[int, bool]:
         """Grow from the nearest configuration.
@@ -111,6 +118,20 @@ class _Tree:
             found.append(self.q[node])
             node = self.before[node]
         return found[::-1]
+
+
+def _away(space: FreeSpace, q: Floats) -> list[Floats]:
+    """Configurations from q on, one after the other away from what is near."""
+    rows = [q]
+    for _ in range(PUSHES):
+        push = np.zeros_like(q)
+        if clearance_gradient(space.buffer, rows[-1], push, PUSH) <= NEAR:
+            break
+        got = space.reached(rows[-1], np.clip(rows[-1] + push, space.lower, space.upper))
+        if not space.length(rows[-1], got) > 0.0:
+            break
+        rows.append(got)
+    return rows
 
 
 def free_motion(space: FreeSpace, start: Floats, end: Floats, seed: int) -> Floats | None:

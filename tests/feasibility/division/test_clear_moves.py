@@ -134,7 +134,7 @@ def behind() -> Division:
             "shoulder_pan_joint": np.radians([-180, 180]),
             "shoulder_lift_joint": np.radians([-90, 0]),
             "elbow_joint": np.radians([0, 150]),
-            "wrist_1_joint": np.radians([-180, 180]),
+            "wrist_1_joint": np.radians([-120, 120]),  # not folded back onto the forearm
         }
     )
     asked = Collision(clearance=0.005, scene=(POST,))
