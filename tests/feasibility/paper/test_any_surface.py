@@ -120,7 +120,9 @@ def test_the_replay_of_a_tree_judges_between_jcells(cells) -> None:
 def test_creases_are_named_and_not_crossed() -> None:
     arm, task = load_robot("ur5"), Task(0.005, 20, tolerance=1e-3)
     roof = mesh(TriangleMesh(*folded(17.0)), side="outside").cells(count=12)
-    verdict = greedy_check(arm, roof, task, Search(method="greedy", step_deg=0.5, cap=300))
+    verdict = greedy_check(
+        arm, roof, task, Search(method="greedy", step_deg=0.5, cap=300, starts=1)
+    )
     assert verdict.answer is Answer.INFEASIBLE
     assert not (verdict.covered & roof.creased).any()
     assert verdict.covered.any()
@@ -132,7 +134,9 @@ def test_creases_are_named_and_not_crossed() -> None:
               position=(0.35 + 0.2 * np.cos(slope), 0, 0.2 + 0.2 * np.sin(slope))),
     ]  # fmt: skip
     halves = piecewise(sides, side="outside").cells((2, 2))
-    verdict = greedy_check(arm, halves, task, Search(method="greedy", step_deg=0.2, cap=300))
+    verdict = greedy_check(
+        arm, halves, task, Search(method="greedy", step_deg=0.2, cap=300, starts=1)
+    )
     assert "4 pairs of cells on both sides of a crease were left out" in verdict.message
     owner = halves.piece[np.flatnonzero(verdict.covered)]
     assert len(set(owner.tolist())) == 1
