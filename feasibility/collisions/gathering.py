@@ -49,6 +49,8 @@ def gather(
         ArgumentError: a pair names something that is not there; all such names are given.
         SurfaceError: no bounds on the surface are known.
     """
+    if collision is not None and collision.surface and surface.bare:
+        collision = collision.without_surface
     if collision is None or not collision.checked:
         return None
     return _gathered(robot, surface, collision, float(standoff))

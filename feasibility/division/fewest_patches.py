@@ -38,6 +38,10 @@ NOT_GREEDY = (
     "a division needs search.method 'complete', got {!r}: the greedy search keeps one tree of "
     "motions, not all components"
 )
+NOT_IN_ORDER = (
+    "a toolpath is run in its order and not divided into patches; to divide its poses, give them a "
+    "radius as neighbours"
+)
 LATE = " Patches were not planned and replayed: the time limit ran out first."
 MOST_EXPLAINED = 400  # proved cells that are explained although the search did not end
 
@@ -68,7 +72,8 @@ def divide(
 
     Raises:
         OutOfTime: a command's time ran out before the search began.
-        ArgumentError: the search is the greedy one, which keeps a single tree of motions.
+        ArgumentError: the search is the greedy one, which keeps a single tree of motions; or the
+            cells are a toolpath.
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
@@ -80,8 +85,7 @@ def divide(
         (1, True, True)
     """
     search = Search() if search is None else search
-    if search.method != "complete":
-        raise ArgumentError(NOT_GREEDY.format(search.method))
+    _refuse_others(search, cells)
     called = time.monotonic()
     with compiling_notice():
         warm_up()
@@ -123,6 +127,18 @@ class _Shared(NamedTuple):
     causes: tuple[Cause, ...]
     late: bool
     """Did a command's time run out meanwhile?"""
+
+
+def _refuse_others(search: Search, cells: Cells) -> None:
+    """Refuse the greedy search, and toolpaths.
+
+    Raises:
+        ArgumentError: it is one of them.
+    """
+    if search.method != "complete":
+        raise ArgumentError(NOT_GREEDY.format(search.method))
+    if cells.in_order:
+        raise ArgumentError(NOT_IN_ORDER)
 
 
 def _shared(
