@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from planted_rolls import planted_roll
 from random_arms import tools
 
 from coverable import load_case
@@ -67,6 +68,14 @@ def test_a_range_of_a_full_turn_is_free():
     free, whole = (check(*square(0.15, 20.0, roll)) for roll in (None, (-170.0, 190.0)))
     assert fk(free) == fk(whole)
     np.testing.assert_array_equal(free.witness.q, whole.witness.q)
+
+
+@pytest.mark.parametrize("name", ["puma560", "ur5"])
+def test_planted_motions_are_found(name):
+    """As the campaign `planted_rolls`: limits end 1 to 10 deg beyond a motion that never turns."""
+    rng = np.random.default_rng(len(name))
+    for _ in range(2):
+        assert check(*planted_roll(name, rng)).feasible
 
 
 @pytest.mark.parametrize("turn", [30.0, -110.0, 180.0])

@@ -50,3 +50,9 @@ def test_the_parts_that_blocked_curves_leave_are_counted(turns: tuple[int, ...])
 def test_no_message_where_no_curve_is_blocked() -> None:
     for cells in (plane((0, 1), (0, 1)).cells(3, 4), sphere(0.5, (20, 80), (0, 90)).cells(4, 4)):
         assert blocked_curves(cells, Task(standoff=0.02, cone_deg=30)) == ""
+
+
+def test_a_single_roll_leaves_no_margin() -> None:
+    cells = plane((0, 1), (0, 1)).cells(3, 4)
+    assert "single roll" in blocked_curves(cells, Task(0.02, 30, roll_deg=(5, 5)))
+    assert blocked_curves(cells, Task(0.02, 30, roll_deg=(5, 6))) == ""
