@@ -41,6 +41,7 @@ def check_arguments(
     base: Any = None,
     reference_axis: Any = None,
     axes: Any = (),
+    xacro_args: Any = None,
 ) -> Mounting:
     """Refuse axes, poses and held values that fit no arm.
 
@@ -51,6 +52,7 @@ def check_arguments(
         tcp, base: poses, see `load_robot`; None for the default.
         reference_axis: (3,) of any length; None for the default.
         axes: that arm or surface are mounted on.
+        xacro_args: name -> text, number or truth value; None for none.
 
     Raises:
         RobotError: with everything that is wrong.
@@ -69,6 +71,7 @@ def check_arguments(
         _refuse_parallel(checks, approach_axis, reference_axis)
     for joint, value in (lock or {}).items():
         checks.number(f"lock.{printable(joint)}", value, "must be a finite number (rad or m)")
+    _check_xacro_args(checks, {} if xacro_args is None else xacro_args)
     listed = isinstance(axes, (list, tuple))
     if not (listed and all(isinstance(axis, Axis) for axis in axes)):
         checks.wrong("axes", axes, "must be a list of Axis")
@@ -79,6 +82,17 @@ def check_arguments(
     )
     checks.done()
     return mounting
+
+
+def _check_xacro_args(checks: Checks, args: Any) -> None:
+    """Keep the faults of arguments that no xacro file can have."""
+    if not isinstance(args, Mapping) or not all(isinstance(name, str) for name in args):
+        checks.wrong("xacro_args", args, "must be names and values, such as {'prefix': 'left_'}")
+        return
+    for name, value in args.items():
+        if not isinstance(value, (str, bool, int, float)):
+            expected = "must be a text, a number, true or false"
+            checks.wrong(f"xacro_args.{printable(name)}", value, expected)
 
 
 def _refuse_parallel(checks: Checks, approach: Any, reference: Any) -> None:

@@ -33,8 +33,8 @@ HERE = Path(__file__).parent
 DATA = "example-robot-data"
 BRING_YOUR_OWN = (
     'Any other arm comes as a URDF: urdf = "my_arm.urdf" in a case, load_robot("my_arm.urdf") in '
-    "Python. The maker's ROS description package has one, often as xacro, which is expanded first: "
-    "xacro my_arm.urdf.xacro > my_arm.urdf"
+    "Python. The maker's ROS description package has one, often as my_arm.urdf.xacro, which is "
+    "read too: pip install 'coverable[xacro]'"
 )
 
 
@@ -93,8 +93,9 @@ def load_robot(
     axes: Sequence[Axis] = (),
     surface_link: str | None = None,
     start: ArrayLike | None = None,
+    xacro_args: Mapping[str, Any] | None = None,
 ) -> Robot:
-    """Load an arm by its name in the library, or from a URDF file.
+    """Load an arm by its name in the library, or from a URDF or xacro file.
 
     Free are the joints between the URDF's root link and the tool frame; every other joint is held
     at zero, brought into its limits. A continuous joint is one real coordinate without limits
@@ -104,16 +105,14 @@ def load_robot(
     such as ((0, 0, 0.12), (0, 0, 0)) or a `Pose`; or a (4, 4) matrix, such as a `pin.SE3`.
 
     Args:
-        name_or_path: a name of `list_robots()`, or the path of a URDF file.
-        limits: replaces the URDF's limits: a named set, (n, 2) rad or m, or a mapping
-            joint -> (lower, upper).
-        tool_frame: the link that carries the tool; default from the library, and for a URDF file
-            its only leaf link. Where there are several, the first link called tcp,
-            tool0, flange or ee_link that a joint moves, else the only leaf that one moves; a note
-            says which.
+        name_or_path: a name of `list_robots()`, or the path of a URDF or .xacro file.
+        limits: in place of the URDF's: a named set, (n, 2) rad or m, or {joint: (lower, upper)}.
+        tool_frame: the link that carries the tool; default from the library, and for a file its
+            only leaf link. Where there are several, the first link called tcp, tool0, flange or
+            ee_link that a joint moves, else the only leaf that one moves; a note says which.
         approach_axis: (3,) in the TCP's frame; default from the library, else +z.
         lock: joints to hold, name -> rad or m, in addition to those the library holds.
-        package_dirs: one or more folders in which `package://` meshes are looked up.
+        package_dirs: one or more folders with the packages of `package://` and xacro's $(find ...).
         tcp: pose of the tool centre point in the frame of `tool_frame`; default: they are the same.
         base: pose of the URDF's root link in the world; default: they are the same.
         reference_axis: (3,) in the TCP's frame, by which roll is measured: its part across the
@@ -123,6 +122,7 @@ def load_robot(
         surface_link: the link that carries the surface: the free joints are those between it and
             the tool. Default the last axis that carries the surface, else the world.
         start: (n,) rad or m, where the motion has to begin; default: anywhere.
+        xacro_args: arguments of a .xacro file, name -> text, number or truth value.
 
     Raises:
         RobotError: the name is unknown, or the URDF, frame, limits, a pose, an axis or a locked
@@ -135,15 +135,15 @@ def load_robot(
         Robot('ur5', 6 joints, tool 'tool0' + (0, 0, 0.12) m)
     """
     info = _find(name_or_path) or _unknown(Path(name_or_path).expanduser(), tool_frame)
-    if approach_axis is None:
-        changed = tool_frame not in (None, info.tool_frame)  # the axis belongs to that frame
-        approach_axis = (0.0, 0.0, 1.0) if changed else info.approach_axis
-    source, given = f"robot {os.fspath(name_or_path)!r}", {"tcp": tcp, "base": base, "axes": axes}
-    mounting = check_arguments(approach_axis, lock, source, reference_axis=reference_axis, **given)
+    approach_axis = _approach_axis(info, tool_frame) if approach_axis is None else approach_axis
+    given = {"tcp": tcp, "base": base, "axes": axes, "xacro_args": xacro_args}
+    source, given["reference_axis"] = f"robot {os.fspath(name_or_path)!r}", reference_axis
+    mounting = check_arguments(approach_axis, lock, source, **given)
     robot = _read(
         replace(info, lock={**info.lock, **(lock or {})}, tool_frame=tool_frame or info.tool_frame),
         _folders(package_dirs),
         mounting._replace(surface_link=surface_link),
+        xacro_args or {},
         limits=limits,
         approach_axis=approach_axis,
         reference_axis=reference_axis,
@@ -151,13 +151,25 @@ def load_robot(
     return robot if start is None else replace(robot, start=np.asarray(start))
 
 
-def _read(info: RobotInfo, folders: tuple[str, ...], mounting: Mounting, **asked: Any) -> Robot:
+def _approach_axis(info: RobotInfo, tool_frame: str | None) -> tuple[float, float, float]:
+    """The axis of the library belongs to the tool frame of the library."""
+    return info.approach_axis if tool_frame in (None, info.tool_frame) else (0.0, 0.0, 1.0)
+
+
+def _read(
+    info: RobotInfo,
+    folders: tuple[str, ...],
+    mounting: Mounting,
+    xacro_args: Mapping[str, Any],
+    **asked: Any,
+) -> Robot:
     """Read the URDF of an arm.
 
     Args:
         info: the arm, with the tool frame and the held joints that are asked for.
         folders: where meshes are looked up, besides those of `info`.
         mounting: of tool, arm and surface; the axes may carry the surface.
+        xacro_args: of a .xacro file.
         asked: limits and axes of the tool, as in `load_robot`.
     """
     from robots.pinocchio_model import robot_from_urdf
@@ -165,8 +177,8 @@ def _read(info: RobotInfo, folders: tuple[str, ...], mounting: Mounting, **asked
 
     link = mounting.surface_link or carrier_of_surface(mounting.axes)
     folders = (*folders, *info.package_dirs)
-    return robot_from_urdf(
-        check_urdf(info.urdf, folders, mounting.axes, mounting.base),
+    robot = robot_from_urdf(
+        check_urdf(info.urdf, folders, mounting.axes, mounting.base, xacro_args),
         name=info.name,
         tool_frame=info.tool_frame or None,
         mounting=mounting._replace(surface_link=link),
@@ -174,11 +186,13 @@ def _read(info: RobotInfo, folders: tuple[str, ...], mounting: Mounting, **asked
         limit_sets=_limit_sets(Path(info.limits)) if info.limits is not None else None,
         **asked,
     )
+    return replace(robot, xacro_args=tuple(xacro_args.items())) if xacro_args else robot
 
 
 def _unknown(path: Path, tool_frame: str | None) -> RobotInfo:
     """What is known about the URDF of an arm that is not in the library."""
-    return RobotInfo(path.stem, "file", "", str(path), tool_frame or "")
+    name = path.stem.removesuffix(".urdf") if path.suffix.lower() == ".xacro" else path.stem
+    return RobotInfo(name, "file", "", str(path), tool_frame or "")
 
 
 def _folders(package_dirs: str | os.PathLike[str] | Sequence[Any]) -> tuple[str, ...]:
@@ -208,11 +222,12 @@ def _find(name_or_path: str | os.PathLike[str]) -> RobotInfo | None:
 def joint_kinds(
     name_or_path: str | os.PathLike[str],
     package_dirs: Sequence[str | os.PathLike[str]] = (),
+    xacro_args: Mapping[str, Any] = {},
 ) -> dict[str, str]:
     """The kind of every moving joint of a URDF, by name, whatever else the arm is loaded with.
 
     Args:
-        name_or_path, package_dirs: see `load_robot`.
+        name_or_path, package_dirs, xacro_args: see `load_robot`.
 
     Raises:
         RobotError: the name is unknown, or the URDF has faults.
@@ -226,7 +241,7 @@ def joint_kinds(
     info = _find(name_or_path)
     path = Path(name_or_path).expanduser() if info is None else info.urdf
     folders = (*package_dirs, *(() if info is None else info.package_dirs))
-    checked = check_urdf(path, package_dirs=folders)
+    checked = check_urdf(path, package_dirs=folders, xacro_args=xacro_args)
     return {joint.name: joint.kind for joint in checked.joints if joint.moves}
 
 

@@ -79,6 +79,8 @@ class Robot:
     """Axes that arm or surface are mounted on and that the URDF lacks, from the world outwards."""
     root_link: str = ""
     """The URDF's root link; by default the model's first."""
+    xacro_args: tuple[tuple[str, object], ...] = ()
+    """Arguments of a .xacro file, for reading it again."""
 
     def __post_init__(self) -> None:
         """Copy and write-protect the arrays, and check that they fit together."""

@@ -25,7 +25,9 @@ coverable_kernels
 coverable_meshes
 robots: errors
 robots.mounting
-robots.urdf
+robots.urdf: xml mesh_folders
+robots.urdf.expansion
+robots.urdf: axes geometry visuals collisions joints tree srdf checked_urdf
 robots: arguments joint_checks chain reach robot kinematics joint_selection pinocchio_model library
 robots.shapes
 surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments

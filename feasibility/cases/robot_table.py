@@ -12,8 +12,8 @@ import numpy as np
 
 from coverable_errors import Fault, is_number, printable, shown
 from feasibility.cases.axis_table import AxisPart, read_axes
+from feasibility.cases.robot_limits import read_limits_by_name, read_limits_deg
 from feasibility.cases.table_reader import (
-    DEG,
     METRES,
     ORIGIN,
     Pair,
@@ -45,7 +45,7 @@ class RobotPart:
     name: str | None = None
     """In the library; None where `urdf` is given."""
     urdf: str | None = None
-    """Absolute path of a URDF file."""
+    """Absolute path of a URDF or .xacro file."""
     package_dirs: tuple[str, ...] = ()
     """Absolute paths."""
     tool_frame: str | None = None
@@ -68,6 +68,8 @@ class RobotPart:
     """rad or m, in the order of the free joints."""
     start_deg: tuple[float, ...] | None = None
     """The same in degrees, where all joints turn."""
+    xacro_args: Mapping[str, Any] = field(default_factory=dict)
+    """Arguments of a .xacro file: texts, numbers and truth values."""
 
     def table(self) -> dict[str, Any]:
         """The keys of the [robot] table that say something."""
@@ -103,6 +105,7 @@ class RobotPart:
                 reference_axis=self.reference_axis,
                 axes=[axis.build() for axis in self.axis],
                 surface_link=surface_link,
+                xacro_args=self.xacro_args or None,
             )
         except RobotError as error:
             units = self._wrong_units(self._kinds_alone())
@@ -130,7 +133,8 @@ class RobotPart:
 
         axes = {axis.name: axis.type for axis in self.axis}
         try:
-            return axes | joint_kinds(self.urdf or self.name or "", self.package_dirs)
+            source = self.urdf or self.name or ""
+            return axes | joint_kinds(source, self.package_dirs, self.xacro_args)
         except RobotError:
             return {}
 
@@ -236,8 +240,8 @@ def _part(section: Section) -> RobotPart:
         package_dirs=_package_dirs(section),
         tool_frame=section.text("tool_frame"),
         limits=section.text("limits"),
-        limits_deg=_limits_deg(section),
-        limits_m=_limits_by_name(section, "limits_m", METRES),
+        limits_deg=read_limits_deg(section),
+        limits_m=read_limits_by_name(section, "limits_m", METRES),
         axis=read_axes(section),
         start=_values(section, "start"),
         start_deg=_values(section, "start_deg"),
@@ -252,7 +256,7 @@ def _axes_poses_and_lock(section: Section) -> dict[str, Any]:
     """The axes and poses of the tool and the base, and the held joints, without what is wrong."""
     from robots import check_arguments
 
-    values = section.take("approach_axis", "reference_axis", "lock")
+    values = section.take("approach_axis", "reference_axis", "lock", "xacro_args")
     if not isinstance(values.get("lock", {}), Mapping):
         section.wrong_type("lock", values.pop("lock"))
     for key in POSES:
@@ -264,10 +268,13 @@ def _axes_poses_and_lock(section: Section) -> dict[str, Any]:
         wrong = {fault.key.removeprefix("robot.") for fault in section.faults[before:]}
         lock = values.get("lock", {})
         values["lock"] = {joint: value for joint, value in lock.items() if is_number(value)}
+        if any(key.startswith("xacro_args") for key in wrong):
+            del values["xacro_args"]
         for key in ("approach_axis", "reference_axis", *POSES):
             if wrong & {key, f"{key}.position", f"{key}.rpy_deg"}:
                 values.pop(key, None)
-    kept = {key: frozen(value) for key, value in values.items() if key not in POSES}
+    whole = "xacro_args"  # 1 and 1.0 are two texts
+    kept = {key: frozen(value, key == whole) for key, value in values.items() if key not in POSES}
     return kept | {key: PosePart(*frozen(values[key])) for key in POSES if key in values}
 
 
@@ -290,6 +297,8 @@ def _refuse_contradictions(section: Section) -> None:
             "contradicts the list in robot.limits_deg, which is for arms whose joints all turn; "
             "give both by joint name",
         )
+    if "xacro_args" in table and not str(table.get("urdf")).lower().endswith(".xacro"):
+        section.fault("xacro_args", "is for a .xacro file in robot.urdf; leave it out")
     if "start" in table and "start_deg" in table:
         section.fault("start", "contradicts robot.start_deg; give one of the two")
     in_degrees, in_metres = _names(table.get("limits_deg")), _names(table.get("limits_m"))
@@ -321,28 +330,3 @@ def _package_dirs(section: Section) -> tuple[str, ...]:
         section.wrong_type("package_dirs", value)
         return ()
     return tuple(os.path.abspath(os.path.expanduser(folder)) for folder in value)
-
-
-def _limits_deg(section: Section) -> tuple[Pair, ...] | dict[str, Pair] | None:
-    """Limits of all joints in order, or of some by name."""
-    value = section.table.get("limits_deg")
-    if value is None or isinstance(value, Mapping):
-        return _limits_by_name(section, "limits_deg", DEG)
-    section.has("limits_deg")
-    if not isinstance(value, list) or not value:
-        section.wrong_type("limits_deg", value)
-        return None
-    return tuple(section.interval(f"limits_deg[{i}]", pair, DEG) for i, pair in enumerate(value))
-
-
-def _limits_by_name(section: Section, key: str, unit: str) -> dict[str, Pair] | None:
-    """Limits of some joints by name."""
-    value = section.take(key).get(key)
-    if value is not None and not isinstance(value, Mapping):
-        section.wrong_type(key, value)
-        return None
-    pairs = {
-        joint: section.interval(f"{key}.{printable(joint)}", pair, unit)
-        for joint, pair in (value or {}).items()
-    }
-    return pairs or None

@@ -141,7 +141,9 @@ def _visuals(robot: Robot) -> tuple[list[Visual], list[str]]:
     from robots.urdf import check_urdf
 
     try:
-        checked = check_urdf(robot.urdf, robot.package_dirs, robot.axes)
+        checked = check_urdf(
+            robot.urdf, robot.package_dirs, robot.axes, xacro_args=dict(robot.xacro_args)
+        )
     except (RobotError, OSError) as error:
         return [], [f"not drawn: {robot.urdf} cannot be read: {error}"]
     bodies = {frame.name for frame in robot.model.frames if frame.type == pin.FrameType.BODY}

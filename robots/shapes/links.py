@@ -66,7 +66,9 @@ def link_shapes(robot: Robot, fineness: Fineness = "hulls") -> LinkShapes:
             "has no URDF file, so its links have no shapes for collisions; load it from a file",
             f"robot {robot.name!r}",
         )
-    checked = check_urdf(robot.urdf, robot.package_dirs, robot.axes)
+    checked = check_urdf(
+        robot.urdf, robot.package_dirs, robot.axes, xacro_args=dict(robot.xacro_args)
+    )
     gathered = _Gathered(robot, checked)
     for link in checked.links:
         gathered.add(link)

@@ -9,8 +9,9 @@ links and joints and nothing else of the file.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 
 from robots.urdf.axes import Axis, insert_axes
 from robots.urdf.collisions import CollisionShapes, read_collisions
+from robots.urdf.expansion import expanded, is_xacro
 from robots.urdf.geometry import ShapeFault
 from robots.urdf.joints import JointInfo
 from robots.urdf.mesh_folders import MeshFolders
@@ -88,21 +90,22 @@ def check_urdf(
     package_dirs: Sequence[str | os.PathLike[str]] = (),
     axes: Sequence[Axis] = (),
     base: NDArray[np.float64] | None = None,
+    xacro_args: Mapping[str, Any] = {},
 ) -> CheckedUrdf:
-    """Read and check a URDF file.
+    """Read and check a URDF file, or a .xacro file, which is expanded first.
 
     Args:
         path: the file.
         package_dirs: folders that hold the packages of `package://` mesh names.
         axes: that arm or surface are mounted on, added to the tree; the world is then its root.
         base: (4, 4) m, with axes, the file's root link in the world or on the last base axis.
+        xacro_args: arguments of a .xacro file.
 
     Raises:
         UrdfError: with every fault that was found, each with its line and what would do.
     """
     name = os.fsdecode(path)
-    root = parse_xml(read_bytes(name), name)
-    refuse_other_formats(root, name)
+    root = _root_of(name, package_dirs, xacro_args)
     mounted = insert_axes(root, axes, base, name) if axes else None
     checked = _check(root, name, os.path.dirname(os.path.abspath(name)), package_dirs)
     if mounted is None:
@@ -110,6 +113,22 @@ def check_urdf(
     composed = {axis.name for axis in axes}
     leaves = tuple(leaf for leaf in checked.leaves if leaf not in composed)
     return replace(checked, mounted=mounted, leaves=leaves)
+
+
+def _root_of(
+    path: str, package_dirs: Sequence[str | os.PathLike[str]], xacro_args: Mapping[str, Any]
+) -> Node:
+    """The first element of a file; lines are those of the expanded text."""
+    if is_xacro(path):
+        called = f"{path} (expanded)"
+        data = expanded(path, tuple(map(os.fsdecode, package_dirs)), xacro_args)
+        root = parse_xml(data, called, encoding="utf-8")
+    elif xacro_args:
+        raise UrdfError("is no .xacro file, so it has no xacro_args; leave them out", path)
+    else:
+        called, root = path, parse_xml(read_bytes(path), path)
+    refuse_other_formats(root, called)
+    return root
 
 
 def check_urdf_text(

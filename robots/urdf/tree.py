@@ -39,7 +39,7 @@ def refuse_other_formats(robot: Node, path: str) -> None:
         pending.extend(child for child in node.children if child.tag not in EXTENSIONS)
         values = " ".join(node.attributes.values())
         if node.tag.startswith("xacro:") or "${" in values or "$(" in values:
-            what = "still holds xacro; expand it first: xacro robot.urdf.xacro > robot.urdf"
+            what = "still holds xacro; end the name of the file in .xacro to expand it"
         elif node.tag.split(":")[-1] == "include":
             what = "would include another file, which is not done; write one URDF with every link"
         else:

@@ -106,6 +106,8 @@ def with_value(key, value):
         table.pop("points" if key.name == "file" else "", None)
     elif key.name == "degree":
         table["points"] = [[[0, 0, 0], [0, 1, 0]], [[1, 0, 0.2], [1, 1, 0]]]
+    elif key.name == "xacro_args":
+        table["urdf"] = f"{table.pop('name')}.urdf.xacro"
     if value is MISSING:
         table.pop(key.name, None)
     else:

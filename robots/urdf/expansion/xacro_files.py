@@ -1,0 +1,140 @@
+"""xacro files into URDF, through the package xacro of the extra `coverable[xacro]`.
+
+A xacro file is a program: it includes files, evaluates Python and may never end. It runs in a
+process of its own (`child`), without environment, with caps on memory, processor time and output,
+and reads nothing but the folders that its meshes may come from too.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from coverable_errors import Fault
+from robots.urdf.mesh_folders import MeshFolders
+from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes
+
+EXTRA = "needs the extra: pip install 'coverable[xacro]'"
+CHILD = Path(__file__).with_name("child.py")
+
+
+class Caps(NamedTuple):
+    """What expanding one file may use; the xacro of a humanoid takes 2 s and 100 MB."""
+
+    seconds: int = 20
+    """Of processor time."""
+    waiting: float = 300.0
+    """s, for a machine that is busy with other things."""
+    memory: int = 2**30
+    """bytes of address space"""
+    bytes: int = MAX_BYTES
+    """The largest file that is read, and the largest URDF that is made."""
+
+
+CAPS = Caps()
+
+
+def is_xacro(path: str | os.PathLike[str]) -> bool:
+    """True for a file name that ends in .xacro.
+
+    Example:
+        >>> is_xacro("arm.urdf.xacro"), is_xacro("arm.urdf")
+        (True, False)
+    """
+    return os.fsdecode(path).lower().endswith(".xacro")
+
+
+def expanded(
+    path: str, package_dirs: Sequence[str] = (), args: Mapping[str, Any] = {}, caps: Caps = CAPS
+) -> bytes:
+    """Expand a xacro file into the text of a URDF, as UTF-8.
+
+    Args:
+        path: the file.
+        package_dirs: folders that hold the packages of $(find ...); with them, the file's own
+            folder and the ROS package around it, all that the file may read.
+        args: its arguments: texts, numbers and truth values.
+        caps: of the process.
+
+    Raises:
+        UrdfError: the extra is missing; the file cannot be read, or expanded within the caps.
+    """
+    read_bytes(path)
+    library = [_folder_of(package, path) for package in ("xacro", "yaml")]
+    path = os.path.abspath(path)
+    base = os.path.dirname(path)
+    mesh_folders = MeshFolders(base, [os.path.abspath(folder) for folder in package_dirs])
+    roots = [*mesh_folders.packages, *filter(None, (mesh_folders.own_package, mesh_folders.base))]
+    job = {
+        "path": path,
+        "library": library,
+        "folders": [os.path.join(str(folder), "") for folder in mesh_folders.allowed],
+        "packages": [str(folder) for folder in (*mesh_folders.packages, base)],
+        "roots": [str(folder) for folder in roots],
+        "args": {name: _text(value) for name, value in args.items()},
+        **caps._asdict(),
+    }
+    kind, _, answer = _run(job, path, caps).partition(b"\n")
+    if kind == b"urdf":
+        return answer
+    try:
+        said = json.loads(answer) if kind == b"fault" else {}
+    except ValueError:
+        said = {}
+    what = str(said.get("fault", "cannot be expanded: its process broke off"))
+    raise UrdfError(Fault("", what, str(said.get("place", ""))), path)
+
+
+def _run(job: Mapping[str, Any], path: str, caps: Caps) -> bytes:
+    """What the process writes about a job.
+
+    Raises:
+        UrdfError: it took too long.
+    """
+    command = [sys.executable, "-I", "-S", "-B", "-X", "utf8", str(CHILD)]
+    with tempfile.TemporaryFile() as written:
+        try:
+            done = subprocess.run(
+                command,
+                input=json.dumps(job).encode(),
+                stdout=written,
+                stderr=subprocess.DEVNULL,
+                env={},
+                timeout=caps.waiting,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise UrdfError(f"is not expanded after {caps.waiting:g} s", path) from None
+        if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+            raise UrdfError(
+                f"takes more than {caps.seconds} s of processor time to expand; does a macro or an "
+                "expression grow without bound?",
+                path,
+            )
+        written.seek(0)
+        return written.read(2 * caps.bytes)
+
+
+def _folder_of(package: str, path: str) -> str:
+    """The folder that a package is imported from.
+
+    Raises:
+        UrdfError: it is not installed.
+    """
+    spec = find_spec(package)
+    if spec is None or spec.origin is None:  # a folder of that name has no origin
+        raise UrdfError(EXTRA, path)
+    return str(Path(spec.origin).parent.parent)
+
+
+def _text(value: Any) -> str:
+    """An argument as the command line of xacro would have it."""
+    return str(value).lower() if isinstance(value, bool) else str(value)
