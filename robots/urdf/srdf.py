@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 
+from robots.urdf.expansion import expanded, is_xacro
 from robots.urdf.xml import Faults, UrdfError, name_of, parse_xml, read_bytes
 
 TAKEN = ("Adjacent", "Default", "Always", "User")
@@ -26,11 +27,13 @@ class DisabledPairs:
 def read_srdf(path: str | os.PathLike[str]) -> DisabledPairs:
     """Read the <disable_collisions> of an SRDF; nothing else of it is looked at.
 
+    A .xacro file is expanded first, with the defaults of its arguments.
+
     Raises:
         UrdfError: the file cannot be read, is no SRDF, or a pair lacks a link; with every fault.
     """
     name = os.fsdecode(path)
-    root = parse_xml(read_bytes(name), name)
+    root = parse_xml(expanded(name) if is_xacro(name) else read_bytes(name), name)
     faults = Faults()
     if root.tag != "robot":
         raise UrdfError(f"line {root.line}: an SRDF starts with <robot name=...>", name)

@@ -197,7 +197,7 @@ def described(error: BaseException) -> str:
     words = f"{deepest} {where or ''}".split() or [type(deepest).__name__]
     said = " ".join(words)[:LONGEST]
     if isinstance(deepest, FileNotFoundError):
-        return f"includes {str(deepest.filename)!r}, which is not there; correct its name"
+        return f"asks for {str(deepest.filename)!r}, which is not there; correct its name"
     if isinstance(deepest, NameError):
         return f"{said}; define it with <xacro:property>, or as an argument"
     if type(deepest).__name__ == "ArgException":

@@ -27,6 +27,19 @@ def test_only_pairs_with_a_stated_reason_are_taken(tmp_path):
     assert pairs.named == {"a", "c", "d", *(f"b{k}" for k in range(8))}
 
 
+def test_a_xacro_file_is_expanded(tmp_path):
+    inside = (
+        '<xacro:macro name="pair" params="k">'
+        '<disable_collisions link1="a" link2="b${k}" reason="Adjacent"/></xacro:macro>'
+        '<xacro:pair k="1"/><xacro:pair k="2"/>'
+    )
+    path = srdf(tmp_path, inside, "arm.srdf.xacro")
+    path.write_text(
+        path.read_text().replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"')
+    )
+    assert read_srdf(path).taken == (("a", "b1"), ("a", "b2"))
+
+
 def test_an_srdf_without_pairs_is_empty(tmp_path):
     pairs = read_srdf(srdf(tmp_path, ""))
     assert (pairs.taken, pairs.ignored, pairs.named) == ((), (), frozenset())
