@@ -23,7 +23,7 @@ __all__ = ["cfunc", "njit"]
 
 HERE = Path(__file__).resolve().parent
 PACKAGES = ("robots", "surfaces", "feasibility")
-MARKS = (b"njit", b"cfunc", b"@kernel", b"@inlined")
+MARKS = (b"njit", b"cfunc", b"@kernel", b"@inlined", b"@allocating")
 
 
 def _sources() -> Iterator[bytes]:

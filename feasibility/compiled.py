@@ -13,8 +13,13 @@ from __future__ import annotations
 
 from coverable_kernels import njit
 
-kernel = njit(cache=True, error_model="numpy")
-# Written into its caller, of the same file: each array in a `NamedTuple` costs at every call.
+# numba counts references to each array that a kernel reads out of a `NamedTuple`. A kernel that
+# makes no arrays and returns none needs no counting, because its caller holds what it is given; one
+# that makes some is refused by numba when it is compiled, and is to be `allocating`.
+kernel = njit(cache=True, error_model="numpy", _nrt=False)
+allocating = njit(cache=True, error_model="numpy", _nrt=True)
+# Written into its caller: a call copies every field of every array in its `NamedTuple`s, which are
+# hundreds of numbers and take longer than what a small kernel does.
 inlined = njit(cache=True, error_model="numpy", inline="always")
 
 

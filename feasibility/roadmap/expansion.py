@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import inlined, kernel, put
+from feasibility.compiled import allocating, inlined, kernel, put
 from feasibility.roadmap.graph import (
     BUDGET,
     COVERED,
@@ -55,7 +55,7 @@ def _nearest_rival(roadmap, cell, q, own, tried, most):  # type: ignore[no-untyp
     return best
 
 
-@kernel
+@allocating
 def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-untyped-def]
     """Try to reach, by self-motion from q over `cell`, a node of another component.
 
@@ -89,7 +89,7 @@ def join(arrays, work, roadmap, cell, q, own, rows, most):  # type: ignore[no-un
     return -1, 0
 
 
-@kernel
+@allocating
 def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: ignore[no-untyped-def]
     """Spread every queued node into the neighbouring cells that its component does not cover yet.
 
@@ -157,7 +157,7 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
     return DONE
 
 
-@kernel
+@allocating
 def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: ignore[no-untyped-def]
     """Explore the self-motion manifold over one cell, and merge the components that it connects.
 
@@ -239,7 +239,7 @@ def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
     return best_x, best_y
 
 
-@kernel
+@allocating
 def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type: ignore[no-untyped-def]
     """Try to connect every neighbouring pair of cells inside one component by a motion of its own.
 

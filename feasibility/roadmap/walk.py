@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.compiled import inlined, kernel, put
+from feasibility.compiled import allocating, inlined, put
 from feasibility.roadmap.graph import EDGES, NODES, Roadmap, root_of
 from feasibility.verdict import Walk
 
@@ -59,7 +59,7 @@ def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
     return inside, indptr, steps
 
 
-@kernel
+@allocating
 def _filled(size, value):  # type: ignore[no-untyped-def]
     """(size,) integers, all the same."""
     result = np.empty(size, dtype=np.int64)
@@ -147,7 +147,7 @@ def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ign
     return path, found
 
 
-@kernel
+@allocating
 def _route(roadmap, links, wanted, start, first):  # type: ignore[no-untyped-def]
     """Signed edges of a walk from a node through the wanted cells, always to the nearest one.
 
@@ -173,7 +173,7 @@ def _route(roadmap, links, wanted, start, first):  # type: ignore[no-untyped-def
     return route[:length]
 
 
-@kernel
+@allocating
 def _string(roadmap, start, route):  # type: ignore[no-untyped-def]
     """Waypoints and cell marks of a route."""
     total = 1

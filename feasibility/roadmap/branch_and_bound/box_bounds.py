@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from feasibility.compiled import allocating, kernel
 
 
 @kernel
@@ -75,7 +75,7 @@ def contract_along(rows, gap, radius, direction, g, low, high):  # type: ignore[
     return contract(g, goal - radius, goal + radius, low, high)
 
 
-@kernel
+@allocating
 def contract_to_ball(rows, gap, distance, radius, directions, g, low, high):  # type: ignore[no-untyped-def]
     """Cut the box to d with |rows d - gap| <= radius, along the gap and along every direction.
 

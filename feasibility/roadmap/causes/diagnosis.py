@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.collisions import Pair
-from feasibility.compiled import kernel, put
+from feasibility.compiled import allocating, put
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.causes.collision import blocked, colliding
@@ -50,7 +50,7 @@ UNPROVED = "not proved: off its target, within the tolerance, the tool point may
 MOST_DECIMALS = 6
 
 
-@kernel
+@allocating
 def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
     """Smallest distance of the tool point from the target, by damped descent from guesses."""
     n = guesses.shape[1]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import kernel
+from feasibility.compiled import allocating, inlined, kernel
 
 
 @kernel
@@ -32,7 +32,7 @@ def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
     return True
 
 
-@kernel
+@inlined
 def least_step(arrays, work, q, m, damping):  # type: ignore[no-untyped-def]
     """The step nearest to `work.secondary_step` with rows @ step = rhs, inside the limits.
 
@@ -40,23 +40,35 @@ def least_step(arrays, work, q, m, damping):  # type: ignore[no-untyped-def]
     and the others take over. Returns False when too few joints are left. With a larger `damping`
     (a share of the rows' squares) the step is shorter, and the rows hold as nearly as they can.
     """
+    # To hand over all of `arrays` and `work` would take longer than the step.
+    return step_within(
+        arrays.lower, arrays.upper, work.rows, work.rhs, work.secondary_step, work.step, work.held,
+        work.stop_reason, q, m, damping,
+    )  # fmt: skip
+
+
+@allocating
+def step_within(  # type: ignore[no-untyped-def]
+    lower, upper, rows, rhs, secondary_step, step, held, stop_reason, q, m, damping
+):
+    """See `least_step`; its arguments one by one."""
     n = q.shape[0]
     a = np.empty((6, 6))
     y = np.empty(6)
     for j in range(n):
-        work.held[j] = False
-        work.step[j] = 0.0
+        held[j] = False
+        step[j] = 0.0
     for _ in range(n + 1):
         trace = 0.0
         for i in range(m):
-            y[i] = work.rhs[i]
+            y[i] = rhs[i]
             for j in range(n):
-                y[i] -= work.rows[i, j] * (work.step[j] if work.held[j] else work.secondary_step[j])
+                y[i] -= rows[i, j] * (step[j] if held[j] else secondary_step[j])
             for k in range(i + 1):
                 total = 0.0
                 for j in range(n):
-                    if not work.held[j]:
-                        total += work.rows[i, j] * work.rows[k, j]
+                    if not held[j]:
+                        total += rows[i, j] * rows[k, j]
                 a[i, k] = total
             trace += a[i, i]
         if not trace > 1e-14:
@@ -67,19 +79,19 @@ def least_step(arrays, work, q, m, damping):  # type: ignore[no-untyped-def]
             return False
         worst, furthest = -1, 1e-14
         for j in range(n):
-            if work.held[j]:
+            if held[j]:
                 continue
-            s = work.secondary_step[j]
+            s = secondary_step[j]
             for i in range(m):
-                s += work.rows[i, j] * y[i]
-            work.step[j] = s
-            over = max(q[j] + s - arrays.upper[j], arrays.lower[j] - q[j] - s)
+                s += rows[i, j] * y[i]
+            step[j] = s
+            over = max(q[j] + s - upper[j], lower[j] - q[j] - s)
             if over > furthest:
                 worst, furthest = j, over
         if worst < 0:
             return True
-        work.stop_reason[1] = worst
-        limit = arrays.upper[worst] if work.step[worst] > 0.0 else arrays.lower[worst]
-        work.step[worst] = limit - q[worst]
-        work.held[worst] = True
+        stop_reason[1] = worst
+        limit = upper[worst] if step[worst] > 0.0 else lower[worst]
+        step[worst] = limit - q[worst]
+        held[worst] = True
     return False

@@ -94,7 +94,7 @@ def tilts(work, goal):  # type: ignore[no-untyped-def]
         work.rows[4, j] = sx * rx + sy * ry + sz * rz
 
 
-@kernel
+@inlined
 def add_row(work, m, which, change):  # type: ignore[no-untyped-def]
     """Make row m that of a gradient: 0 the cone's, 1 that of roll; returns the number of rows."""
     for j in range(work.step.shape[0]):
@@ -103,7 +103,7 @@ def add_row(work, m, which, change):  # type: ignore[no-untyped-def]
     return m + 1
 
 
-@kernel
+@inlined
 def roll_change(work, goal):  # type: ignore[no-untyped-def]
     """rad by which roll has to change in slot 1 to be `goal` off the middle of its range."""
     off = work.error[1, 2]
@@ -120,7 +120,7 @@ def enough_left(work, m):  # type: ignore[no-untyped-def]
     return free >= m
 
 
-@kernel
+@inlined
 def bounded_step(arrays, work, q, cone, roll, goal, roll_goal):  # type: ignore[no-untyped-def]
     """`least_step` with cone and roll, where they are asked for.
 
@@ -168,7 +168,7 @@ def predicted_roll(work):  # type: ignore[no-untyped-def]
     return abs(roll)
 
 
-@kernel
+@inlined
 def corrected(arrays, work, q, usable, goal, roll_goal):  # type: ignore[no-untyped-def]
     """The step with cone and roll where they are violated, or would be.
 
@@ -212,7 +212,7 @@ def first_roll_goal(arrays, work, hard, slack, before):  # type: ignore[no-untyp
     return min(hard, comfort)
 
 
-@kernel
+@inlined
 def inside(arrays, work):  # type: ignore[no-untyped-def]
     """Is slot 1 at its target, and inside what there is of cone and roll?"""
     return (
