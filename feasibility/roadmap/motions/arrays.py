@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -109,11 +109,11 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
         chain=robot.chain,
         lower=np.array(robot.lower),
         upper=np.array(robot.upper),
-        points=np.ascontiguousarray(targets.points),
-        approaches=np.ascontiguousarray(targets.approaches),
+        points=np.array(targets.points, order="C"),
+        approaches=np.array(targets.approaches, order="C"),
         references=np.array(np.zeros((0, 3)) if rolls is None else rolls, order="C"),
-        first_piece=curves.first,
-        targets=curves.cubics,
+        first_piece=_read_only(curves.first),
+        targets=_read_only(curves.cubics),
         derivative_bounds=np.column_stack([curves.derivative_bounds, curves.curvature]),
         deviations=deviations,
         frames=frames.cubics,
@@ -132,6 +132,16 @@ def arrays_of(robot: Robot, cells: Cells, task: Task) -> SearchArrays:
         scale=float(np.linalg.norm(robot.chain.translations, axis=1).sum()) or 1.0,
         collisions=collisions_of(robot, cells.surface, task),
     )
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """The same numbers, in order and not to be written.
+
+    To numba an array that may be written is of another type, and kernels are compiled for each.
+    """
+    view = np.ascontiguousarray(array).view()
+    view.flags.writeable = False
+    return view
 
 
 def _ordinary(deviations: NDArray[np.float64], most: float) -> float:

@@ -241,7 +241,10 @@ BAD_CASES = {
     "kind is a list": changed('"sphere"', '["sphere"]', "surface.kind", "must be"),
     "mesh key": added("surface", "cell_size = 0.1", "surface.cell_size", "belongs to a mesh"),
     "file of nothing": added(
-        "surface", 'file = "part.stl"', "surface.file", "a bspline or a mesh, not to a sphere"
+        "surface",
+        'file = "part.stl"',
+        "surface.file",
+        "a bspline, a grid, poses or a mesh, not to a sphere",
     ),
     "key of another kind": added("surface", "flare = 1.0", "surface.flare", "belongs to a hyper"),
     "radius missing": changed("radius = 1.0\n", "", "surface.radius", "is missing", "metres"),
@@ -376,7 +379,7 @@ BAD_CASES = {
     "piece is a mesh": Bad(
         surface('kind = "piecewise"\npieces = [{ kind = "mesh" }]'),
         "surface.pieces[0].kind",
-        ("'bspline', got",),
+        ("'bspline' or 'grid', got",),
     ),
     "piece with a side": wrong(
         "piecewise",

@@ -53,7 +53,8 @@ def test_keys_of_one_table_or_kind(ask, asked, wanted):
 
 
 @pytest.mark.parametrize(
-    ("asked", "words"), [("serach", '"search"'), ("?", "robot, surface"), ("", "robot, surface")]
+    ("asked", "words"),
+    [("serach", '"search"'), ("?", "there are robot, "), ("", "surface, sphere, ")],
 )
 def test_keys_of_a_table_that_there_is_not(ask, asked, words):
     status, out, err = ask("keys", asked)
