@@ -11,13 +11,17 @@ which are plain values; so that every kernel is compiled once.
 
 from __future__ import annotations
 
+from typing import Any
+
 from coverable_kernels import njit
 
 # numba counts references to each array that a kernel reads out of a `NamedTuple`. A kernel that
 # makes no arrays and returns none needs no counting, because its caller holds what it is given; one
 # that makes some is refused by numba when it is compiled, and is to be `allocating`.
-kernel = njit(cache=True, error_model="numpy", _nrt=False)
-allocating = njit(cache=True, error_model="numpy", _nrt=True)
+COUNTED: dict[str, Any] = {"_nrt": True}
+UNCOUNTED: dict[str, Any] = {"_nrt": False}
+kernel = njit(cache=True, error_model="numpy", **UNCOUNTED)
+allocating = njit(cache=True, error_model="numpy", **COUNTED)
 # Written into its caller: a call copies every field of every array in its `NamedTuple`s, which are
 # hundreds of numbers and take longer than what a small kernel does.
 inlined = njit(cache=True, error_model="numpy", inline="always")

@@ -15,6 +15,7 @@ from numba.core.errors import TypingError
 import feasibility
 from coverable_kernels import njit
 from feasibility import Task, check
+from feasibility.compiled import COUNTED, UNCOUNTED
 from robots import load_robot
 from surfaces import plane
 
@@ -57,5 +58,5 @@ def test_numba_refuses_one_that_makes_arrays() -> None:
         return np.zeros(n)
 
     with pytest.raises(TypingError):
-        njit(error_model="numpy", _nrt=False)(made)(3)
-    assert njit(error_model="numpy", _nrt=True)(made)(3).shape == (3,)
+        njit(error_model="numpy", **UNCOUNTED)(made)(3)
+    assert njit(error_model="numpy", **COUNTED)(made)(3).shape == (3,)
