@@ -90,7 +90,7 @@ class Problem:
 def task_over(cells: Cells, task: Task) -> Task:
     """The task without collisions with a surface where there is none: between poses."""
     collision = task.collision
-    if collision is None or not (cells.surface.bare and collision.surface):
+    if collision is None or not collision.surface or cells.surface.wall is not None:
         return task
     return replace(task, collision=collision.without_surface)
 

@@ -16,6 +16,9 @@ from .meshes import faces_within_cone as faces_within_cone
 from .meshes import mesh as mesh
 from .meshes import take_faces as take_faces
 from .parts import SurfaceParts as SurfaceParts
+from .passes import Passes as Passes
+from .passes import parallel_passes as parallel_passes
+from .passes import pass_toolpath as pass_toolpath
 from .patches import LocalClosestPoints as LocalClosestPoints
 from .patches import Patch as Patch
 from .patches import SmoothPatch as SmoothPatch

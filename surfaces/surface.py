@@ -89,6 +89,11 @@ class Surface(Protected, ABC):
         return False
 
     @property
+    def wall(self) -> Surface | None:
+        """The surface that an arm could collide with; None where there is none."""
+        return self
+
+    @property
     def mean_edge_length(self) -> float:
         """m, typical length of a mesh's edges; 0 where the surface is smooth."""
         return 0.0

@@ -80,7 +80,7 @@ feasibility.viewer: threejs html_page meshes robot playback
 feasibility.viewer.frames
 feasibility.viewer: cell_meshes cut_sides figures live_server nearest obstacles painter path_and_division placements poses readout scene stage view_figures viewer
 feasibility.reports
-feasibility.cli: case_commands command console listing main place study_compare verify
+feasibility.cli: case_commands command console listing main path place study_compare verify
 coverable_command
 feasibility.cli: __main__
 coverable

@@ -1,10 +1,9 @@
-"""Commands on one case: `coverable check`, `show`, `path`, `divide` and `explain`."""
+"""Commands on one case: `coverable check`, `show`, `divide` and `explain`."""
 
 from __future__ import annotations
 
 import argparse
 import os
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from coverable_errors import CoverableError
@@ -15,7 +14,6 @@ from feasibility.cli.command import (
     add_html,
     json_text,
     open_case,
-    positive,
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
@@ -23,18 +21,15 @@ from feasibility.interrupts import forgive
 from feasibility.safe_files import check_writable, shown_path
 
 if TYPE_CHECKING:
-    from feasibility.cases import Case
     from feasibility.cli.command import OpenCase
     from feasibility.sensitivity import Explanation
-    from feasibility.verdict import Verdict, Walk
+    from feasibility.verdict import Walk
 
 INSIDE = "-"  # in place of a file: in the object that is printed
-ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
 LATER_STATUSES = """exit status: as of `coverable check`; divide: 0 every cell is in a patch,
 1 cells are left out, 3 undecided"""
 WHY_COMPLETE = {
-    "path": "a path needs 'complete': the greedy search does not visit the cells' centres",
     "divide": "a division needs 'complete': the greedy search keeps one motion only",
     "seeds": "--seeds needs 'complete': the greedy search has a start, and no seeds",
     "explain": "thresholds need 'complete': a greedy search that fails depends on its start",
@@ -74,13 +69,6 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         help="only print the address of the view",
     )  # fmt: skip
     add_command(
-        subcommands, "path", path, add_case, add_html, _add_timing,
-        help="a coverage motion that an arm can run",
-        description="Plan a path over every cell in a chosen order, time it within the limits of "
-        "joints and tool, and write it as a trajectory.",
-        epilog=LATER_STATUSES,
-    )  # fmt: skip
-    add_command(
         subcommands, "divide", divide, add_case, add_html,
         help="the fewest sub-patches, each covered by one continuous motion",
         description="Divide a surface that one motion cannot cover into the fewest patches, and "
@@ -97,37 +85,6 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--witness", metavar="FOLDER",
         help="write the covering motion at each threshold as CSV, for `check --seeds` and `verify`",
-    )  # fmt: skip
-
-
-def _add_timing(parser: argparse.ArgumentParser) -> None:
-    """How a path is ordered, timed and written."""
-    parser.add_argument(
-        "--order",
-        choices=ORDERS,
-        help="default: rows on a grid of cells, given of a toolpath, shortest on others",
-    )
-    parser.add_argument(
-        "--speed", type=positive, default=0.1, metavar="M_PER_S",
-        help="maximum speed of the tool point, m/s (default 0.1)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--velocity", type=positive, metavar="RAD_PER_S",
-        help="maximum velocity of every joint, rad/s or m/s (default: the URDF's limits)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--acceleration", type=positive, metavar="RAD_PER_S2",
-        help="maximum acceleration of every joint, rad/s^2 or m/s^2 (default: what takes a joint "
-        "to its maximum velocity in half a second)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--period", type=positive, default=0.02, metavar="S",
-        help="time between samples, seconds (default 0.02)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--out", metavar="FILE", action="append", default=[],
-        help="write the trajectory; .csv, .json, or .yaml like a ROS JointTrajectory; can be "
-        "repeated",
     )  # fmt: skip
 
 
@@ -209,79 +166,6 @@ def show(args: argparse.Namespace, began: float) -> int:
             forgive()
             print_err("")
     return 0
-
-
-def path(args: argparse.Namespace, began: float) -> int:
-    """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
-    outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
-
-    def judge(case: Case) -> None:
-        from feasibility.paths import check_order
-
-        if args.order is not None:
-            check_order(args.order, case.surface.kind, case.surface.is_grid)
-
-    with open_case(args, began, outputs, WHY_COMPLETE["path"], judge) as opened:
-        from feasibility.checking import check
-        from feasibility.clock import OutOfTime
-        from feasibility.paths import coverage_path
-        from feasibility.reports import path as report
-        from feasibility.results import check_ending
-        from feasibility.timing import motion_limits, trajectory
-        from feasibility.verdict import Answer
-
-        for out in args.out:
-            check_ending(out)
-        robot, loaded = opened.setup.robot, opened.so_far()
-        limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
-        verdict = check(*opened.setup, clock=opened.clock)
-        if not verdict.feasible:
-            return _no_path(args, opened.case.name, verdict, loaded)
-        try:
-            with opened.clock.enforced():
-                opened.progress(0, None, "planning the path")
-                found = coverage_path(verdict, args.order)
-                opened.progress(0, None, "timing the path")
-                run = trajectory(
-                    found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
-                    period=args.period,
-                )  # fmt: skip
-        except OutOfTime:
-            late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
-            verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
-            return _no_path(args, opened.case.name, verdict, loaded)
-    if args.json:
-        print_out(json_text(report.as_json(found, run, limits)))
-    else:
-        print_out(report.as_text(found, run, limits))
-    for out in args.out:
-        from feasibility.results import save_trajectory
-
-        save_trajectory(out, run)
-        print_err(f"trajectory: {shown_path(out)}")
-    if args.html is not None:
-        from feasibility.viewer import view_path
-
-        write_text(args.html, view_path(found, run, opened.case.name).html(), "view")
-    return 0
-
-
-def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: float) -> int:
-    """Say why there is no path; the exit status is the verdict's."""
-    from feasibility.reports import path as report
-
-    reason = f"no path over this surface is known. {verdict!r}"
-    print_err(f"coverable path: {name}: {reason}")
-    if str(verdict.answer) == "undecided" and "time limit" in verdict.message:
-        print_err("`--set search.time_limit=...` gives the search more time.")
-    print_err("`coverable explain` finds what would help, `coverable divide` splits the surface.")
-    for flag, files in (("--out", args.out), ("--html", [args.html])):
-        for file in files:
-            if file is not None:
-                print_err(f"{flag}: nothing written to {shown_path(file)}")
-    if args.json:
-        print_out(json_text(report.no_path_json(verdict, reason, loaded)))
-    return STATUS[str(verdict.answer)]
 
 
 def divide(args: argparse.Namespace, began: float) -> int:

@@ -49,7 +49,7 @@ def gather(
         ArgumentError: a pair names something that is not there; all such names are given.
         SurfaceError: no bounds on the surface are known.
     """
-    if collision is not None and collision.surface and surface.bare:
+    if collision is not None and collision.surface and surface.wall is None:
         collision = collision.without_surface
     if collision is None or not collision.checked:
         return None
@@ -67,8 +67,8 @@ def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: fl
     shapes, tool = arm.shapes, arm.tool
     solids = [*shapes.solids, *tool_solids(collision.tool, robot)]
     polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
-    if collision.surface:
-        sheet = sheet_of(surface, thickness=collision.thickness)
+    if collision.surface and surface.wall is not None:
+        sheet = sheet_of(surface.wall, thickness=collision.thickness)
         soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False))
     seats = seats_of(robot, collision.scene)
     reach = _reach(robot, polytopes, seats, soups)

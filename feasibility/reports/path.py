@@ -24,10 +24,14 @@ from feasibility.timing import MotionLimits, Trajectory, used
 from feasibility.verdict import Verdict
 from feasibility.version import version
 from robots import Robot
+from surfaces.passes import Passes
 
 
 def as_json(
-    path: CoveragePath, trajectory: Trajectory | None = None, limits: MotionLimits | None = None
+    path: CoveragePath,
+    trajectory: Trajectory | None = None,
+    limits: MotionLimits | None = None,
+    laid: Passes | None = None,
 ) -> dict[str, Any]:
     """The object that `coverable path --json` prints, without NaN.
 
@@ -37,6 +41,7 @@ def as_json(
         path: the path.
         trajectory: its timing, if it was asked for.
         limits: of the timing.
+        laid: the passes that it runs, if it does.
     """
     figures = path.figures
     sliding = path.robot.prismatic
@@ -64,6 +69,7 @@ def as_json(
             "singular_value": plain(figures.singular_value),
         },
         "certificate": certificate_json(path.certificate) | clearance_json(path.certificate),
+        "passes": None if laid is None else _passes_json(laid),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,
@@ -135,16 +141,48 @@ def _timing(
     return found
 
 
+def _passes_json(laid: Passes) -> dict[str, Any]:
+    """Passes as they were laid."""
+    return {
+        "count": laid.count,
+        "stretches": len(laid.stretches),
+        "by": laid.by,
+        "pitch_m": laid.pitch,
+        "spacing_m": laid.spacing,
+        "widest_m": laid.widest,
+        "length_m": laid.length,
+        "dropped_m": laid.dropped,
+        "notes": list(laid.notes),
+    }
+
+
+def _passes_text(laid: Passes) -> str:
+    """Passes in words."""
+    words = f"{laid.count}, {1e3 * laid.spacing:.4g} mm apart"
+    if laid.widest > 1.001 * laid.spacing:
+        words += f" ({1e3 * laid.widest:.4g} mm where the surface slopes)"
+    if len(laid.stretches) > laid.count:
+        words += f", in {len(laid.stretches)} stretches"
+    words += f", {laid.length:.4g} m together"
+    if laid.dropped > 0.0:
+        words += f"; {laid.dropped:.3g} m left out in pieces too short to run"
+    return "; ".join([words, *laid.notes])
+
+
 def as_text(
-    path: CoveragePath, trajectory: Trajectory | None = None, limits: MotionLimits | None = None
+    path: CoveragePath,
+    trajectory: Trajectory | None = None,
+    limits: MotionLimits | None = None,
+    laid: Passes | None = None,
 ) -> str:
     """The path for people: its length compared with the least possible, margins, and times.
 
     The arguments are those of `as_json`.
     """
     count, figures = int(path.needed.sum()), path.figures
+    over = counted(count, "cell" if laid is None else "place")
     rows = [
-        ("order", f"{path.order}, {counted(count, 'cell')}, {len(path.visits):,} centres passed"),
+        ("order", f"{path.order}, {over}, {len(path.visits):,} centres passed"),
         ("length", _length_text(figures)),
         ("joint travel", _travel_text(path)),
         ("margins", _margins_text(figures)),
@@ -164,7 +202,12 @@ def as_text(
             ("time", f"{trajectory.duration:.4g} s in {samples}, tool at up to {speed} m/s"),
             ("limits", _limits_text(path.robot, trajectory, limits)),
         ]
-    head = f"path: one continuous motion over {counted(count, 'cell')}."
+    head = f"path: one continuous motion over {over}."
+    if laid is not None:
+        rows[0] = ("passes", _passes_text(laid))
+        head = (
+            f"path: one continuous motion along {laid.count} pass{'' if laid.count == 1 else 'es'}."
+        )
     return "\n".join(summary(head, rows, path.task.collision, 14))
 
 

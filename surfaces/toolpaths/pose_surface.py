@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -41,6 +41,19 @@ class PoseSurface(Surface):
     """(M, 2) i < j, sorted: between which poses the tool may move."""
     in_order: bool
     """Whether they are a toolpath, to be run from the first to the last."""
+    under: Surface | None = None
+    """The surface that they were laid over, if it is known."""
+
+    @property
+    def wall(self) -> Surface | None:
+        """See `Surface.wall`."""
+        return self.under
+
+    def moved(self, rotation: ArrayLike, translation: ArrayLike) -> Self:
+        """See `Surface.moved`."""
+        found = super().moved(rotation, translation)
+        under = None if self.under is None else self.under.moved(rotation, translation)
+        return replace(found, under=under)
 
     @property
     def bare(self) -> bool:
@@ -54,11 +67,10 @@ class PoseSurface(Surface):
             "The poses are run in their order, from the first to the last and never back; the arm "
             "may change its posture in place, over a pose."
         )
-        return (
-            "Between poses the tool point runs straight and its direction along the great arc; "
-            "there is no surface between them that anything could be checked against.",
-            *([runs] if self.in_order else []),
-        )
+        between = "Between poses the tool point runs straight and its direction along the great arc"
+        if self.under is None:
+            between += "; there is no surface between them that anything could be checked against"
+        return (f"{between}.", *([runs] if self.in_order else []))
 
     @cached_property
     def placed_points(self) -> Array:

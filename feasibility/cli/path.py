@@ -1,0 +1,235 @@
+"""The command `coverable path`: a coverage motion over cells, or along passes."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from coverable_errors import CoverableError, Fault
+from feasibility.cli.command import (
+    STATUS,
+    add_case,
+    add_command,
+    add_html,
+    json_text,
+    open_case,
+    positive,
+    write_text,
+)
+from feasibility.cli.console import print_err, print_out
+from feasibility.safe_files import shown_path
+
+if TYPE_CHECKING:
+    from feasibility.cases import Case
+    from feasibility.verdict import Verdict
+    from surfaces import Surface
+    from surfaces.passes import Passes
+
+ORDERS = ("rows", "columns", "spiral", "shortest", "given")
+STATUSES = "exit status: as of `coverable check`"
+WHY_COMPLETE = "a path needs 'complete': the greedy search does not visit the cells' centres"
+BY = ("distance", "planes", "parameters")
+
+
+def add(subcommands: argparse._SubParsersAction) -> None:
+    """Add the command."""
+    add_command(
+        subcommands, "path", path, add_case, add_html, _add_passes, _add_timing,
+        help="a coverage motion that an arm can run",
+        description="Plan a path over every cell in a chosen order, time it within the limits of "
+        "joints and tool, and write it as a trajectory.",
+        epilog=STATUSES,
+    )  # fmt: skip
+
+
+def _add_timing(parser: argparse.ArgumentParser) -> None:
+    """How a path is ordered, timed and written."""
+    parser.add_argument(
+        "--order",
+        choices=ORDERS,
+        help="default: rows on a grid of cells, given of a toolpath, shortest on others",
+    )
+    parser.add_argument(
+        "--speed", type=positive, default=0.1, metavar="M_PER_S",
+        help="maximum speed of the tool point, m/s (default 0.1)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--velocity", type=positive, metavar="RAD_PER_S",
+        help="maximum velocity of every joint, rad/s or m/s (default: the URDF's limits)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--acceleration", type=positive, metavar="RAD_PER_S2",
+        help="maximum acceleration of every joint, rad/s^2 or m/s^2 (default: what takes a joint "
+        "to its maximum velocity in half a second)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--period", type=positive, default=0.02, metavar="S",
+        help="time between samples, seconds (default 0.02)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--out", metavar="FILE", action="append", default=[],
+        help="write the trajectory; .csv, .json, or .yaml like a ROS JointTrajectory; can be "
+        "repeated",
+    )  # fmt: skip
+
+
+def _add_passes(parser: argparse.ArgumentParser) -> None:
+    """Parallel passes in place of the cells."""
+    parser.add_argument(
+        "--passes", metavar="DIRECTION",
+        help="run parallel passes over the surface, whatever its cells: an angle in degrees at its "
+        "middle, from the u direction (or the x axis of a mesh's frame), or an axis as X,Y,Z",
+    )  # fmt: skip
+    parser.add_argument(
+        "--pitch", type=positive, metavar="M", help="largest distance between passes, m"
+    )
+    parser.add_argument(
+        "--by", choices=BY, default="distance",
+        help="how it is measured: on the surface (default), between section planes, or by "
+        "parameters",
+    )  # fmt: skip
+    parser.add_argument(
+        "--overrun", type=positive, default=0.0, metavar="M",
+        help="how far passes go on beyond the border, m",
+    )  # fmt: skip
+    parser.add_argument(
+        "--retract", type=positive, default=0.05, metavar="M",
+        help="how far the tool is lifted between stretches that are not side by side, m "
+        "(default 0.05)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--one-way", action="store_true", help="run all passes in the same direction"
+    )
+
+
+def check_passes(args: argparse.Namespace) -> None:
+    """Refuse arguments of passes that do not go together.
+
+    Raises:
+        CoverableError: there is one without another, or an order besides.
+    """
+    faults = []
+    if (args.passes is None) != (args.pitch is None):
+        missing = "--pitch" if args.pitch is None else "--passes"
+        faults.append(Fault(missing, "is missing", expected="--passes and --pitch go together"))
+    if args.passes is not None and args.order is not None:
+        faults.append(
+            Fault(
+                "--order",
+                f"got {args.order!r}, but passes have an order of their own",
+                expected="leave it out",
+            )
+        )
+    if faults:
+        raise CoverableError(faults)
+
+
+def direction_of(text: str) -> Any:
+    """An angle (rad) from degrees, or a vector (x, y, z).
+
+    Raises:
+        CoverableError: the text is neither.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1 and math.isfinite(numbers[0]):
+        return math.radians(numbers[0])
+    if len(numbers) == 3 and all(map(math.isfinite, numbers)):
+        return numbers
+    raise CoverableError(
+        Fault("--passes", f"got {text!r:.60}", expected="must be degrees, or an axis as 1,0,0")
+    )
+
+
+def lay_passes(args: argparse.Namespace, surface: Surface) -> Passes:
+    """The passes that the arguments ask for."""
+    from surfaces.passes import parallel_passes
+
+    return parallel_passes(
+        surface, args.pitch, direction_of(args.passes),
+        by=args.by, overrun=args.overrun, one_way=args.one_way,
+    )  # fmt: skip
+
+
+def path(args: argparse.Namespace, began: float) -> int:
+    """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
+    outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
+
+    def judge(case: Case) -> None:
+        from feasibility.paths import check_order
+
+        check_passes(args)
+        if args.order is not None:
+            check_order(args.order, case.surface.kind, case.surface.is_grid)
+
+    with open_case(args, began, outputs, WHY_COMPLETE, judge) as opened:
+        from feasibility.checking import check
+        from feasibility.clock import OutOfTime
+        from feasibility.paths import coverage_path
+        from feasibility.reports import path as report
+        from feasibility.results import check_ending
+        from feasibility.timing import motion_limits, trajectory
+        from feasibility.verdict import Answer
+        from surfaces.passes import pass_toolpath
+
+        for out in args.out:
+            check_ending(out)
+        robot, loaded = opened.setup.robot, opened.so_far()
+        limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
+        setup, laid = opened.setup, None
+        if args.passes is not None:
+            opened.progress(0, None, "laying passes")
+            laid = lay_passes(args, setup.cells.surface)
+            setup = setup._replace(cells=pass_toolpath(laid, args.retract))
+        verdict = check(*setup, clock=opened.clock)
+        if not verdict.feasible:
+            return _no_path(args, opened.case.name, verdict, loaded)
+        try:
+            with opened.clock.enforced():
+                opened.progress(0, None, "planning the path")
+                found = coverage_path(verdict, args.order)
+                opened.progress(0, None, "timing the path")
+                run = trajectory(
+                    found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
+                    period=args.period,
+                )  # fmt: skip
+        except OutOfTime:
+            late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
+            verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
+            return _no_path(args, opened.case.name, verdict, loaded)
+    if args.json:
+        print_out(json_text(report.as_json(found, run, limits, laid)))
+    else:
+        print_out(report.as_text(found, run, limits, laid))
+    for out in args.out:
+        from feasibility.results import save_trajectory
+
+        save_trajectory(out, run)
+        print_err(f"trajectory: {shown_path(out)}")
+    if args.html is not None:
+        from feasibility.viewer import view_path
+
+        write_text(args.html, view_path(found, run, opened.case.name).html(), "view")
+    return 0
+
+
+def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: float) -> int:
+    """Say why there is no path; the exit status is the verdict's."""
+    from feasibility.reports import path as report
+
+    reason = f"no path over this surface is known. {verdict!r}"
+    print_err(f"coverable path: {name}: {reason}")
+    if str(verdict.answer) == "undecided" and "time limit" in verdict.message:
+        print_err("`--set search.time_limit=...` gives the search more time.")
+    print_err("`coverable explain` finds what would help, `coverable divide` splits the surface.")
+    for flag, files in (("--out", args.out), ("--html", [args.html])):
+        for file in files:
+            if file is not None:
+                print_err(f"{flag}: nothing written to {shown_path(file)}")
+    if args.json:
+        print_out(json_text(report.no_path_json(verdict, reason, loaded)))
+    return STATUS[str(verdict.answer)]
