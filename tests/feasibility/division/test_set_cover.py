@@ -238,7 +238,12 @@ def test_without_time_there_is_a_gap_and_it_is_honest() -> None:
         assert len(slower.fewest) <= len(hasty.fewest)
         assert hasty.connected.bound <= slower.connected.bound <= len(slower.connected)
         assert len(slower.connected) <= len(hasty.connected)
-        gaps += not hasty.connected.optimal
+    # Small ones are solved before anybody looks at the clock.
+    for seed in range(3):
+        covers, everywhere = blobs(18, 18, 150, 1.5, 100 + seed), np.ones(18 * 18, dtype=bool)
+        hasty = fewest_patches(covers, everywhere, grid(18, 18), time_limit=0.0)
+        assert_cover(hasty, covers, everywhere, grid(18, 18))
+        gaps += hasty.connected.bound < len(hasty.connected)
     assert gaps > 0
     i, j = np.divmod(np.arange(121), 11)
     bars = np.array([abs(i - 5) < 2, abs(j - 5) < 2])
