@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from feasibility.task import Task
 from surfaces import Cells, fit_directions
+from surfaces.toolpaths import arc_at
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -82,22 +83,4 @@ def approach_curves(cells: Cells, task: Task) -> DirectionCurves | None:
     if cells.approaches is None or task.along_normals(cells):
         return None
     ends = cells.approaches[cells.pairs]
-    return fitted(cells, lambda curve, t: great_arcs(ends[curve, 0], ends[curve, 1], t), ends)
-
-
-def great_arcs(start: Array, end: Array, t: Array) -> Array:
-    """(k, 3) unit, at t (k,) on the shortest way from unit directions to others (k, 3).
-
-    Example:
-        >>> great_arcs(np.eye(3)[:1], np.eye(3)[1:2], np.array([0.5])).round(4).tolist()
-        [[0.7071, 0.7071, 0.0]]
-    """
-    chord = np.linalg.norm(end - start, axis=1)
-    angle = 2.0 * np.arcsin(np.minimum(0.5 * chord, 1.0))
-    # sin(t angle) / sin(angle), and t where the angle is 0.
-    with np.errstate(divide="ignore", invalid="ignore"):
-        shares = [np.sin(s * angle) / np.sin(angle) for s in (1.0 - t, t)]
-    both = zip(shares, (1.0 - t, t), strict=True)
-    before, after = (np.where(angle > 1e-9, share, s)[:, None] for share, s in both)
-    between = before * start + after * end
-    return np.asarray(between / np.linalg.norm(between, axis=1, keepdims=True))
+    return fitted(cells, lambda curve, t: arc_at(ends[curve, 0], ends[curve, 1], t)[0], ends)

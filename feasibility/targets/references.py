@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, Fault
 from feasibility.roll import ALONG, projected
-from feasibility.targets.directions import great_arcs
 from feasibility.task import Task
 from surfaces import Cells, Patch, Piecewise, Surface
+from surfaces.toolpaths import arc_at
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -66,7 +66,7 @@ def reference_directions(cells: Cells, task: Task, curves: Ints, t: Array) -> Ar
     if found is not None:
         return found
     ends = _tangents(cells)[cells.pairs[curves]]
-    return great_arcs(ends[:, 0], ends[:, 1], t)
+    return arc_at(ends[:, 0], ends[:, 1], t)[0]
 
 
 def _tangents(cells: Cells) -> Array:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from surfaces.passes.cutting import cut_edges, edges_of
 from surfaces.passes.net import WorkingMesh
-from surfaces.passes.triangulation import cut_faces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -33,18 +33,14 @@ def cut_in(mesh: WorkingMesh, field: Floats) -> CutMesh:
         mesh: the triangles.
         field: (V,) one number for each vertex.
     """
-    sides = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2)
-    edges, of = np.unique(np.sort(sides.reshape(-1, 2), axis=1), axis=0, return_inverse=True)
-    field = _snapped(field, edges)
-    low, high = field[edges[:, 0]], field[edges[:, 1]]
+    edges = edges_of(mesh.faces)
+    field = _snapped(field, edges.ends)
+    low, high = field[edges.ends].T
     crossed = low * high < 0.0
     share = (low / np.where(crossed, low - high, 1.0))[crossed]
-    ends = mesh.vertices[edges[crossed]]
+    ends = mesh.vertices[edges.ends[crossed]]
     points = ends[:, 0] + share[:, None] * (ends[:, 1] - ends[:, 0])
-    number = np.full(len(edges), -1, dtype=np.int64)
-    number[crossed] = len(mesh.vertices) + np.arange(len(points))
-    faces, parent = cut_faces(mesh.faces, number[of.reshape(-1, 3)])
-    made = WorkingMesh(np.concatenate([mesh.vertices, points]), faces)
+    made, parent = cut_edges(mesh, edges, crossed, points)
     return CutMesh(made, np.concatenate([field, np.zeros(len(points))]), parent)
 
 
@@ -61,7 +57,5 @@ def _snapped(field: Floats, edges: Ints) -> Floats:
 
 def line_edges(cut: CutMesh) -> Ints:
     """(k, 2) the edges of the mesh along which the field is zero, the lower vertex first."""
-    faces = cut.mesh.faces
-    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    on = (cut.field[sides] == 0.0).all(axis=1)
-    return np.unique(np.sort(sides[on], axis=1), axis=0)
+    ends = edges_of(cut.mesh.faces).ends
+    return ends[(cut.field[ends] == 0.0).all(axis=1)]

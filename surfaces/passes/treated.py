@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from surfaces.passes.cutting import Cut, cut_edges, edges_of
 from surfaces.passes.net import WorkingMesh
 from surfaces.protected import Protected
 
@@ -263,16 +264,9 @@ def _connected(mesh: WorkingMesh, path: ToolLines, touched: NDArray[np.bool_]) -
     return found
 
 
-def _quartered(mesh: WorkingMesh, which: NDArray[np.bool_]) -> tuple[WorkingMesh, Ints]:
+def _quartered(mesh: WorkingMesh, which: NDArray[np.bool_]) -> Cut:
     """Some faces cut in four at the middles of their edges, and those next to them to fit."""
-    from surfaces.passes.triangulation import cut_faces
-
-    sides = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges, of = np.unique(np.sort(sides, axis=1), axis=0, return_inverse=True)
-    cut = np.zeros(len(edges), dtype=bool)
-    cut[of.reshape(-1, 3)[which]] = True
-    number = np.full(len(edges), -1, dtype=np.int64)
-    number[cut] = len(mesh.vertices) + np.arange(int(cut.sum()))
-    middles = mesh.vertices[edges[cut]].mean(axis=1)
-    faces, parent = cut_faces(mesh.faces, number[of.reshape(-1, 3)])
-    return WorkingMesh(np.concatenate([mesh.vertices, middles]), faces), parent
+    edges = edges_of(mesh.faces)
+    some = np.zeros(len(edges.ends), dtype=bool)
+    some[edges.of[which]] = True
+    return cut_edges(mesh, edges, some, mesh.vertices[edges.ends[some]].mean(axis=1))

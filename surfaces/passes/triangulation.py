@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.meshes import MeshSurface
+from surfaces.passes.cutting import cut_edges, edges_of
 from surfaces.passes.edge_flips import delaunay
 from surfaces.passes.net import WorkingMesh
 from surfaces.patches import Patch
@@ -193,46 +194,7 @@ def _divided(mesh: WorkingMesh, edge: float) -> WorkingMesh:
 
 def _halved(mesh: WorkingMesh, edge: float) -> WorkingMesh:
     """Every edge longer than `edge` m cut in its middle, and the faces with it."""
-    faces, vertices = mesh.faces, mesh.vertices
-    sides = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)  # (F, 3, 2)
-    ends = np.sort(sides.reshape(-1, 2), axis=1)
-    edges, of = np.unique(ends, axis=0, return_inverse=True)
-    long = np.linalg.norm(np.diff(vertices[edges], axis=1)[:, 0], axis=1) > edge
-    number = np.full(len(edges), -1, dtype=np.int64)
-    number[long] = len(vertices) + np.arange(int(long.sum()))
-    middles = vertices[edges[long]].mean(axis=1)
-    cut = number[of.reshape(-1, 3)]  # (F, 3) the vertex on each side, -1 for none
-    return WorkingMesh(np.concatenate([vertices, middles]), cut_faces(faces, cut)[0])
-
-
-def cut_faces(faces: Ints, cut: Ints) -> tuple[Ints, Ints]:
-    """Faces (k, 3) cut where `cut` (k, 3) names a vertex on the side from each corner to the next.
-
-    Returns:
-        The triangles (m, 3), and the face (m,) that each is a part of; -1 in `cut` is no vertex.
-    """
-    whole = np.flatnonzero((cut < 0).all(axis=1))
-    made, parents = [faces[whole]], [whole]
-    for pattern in range(1, 8):
-        wanted = np.array([pattern >> k & 1 for k in range(3)], dtype=bool)
-        some = ((cut >= 0) == wanted).all(axis=1)
-        if not some.any():
-            continue
-        f, m = faces[some], cut[some]
-        count = int(wanted.sum())
-        if count == 3:
-            triangles = [
-                (f[:, 0], m[:, 0], m[:, 2]),
-                (m[:, 0], f[:, 1], m[:, 1]),
-                (m[:, 2], m[:, 1], f[:, 2]),
-                (m[:, 0], m[:, 1], m[:, 2]),
-            ]
-        else:
-            # Turned so that the cut sides are the first, or the first two.
-            turn = next(k for k in range(3) if wanted[k] and (count == 1 or wanted[(k + 1) % 3]))
-            a, b, c = (f[:, (turn + k) % 3] for k in range(3))
-            p, q = m[:, turn], m[:, (turn + 1) % 3]
-            triangles = [(a, p, c), (p, b, c)] if count == 1 else [(p, b, q), (a, p, q), (a, q, c)]
-        made += [np.column_stack(each) for each in triangles]
-        parents += [np.flatnonzero(some)] * len(triangles)
-    return np.concatenate(made), np.concatenate(parents)
+    edges = edges_of(mesh.faces)
+    ends = mesh.vertices[edges.ends]
+    long = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) > edge
+    return cut_edges(mesh, edges, long, ends[long].mean(axis=1)).mesh
