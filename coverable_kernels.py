@@ -27,7 +27,8 @@ MARKS = (b"njit", b"cfunc", b"@kernel", b"@inlined", b"@allocating")
 
 
 def _sources() -> Iterator[bytes]:
-    """The files that hold kernels, and all others in their rooms."""
+    """This file, the files that hold kernels, and all others in their rooms."""
+    yield Path(__file__).read_bytes()
     for package in PACKAGES:
         rooms: dict[Path, list[bytes]] = {}
         for path in sorted((HERE / package).rglob("*.py")):
@@ -48,13 +49,15 @@ def content_stamp() -> str:
 
 
 def _stamp_by_content() -> None:
-    """Have numba's stamp of a file of ours change with all sources of kernels."""
+    """Have all sources of kernels be the stamp of a file of ours, in place of its time and size.
+
+    What was compiled in one copy of the project then holds in every other with the same sources.
+    """
     of_file = caching._SourceFileBackedLocatorMixin.get_source_stamp
 
     def get_source_stamp(locator: Any) -> Any:
-        stamp = of_file(locator)
         ours = HERE in Path(locator._py_file).resolve().parents
-        return (stamp, content_stamp()) if ours else stamp
+        return content_stamp() if ours else of_file(locator)
 
     setattr(caching._SourceFileBackedLocatorMixin, "get_source_stamp", get_source_stamp)  # noqa: B010
 

@@ -50,6 +50,16 @@ def test_a_kernel_is_compiled_anew_when_another_that_it_calls_has_changed(checko
     assert result(checkout) == (2, False)  # numba alone would have said 1
 
 
+def test_what_was_compiled_holds_in_a_copy(checkout: Path, tmp_path: Path) -> None:
+    assert result(checkout) == (1, False)
+    copy = tmp_path / "elsewhere"
+    shutil.copytree(checkout, copy, ignore=lambda *_: ["elsewhere"], copy_function=shutil.copyfile)
+    assert result(copy) == (1, True)  # although every file is younger
+    (copy / "robots" / "inner.py").write_text(INNER.format(3))
+    assert result(copy) == (3, False)
+    assert result(checkout) == (1, True)
+
+
 def test_no_kernel_of_ours_is_kept_by_its_own_file_alone() -> None:
     for package in ("robots", "surfaces", "feasibility", "coverable_meshes"):
         for path in (ROOT / package).rglob("*.py"):
