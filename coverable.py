@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         station_plan,
     )
     from feasibility.placement import LocalEvaluator as Local
+    from feasibility.programs import save_program
     from feasibility.reports.comparison import as_text as comparison_text
     from feasibility.reports.comparison import chart as comparison_chart
     from feasibility.reports.division import as_text as division_text
@@ -143,9 +144,10 @@ __all__ = [
     "piecewise", "place", "placement_map", "placement_text", "plane", "plot_causes",
     "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view", "plot_views",
     "poses", "read_grid", "read_net", "read_poses", "read_study", "replay", "revolution",
-    "run_tasks", "save_result", "save_trajectory", "settings_of", "show", "sphere", "starts",
-    "station_plan", "study_text", "take_faces", "torus", "trajectory", "unrolled_edges",
-    "verify", "view", "view_division", "view_path", "view_placements", "view_study",
+    "run_tasks", "save_program", "save_result", "save_trajectory", "settings_of", "show",
+    "sphere", "starts", "station_plan", "study_text", "take_faces", "torus", "trajectory",
+    "unrolled_edges", "verify", "view", "view_division", "view_path", "view_placements",
+    "view_study",
 ]
 # fmt: on
 
@@ -159,6 +161,7 @@ _ROOMS = (
     "feasibility.paper",
     "feasibility.paths",
     "feasibility.timing",
+    "feasibility.programs",
     "feasibility.division",
     "feasibility.sensitivity",
     "feasibility.results",

@@ -70,6 +70,7 @@ feasibility.roadmap: between_rounds complete graph_g outcome refinement warmup
 feasibility: checking
 feasibility.paths
 feasibility.timing
+feasibility.programs
 feasibility.division
 feasibility.sensitivity
 feasibility.results

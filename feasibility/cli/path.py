@@ -24,12 +24,14 @@ from feasibility.safe_files import shown_path
 if TYPE_CHECKING:
     from feasibility.cases import Case
     from feasibility.verdict import Verdict
+    from robots import Robot
     from surfaces import Surface
     from surfaces.passes import Passes
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
 WHY_COMPLETE = "a path needs 'complete': the greedy search does not visit the cells' centres"
+PERIOD = 0.02  # [s] between samples
 BY = ("distance", "planes", "parameters")
 
 
@@ -37,6 +39,7 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     add_command(
         subcommands, "path", path, add_case, add_html, _add_passes, _add_timing,
+        _add_programs,
         help="a coverage motion that an arm can run",
         description="Plan a path over every cell in a chosen order, time it within the limits of "
         "joints and tool, and write it as a trajectory.",
@@ -65,14 +68,47 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
         "to its maximum velocity in half a second)",
     )  # fmt: skip
     parser.add_argument(
-        "--period", type=positive, default=0.02, metavar="S",
-        help="time between samples, seconds (default 0.02)",
+        "--period", type=positive, metavar="S",
+        help="time between samples, seconds (default 0.02; 0.1 for programs in RAPID or KRL alone)",
     )  # fmt: skip
     parser.add_argument(
         "--out", metavar="FILE", action="append", default=[],
         help="write the trajectory; .csv, .json, or .yaml like a ROS JointTrajectory; can be "
         "repeated",
     )  # fmt: skip
+
+
+def _add_programs(parser: argparse.ArgumentParser) -> None:
+    """Programs of robot controllers."""
+    parser.add_argument(
+        "--program", metavar="FILE", action="append", default=[],
+        help="write the trajectory as a program: .script (URScript), .mod (ABB RAPID) or .src "
+        "(KUKA KRL); can be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--axis-signs", metavar="S1,..,S6", type=_six,
+        help="of a program: 1 or -1 for each axis of the controller, where its sense is not that "
+        "of the URDF's joint; write --axis-signs=-1,1,1,1,1,1",
+    )  # fmt: skip
+    parser.add_argument(
+        "--axis-offsets-deg", metavar="D1,..,D6", type=_six,
+        help="of a program: degrees that are added to each axis, where its zero is another",
+    )  # fmt: skip
+
+
+def _six(text: str) -> list[float]:
+    """Six finite numbers with commas between them.
+
+    Raises:
+        ArgumentTypeError: the text is something else.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) != 6 or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"must be six numbers with commas, got {text!r:.60}")
+    return numbers
 
 
 def _add_passes(parser: argparse.ArgumentParser) -> None:
@@ -158,6 +194,7 @@ def lay_passes(args: argparse.Namespace, surface: Surface) -> Passes:
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
+    outputs |= {f"--program[{k}]": file for k, file in enumerate(args.program)}
 
     def judge(case: Case) -> None:
         from feasibility.paths import check_order
@@ -179,6 +216,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         for out in args.out:
             check_ending(out)
         robot, loaded = opened.setup.robot, opened.so_far()
+        period = _check_programs(args, robot)
         limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
         setup, laid = opened.setup, None
         if args.passes is not None:
@@ -195,7 +233,7 @@ def path(args: argparse.Namespace, began: float) -> int:
                 opened.progress(0, None, "timing the path")
                 run = trajectory(
                     found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
-                    period=args.period,
+                    period=period,
                 )  # fmt: skip
         except OutOfTime:
             late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
@@ -210,11 +248,33 @@ def path(args: argparse.Namespace, began: float) -> int:
 
         save_trajectory(out, run)
         print_err(f"trajectory: {shown_path(out)}")
+    for file in args.program:
+        from feasibility.programs import save_program
+
+        save_program(file, robot, run, opened.case.name, args.axis_signs, args.axis_offsets_deg)
+        print_err(f"program: {shown_path(file)}")
     if args.html is not None:
         from feasibility.viewer import view_path
 
         write_text(args.html, view_path(found, run, opened.case.name).html(), "view")
     return 0
+
+
+def _check_programs(args: argparse.Namespace, robot: Robot) -> float:
+    """Refuse programs that this arm has not, before the search; s between samples.
+
+    Raises:
+        CoverableError: a file's ending is that of no program, or the arm has none of that kind.
+    """
+    from feasibility.programs import check_program, language_of
+
+    languages = [language_of(file) for file in args.program]
+    for language in languages:
+        check_program(language, robot, args.axis_signs, args.axis_offsets_deg)
+    if args.period is not None:
+        return float(args.period)
+    slow = [language.period for language in languages]
+    return PERIOD if args.out or not slow else min(slow)
 
 
 def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: float) -> int:
@@ -226,7 +286,8 @@ def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: floa
     if str(verdict.answer) == "undecided" and "time limit" in verdict.message:
         print_err("`--set search.time_limit=...` gives the search more time.")
     print_err("`coverable explain` finds what would help, `coverable divide` splits the surface.")
-    for flag, files in (("--out", args.out), ("--html", [args.html])):
+    written = ("--out", args.out), ("--program", args.program), ("--html", [args.html])
+    for flag, files in written:
         for file in files:
             if file is not None:
                 print_err(f"{flag}: nothing written to {shown_path(file)}")

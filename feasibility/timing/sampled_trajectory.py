@@ -165,6 +165,19 @@ def values(points: Array, places: int) -> Array:
     return np.einsum("tk,kin->itn", basis, points).reshape(-1, points.shape[2])
 
 
+def at_times(run: Trajectory, time: Array) -> Array:
+    """(k, n) joints at times (k,) s, on the quintics through the samples; at rest outside them."""
+    if len(run) == 1:
+        return np.tile(run.q, (len(time), 1))
+    inside = np.clip(time, run.time[0], run.time[-1])
+    piece = np.clip(np.searchsorted(run.time, inside, side="right") - 1, 0, len(run) - 2)
+    points = coefficients(run, "quintic")[:, piece]
+    share = ((inside - run.time[piece]) / np.diff(run.time)[piece])[:, None]
+    while len(points) > 1:  # de Casteljau
+        points = (1.0 - share) * points[:-1] + share * points[1:]
+    return np.asarray(points[0])
+
+
 def motion_between(run: Trajectory, kind: Kind, places: int) -> Walk:
     """The polynomials evaluated at some places each, as a motion that a replay can check."""
     q = np.vstack([values(coefficients(run, kind), places), run.q[-1:]])
