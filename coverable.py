@@ -122,6 +122,8 @@ if TYPE_CHECKING:
         read_poses,
         revolution,
         sphere,
+        step,
+        step_faces,
         take_faces,
         torus,
     )
@@ -145,7 +147,8 @@ __all__ = [
     "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view", "plot_views",
     "poses", "read_grid", "read_net", "read_poses", "read_study", "replay", "revolution",
     "run_tasks", "save_program", "save_result", "save_trajectory", "settings_of", "show",
-    "sphere", "starts", "station_plan", "study_text", "take_faces", "torus", "trajectory",
+    "sphere", "starts", "station_plan", "step", "step_faces", "study_text", "take_faces", "torus",
+    "trajectory",
     "unrolled_edges", "verify", "view", "view_division", "view_path", "view_placements",
     "view_study",
 ]

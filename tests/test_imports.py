@@ -22,6 +22,7 @@ ORDER = """
 coverable_errors
 coverable_files
 coverable_kernels
+coverable_processes
 coverable_meshes
 robots: errors
 robots.mounting
@@ -41,6 +42,7 @@ surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
+surfaces.step_files
 surfaces: sheet tiles triangle_kernel cell_triangles
 surfaces.passes
 surfaces.places
@@ -94,7 +96,7 @@ FACTORIES = {
     ("surfaces.meshes.mesh_surface", "surfaces.meshes.cells.mesh_cells"),
 }
 
-HEAVY = {"matplotlib", "meshcat", "rich", "trimesh", "yourdfpy"}
+HEAVY = {"OCP", "matplotlib", "meshcat", "rich", "trimesh", "yourdfpy"}
 
 
 class Import(NamedTuple):

@@ -1,4 +1,4 @@
-"""Meshes in a case: a file, its unit, the part that is to be covered, and how it is cut."""
+"""Triangles in a case, a mesh or STEP faces: the file, which part of it, and how it is cut."""
 
 from __future__ import annotations
 
@@ -8,12 +8,15 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import MISSING
-from feasibility.cases.table_reader import CaseError, Section, in_file
+from feasibility.cases.keys import own_keys
+from feasibility.cases.table_reader import CaseError, Section, in_file, shown_path
 
 if TYPE_CHECKING:
     from surfaces.meshes import MeshSurface, TriangleMesh
     from surfaces.meshes.cells import MeshCells
 
+CHOICE = ("faces", "colour", "deviation")
+"""Keys of a STEP file that say what of it is read."""
 MOST_MESH_CELLS = 20_000  # as `surfaces.meshes.cells` has it
 NAMES = {
     "low": "box[0]",
@@ -27,26 +30,25 @@ NAMES = {
 Values = Mapping[str, Any]
 
 
-def read_mesh_keys(section: Section) -> dict[str, Any]:
-    """The values of a mesh's own keys, as they are written."""
-    from surfaces.meshes.files import metres_per_unit
-
-    values = section.take("scale", "cell_size", "faces", "box", "cut", "facing")
+def read_mesh_keys(section: Section, kind: str) -> dict[str, Any]:
+    """The values of the own keys of a mesh or of STEP faces, as they are written."""
+    values = section.take(*own_keys(kind))
+    values.pop("file", None)
     file = section.text("file", required=True)
     if file is not None:
         values["file"] = os.path.abspath(os.path.expanduser(file))
-    if "scale" in values:
-        section.make(metres_per_unit, {"scale": values["scale"]})
+    if kind == "step":
+        _check_choice(section, values)
+    else:
+        _check_mesh(section, values)
     if "cell_size" in values:
         section.positive("cell_size", values["cell_size"])
-    if "faces" in values:
-        _check_faces(section, values["faces"])
     _check_parts(section, values)
     if section.is_table and not section.has("side"):
         section.fault(
             "side",
-            'is missing; a mesh needs "outside" (the tool works where the faces look to) or '
-            '"inside" (behind the faces)',
+            f'is missing; {"STEP faces need" if kind == "step" else "a mesh needs"} "outside" (the '
+            'tool works where the faces look to) or "inside" (behind the faces)',
         )
     return values
 
@@ -75,7 +77,7 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
         CaseError: the file cannot be used, or nothing is left of it.
     """
     from surfaces import SurfaceError
-    from surfaces.meshes import mesh
+    from surfaces.meshes import mesh, take_faces
     from surfaces.meshes.files import read_mesh
 
     file = values["file"]
@@ -83,12 +85,34 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
         triangles = read_mesh(file, values.get("scale"))
     except SurfaceError as error:
         raise CaseError(in_file(error, file, "surface")) from error
-    for key, take in _parts().items():
-        if key in values:
-            with _faults_of(key):
-                triangles = take(triangles, values[key])
+    if "faces" in values:
+        with _faults_of("faces"):
+            triangles = take_faces(triangles, values["faces"])
     with _faults_of(""):
-        return mesh(triangles, **pose)
+        return mesh(_part(triangles, values), **pose)
+
+
+def build_step(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
+    """Read the file, cut the chosen faces into triangles, take a part of them, and place it.
+
+    Args:
+        values: of the keys that only STEP faces have.
+        pose: `side`, `position` and `rpy_deg`.
+
+    Raises:
+        CaseError: the file cannot be used, it has no such faces, or nothing is left of them.
+    """
+    from surfaces import SurfaceError, mesh, step_triangles
+
+    file = values["file"]
+    try:
+        triangles = step_triangles(file, **{key: values[key] for key in CHOICE if key in values})
+    except SurfaceError as error:
+        own = [fault for fault in error.faults if fault.key.partition("[")[0] in CHOICE]
+        faults = [fault._replace(place=shown_path(file)).renamed({}, "surface") for fault in own]
+        raise CaseError(faults or in_file(error, file, "surface")) from error
+    with _faults_of(""):
+        return mesh(_part(triangles, values), **pose)
 
 
 def cut_mesh(surface: MeshSurface, count: int | None, size: float | None) -> MeshCells:
@@ -101,21 +125,26 @@ def cut_mesh(surface: MeshSurface, count: int | None, size: float | None) -> Mes
         return surface.cells(count=count, size=size)
 
 
-def _parts() -> dict[str, Callable[[TriangleMesh, Any], TriangleMesh]]:
-    """What each key takes of a mesh, in the order in which this is done.
+def _part(triangles: TriangleMesh, values: Values) -> TriangleMesh:
+    """What box, cut and facing leave of triangles, in this order.
 
-    Faces first: they are numbered in the mesh of the file.
+    Raises:
+        CaseError: nothing.
     """
-    from surfaces.meshes import cut_box, cut_plane, faces_within_cone, take_faces
+    from surfaces.meshes import cut_box, cut_plane, faces_within_cone
 
-    return {
-        "faces": take_faces,
-        "box": lambda mesh, box: cut_box(mesh, *box),
-        "cut": lambda mesh, cut: cut_plane(mesh, cut["point"], cut["normal"]),
-        "facing": lambda mesh, facing: faces_within_cone(
-            mesh, facing["direction"], facing["within_deg"]
+    parts: dict[str, Callable[[Any], TriangleMesh]] = {
+        "box": lambda box: cut_box(triangles, *box),
+        "cut": lambda cut: cut_plane(triangles, cut["point"], cut["normal"]),
+        "facing": lambda facing: faces_within_cone(
+            triangles, facing["direction"], facing["within_deg"]
         ),
     }
+    for key, take in parts.items():
+        if key in values:
+            with _faults_of(key):
+                triangles = take(values[key])
+    return triangles
 
 
 @contextmanager
@@ -134,16 +163,28 @@ def _faults_of(key: str) -> Iterator[None]:
         raise CaseError([fault.renamed(NAMES, "surface") for fault in faults]) from error
 
 
-def _check_faces(section: Section, value: Any) -> None:
-    """Numbers of faces; which there are, the file says."""
-    if not isinstance(value, list) or not value:
-        section.wrong_type("faces", value)
+def _check_mesh(section: Section, values: Values) -> None:
+    """The unit, and numbers of faces; which there are, the file says."""
+    from surfaces.meshes.files import metres_per_unit
+
+    if "scale" in values:
+        section.make(metres_per_unit, {"scale": values["scale"]})
+    faces = values.get("faces", [0])
+    if not isinstance(faces, list) or not faces:
+        section.wrong_type("faces", faces)
         return
     before = len(section.faults)
-    for k, number in enumerate(value):
+    for k, number in enumerate(faces):
         section.whole(f"faces[{k}]", number, 0)
         if len(section.faults) > before:
             return
+
+
+def _check_choice(section: Section, values: Values) -> None:
+    """Which faces of a STEP file are meant, and how closely triangles follow them."""
+    from surfaces import checked_choice
+
+    section.make(checked_choice, {key: values.get(key) for key in CHOICE if key in values})
 
 
 def _check_parts(section: Section, values: Values) -> None:

@@ -35,7 +35,7 @@ PATCHES: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         kind: {key.name: key.argument for key in own_keys(kind).values() if key.name != "file"}
         for kind in kinds()
-        if kind not in ("piecewise", "mesh", "poses")
+        if kind not in ("piecewise", "mesh", "step", "poses")
     }
 )
 """The keys of each kind of patch, and the arguments of its constructor that they stand for."""
@@ -165,6 +165,5 @@ def foreign_keys(kind: str) -> dict[str, str]:
 
 def _a(kind: str) -> str:
     """The kind with its article."""
-    if kind in ("piecewise", "poses"):
-        return "a piecewise surface" if kind == "piecewise" else "poses"
-    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"
+    several = {"piecewise": "a piecewise surface", "poses": "poses", "step": "STEP faces"}
+    return several.get(kind) or f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"

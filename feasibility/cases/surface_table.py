@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from coverable_errors import MISSING, Fault, alternatives, close, shown
 from feasibility.cases.given_files import KINDS, UNITS, build_poses, check_side, read_given
-from feasibility.cases.mesh_keys import build_mesh, cut_mesh, read_count, read_mesh_keys
+from feasibility.cases.mesh_keys import (
+    build_mesh,
+    build_step,
+    cut_mesh,
+    read_count,
+    read_mesh_keys,
+)
 from feasibility.cases.surface_keys import (
     MOST_CELLS,
     OWN_KEYS,
@@ -198,6 +204,8 @@ class SurfacePart:
         pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
         if self.kind == "mesh":
             return build_mesh(self.values, pose)
+        if self.kind == "step":
+            return build_step(self.values, pose)
         if self.kind == "piecewise":
             return build_pieces(self.values, pose)
         if self.kind == "poses":
@@ -214,7 +222,7 @@ class SurfacePart:
             pose = {"side": self.side, "position": self.position, "rpy_deg": self.rpy_deg}
             return build_poses(self.values, pose)
         surface = self.build()
-        if self.kind == "mesh":
+        if self.kind in ("mesh", "step"):
             count = cast("int | None", self.cells)
             return cut_mesh(cast("MeshSurface", surface), count, self.values.get("cell_size"))
         if self.kind == "piecewise":
@@ -295,8 +303,8 @@ def named_file(table: Any) -> SurfacePart | None:
 
 def _values(section: Section, kind: str) -> tuple[dict[str, Any], tuple[int, int] | int | None]:
     """What the kind's own keys say, and how many cells there are."""
-    if kind == "mesh":
-        return read_mesh_keys(section), read_count(section)
+    if kind in ("mesh", "step"):
+        return read_mesh_keys(section, kind), read_count(section)
     if kind == "piecewise":
         return read_pieces(section), None
     if kind == "poses":

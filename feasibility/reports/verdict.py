@@ -260,7 +260,7 @@ def _narrower(verdict: Verdict) -> str:
         return {"poses": "a part of the poses", "grid": "a part of the grid"}.get(
             kind, "a narrower u or v"
         )
-    return "a part of the mesh (surface.box, cut, facing or faces)"
+    return "a part of it (surface.box, cut, facing or faces)"
 
 
 def witness_json(verdict: Verdict) -> dict[str, Any] | None:

@@ -142,7 +142,7 @@ def _load(table: str, surface_link: str | None) -> Robot:
 
 
 def cut_of(case: Case) -> Cells:
-    """The cells of a case; a mesh is read and cut once, and then placed.
+    """The cells of a case; a mesh or STEP faces are read and cut once, and then placed.
 
     Raises:
         CaseError: there is no such surface, or it cannot be cut so.
@@ -150,7 +150,7 @@ def cut_of(case: Case) -> Cells:
     from surfaces import rotation_from_rpy
     from surfaces.meshes.cells import MeshCells
 
-    if case.surface.kind != "mesh":
+    if case.surface.kind not in ("mesh", "step"):
         return case.surface.cut()
     table = {key: value for key, value in case.surface.table().items() if value is not None}
     file = os.stat(table["file"])

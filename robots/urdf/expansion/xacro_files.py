@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-import subprocess
-import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from coverable_errors import Fault
+from coverable_processes import run_apart
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes
 
@@ -99,28 +96,16 @@ def _run(job: Mapping[str, Any], path: str, caps: Caps) -> bytes:
     Raises:
         UrdfError: it took too long.
     """
-    command = [sys.executable, "-I", "-S", "-B", "-X", "utf8", str(CHILD)]
-    with tempfile.TemporaryFile() as written:
-        try:
-            done = subprocess.run(
-                command,
-                input=json.dumps(job).encode(),
-                stdout=written,
-                stderr=subprocess.DEVNULL,
-                env={},
-                timeout=caps.waiting,
-                check=False,
-            )
-        except subprocess.TimeoutExpired:
-            raise UrdfError(f"is not expanded after {caps.waiting:g} s", path) from None
-        if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
-            raise UrdfError(
-                f"takes more than {caps.seconds} s of processor time to expand; does a macro or an "
-                "expression grow without bound?",
-                path,
-            )
-        written.seek(0)
-        return written.read(2 * caps.bytes)
+    ended = run_apart(CHILD, json.dumps(job).encode(), caps.waiting, 2 * caps.bytes)
+    if ended.too_late:
+        raise UrdfError(f"is not expanded after {caps.waiting:g} s", path)
+    if ended.too_slow:
+        raise UrdfError(
+            f"takes more than {caps.seconds} s of processor time to expand; does a macro or an "
+            "expression grow without bound?",
+            path,
+        )
+    return ended.written
 
 
 def _folder_of(package: str, path: str) -> str:

@@ -123,6 +123,13 @@ pieces = [
   { kind = "plane", u = [0, 1], v = [0, 1], position = [1, 0, 0], cells = [2, 3] },
 ]
 """,
+    "step": """
+kind = "step"
+file = "part.step"
+faces = [1]
+side = "outside"
+cells = 12
+""",
     "mesh": """
 kind = "mesh"
 file = "part.stl"
@@ -239,12 +246,14 @@ BAD_CASES = {
         "surfaces.parametric",
     ),
     "kind is a list": changed('"sphere"', '["sphere"]', "surface.kind", "must be"),
-    "mesh key": added("surface", "cell_size = 0.1", "surface.cell_size", "belongs to a mesh"),
+    "mesh key": added(
+        "surface", "cell_size = 0.1", "surface.cell_size", "belongs to a mesh or STEP faces"
+    ),
     "file of nothing": added(
         "surface",
         'file = "part.stl"',
         "surface.file",
-        "a bspline, a grid, poses or a mesh, not to a sphere",
+        "a bspline, a grid, poses, a mesh or STEP faces, not to a sphere",
     ),
     "key of another kind": added("surface", "flare = 1.0", "surface.flare", "belongs to a hyper"),
     "radius missing": changed("radius = 1.0\n", "", "surface.radius", "is missing", "metres"),

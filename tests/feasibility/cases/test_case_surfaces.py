@@ -92,7 +92,7 @@ def test_a_patch_is_what_its_constructor_makes(kind):
 
 def test_the_kinds_are_those_that_are_tested():
     assert set(PATCHES) == {*MADE, "sphere", "cylinder", "hyperboloid", "plane", "grid"}
-    assert set(OWN_KEYS) == {*PATCHES, "piecewise", "mesh", "poses"}
+    assert set(OWN_KEYS) == {*PATCHES, "piecewise", "mesh", "step", "poses"}
     assert set(PATCHES) - {"grid"} == set(surface_parts.PATCHES)  # a grid is a file
     assert all(callable(getattr(surfaces, kind)) for kind in OWN_KEYS)
     assert set(CLOSED_FORM_KINDS) < set(PATCHES)

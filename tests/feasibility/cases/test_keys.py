@@ -20,7 +20,8 @@ from feasibility.collisions import Collision
 
 WRONG = datetime.date(2026, 1, 1)  # no key takes a date
 ALTERNATIVES = {"name": "urdf", "urdf": "name", "points": "file", "file": "points",
-                "cell_size": "cells", "limits_deg": "limits", "limits_m": "limits",
+                "cell_size": "cells", "colour": "faces",
+                "limits_deg": "limits", "limits_m": "limits",
                 "lock": "limits", "start": "start_deg", "start_deg": "start"}  # fmt: skip
 UNITS = {"degrees": "deg", "metres": "m", "seconds": "s"}
 GRID = {"cells": [3, 4]}
@@ -214,6 +215,8 @@ def edges_of(said):
         return [[0, 0, -1e-3]], [[0, 0, 0], [0, 0], [0, 0, 0, 1], *NOTHING]
     if said.startswith("a pair [low, high]"):
         return [], [[0.5, 0.5], [0.6, 0.4], [0.1], [0.1, 0.2, 0.3], 0.1, *NOTHING]
+    if said.startswith("the path of"):
+        return [], ["", " ", 0, True, math.nan, [], {}, ["part"]]
     if said == "true or false":
         return [True, False], [0, 1, "true", None, [], {}]
     if re.fullmatch(r"('\w+', )*'\w+' or '\w+'", said):

@@ -1,0 +1,184 @@
+"""Faces of a STEP file as a surface: chosen by number or by colour, cut into triangles."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from numpy.typing import ArrayLike
+
+from coverable_errors import Fault, shown
+from surfaces.arguments import ORIGIN, Checks
+from surfaces.meshes import MeshSurface, TriangleMesh, mesh
+from surfaces.meshes.files import with_likely_unit
+from surfaces.meshes.repair import clean
+from surfaces.step_files.step_process import CAPS, Caps, Read, read_step
+from surfaces.surface import Side, SurfaceError
+
+DEVIATION = 1e-4  # [m]
+ANGLE = 0.2  # [rad] between neighbouring triangles: their normals are blended, as of any mesh
+LISTED = 20  # faces, or colours, in a message
+CHOOSE = 'choose by faces = [3, 7] or by colour = "#ff0000"'
+
+
+class StepFace(NamedTuple):
+    """One face of a STEP file."""
+
+    number: int
+    """From 1, in the order in which Open CASCADE explores the file, as FreeCAD's Face1, Face2."""
+    kind: str
+    """Of surface: "plane", "cylinder", "bsplinesurface", ..."""
+    area: float
+    """m^2."""
+    colour: str
+    """As "#rrggbb"; empty where the file gives it none."""
+
+
+def step(
+    file: str | os.PathLike[str],
+    faces: Sequence[int] | None = None,
+    colour: str | None = None,
+    deviation: float = DEVIATION,
+    side: Side = "outside",
+    position: ArrayLike = ORIGIN,
+    rpy_deg: ArrayLike = ORIGIN,
+) -> MeshSurface:
+    """A surface of faces of a STEP file, through triangles (extra `coverable[step]`).
+
+    Faces that share an edge get the same points on it, so that cells on both sides of it are
+    neighbours. Lengths are metres, whatever the file's unit. How far the triangles lie off the
+    faces is measured, and stated in `notes`.
+
+    Args:
+        file: its path.
+        faces: numbers as `step_faces` gives them, from 1; or
+        colour: "#rrggbb", of all faces to be taken.
+        deviation: m, how far triangles may lie off the faces, about.
+        side: 'outside' for a tool on the side that the faces look to, which is outside the solid.
+        position: (3,) m, origin of the file's frame in the root frame.
+        rpy_deg: (3,) fixed-axis roll, pitch, yaw of the file's frame.
+
+    Raises:
+        SurfaceError: the numbers make no sense, the file cannot be read, it has no such face or
+            colour, or its faces make no surface.
+    """
+    check = Checks("step")
+    check.pose(side, position, rpy_deg)
+    check.done()
+    return mesh(step_triangles(file, faces, colour, deviation), 1.0, side, position, rpy_deg)
+
+
+def step_faces(file: str | os.PathLike[str]) -> tuple[StepFace, ...]:
+    """The faces of a STEP file, with what tells them apart.
+
+    Raises:
+        SurfaceError: the extra is missing, or the file cannot be read.
+    """
+    name = repr(Path(os.fsdecode(file)).name[:100])
+    try:
+        return _faces(read_step(file, {"numbers": [], "colour": ""}))
+    except SurfaceError as error:
+        raise SurfaceError(error.faults, name) from error
+
+
+def step_triangles(
+    file: str | os.PathLike[str],
+    faces: Sequence[int] | None = None,
+    colour: str | None = None,
+    deviation: float = DEVIATION,
+    caps: Caps = CAPS,
+) -> TriangleMesh:
+    """The triangles of faces of a STEP file; arguments as of `step`.
+
+    Raises:
+        SurfaceError: as `step`.
+    """
+    numbers, wanted = checked_choice(faces, colour, deviation)
+    name = repr(Path(os.fsdecode(file)).name[:100])
+    job = {"numbers": numbers, "colour": wanted, "deviation": deviation, "angle": ANGLE}
+    try:
+        read = read_step(file, job, caps)
+        _refuse_missing(read, numbers, wanted, faces is not None or colour is not None)
+        return with_likely_unit(clean(read.vertices, read.triangles, [_note(read)]))
+    except SurfaceError as error:
+        raise SurfaceError(error.faults, name) from error
+
+
+def checked_choice(
+    faces: Sequence[int] | None = None,
+    colour: str | None = None,
+    deviation: float = DEVIATION,
+) -> tuple[list[int], str]:
+    """Which faces are meant: their numbers, and the colour in small letters.
+
+    Raises:
+        SurfaceError: the arguments make no sense, or contradict each other.
+    """
+    check = Checks("step")
+    check.number("deviation", deviation, "must be a number in 1e-06 .. 0.1 (metres)", 1e-6, 0.1)
+    numbers: list[int] = []
+    if faces is not None:
+        given: Any = faces.tolist() if hasattr(faces, "tolist") else faces
+        if isinstance(given, Sequence) and not isinstance(given, str) and given:
+            numbers = [check.whole(f"faces[{k}]", one, 1, 10**9) for k, one in enumerate(given)]
+        else:
+            check.wrong("faces", faces, "must be an array of numbers of faces, from 1")
+    wanted = ""
+    if colour is not None:
+        if isinstance(colour, str) and re.fullmatch("#[0-9a-fA-F]{6}", colour):
+            wanted = colour.lower()
+        else:
+            check.wrong("colour", colour, 'must be a colour as "#rrggbb", such as "#ff0000"')
+        if faces is not None:
+            check.keep(Fault("colour", "contradicts faces; give one of the two"))
+    check.done()
+    return numbers, wanted
+
+
+def _refuse_missing(read: Read, numbers: list[int], colour: str, chosen: bool) -> None:
+    """Refuse faces that are not there.
+
+    Raises:
+        SurfaceError: there are such, or none were asked for; with a list of those there are.
+    """
+    count = len(read.faces)
+    if not chosen:
+        raise SurfaceError(f"{CHOOSE}; the file has {_listed(read)}")
+    beyond = [k for k, number in enumerate(numbers) if number > count]
+    if beyond:
+        what = f"names face {numbers[beyond[0]]}; the file has {_listed(read)}"
+        raise SurfaceError(Fault(f"faces[{beyond[0]}]", what))
+    if colour and not read.taken:
+        there = sorted({face["colour"] for face in read.faces} - {""})
+        remedy = "there are " + ", ".join(there[:LISTED]) + ", ..." * (len(there) > LISTED)
+        if not there:
+            remedy = f"none of its {count} faces has one; choose by faces = [3, 7]"
+        raise SurfaceError(Fault("colour", f"is {shown(colour)}, which no face has; {remedy}"))
+
+
+def _listed(read: Read) -> str:
+    """How many faces there are, and what the largest of them are."""
+    faces = sorted(_faces(read), key=lambda face: -face.area)[:LISTED]
+    words = [
+        f"{face.number}: {face.kind}, {face.area:.3g} m^2" + f", {face.colour}" * bool(face.colour)
+        for face in sorted(faces)
+    ]
+    largest = f", the {LISTED} largest" if len(read.faces) > LISTED else ""
+    plural = "face" if len(read.faces) == 1 else f"faces, 1 .. {len(read.faces)}"
+    return f"{len(read.faces)} {plural}{largest} ({'; '.join(words)})"
+
+
+def _note(read: Read) -> str:
+    """What stands for the faces, and how far off."""
+    faces = read.taken
+    shown_faces = ", ".join(map(str, faces[:LISTED])) + (", ..." if len(faces) > LISTED else "")
+    which = f"face {shown_faces}" if len(faces) == 1 else f"{len(faces)} faces ({shown_faces})"
+    count = len(read.triangles)
+    return f"{count:,} triangles stand for {which}, at most {read.deviation * 1e3:.2g} mm off"
+
+
+def _faces(read: Read) -> tuple[StepFace, ...]:
+    return tuple(StepFace(k + 1, **face) for k, face in enumerate(read.faces))

@@ -1,0 +1,73 @@
+"""A small part as STEP files, made with Open CASCADE, for the tests of reading them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from OCP.BRepFilletAPI import BRepFilletAPI_MakeFillet
+from OCP.BRepPrimAPI import BRepPrimAPI_MakeBox
+from OCP.gp import gp_Ax1, gp_Dir, gp_Pnt, gp_Trsf, gp_Vec
+from OCP.IFSelect import IFSelect_ReturnStatus
+from OCP.Interface import Interface_Static
+from OCP.Quantity import Quantity_Color, Quantity_TypeOfColor
+from OCP.STEPCAFControl import STEPCAFControl_Writer
+from OCP.TCollection import TCollection_ExtendedString
+from OCP.TDocStd import TDocStd_Document
+from OCP.TopAbs import TopAbs_ShapeEnum
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
+
+SIZE = (0.2, 0.1, 0.05)  # m
+ROUND = 0.01  # [m], radius of the one edge that is round
+RED, GREY = (1.0, 0.0, 0.0), (0.5, 0.5, 0.5)
+
+
+def write_part(path: Path, unit: str = "MM", placed: bool = False) -> None:
+    """A box from the origin to `SIZE`, its edge along z at the origin round and red, the rest grey.
+
+    Args:
+        path: of the file.
+        unit: of the file, as STEP calls it.
+        placed: an assembly of two of it, the second turned by 90 degrees about z and 1 m up.
+    """
+    box = BRepPrimAPI_MakeBox(*(1e3 * length for length in SIZE)).Shape()
+    fillet = BRepFilletAPI_MakeFillet(box)
+    fillet.Add(
+        1e3 * ROUND, TopoDS.Edge(TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_EDGE).Current())
+    )
+    shape = fillet.Shape()
+    document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
+    shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
+    colours = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    part = shapes.AddShape(shape, False)
+    _paint(colours, part, GREY)
+    _paint(colours, shapes.AddSubShape(part, _third_face(shape)), RED)
+    if placed:
+        move, turn = gp_Trsf(), gp_Trsf()
+        turn.SetRotation(gp_Ax1(gp_Pnt(0, 0, 0), gp_Dir(0, 0, 1)), 1.5707963267948966)
+        move.SetTranslation(gp_Vec(0, 0, 1e3))
+        both = shapes.NewShape()
+        for place in (gp_Trsf(), move.Multiplied(turn)):
+            shapes.AddComponent(both, part, TopLoc_Location(place))
+        shapes.UpdateAssemblies()
+    writer = STEPCAFControl_Writer()
+    writer.SetColorMode(True)
+    assert Interface_Static.SetCVal_s("write.step.unit", unit)
+    assert writer.Transfer(document)
+    assert writer.Write(str(path)) == IFSelect_ReturnStatus.IFSelect_RetDone
+
+
+def _third_face(shape: Any) -> Any:
+    """The round one, as it happens."""
+    faces = TopExp_Explorer(shape, TopAbs_ShapeEnum.TopAbs_FACE)
+    faces.Next()
+    faces.Next()
+    return TopoDS.Face(faces.Current())
+
+
+def _paint(colours: Any, label: Any, rgb: tuple[float, float, float]) -> None:
+    colour = Quantity_Color(*rgb, Quantity_TypeOfColor.Quantity_TOC_sRGB)
+    colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
