@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,12 +18,15 @@ from feasibility.found import Found
 from feasibility.problem import Problem
 from feasibility.search import Progress, Search
 from feasibility.task import Task
+from feasibility.treated import Decision, with_coverage
 from feasibility.verdict import Answer, Cause, Evidence, Replay, Verdict, Walk, deferred
 from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
     import networkx as nx
+
+    from feasibility.treated import TreatedArea
 
 
 NOT_BEGUN = "The time limit of {:g} s ran out while the search was prepared; nothing was searched."
@@ -67,10 +70,10 @@ def check(
         TypeError: an argument is something else, such as a surface that is not cut into cells.
         RobotError: the arm is no serial chain of one-dof joints.
         SurfaceError: the greedy search needs a surface, which poses have not.
-        ArgumentError: the arm's start is not on the motion set; the seeds fit neither arm nor
-            cells; seeds, collisions or cells with approaches of their own are given to the greedy
-            search; a pair names something that is not there; or the surface has no reference
-            direction for the roll.
+        ArgumentError: the arm's start is not on the motion set; there is a footprint, but no
+            surface; the seeds fit neither arm nor cells; seeds, collisions or cells with approaches
+            of their own are given to the greedy search; a pair names something that is not there;
+            or the surface has no reference direction for the roll.
 
     Example:
         >>> from robots import load_robot
@@ -196,7 +199,14 @@ def _decided(
     last = tried[-1].replayed
     chosen = tried[-1] if last is not None and last.accepted else tried[0]
     found, replayed = chosen.found, chosen.replayed
-    answer, evidence, message = _answer(problem, found, replayed)
+    decision = _answer(problem, found, replayed)
+    treated: Any = None
+    if decision.answer is Answer.FEASIBLE and problem.task.footprint is not None:
+        treated = deferred(lambda: _treated(problem, found, clock))
+    if treated is not None and problem.task.coverage is not None:
+        treated = _treated(problem, found, clock)
+        decision = with_coverage(decision, problem.task, treated)
+    answer, evidence, message = decision
     feasible = answer is Answer.FEASIBLE
     return Verdict(
         answer=answer,
@@ -226,6 +236,7 @@ def _decided(
         n_edges=found.n_edges,
         unchecked_links=() if bodies is None else bodies.unchecked,
         pairs_left_out=() if bodies is None else bodies.left_out,
+        treated=treated,
         statistics={**found.counts, "fk": sum(one.found.counts["fk"] for one in tried)},
     )
 
@@ -239,21 +250,32 @@ def _causes(found: Found, clock: Clock) -> tuple[Cause, ...]:
         return ()
 
 
-def _answer(
-    problem: Problem, found: Found, replayed: Replay | None
-) -> tuple[Answer, Evidence, str]:
+def _treated(problem: Problem, found: Found, clock: Clock) -> TreatedArea | None:
+    """What the motion treats; None where there is no motion, or no time to measure it."""
+    from feasibility.treated import treated_by_walk
+
+    if found.motion is None:
+        return None
+    try:
+        with clock.enforced():
+            return treated_by_walk(problem.robot, problem.cells, problem.task, found.motion)
+    except OutOfTime:
+        return None
+
+
+def _answer(problem: Problem, found: Found, replayed: Replay | None) -> Decision:
     """Answer, evidence, and the sentences that say what was done."""
     if len(problem.cells) == 0:
-        return Answer.FEASIBLE, Evidence.WITNESS, NO_CELLS
+        return Decision(Answer.FEASIBLE, Evidence.WITNESS, NO_CELLS)
     if replayed is not None and replayed.accepted:
         waypoints = str(replayed.certificate.waypoints)
         message = found.accepted.replace("{waypoints}", waypoints)
-        return Answer.FEASIBLE, Evidence.WITNESS, message
+        return Decision(Answer.FEASIBLE, Evidence.WITNESS, message)
     if replayed is not None:
         message = found.refused.replace("{refusal}", replayed.refusal)
-        return Answer.UNDECIDED, Evidence.BUDGET, message
+        return Decision(Answer.UNDECIDED, Evidence.BUDGET, message)
     if found.proof is not None:
-        return Answer.INFEASIBLE, Evidence.PROOF, found.proved
+        return Decision(Answer.INFEASIBLE, Evidence.PROOF, found.proved)
     if found.unfinished:
-        return Answer.UNDECIDED, Evidence.BUDGET, found.unfinished
-    return Answer.INFEASIBLE, Evidence.EXHAUSTED, found.exhausted
+        return Decision(Answer.UNDECIDED, Evidence.BUDGET, found.unfinished)
+    return Decision(Answer.INFEASIBLE, Evidence.EXHAUSTED, found.exhausted)

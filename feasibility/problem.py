@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from feasibility.collisions import Bodies, Pair, gather
 from feasibility.targets import check_references
-from feasibility.task import Task
+from feasibility.task import Task, check_footprint
 from robots import Robot
 from surfaces import Cells, Surface
 
@@ -38,7 +38,8 @@ class Problem:
             TypeError: an argument is something else, such as a surface that is not cut into cells;
                 all of them are named.
             ArgumentError: the roll is limited, but the surface has no reference direction for it,
-                or one that is along the approach direction at some cell.
+                or one that is along the approach direction at some cell; or there is a footprint,
+                but no surface.
         """
         _refuse_other_types(
             (robot, "robot", Robot, 'a Robot, such as robots.load_robot("ur5")'),
@@ -47,6 +48,7 @@ class Problem:
             *others,
         )
         check_references(cells, task)
+        check_footprint(cells, task)
         asked = task_over(cells, task)
         return cls(robot, cells, asked, asked)
 

@@ -47,8 +47,8 @@ class Task:
 
     Raises:
         ArgumentError: standoff or tolerance is negative or not finite, the cone is outside 0 to
-            180 degrees, a direction is none, or the range of the roll is empty, or limited with a
-            cone over 90 degrees; all that is wrong is named.
+            180 degrees, a direction is none, the range of the roll is empty, or limited with a
+            cone over 90 degrees, or a coverage has no footprint; all that is wrong is named.
     """
 
     standoff: float
@@ -72,6 +72,11 @@ class Task:
     roll_reference: Direction | None = None
     """The reference direction in the surface's own frame; its part square to the approach counts.
     None for the direction in which u grows, or the tangents of poses."""
+    footprint: float | tuple[float, float] | None = None
+    """What the tool treats at once, metres: the diameter of a disc, or an ellipse's along its path
+    and across. Answers then have the treated share of the area; it alone changes no verdict."""
+    coverage: float | None = None
+    """The share of the area that has to be treated for "feasible", besides every cell."""
 
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task; keep them as plain floats."""
@@ -96,10 +101,39 @@ class Task:
             "roll_reference": None
             if self.roll_reference is None
             else tuple(checks.direction("roll_reference", self.roll_reference)),
+            "footprint": self._checked_footprint(checks),
+            "coverage": self._checked_coverage(checks),
         }
         checks.done()
         for name, value in {**kept, **kept_too}.items():
             object.__setattr__(self, name, value)
+
+    def _checked_footprint(self, checks: Checks) -> float | tuple[float, float] | None:
+        """The footprint as one diameter or two."""
+        given = self.footprint
+        if given is None or not isinstance(given, (list, tuple)):
+            return None if given is None else checks.positive("footprint", given)
+        expected = "must be a diameter > 0, or two such as [0.06, 0.04] (metres)"
+        found = checks.numbers("footprint", given, 2, expected)
+        if found is None:
+            return None
+        if min(found) <= 0.0:
+            checks.wrong("footprint", given, expected)
+        return found[0], found[1]
+
+    def _checked_coverage(self, checks: Checks) -> float | None:
+        """The share that has to be treated, which needs a footprint."""
+        if self.coverage is None:
+            return None
+        expected = "must be a share above 0 and up to 1, such as 0.99"
+        known = len(checks.faults)
+        share = checks.number("coverage", self.coverage, expected, 0.0, 1.0)
+        if share == 0.0 and len(checks.faults) == known:
+            checks.wrong("coverage", self.coverage, expected)
+        if self.footprint is None:
+            wanted = "give task.footprint, in metres, or leave coverage out"
+            checks.keep(Fault("coverage", "needs a footprint to measure", expected=wanted))
+        return share
 
     def _checked_approach(self, checks: Checks) -> Any:
         """The approach as a word or three numbers."""
@@ -130,6 +164,12 @@ class Task:
     def cone(self) -> float:
         """The half angle alpha of the cone, radians."""
         return math.radians(self.cone_deg)
+
+    @property
+    def disc(self) -> tuple[float, float] | None:
+        """m, the footprint along the path and across it; None where none is given."""
+        given = self.footprint
+        return given if given is None or isinstance(given, tuple) else (given, given)
 
     @property
     def effective_tolerance(self) -> float:
@@ -205,6 +245,20 @@ class Task:
                 "task",
             )
         return projected(directions, approaches)[0]
+
+
+def check_footprint(cells: Cells, task: Task) -> None:
+    """Refuse a footprint where there is no surface to treat.
+
+    Raises:
+        ArgumentError: the cells are poses.
+    """
+    if task.footprint is not None and cells.surface.wall is None:
+        expected = "leave it out, or lay passes over the surface itself"
+        raise ArgumentError(
+            Fault("footprint", "is given, but between poses there is no surface to treat",
+                  expected=expected), "task",
+        )  # fmt: skip
 
 
 def unit(direction: Direction) -> NDArray[np.float64]:

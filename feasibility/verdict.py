@@ -128,7 +128,7 @@ class Replay:
         return math.isfinite(self.certificate.max_position_error)
 
 
-DEFERRED = ("graph", "causes", "tree")
+DEFERRED = ("graph", "causes", "tree", "treated")
 
 
 def deferred(make: Callable[[], Any]) -> Any:
@@ -192,6 +192,9 @@ class Verdict:
     """Links without any shape, where collisions are checked."""
     pairs_left_out: tuple[LeftOut, ...] = ()
     """Pairs that are not asked for, and why."""
+    treated: Any = None
+    """What the motion that was found treats, a `feasibility.treated.TreatedArea`; None unless the
+    task has a footprint and a motion was accepted. Measured when first read."""
     statistics: Mapping[str, Any] = field(default_factory=dict)
     """Counts of work done (FK evaluations, calls, proofs), for benchmarks and the curious."""
 

@@ -52,6 +52,7 @@ feasibility.collisions.kernels
 feasibility: task
 feasibility.targets
 feasibility: found problem verdict
+feasibility.treated
 feasibility.certification: faults kinematic_bounds
 feasibility.certification.collisions
 feasibility.certification.tool_alone

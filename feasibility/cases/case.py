@@ -13,6 +13,7 @@ from coverable_errors import MISSING, ArgumentError, Fault, close, printable
 from feasibility.cases.collision_table import CollisionPart, faults_of_meshes, read_collision
 from feasibility.cases.robot_table import RobotPart, faults_of_loading, in_robot_table, read_robot
 from feasibility.cases.surface_table import (
+    AUTO,
     SurfacePart,
     faults_of_building,
     named_file,
@@ -30,7 +31,7 @@ from feasibility.cases.toml import (
 from feasibility.safe_files import FileError, read_regular, shown_path
 from feasibility.search import Search
 from feasibility.targets import check_references
-from feasibility.task import Task
+from feasibility.task import Task, check_footprint
 
 if TYPE_CHECKING:
     from robots import Robot
@@ -39,7 +40,10 @@ if TYPE_CHECKING:
 BUILT_IN = Path(__file__).with_name("built_in.toml")
 LARGEST_FILE = 256 * 1024  # bytes
 TABLES = ("robot", "surface", "task", "collision", "search")
-TASK = ("standoff", "cone_deg", "tolerance", "approach", "roll_deg", "roll_reference")
+TASK = (
+    "standoff", "cone_deg", "tolerance", "approach", "roll_deg", "roll_reference", "footprint",
+    "coverage",
+)  # fmt: skip
 
 Tables = dict[str, Any]
 
@@ -104,7 +108,7 @@ class Case:
         except RobotError as error:
             faults += in_robot_table(error)
         try:
-            cells = self.surface.cut()
+            cells = self.surface.cut(self.task.disc)
         except CaseError as error:
             faults += error.faults
         try:
@@ -119,6 +123,7 @@ class Case:
             raise CaseError(faults, self.name)
         try:
             check_references(cells, task)
+            check_footprint(cells, task)
         except ArgumentError as error:
             named = [fault.renamed({}, "task") for fault in error.faults]
             raise CaseError(named, self.name) from error
@@ -266,6 +271,9 @@ def _from_tables(tables: Tables, name: str, overrides: Iterable[str]) -> Case:
     surface = read_surface(tables["surface"], faults) if "surface" in tables else None
     task = _read_task(tables["task"], faults) if "task" in tables else None
     collision = read_collision(tables["collision"], faults) if "collision" in tables else None
+    if surface is not None and task is not None and surface.automatic and task.disc is None:
+        wanted = "give task.footprint, in metres, which tells how fine is fine enough"
+        faults.append(Fault("surface.cells", f"is {AUTO!r}, without a footprint", expected=wanted))
     search = _read_search(tables.get("search", {}), faults)
     if faults and "robot" in tables:
         faults += faults_of_loading(tables["robot"])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from coverable_errors import MISSING
 from feasibility.cases.keys import own_keys
@@ -53,8 +53,8 @@ def read_mesh_keys(section: Section, kind: str) -> dict[str, Any]:
     return values
 
 
-def read_count(section: Section) -> int | None:
-    """How many cells; None where `cell_size` stands for it."""
+def read_count(section: Section) -> int | Literal["auto"] | None:
+    """How many cells, or as many as the footprint asks for; None where `cell_size` is given."""
     written = section.take("cells")
     if section.has("cell_size"):
         if written:
@@ -63,7 +63,9 @@ def read_count(section: Section) -> int | None:
     if not written:
         section.fault("cells", "is missing; give their number, or cell_size = 0.05 (metres)")
         return None
-    return section.whole("cells", written["cells"], 1, MOST_MESH_CELLS)
+    if written["cells"] == "auto":
+        return "auto"
+    return section.whole("cells", written["cells"], 1, MOST_MESH_CELLS, "'auto'")
 
 
 def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:

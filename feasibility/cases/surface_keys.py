@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from coverable_errors import MISSING, alternatives, shown
 from feasibility.cases.given_files import build_grid, read_given
@@ -58,9 +58,11 @@ def read_patch(section: Section, kind: str) -> dict[str, Any]:
     return values
 
 
-def read_grid(section: Section) -> tuple[int, int] | None:
-    """Cells along u and v, at least one of each."""
+def read_grid(section: Section) -> tuple[int, int] | Literal["auto"] | None:
+    """Cells along u and v, at least one of each, or as many as the footprint asks for."""
     written = section.take("cells").get("cells", MISSING)
+    if written == "auto":
+        return "auto"
     if not isinstance(written, list) or len(written) != 2:
         if section.is_table:
             section.wrong_type("cells", written)

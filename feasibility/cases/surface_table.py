@@ -8,6 +8,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from coverable_errors import MISSING, Fault, alternatives, close, shown
+from feasibility.cases.automatic_cells import (
+    AUTO,
+    Footprint,
+    automatic_count,
+    automatic_grid,
+)
 from feasibility.cases.given_files import KINDS, UNITS, build_poses, check_side, read_given
 from feasibility.cases.mesh_keys import (
     build_mesh,
@@ -49,7 +55,7 @@ class PiecePart:
     kind: str
     values: Mapping[str, Any]
     """The kind's own keys, as in `SurfacePart`."""
-    cells: tuple[int, int]
+    cells: tuple[int, int] | Literal["auto"]
     position: Triple = ORIGIN
     """m, in the frame of the surface."""
     rpy_deg: Triple = ORIGIN
@@ -88,7 +94,8 @@ def read_pieces(section: Section) -> dict[str, Any]:
         return values
     found = [_piece(section, k, entry) for k, entry in enumerate(entries)]
     pieces = values["pieces"] = tuple(piece for piece in found if piece is not None)
-    if sum(piece.cells[0] * piece.cells[1] for piece in pieces) > MOST_CELLS:
+    grids = [piece.cells for piece in pieces if piece.cells != AUTO]
+    if sum(nu * nv for nu, nv in grids) > MOST_CELLS:
         section.fault("pieces", f"make more than {MOST_CELLS:,} cells; use coarser grids")
     return values
 
@@ -116,8 +123,10 @@ def build_pieces(values: Mapping[str, Any], pose: Mapping[str, Any]) -> Piecewis
         raise CaseError([fault.renamed({}, "surface") for fault in error.faults]) from error
 
 
-def cut_pieces(surface: Piecewise, values: Mapping[str, Any]) -> PieceCells:
-    """Cut each piece into its grid.
+def cut_pieces(
+    surface: Piecewise, values: Mapping[str, Any], footprint: Footprint | None
+) -> PieceCells:
+    """Cut each piece into its grid, fine enough for a footprint (m) where that is asked for.
 
     Raises:
         CaseError: they cannot be cut so.
@@ -125,9 +134,25 @@ def cut_pieces(surface: Piecewise, values: Mapping[str, Any]) -> PieceCells:
     from surfaces import SurfaceError
 
     try:
-        return surface.cells([piece.cells for piece in values["pieces"]])
+        return surface.cells(
+            [
+                _grid_of(patch, piece.cells, footprint)
+                for patch, piece in zip(surface.placed, values["pieces"], strict=True)
+            ]
+        )
     except SurfaceError as error:
         raise CaseError([fault._replace(key="surface.pieces") for fault in error.faults]) from error
+
+
+def _grid_of(
+    patch: Patch, cells: tuple[int, int] | Literal["auto"], footprint: Footprint | None
+) -> tuple[int, int]:
+    """Cells along u and v."""
+    if cells != AUTO:
+        return cells
+    if footprint is None:
+        raise CaseError([Fault("surface.cells", f"is {AUTO!r}, without a footprint")])
+    return automatic_grid(patch, footprint)
 
 
 def _piece(section: Section, k: int, entry: Any) -> PiecePart | None:
@@ -157,9 +182,10 @@ class SurfacePart:
     kind: str
     values: Mapping[str, Any]
     """The kind's own keys, in the units of the case; arrays as tuples, paths absolute."""
-    cells: tuple[int, int] | int | None
-    """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given; None
-    for pieces, which have their own, and for poses, each of which is one."""
+    cells: tuple[int, int] | int | Literal["auto"] | None
+    """Along u and v of a patch; of a mesh their number, or None where `cell_size` is given; "auto"
+    for as many as the footprint asks for; None for pieces, which have their own, and for poses,
+    each of which is one."""
     side: Literal["inside", "outside"] = "inside"
     position: Triple = ORIGIN
     rpy_deg: Triple = ORIGIN
@@ -175,13 +201,25 @@ class SurfacePart:
     @property
     def is_grid(self) -> bool:
         """Whether the cells lie in rows and columns."""
-        return isinstance(self.cells, tuple)
+        return isinstance(self.cells, tuple) or (self.cells == AUTO and self.kind in PATCHES)
+
+    @property
+    def automatic(self) -> bool:
+        """Whether it takes a footprint to tell how many cells there are."""
+        pieces = cast("tuple[PiecePart, ...]", self.values.get("pieces", ()))
+        return self.cells == AUTO or any(piece.cells == AUTO for piece in pieces)
 
     @property
     def counts(self) -> list[int]:
         """The number of cells along u and v, or of all cells of a mesh; empty if not known yet."""
         cells = self.cells
-        return [] if cells is None else [cells] if isinstance(cells, int) else list(cells)
+        return (
+            []
+            if cells is None or cells == AUTO
+            else [cells]
+            if isinstance(cells, int)
+            else list(cells)
+        )
 
     def table(self) -> dict[str, Any]:
         """The keys of the [surface] table; what is None is not written."""
@@ -212,8 +250,11 @@ class SurfacePart:
             return build_poses(self.values, pose).surface
         return build_patch(self.kind, self.values, pose)
 
-    def cut(self) -> Cells:
+    def cut(self, footprint: Footprint | None = None) -> Cells:
         """Build the surface and cut it into its cells.
+
+        Args:
+            footprint: m, of the tool, where the cells are to be fine enough for it.
 
         Raises:
             CaseError: there is no such surface, or it cannot be cut so.
@@ -223,11 +264,18 @@ class SurfacePart:
             return build_poses(self.values, pose)
         surface = self.build()
         if self.kind in ("mesh", "step"):
-            count = cast("int | None", self.cells)
-            return cut_mesh(cast("MeshSurface", surface), count, self.values.get("cell_size"))
+            return self._cut_mesh(cast("MeshSurface", surface), footprint)
         if self.kind == "piecewise":
-            return cut_pieces(cast("Piecewise", surface), self.values)
-        return cast("Patch", surface).cells(*cast("tuple[int, int]", self.cells))
+            return cut_pieces(cast("Piecewise", surface), self.values, footprint)
+        patch, cells = cast("Patch", surface), cast("tuple[int, int]", self.cells)
+        return patch.cells(*_grid_of(patch, cells, footprint))
+
+    def _cut_mesh(self, surface: MeshSurface, footprint: Footprint | None) -> Cells:
+        """Cut a mesh into its cells."""
+        count = self.cells
+        if count == AUTO and footprint is not None:
+            count = automatic_count(surface, footprint)
+        return cut_mesh(surface, cast("int | None", count), self.values.get("cell_size"))
 
 
 def read_surface(table: Any, faults: list[Fault]) -> SurfacePart | None:
@@ -301,7 +349,9 @@ def named_file(table: Any) -> SurfacePart | None:
     return known if known or "scale" not in plain else read_surface(plain | {"scale": 1.0}, [])
 
 
-def _values(section: Section, kind: str) -> tuple[dict[str, Any], tuple[int, int] | int | None]:
+def _values(
+    section: Section, kind: str
+) -> tuple[dict[str, Any], tuple[int, int] | int | Literal["auto"] | None]:
     """What the kind's own keys say, and how many cells there are."""
     if kind in ("mesh", "step"):
         return read_mesh_keys(section, kind), read_count(section)

@@ -103,6 +103,7 @@ def check(args: argparse.Namespace, began: float) -> int:
         loaded = opened.so_far()
         verdict = run(*opened.setup, seeds=seeds, clock=opened.clock)
         verdict.causes  # noqa: B018 - looked into within the time limit
+        verdict.treated  # noqa: B018 - measured within the time limit
     if args.json:
         found = report.as_json(verdict, loaded)
         print_out(json_text(found | ({"witness": report.witness_json(verdict)} if within else {})))

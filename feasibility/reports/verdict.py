@@ -28,6 +28,7 @@ from feasibility.reports.parts import (
 )
 from feasibility.reports.proof import proof_json
 from feasibility.results import plain
+from feasibility.treated import treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
 from surfaces import Cells
@@ -49,6 +50,7 @@ EVIDENCE = {
     Evidence.BUDGET: "the search was stopped, or what it found could not be certified",
 }
 CUT = "cuts through the joint space, which no motion crosses, part cells from each other"
+SHORT = "a motion visits every cell, but it is not shown to treat enough of the area"
 CAUSES = {
     CauseKind.OUT_OF_REACH: "out of reach",
     CauseKind.JOINT_LIMITS: "joint limits",
@@ -79,6 +81,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         "proof": None
         if verdict.proof is None
         else proof_json(verdict.proof, verdict.robot, verdict.cells),
+        "treated": treated_json(verdict.treated),
         "timing": seconds(verdict.timing, PHASES, before_s),
         "robot": verdict.robot.name,
         "method": verdict.method,
@@ -129,6 +132,8 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
     if not len(verdict.cells):
         return "\n".join(summary(EMPTY, [title], verdict.task.collision))
     head = SENTENCES[verdict.answer]
+    if _falls_short(verdict):
+        head = f"undecided: {SHORT}."
     if verdict.answer is Answer.INFEASIBLE and verdict.method == "greedy":
         head = GREEDY_NO
     rows = [
@@ -138,6 +143,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
         ("found", _message(verdict)),
         ("certificate", _certificate_text(verdict)),
+        ("treated", _treated_text(verdict)),
         ("no shape", ", ".join(verdict.unchecked_links)),
         ("left out", left_out_text(verdict.pairs_left_out)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),
@@ -163,6 +169,7 @@ def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
         ("found", verdict.message),
         ("certificate", _certificate_text(verdict)),
+        ("treated", _treated_text(verdict)),
     ]
 
 
@@ -170,7 +177,14 @@ def _evidence(verdict: Verdict) -> str:
     """What the answer rests on."""
     if verdict.proof is not None and verdict.proof.kind == "cut":
         return CUT
+    if _falls_short(verdict):
+        return SHORT
     return EVIDENCE[verdict.evidence]
+
+
+def _falls_short(verdict: Verdict) -> bool:
+    """Does a motion that visits every cell treat too little of the area?"""
+    return verdict.treated is not None and verdict.answer is Answer.UNDECIDED
 
 
 def _certificate_text(verdict: Verdict) -> str:
@@ -189,6 +203,19 @@ def _certificate_text(verdict: Verdict) -> str:
     if found["min_limit_margin_deg"] is not None:
         parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
     return "; ".join(filter(None, [*parts, clearance_text(verdict.certificate)]))
+
+
+def _treated_text(verdict: Verdict) -> str:
+    """What the motion treats."""
+    if verdict.treated is not None:
+        return treated_words(verdict.treated)
+    if verdict.task.footprint is None or not verdict.feasible:
+        return ""
+    return "not measured: " + (
+        "the greedy search's motion need not pass the cells' centres"
+        if verdict.method == "greedy"
+        else "the time limit ran out"
+    )
 
 
 def causes_listed(missed: Iterable[Cause], cells: Cells) -> Iterator[str]:
@@ -216,6 +243,8 @@ def _hints(verdict: Verdict) -> list[str]:
         replayed = verdict.witness is not None and len(verdict.cells)
         return [*walk, "--html view.html shows it", *(more if replayed else [])]
     hints = []
+    if _falls_short(verdict):
+        return ["--set surface.cells=auto cuts cells that are fine enough for the footprint"]
     if not verdict.task.cone_deg > 0.0:
         hints.append("--set task.cone_deg=1 gives the tool axis a tolerance")
     elif verdict.answer is Answer.UNDECIDED and "time limit" in verdict.message:

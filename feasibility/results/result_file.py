@@ -34,12 +34,22 @@ from feasibility.results.result_arrays import (
 )
 from feasibility.safe_files import FileError
 from feasibility.task import Task
-from feasibility.verdict import Answer, Cause, CauseKind, Certificate, Evidence, Verdict, Walk
+from feasibility.treated import treated_by_walk
+from feasibility.verdict import (
+    Answer,
+    Cause,
+    CauseKind,
+    Certificate,
+    Evidence,
+    Verdict,
+    Walk,
+    deferred,
+)
 from feasibility.version import version
 
 FORMAT = "coverable-result"
 TASK = ("standoff", "cone_deg", "tolerance")  # what is stored of it; the rest is the case's
-OF_CASE = ("collision", "approach", "roll_deg", "roll_reference")
+OF_CASE = ("collision", "approach", "roll_deg", "roll_reference", "footprint", "coverage")
 FORMAT_VERSION = 3  # 2 had no proofs; 1 no `places`, and the kinds `CLOSED_FORM_KINDS` alone
 
 
@@ -215,13 +225,14 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
     components = unpack_ragged(archive, "components", count)
     start = None if fields.entries.get("start") is None else fields.cell("start", count)
     timing = fields.table("timing")
+    task = replace(_task(fields.table("task")), **{k: getattr(setup.task, k) for k in OF_CASE})
     return Verdict(
         answer=fields.member("answer", Answer),
         evidence=fields.member("evidence", Evidence),
         message=fields.text("message"),
         robot=robot,
         cells=cells,
-        task=replace(_task(fields.table("task")), **{k: getattr(setup.task, k) for k in OF_CASE}),
+        task=task,
         method=fields.text("method"),
         seed=int(fields.get("seed", int, "a whole number")),
         graph=graph,
@@ -239,6 +250,9 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         proof=proof,
         unchecked_links=_names(fields, "unchecked_links"),
         pairs_left_out=_left_out(fields),
+        treated=None
+        if witness is None
+        else deferred(lambda: treated_by_walk(robot, cells, task, witness)),
         timing={key: timing.number(key) for key in timing.entries},
         statistics=dict(fields.table("statistics").entries),
     )

@@ -2,8 +2,12 @@ from .net import WorkingMesh as WorkingMesh
 from .parallel import Passes as Passes
 from .parallel import parallel_passes as parallel_passes
 from .stretches import Pass as Pass
+from .toolpath import PassPlaces as PassPlaces
+from .toolpath import pass_places as pass_places
 from .toolpath import pass_toolpath as pass_toolpath
 from .treated import ToolLines as ToolLines
 from .treated import Treated as Treated
 from .treated import treated_share as treated_share
+from .triangulation import grid_shape as grid_shape
 from .triangulation import working_mesh as working_mesh
+from .visits import visits as visits

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,51 @@ Floats = NDArray[np.float64]
 
 RETRACT = 0.05  # m
 BESIDE = 2.0  # [1] times the spacing: to an end this near the tool goes on along the surface
+LIFTED = -1
 SAMPLES = 16  # places of a lifted way that are looked at
+
+
+class PassPlaces(NamedTuple):
+    """Places along all passes in the order in which they are run, those of lifted ways among them.
+
+    Where one stretch follows on another along the surface, the tool works on the way between too.
+    """
+
+    points: Floats
+    """(N, 3) m."""
+    normals: Floats
+    """(N, 3) outward unit normals."""
+    stretch: NDArray[np.int64]
+    """(N,) which of the stretches each is a place of; -1 where the tool is lifted."""
+
+
+def pass_places(found: Passes, retract: float = RETRACT) -> PassPlaces:
+    """All stretches in their order, and the lifted ways between those that are apart.
+
+    Args:
+        found: passes with at least one stretch.
+        retract: m > 0, how far the tool is lifted.
+
+    Raises:
+        SurfaceError: there are no passes, or a lifted way would run through the surface.
+    """
+    if not found.stretches:
+        raise SurfaceError("there is no pass on it; take a smaller pitch", found.surface.kind)
+    out = found.surface.side_sign * retract
+    rows = [(found.stretches[0].points, found.stretches[0].normals, 0)]
+    for number, (before, after) in enumerate(pairwise(found.stretches), start=1):
+        ends = _ends(before, after)
+        if np.linalg.norm(ends.points[1] - ends.points[0]) > BESIDE * found.spacing:
+            lifted = ends.points + out * ends.normals
+            _refuse_if_through(found, lifted)
+            rows.append((lifted, ends.normals, LIFTED))
+        rows.append((after.points, after.normals, number))
+    points, normals, numbers = zip(*rows, strict=True)
+    return PassPlaces(
+        np.concatenate(points),
+        np.concatenate(normals),
+        np.repeat(np.array(numbers, dtype=np.int64), [len(row) for row in points]),
+    )
 
 
 def pass_toolpath(found: Passes, retract: float = RETRACT) -> PoseCells:
@@ -41,22 +86,8 @@ def pass_toolpath(found: Passes, retract: float = RETRACT) -> PoseCells:
         >>> len(line), line.in_order
         (100, True)
     """
-    if not found.stretches:
-        raise SurfaceError("there is no pass on it; take a smaller pitch", found.surface.kind)
-    out = found.surface.side_sign * retract
-    first = found.stretches[0]
-    points, normals = [first.points], [first.normals]
-    for before, after in pairwise(found.stretches):
-        ends = _ends(before, after)
-        if np.linalg.norm(ends.points[1] - ends.points[0]) > BESIDE * found.spacing:
-            lifted = ends.points + out * ends.normals
-            _refuse_if_through(found, lifted)
-            points.append(lifted)
-            normals.append(ends.normals)
-        points.append(after.points)
-        normals.append(after.normals)
-    side = found.surface.side
-    made = poses(np.concatenate(points), np.concatenate(normals), side=side)
+    places = pass_places(found, retract)
+    made = poses(places.points, places.normals, side=found.surface.side)
     return PoseCells.of(replace(made.surface, under=found.surface))
 
 

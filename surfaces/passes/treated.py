@@ -76,16 +76,21 @@ class Treated(Protected):
     """[1] at least this share of it is treated."""
     upper: float
     """[1] and at most this."""
-    twice: float
-    """[1] share treated by two stretches or more, about."""
     mesh: WorkingMesh
     """The surface as it was measured."""
     shares: Floats
     """(F,) the treated share of each of its faces, at least."""
+    most: Floats
+    """(F,) and at most."""
 
 
 def treated_share(
-    mesh: WorkingMesh, normals: Floats, path: ToolLines, radius: float, rounds: int = ROUNDS
+    mesh: WorkingMesh,
+    normals: Floats,
+    path: ToolLines,
+    radius: float,
+    rounds: int = ROUNDS,
+    off: float = 0.0,
 ) -> Treated:
     """Measure what lies within `radius` (m) of a path.
 
@@ -95,27 +100,29 @@ def treated_share(
         path: of the tool, on the surface.
         radius: m > 0, half of the footprint.
         rounds: how often faces at the rim are cut in four, where the bracket is wide.
+        off: m >= 0, less than the radius, how far the tool may be from the path at most.
     """
     area = float(mesh.areas.sum())
     if not len(path.points):
-        return Treated(area, 0.0, 0.0, 0.0, mesh, np.zeros(len(mesh.faces)))
+        none = np.zeros(len(mesh.faces))
+        return Treated(area, 0.0, 0.0, mesh, none, none)
     path = path.no_longer_than(CLOSE * radius)
-    found = _bracket(mesh, normals, path, radius)
+    found = _bracket(mesh, normals, path, radius, off)
     for _ in range(rounds):
         open_ = found.upper - found.lower > 1e-9
         if float(((found.upper - found.lower) * mesh.areas).sum()) <= NARROW * area:
             break
         mesh, parent = _quartered(mesh, open_)
         normals = normals[parent]
-        found = _bracket(mesh, normals, path, radius)
+        found = _bracket(mesh, normals, path, radius, off)
     areas = mesh.areas
     return Treated(
         area=area,
         lower=float((found.lower * areas).sum()) / area,
         upper=min(1.0, float((found.upper * areas).sum()) / area),
-        twice=float((found.twice * areas).sum()) / area,
         mesh=mesh,
         shares=found.lower,
+        most=found.upper,
     )
 
 
@@ -124,15 +131,17 @@ class _Bracket(NamedTuple):
 
     lower: Floats
     upper: Floats
-    twice: Floats
 
 
-def _bracket(mesh: WorkingMesh, normals: Floats, path: ToolLines, radius: float) -> _Bracket:
-    """Treated shares of faces, at least and at most."""
+def _bracket(
+    mesh: WorkingMesh, normals: Floats, path: ToolLines, radius: float, off: float
+) -> _Bracket:
+    """Treated shares of faces, at least and at most; the radius may be `off` (m) either way."""
     from scipy.spatial import KDTree
 
     corners = mesh.corners
     edge = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+    inner, radius = radius - off, radius + off
     far = radius + 2.0 * float(edge.max()) + path.step
     tree = KDTree(path.points)
     distance, nearest = tree.query(mesh.vertices, distance_upper_bound=far)
@@ -147,12 +156,10 @@ def _bracket(mesh: WorkingMesh, normals: Floats, path: ToolLines, radius: float)
     within = more.found & (more.away - JUNG * edge[rest] - path.step**2 / (8 * radius) <= radius)
     upper[rest] = np.where(within | more.cut_short, 1.0, 0.0)
     places[rest[more.found], 0] = more.place[more.found]
-    lower = _at_least(corners, normals, path, places, radius)
-    both = np.maximum(*(_parity_distance(mesh, path, parity, far) for parity in (0, 1)))
-    twice = np.minimum(share_below(both[mesh.faces], radius), upper)
+    lower = _at_least(corners, normals, path, places, inner)
     joined = _connected(mesh, path, upper > 0.0)
     lower = lower * joined
-    return _Bracket(lower, np.maximum(upper * joined, lower), twice * joined)
+    return _Bracket(lower, np.maximum(upper * joined, lower))
 
 
 def _facing(path: ToolLines, places: Ints, normals: Floats) -> NDArray[np.bool_]:
@@ -202,17 +209,6 @@ def _further(tree: Any, path: ToolLines, middles: Floats, normals: Floats, far: 
     short = ~found & (places[:, -1] >= 0) & (count < len(path.points))
     rows = np.arange(len(places))
     return _Further(found, places[rows, first], away[rows, first], short)
-
-
-def _parity_distance(mesh: WorkingMesh, path: ToolLines, parity: int, far: float) -> Floats:
-    """(V,) m, from every other stretch."""
-    from scipy.spatial import KDTree
-
-    some = path.stretch % 2 == parity
-    if not some.any():
-        return np.full(len(mesh.vertices), far)
-    found, _ = KDTree(path.points[some]).query(mesh.vertices, distance_upper_bound=far)
-    return np.asarray(np.minimum(found, far))
 
 
 def _from_segments(corners: Floats, start: Floats, end: Floats) -> Floats:

@@ -50,20 +50,22 @@ def working_mesh(surface: Surface, edge: float) -> WorkingMesh:
     raise SurfaceError("no passes can be laid over a surface of this kind", surface.kind)
 
 
-def _grid(patch: Patch, edge: float, sign: float) -> WorkingMesh:
-    """A patch cut along its parameters; sign -1.0 turns the faces over."""
+def grid_shape(patch: Patch, edge: float) -> tuple[int, int]:
+    """How many pieces of at most about `edge` m there are along u and v of a patch."""
     (u0, u1), (v0, v1) = patch.u_range, patch.v_range
     u, v = np.meshgrid(np.linspace(u0, u1, SAMPLES), np.linspace(v0, v1, SAMPLES), indexing="ij")
     points = patch.point(u, v)
-    nu, nv = (
-        max(
-            2,
-            math.ceil(
-                np.linalg.norm(np.diff(points, axis=axis), axis=2).sum(axis=axis).max() / edge
-            ),
-        )
+    longest = [
+        float(np.linalg.norm(np.diff(points, axis=axis), axis=2).sum(axis=axis).max())
         for axis in (0, 1)
-    )
+    ]
+    return max(1, math.ceil(longest[0] / edge)), max(1, math.ceil(longest[1] / edge))
+
+
+def _grid(patch: Patch, edge: float, sign: float) -> WorkingMesh:
+    """A patch cut along its parameters; sign -1.0 turns the faces over."""
+    (u0, u1), (v0, v1) = patch.u_range, patch.v_range
+    nu, nv = (max(2, count) for count in grid_shape(patch, edge))
     if 2 * nu * nv > MOST_FACES:
         raise SurfaceError(
             f"edges of {1e3 * edge:.3g} mm make {2 * nu * nv} triangles of it, more than "

@@ -109,6 +109,8 @@ def with_value(key, value):
         table["points"] = [[[0, 0, 0], [0, 1, 0]], [[1, 0, 0.2], [1, 1, 0]]]
     elif key.name == "xacro_args":
         table["urdf"] = f"{table.pop('name')}.urdf.xacro"
+    elif key.name == "coverage":
+        table["footprint"] = 0.06
     if value is MISSING:
         table.pop(key.name, None)
     else:

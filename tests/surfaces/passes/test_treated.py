@@ -107,14 +107,6 @@ def test_random_points_agree_and_further_rounds_only_narrow_it() -> None:
     assert found.upper - found.lower < 0.02
 
 
-def test_overlap_is_counted() -> None:
-    rows = [straight((-0.05, y, 0), (0.65, y, 0)) for y in (0.1, 0.14)]
-    found = treated_share(PLATE, facing(PLATE), lines_of(*rows), 0.03)
-    assert found.twice == pytest.approx(0.02 / 0.4, abs=0.004)
-    alone = treated_share(PLATE, facing(PLATE), lines_of(rows[0]), 0.03)
-    assert alone.twice == 0.0
-
-
 def test_the_back_of_a_thin_part_is_not_treated_through_it() -> None:
     """Two plates 4 mm apart that look away from one another, a footprint of 40 mm."""
     front, back = PLATE, PLATE.vertices - [0.0, 0.0, 0.004]

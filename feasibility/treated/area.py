@@ -1,0 +1,167 @@
+"""How much of a surface a certified motion treats, measured on the surface itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.read_only import ReadOnlyArrays
+from feasibility.task import Task
+from feasibility.treated.feet import Feet, feet_along, feet_on
+from feasibility.treated.regions import Region, untreated_regions
+from feasibility.verdict import Walk
+from robots import Robot
+from surfaces import Cells, Surface
+from surfaces.passes import (
+    PassPlaces,
+    ToolLines,
+    Treated,
+    WorkingMesh,
+    treated_share,
+    visits,
+    working_mesh,
+)
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+FINE = 0.5  # [1] of the footprint's radius: edges of the triangles that are measured on
+ACROSS = 60  # edges along the surface's extent, at least: where it bends, triangles cut corners
+MOST_COUNTED = 20_000  # faces on which visits are counted
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class TreatedArea(ReadOnlyArrays):
+    """What a tool treats along a motion: everything within half a footprint of its feet."""
+
+    footprint: tuple[float, float]
+    """m, along the path and across it."""
+    area: float
+    """m^2, of the whole surface."""
+    lower: float
+    """[1] at least this share of it is treated."""
+    upper: float
+    """[1] and at most this."""
+    twice: float
+    """[1] share that the tool comes by more than once, about."""
+    untreated: tuple[Region, ...]
+    """What is left out for certain, the largest region first."""
+    mesh: WorkingMesh
+    """The surface as it was measured, for pictures."""
+    shares: Floats
+    """(F,) the treated share of each of its faces, at least."""
+    lines: ToolLines
+    """The path of the tool's feet."""
+    notes: tuple[str, ...] = ()
+    """What to know, one sentence each."""
+
+    def times(self, which: Ints | slice = slice(None)) -> Ints:
+        """(k,) how often the tool comes by some faces, all by default."""
+        normals = self.mesh.doubled_areas[which]
+        middles = self.mesh.corners[which].mean(axis=1)
+        return visits(middles, normals, self.lines, 0.5 * min(self.footprint))
+
+
+def treated_by_walk(robot: Robot, cells: Cells, task: Task, walk: Walk) -> TreatedArea | None:
+    """What a motion over cells treats; None where no footprint is asked for."""
+    if task.disc is None or not len(walk.q) or cells.surface.bare:
+        return None
+    return _measured(cells.surface, task.disc, feet_on(cells.surface, robot, walk))
+
+
+def treated_by_passes(
+    surface: Surface, places: PassPlaces, robot: Robot, task: Task, walks: tuple[Walk, ...]
+) -> TreatedArea | None:
+    """What motions along passes treat; None where no footprint is asked for.
+
+    Args:
+        surface: under the passes.
+        places: the poses of the passes.
+        robot: the arm.
+        task: with its footprint.
+        walks: one or more motions, marked at the poses.
+    """
+    if task.disc is None:
+        return None
+    height = surface.side_sign * task.standoff
+    found = [feet_along(places, robot, walk, height) for walk in walks]
+    return _measured(surface, task.disc, _joined(found))
+
+
+def _joined(found: list[Feet]) -> Feet:
+    """Several paths as one, their stretches numbered on."""
+    lines, first = [each.lines for each in found], 0
+    stretch = []
+    for each in lines:
+        stretch.append(each.stretch + first)
+        first += int(each.stretch.max(initial=-1)) + 1
+    return Feet(
+        ToolLines(
+            np.concatenate([np.zeros((0, 3)), *(each.points for each in lines)]),
+            np.concatenate([np.zeros((0, 3)), *(each.normals for each in lines)]),
+            np.concatenate([np.zeros(0, dtype=np.int64), *stretch]),
+        ),
+        max((each.off for each in found), default=0.0),
+    )
+
+
+def _measured(surface: Surface, footprint: tuple[float, float], feet: Feet) -> TreatedArea:
+    """The bracket: an ellipse holds the disc of its smaller axis, and lies in that of its larger.
+
+    The disc is a ball about each foot, see `surfaces.passes.treated`.
+    """
+    inner, outer = 0.5 * min(footprint), 0.5 * max(footprint)
+    mesh = _mesh_of(surface, FINE * inner)
+    doubled = mesh.doubled_areas
+    normals = doubled / np.maximum(np.linalg.norm(doubled, axis=1), 1e-300)[:, None]
+    off = min(feet.off, 0.5 * inner)
+    small = treated_share(mesh, normals, feet.lines, inner, off=off)
+    large = treated_share(mesh, normals, feet.lines, outer, off=off) if outer > inner else small
+    found = TreatedArea(
+        footprint=footprint,
+        area=small.area,
+        lower=small.lower,
+        upper=large.upper,
+        twice=0.0,
+        untreated=untreated_regions(large),
+        mesh=small.mesh,
+        shares=small.shares,
+        lines=feet.lines,
+        notes=_notes(surface, small, footprint),
+    )
+    return _with_twice(found)
+
+
+def _with_twice(found: TreatedArea) -> TreatedArea:
+    """With the share that the tool comes by more than once, counted on some of the faces."""
+    every = max(1, -(-len(found.shares) // MOST_COUNTED))
+    some = np.arange(0, len(found.shares), every)
+    weight = found.mesh.areas[some]
+    again = found.times(some) > 1
+    return replace(found, twice=float((weight * again).sum() / weight.sum()))
+
+
+def _mesh_of(surface: Surface, edge: float) -> WorkingMesh:
+    """Triangles fine enough for the footprint, and for a surface that bends."""
+    coarse = working_mesh(surface, np.inf)
+    extent = float(np.linalg.norm(np.ptp(coarse.vertices, axis=0)))
+    return working_mesh(surface, min(edge, extent / ACROSS))
+
+
+def _notes(surface: Surface, found: Treated, footprint: tuple[float, float]) -> tuple[str, ...]:
+    """What to know about a share."""
+    notes = []
+    if 0.25 * math.pi * footprint[0] * footprint[1] >= found.area:
+        notes.append("the footprint is larger than the whole surface")
+    if footprint[0] != footprint[1]:
+        notes.append(
+            "of an ellipse the share is at least that of the disc inside it, and at most that of "
+            "the disc around it"
+        )
+    error, _ = surface.deviations
+    if error > 0.0:
+        notes.append(f"the surface is known to {1e3 * error:.2g} mm")
+    return tuple(notes)

@@ -1,0 +1,106 @@
+"""Where a tool touches the surface along a motion: the path of its feet.
+
+The foot of a tool point is the place of the surface below it. Between two configurations the tool
+point leaves its chord by at most reach (sum of |dq|)^2 / 8, because the second derivative along a
+straight line in joint space is at most reach (sum of |dq|)^2 for joints that turn. So rows are put
+in until that is less than `SAG`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.verdict import Walk
+from robots import Kinematics, Robot
+from surfaces import Surface
+from surfaces.passes import PassPlaces, ToolLines
+from surfaces.toolpaths import arc_at
+
+Floats = NDArray[np.float64]
+
+SAG = 1e-5  # [m] how far the path between two feet may be from straight
+FAR = 10.0  # [m] the reach of an arm whose slides have no ends
+MOST_ROWS = 400_000
+
+
+class Feet(NamedTuple):
+    """The path of a tool's feet."""
+
+    lines: ToolLines
+    off: float
+    """m, how far the path may be from these lines at most."""
+
+
+def feet_on(surface: Surface, robot: Robot, walk: Walk) -> Feet:
+    """The feet of a motion all of which runs over a surface."""
+    dense = _dense(robot, walk.q)
+    points, _ = Kinematics(robot).tools(dense.q)
+    at = surface.closest(points)
+    feet = points - at.height[:, None] * at.normal
+    lines = ToolLines(feet, at.normal, np.zeros(len(feet), dtype=np.int64))
+    return Feet(lines, 2.0 * dense.sag)
+
+
+def feet_along(places: PassPlaces, robot: Robot, walk: Walk, height: float) -> Feet:
+    """The feet of a motion along passes; where the tool is lifted it has none.
+
+    Args:
+        places: the poses of the passes.
+        robot: the arm.
+        walk: the motion, marked at the poses.
+        height: m, signed, of the tool point over the surface along the outward normal.
+    """
+    dense = _dense(robot, walk.q)
+    points, _ = Kinematics(robot).tools(dense.q)
+    marks = np.flatnonzero(walk.cell >= 0)
+    last, section = len(marks) - 1, np.searchsorted(marks, dense.row, side="right") - 1
+    known = (section >= 0) & (dense.row <= marks[-1])
+    pose = walk.cell[marks]
+    before = np.clip(section, 0, last)
+    after = np.minimum(before + 1, last)
+    a, b = pose[before], pose[after]
+    normals, _ = arc_at(places.normals[a], places.normals[b], _share(places.points, a, b, points))
+    own = known & (places.stretch[a] >= 0) & (places.stretch[b] >= 0)
+    feet, stretch = (points - height * normals)[own], places.stretch[a][own]
+    rows = np.flatnonzero(own)
+    # A new number where something lies between two feet that is none, so that they are not joined.
+    part = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)
+    _, number = np.unique(np.column_stack([part, stretch]), axis=0, return_inverse=True)
+    return Feet(ToolLines(feet, normals[own], number.reshape(-1)), 2.0 * dense.sag)
+
+
+def _share(points: Floats, a: NDArray[np.int64], b: NDArray[np.int64], tool: Floats) -> Floats:
+    """(k,) how far tool points are from the poses a to the poses b, 0 to 1."""
+    way = points[b] - points[a]
+    along = ((tool - points[a]) * way).sum(axis=1)
+    return np.asarray(np.clip(along / np.maximum((way**2).sum(axis=1), 1e-18), 0.0, 1.0))
+
+
+class _Dense(NamedTuple):
+    """A motion with more rows."""
+
+    q: Floats
+    row: Floats
+    """(m,) in the motion that was given, with the share of the way to the next one."""
+    sag: float
+    """m, how far the tool point is from its chord between rows at most."""
+
+
+def _dense(robot: Robot, q: Floats) -> _Dense:
+    """The same motion with so many rows that the tool point's path is straight between them."""
+    reach = robot.reach if np.isfinite(robot.reach) else FAR
+    # A slide bends no path; it counts as the turn that sweeps it.
+    scale = np.where(robot.prismatic, 1.0 / reach, 1.0)
+    steps = (np.abs(np.diff(q, axis=0)) * scale).sum(axis=1)
+    finest = np.ceil(steps * np.sqrt(reach / (8.0 * SAG))).astype(np.int64)
+    count = np.maximum(finest, 1)
+    if count.sum() > MOST_ROWS:
+        count = np.maximum(count * MOST_ROWS // count.sum(), 1)
+    of = np.repeat(np.arange(len(count)), count)
+    share = (np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)) / count[of]
+    rows = np.concatenate([q[of] + share[:, None] * (q[of + 1] - q[of]), q[-1:]])
+    sag = float((reach * (steps / count) ** 2).max(initial=0.0)) / 8.0
+    return _Dense(rows, np.append(of + share, len(q) - 1.0), sag)
