@@ -9,13 +9,13 @@ of the roadmap itself.
 
 from __future__ import annotations
 
-from collections import deque
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.clock import Clock
+from feasibility.compiled import allocating
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.graph import (
     COMPONENTS,
@@ -148,11 +148,9 @@ def _take_over(
     """Take motions between components, and to cells that they miss, as edges; True for any."""
     routes = _Routes(fine.roadmap, origin)
     gained = False
-    for edge in range(fine.roadmap.counters[EDGES]):
-        a, b = (int(node) for node in fine.roadmap.ends[edge])
-        if a not in routes.source or b not in routes.source:
-            continue
-        x, y = origin[routes.source[a]], origin[routes.source[b]]
+    for edge in _joining(exploration, fine.roadmap, routes).tolist():
+        a, b = fine.roadmap.ends[edge].tolist()
+        x, y = int(routes.old[a]), int(routes.old[b])
         if _root(exploration, x) != _root(exploration, y):
             back = routes.to(b)[::-1]
             motion = np.vstack([routes.to(a), edge_motion(fine.roadmap, edge)[1:], back[1:]])
@@ -160,11 +158,10 @@ def _take_over(
             gained = True
     cell_of = np.full(len(fine.cells), -1)
     cell_of[same] = np.arange(len(same))
-    for node in sorted(routes.source):
-        cell = int(cell_of[fine.roadmap.cell[node]])
-        x = origin[routes.source[node]]
+    for node in _covering(exploration, fine.roadmap, routes, cell_of).tolist():
+        cell, x = int(cell_of[fine.roadmap.cell[node]]), int(routes.old[node])
         own = _root(exploration, x)
-        if cell >= 0 and not exploration.roadmap.cover[own, cell]:
+        if not exploration.roadmap.cover[own, cell]:
             motion = routes.to(node)
             roadmap = exploration.reserve(0)
             y = add_node(exploration.arrays, exploration.work, roadmap, cell, motion[-1], own)
@@ -174,9 +171,36 @@ def _take_over(
     return gained
 
 
+def _joining(exploration: Exploration, roadmap: Roadmap, routes: _Routes) -> NDArray[np.int64]:
+    """Edges over finer cells that join two components; one joined stays so, so none is missed."""
+    a, b = roadmap.ends[: roadmap.counters[EDGES]].T
+    known = np.flatnonzero((routes.old[a] >= 0) & (routes.old[b] >= 0))
+    root = _roots(exploration)
+    return known[root[routes.old[a[known]]] != root[routes.old[b[known]]]]
+
+
+def _covering(
+    exploration: Exploration, roadmap: Roadmap, routes: _Routes, cell_of: NDArray[np.int64]
+) -> NDArray[np.int64]:
+    """Nodes over the centre of a cell that their component misses."""
+    cells = cell_of[roadmap.cell[: len(routes.old)]]
+    there = np.flatnonzero((routes.old >= 0) & (cells >= 0))
+    root = _roots(exploration)[routes.old[there]]
+    return there[exploration.roadmap.cover[root, cells[there]] == 0]
+
+
 def _root(exploration: Exploration, node: int) -> int:
     """The component of a node."""
     return int(root_of(exploration.roadmap, exploration.roadmap.component[node]))
+
+
+def _roots(exploration: Exploration) -> NDArray[np.int64]:
+    """The component of every node."""
+    parent = exploration.roadmap.parent
+    found = exploration.roadmap.component[: exploration.roadmap.counters[NODES]]
+    while np.any(parent[found] != found):
+        found = parent[found]
+    return found
 
 
 class _Routes:
@@ -184,31 +208,62 @@ class _Routes:
 
     def __init__(self, roadmap: Roadmap, origin: dict[int, int]) -> None:
         self._roadmap = roadmap
-        self.source = {node: node for node in origin}
-        """Of each node that a motion leads to: where it begins."""
-        self._came: dict[int, tuple[int, int]] = {}
-        count = roadmap.counters[EDGES]
-        at: dict[int, list[tuple[int, int]]] = {}
-        for edge, (a, b) in enumerate(roadmap.ends[:count].tolist()):
-            at.setdefault(a, []).append((b, edge))
-            at.setdefault(b, []).append((a, edge))
-        queue = deque(sorted(origin))
-        while queue:
-            node = queue.popleft()
-            for other, edge in at.get(node, ()):
-                if other not in self.source:
-                    self.source[other] = self.source[node]
-                    self._came[other] = (node, edge)
-                    queue.append(other)
+        starts = np.array(sorted(origin), dtype=np.int64)
+        nodes, edges = roadmap.counters[NODES], roadmap.counters[EDGES]
+        source, self._before, self._edge = breadth_first(roadmap.ends[:edges], starts, nodes)
+        known = np.array([origin[start] for start in starts.tolist()], dtype=np.int64)
+        self.old = np.full(nodes, -1)
+        """Of each node that a motion leads to: the old node that it begins at; else -1."""
+        self.old[source >= 0] = known[source[source >= 0]]
 
     def to(self, node: int) -> NDArray[np.float64]:
         """(k, n) waypoints from the source of a node to it, both included."""
         parts = [self._roadmap.q[node][None]]
-        while node in self._came:
-            before, edge = self._came[node]
+        while self._before[node] >= 0:
+            before, edge = int(self._before[node]), int(self._edge[node])
             motion = edge_motion(self._roadmap, edge)
             if int(self._roadmap.ends[edge, 0]) != before:
                 motion = motion[::-1]
             parts.append(motion[:-1])
             node = before
         return np.vstack(parts[::-1])
+
+
+@allocating
+def breadth_first(ends, starts, nodes):  # type: ignore[no-untyped-def]
+    """Of each node: which of `starts` is nearest in edges, and the node and edge before; or -1."""
+    first = np.zeros(nodes + 1, dtype=np.int64)
+    for edge in range(len(ends)):
+        first[ends[edge, 0] + 1] += 1
+        first[ends[edge, 1] + 1] += 1
+    for node in range(nodes):
+        first[node + 1] += first[node]
+    at = np.empty(2 * len(ends), dtype=np.int64)
+    filled = first[:-1].copy()
+    for edge in range(len(ends)):
+        for end in range(2):
+            node = ends[edge, end]
+            at[filled[node]] = edge
+            filled[node] += 1
+    source = np.full(nodes, -1)
+    before = np.full(nodes, -1)
+    by = np.full(nodes, -1)
+    queue = np.empty(nodes, dtype=np.int64)
+    tail = len(starts)
+    for start in range(tail):
+        queue[start] = starts[start]
+        source[starts[start]] = start
+    for head in range(nodes):
+        if head == tail:
+            break
+        node = queue[head]
+        for k in range(first[node], first[node + 1]):
+            edge = at[k]
+            other = ends[edge, 1] if ends[edge, 0] == node else ends[edge, 0]
+            if source[other] < 0:
+                source[other] = source[node]
+                before[other] = node
+                by[other] = edge
+                queue[tail] = other
+                tail += 1
+    return source, before, by
