@@ -1,9 +1,11 @@
-"""Compiled functions, kept on disk for as long as none of their sources changes.
+"""Compiled functions, kept on disk for as long as nothing that they were compiled from changes.
 
 numba keeps what it has compiled until the file of that function changes. What a kernel calls, and
 the constants that it reads, are compiled into it, whichever files they stand in: with another
 version of those, a kernel that was kept would run on with the old ones, and give wrong results
-without a word. So all kernels are compiled anew once a file changes in any folder that holds some.
+without a word. So a kept kernel holds only where its stamp does: the code of its function, every
+value that this code names, and the same again of every function among those. Types of arguments
+are in numba's own key of each kernel, but for the names of their fields, which are added.
 
 Take `njit` and `cfunc` from here, not from numba.
 """
@@ -11,69 +13,199 @@ Take `njit` and `cfunc` from here, not from numba.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from enum import Enum
 from functools import cache
 from pathlib import Path
+from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
-from numba import cfunc, njit
-from numba.core import caching
+import numba
+import numpy as np
+from numba.core import caching, types
+from numba.core.ccallback import CFunc
 
 __all__ = ["cfunc", "njit"]
 
-HERE = Path(__file__).resolve().parent
-PACKAGES = ("robots", "surfaces", "feasibility")
-MARKS = (b"njit", b"cfunc", b"@kernel", b"@inlined", b"@allocating")
+OURS = ("robots", "surfaces", "feasibility", "coverable_")
+PLAIN = (int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
+LIBRARY = (ModuleType, FunctionType, BuiltinFunctionType, np.ufunc, types.Type)
+COMPILED = ("py_func", "_defn", "_pyfunc")  # what compiled functions and intrinsics are made of
+HOW = Path(__file__).read_bytes()  # how kernels are compiled is in this file
+Function = Any
+"""A Python function."""
 
 
-def _sources() -> Iterator[bytes]:
-    """This file, the files that hold kernels, and all others in their rooms."""
-    yield Path(__file__).read_bytes()
-    for package in PACKAGES:
-        rooms: dict[Path, list[bytes]] = {}
-        for path in sorted((HERE / package).rglob("*.py")):
-            rooms.setdefault(path.parent, []).append(path.read_bytes())
-        for room, texts in rooms.items():
-            with_kernels = [text for text in texts if any(mark in text for mark in MARKS)]
-            # What stands beside the packages' doors is no part of kernels unless it holds some.
-            yield from with_kernels if room.parent == HERE or not with_kernels else texts
+def njit(**options: Any) -> Callable[[Function], Any]:
+    """numba's decorator; what it compiles is kept if `cache` is among the options."""
+    kept = options.pop("cache", False)
+
+    def decorate(function: Function) -> Any:
+        compiled: Any = numba.njit(**options)(function)
+        if kept and compiled is not function:  # as it is where the compiler is switched off
+            compiled._cache = KeptKernels(function, options)
+        return compiled
+
+    return decorate
+
+
+def cfunc(signature: Any, **options: Any) -> Callable[[Function], Any]:
+    """numba's decorator for functions that are called by their address; they are kept as above."""
+    kept = options.pop("cache", False)
+
+    def decorate(function: Function) -> Any:
+        arguments = signature.args, signature.return_type
+        compiled: Any = CFunc(function, arguments, locals={}, options=options)
+        if kept:
+            compiled._cache = KeptKernels(function, options)
+        compiled.compile()
+        return compiled
+
+    return decorate
+
+
+class KeptKernels(caching.FunctionCache):
+    """What was compiled of one function, on disk."""
+
+    def __init__(self, function: Function, options: dict[str, Any]) -> None:
+        """Nothing is read yet."""
+        super().__init__(function)
+        self._options = options
+        self._cache_file = _Files(self._cache_path, self._impl.filename_base, "")
+
+    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
+        """numba's key, with the names of fields.
+
+        numba asks for it before it looks for a kernel, and before it keeps one: by then all that
+        the function calls is there, which it need not be where the function is made.
+        """
+        self._cache_file._source_stamp = stamp(self._py_func, self._options)
+        arguments = getattr(signature, "args", signature)
+        key: tuple[Any, ...] = super()._index_key(signature, codegen)
+        return (*key, tuple(map(_layout, arguments)))
+
+
+class _Files(caching.IndexDataCacheFile):
+    """The files of what was compiled of one function."""
+
+    def _load_index(self) -> dict[Any, str]:
+        """What is kept; nothing where its list names a class that has moved."""
+        try:
+            found: dict[Any, str] = super()._load_index()
+        except (ImportError, AttributeError):
+            return {}
+        return found
+
+
+def _layout(kind: Any) -> tuple[Any, ...]:
+    """Names of the fields of all named tuples in a type of numba's, in their order."""
+    has_parts, has_fields = (isinstance(kind, t) for t in (types.BaseTuple, types.BaseNamedTuple))
+    inside = tuple(map(_layout, kind.types)) if has_parts else ()
+    return (kind.fields, *inside) if has_fields else inside
+
+
+def stamp(function: Function, options: dict[str, Any]) -> str:
+    """A hash of a function's code, all values that it names, and the same of functions among them.
+
+    Args:
+        function: a Python function, which is to be compiled.
+        options: how.
+
+    Raises:
+        TypeError: if one of them is of a kind that it is not known how to compare.
+
+    Example:
+        >>> def add(x):
+        ...     return x + 1
+        >>> stamp(add, {}) == stamp(add, {"fastmath": True})
+        False
+    """
+    found: dict[Function, bytes] = {}
+    waiting = [function]
+    while waiting:
+        reached = waiting.pop()
+        if reached not in found:
+            found[reached], functions = _parts(reached)
+            waiting += functions
+    whole = hashlib.sha256(HOW + repr(sorted(options.items())).encode())
+    for part in sorted(set(found.values())):
+        whole.update(part)
+    return whole.hexdigest()
 
 
 @cache
-def content_stamp() -> str:
-    """One hash of all sources of kernels."""
-    found = hashlib.sha256()
-    for text in _sources():
-        found.update(hashlib.sha256(text).digest())
-    return found.hexdigest()
+def _parts(function: Function) -> tuple[bytes, list[Function]]:
+    """A hash of what a function is by itself, and the functions that it names."""
+    functions: list[Function] = []
+    text = [_code(function)]
+    for name, value in _named(function):
+        text.append(f"{name} = {_described(value, functions)}")
+    return hashlib.sha256("\n".join(text).encode()).digest(), functions
 
 
-def _stamp_by_content() -> None:
-    """Have all sources of kernels be the stamp of a file of ours, in place of its time and size.
+@cache
+def _code(function: Function) -> str:
+    """A hash of a function's code, without its place in its file and without its description."""
 
-    What was compiled in one copy of the project then holds in every other with the same sources.
-    """
-    of_file = caching._SourceFileBackedLocatorMixin.get_source_stamp
+    def text(code: CodeType) -> str:
+        constants = list(map(constant, code.co_consts))
+        names = code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars
+        return repr((code.co_code, code.co_flags, constants, names))
 
-    def get_source_stamp(locator: Any) -> Any:
-        ours = HERE in Path(locator._py_file).resolve().parents
-        return content_stamp() if ours else of_file(locator)
+    def constant(value: object) -> str:
+        if isinstance(value, frozenset):
+            return repr(sorted(map(repr, value)))
+        if isinstance(value, CodeType):
+            return text(value)
+        return repr(value) if value != function.__doc__ else ""
 
-    setattr(caching._SourceFileBackedLocatorMixin, "get_source_stamp", get_source_stamp)  # noqa: B010
-
-
-def _forget_what_is_elsewhere() -> None:
-    """Have numba compile anew where a list of kept kernels names a class that has moved."""
-    load = caching.IndexDataCacheFile._load_index
-
-    def load_index(kept: Any) -> Any:
-        try:
-            return load(kept)
-        except (ImportError, AttributeError):
-            return {}
-
-    setattr(caching.IndexDataCacheFile, "_load_index", load_index)  # noqa: B010
+    return hashlib.sha256(text(function.__code__).encode()).hexdigest()
 
 
-_stamp_by_content()
-_forget_what_is_elsewhere()
+def _named(function: Function) -> Iterator[tuple[str, object]]:
+    """What a function's code names, and its defaults; names of attributes are among the names."""
+    yield "defaults", (function.__defaults__, tuple((function.__kwdefaults__ or {}).items()))
+    cells = zip(function.__code__.co_freevars, function.__closure__ or (), strict=True)
+    yield from ((name, cell.cell_contents) for name, cell in cells)
+    waiting, names = [function.__code__], set()
+    while waiting:
+        code = waiting.pop()
+        waiting += [inner for inner in code.co_consts if isinstance(inner, CodeType)]
+        names.update(code.co_names)
+    for name in sorted(names & function.__globals__.keys()):
+        yield name, function.__globals__[name]
+
+
+def _described(value: Any, functions: list[Function]) -> str:
+    """A value as text; functions in it are told by names and code, and added to the list."""
+    inner = next((vars(value)[kind] for kind in COMPILED if kind in _held(value)), value)
+    if isinstance(inner, FunctionType) and (inner is not value or _is_ours(value)):
+        functions.append(inner)
+        options = sorted(_held(value).get("targetoptions", {}).items())
+        return f"{inner.__module__}.{inner.__qualname__} {options} {_code(inner)}"
+    if isinstance(value, type):
+        fields = getattr(value, "_fields", ()), getattr(value, "_field_defaults", {})
+        members = [(name, item.value) for name, item in getattr(value, "__members__", {}).items()]
+        return f"{value.__module__}.{value.__qualname__} {fields} {members}"
+    if isinstance(value, Enum):
+        return f"{_described(type(value), functions)} {value.name}"
+    if isinstance(value, tuple):
+        return f"{_described(type(value), functions)} {[_described(v, functions) for v in value]}"
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} {value.shape} {value.strides} {value.tobytes()!r}"
+    if isinstance(value, PLAIN):
+        return f"{type(value).__name__} {value!r}"
+    if isinstance(value, LIBRARY) and not _is_ours(value):
+        return f"{getattr(value, '__module__', '')}.{getattr(value, '__name__', value)}"
+    raise TypeError(f"a kernel names {value!r}, and it is not known how to tell when that changes")
+
+
+def _held(value: Any) -> dict[str, Any]:
+    """What an object holds by itself."""
+    return getattr(value, "__dict__", {})
+
+
+def _is_ours(value: Any) -> bool:
+    """Does a module, class or function belong to this project?"""
+    name = value.__name__ if isinstance(value, ModuleType) else value.__module__
+    return str(name).startswith(OURS)

@@ -1,63 +1,209 @@
-"""Kernels that are kept on disk are compiled anew when what they call has changed elsewhere."""
+"""Kernels that are kept on disk are compiled anew when what they were made of has changed."""
 
 from __future__ import annotations
 
+import importlib
 import os
+import pkgutil
 import shutil
 import subprocess
 import sys
+import types
+from collections import namedtuple
 from pathlib import Path
+from typing import Any
 
+import numba
 import pytest
+from numba.core.registry import cpu_target
+
+import feasibility
+import robots
+import surfaces
+from coverable_kernels import KeptKernels, stamp
 
 ROOT = Path(__file__).parents[1]
-CALLS = "from coverable_kernels import njit\nfrom robots.inner import inner\n"
-OUTER = "\n\n@njit(cache=True)\ndef outer():\n    return inner()\n"
-INNER = "from coverable_kernels import njit\n\n\n@njit(cache=True)\ndef inner():\n    return {}\n"
+INNER = """
+from coverable_kernels import njit
+import numpy as np
+from enum import Enum
+from typing import NamedTuple
+SCALE, TABLE = 2.0, np.array([0.5, 0.0])
+UNUSED = 1.0
+
+class Kind(Enum):
+    BIG = 5
+
+class Pair(NamedTuple):
+    first: float
+    second: float
+
+@njit(error_model="numpy", cache=True)
+def innermost(x):
+    "What it does."
+    return x + 1.0
+
+@njit(cache=True)
+def inner(x, more=0.0):
+    pair = Pair(x, Kind.BIG.value)
+    return innermost(pair.first) * SCALE + more + TABLE[0]
+
+def made(factor):
+    @njit()
+    def closed(x):
+        return factor * x
+    return closed
+
+closed = made(3.0)
+"""
+OUTER = """
+from coverable_kernels import cfunc, njit
+from numba import float64
+from robots.inner import closed, inner
+
+@njit(cache=True)
+def outer(x):
+    return inner(x) + closed(x)
+
+@cfunc(float64(float64), cache=True)
+def called(x):
+    return inner(x) + closed(x)
+"""
+
+
+def stamp_of(inner: str) -> str:
+    """The stamp of the outer kernel, with that text of the module of the inner one."""
+    module = types.ModuleType("robots.inner")
+    exec(inner.replace("cache=True", "cache=False"), module.__dict__)
+    outer = types.ModuleType("robots.outer")
+    before = sys.modules.get("robots.inner")
+    sys.modules["robots.inner"] = module
+    try:
+        exec(OUTER[: OUTER.index("@cfunc")].replace("cache=True", "cache=False"), outer.__dict__)
+    finally:
+        del sys.modules["robots.inner"]
+        if before is not None:
+            sys.modules["robots.inner"] = before
+    return stamp(outer.outer.py_func, {})
+
+
+@pytest.fixture(scope="module")
+def first() -> str:
+    """The stamp before anything changes."""
+    return stamp_of(INNER)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("x + 1.0", "x + 2.0"),
+        ("x + 1.0", "x - 1.0"),
+        ("SCALE, TABLE = 2.0", "SCALE, TABLE = 3.0"),
+        ("SCALE, TABLE = 2.0", "SCALE, TABLE = 2"),
+        ("[0.5, 0.0]", "[0.25, 0.0]"),
+        ("[0.5, 0.0]", "[0.5, 0.0, 0.0]"),
+        ("[0.5, 0.0]", "[[0.5, 0.0]]"),
+        ("more=0.0", "more=1.0"),
+        ("BIG = 5", "BIG = 6"),
+        ("first: float\n    second", "second: float\n    first"),
+        ('error_model="numpy"', 'error_model="python"'),
+        ("made(3.0)", "made(4.0)"),
+    ],
+)
+def test_what_a_kernel_is_made_of_is_in_its_stamp(first: str, old: str, new: str) -> None:
+    assert INNER.count(old) == 1
+    assert stamp_of(INNER.replace(old, new)) != first
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("UNUSED = 1.0", "UNUSED = 2.0"),
+        ("What it does.", "It adds one."),
+        ("\nclosed =", "\n@njit()\ndef unrelated(x):\n    return x\n\nclosed ="),
+        ("\nclass Kind", "\n\n# A comment.\nclass Kind"),
+    ],
+)
+def test_nothing_else_is_in_its_stamp(first: str, old: str, new: str) -> None:
+    assert INNER.count(old) == 1
+    assert stamp_of(INNER.replace(old, new)) == first
+
+
+def test_a_value_that_cannot_be_compared_is_refused() -> None:
+    with pytest.raises(TypeError, match="not known how to tell when that changes"):
+        stamp_of(INNER.replace("SCALE, TABLE = 2.0", "SCALE, TABLE = object()"))
+
+
+def test_every_kernel_of_ours_has_a_stamp() -> None:
+    seen = 0
+    for package in (robots, surfaces, feasibility):
+        for found in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+            if "__main__" in found.name:
+                continue
+            for value in vars(importlib.import_module(found.name)).values():
+                if isinstance(getattr(value, "_cache", None), KeptKernels):
+                    assert len(stamp(value.py_func, value.targetoptions)) == 64
+                    seen += 1
+    assert seen > 100
+
+
+def key_of(value: object) -> tuple[Any, ...]:
+    """The key under which a kernel of such an argument is kept, but for the argument's type."""
+
+    def function(pair: object) -> object:
+        return pair
+
+    codegen = cpu_target.target_context.codegen()
+    return KeptKernels(function, {})._index_key((numba.typeof(value),), codegen)[1:]
+
+
+def test_names_of_fields_are_part_of_the_key() -> None:
+    """To numba each of these is a pair of numbers, of a class of that name."""
+    one, same, other = (namedtuple("Pair", names)(1.0, 2.0) for names in ("a b", "a b", "b a"))
+    assert key_of(one) == key_of(same) != key_of(other)
+    assert key_of((1, (one, 2.0))) == key_of((1, (same, 2.0))) != key_of((1, (other, 2.0)))
 
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
-    """A checkout of two kernels, one of which calls the other."""
+    """A checkout of kernels that call each other."""
     shutil.copy(ROOT / "coverable_kernels.py", tmp_path)
-    for room in ("robots", "surfaces", "feasibility"):
-        (tmp_path / room / "inside").mkdir(parents=True)
-    (tmp_path / "robots" / "outer.py").write_text(CALLS + OUTER)
-    (tmp_path / "robots" / "inner.py").write_text(INNER.format(1))
+    for name, text in (("robots/inner.py", INNER), ("robots/outer.py", OUTER)):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
     return tmp_path
 
 
-def result(checkout: Path) -> tuple[int, bool]:
-    """What a new process gets from the kernel, and whether it came from disk."""
-    code = "from robots.outer import outer; print(outer(), sum(outer.stats.cache_hits.values()))"
+def result(checkout: Path) -> tuple[float, bool]:
+    """What a new process gets from kernel and C function, and whether both came from disk."""
+    code = (
+        "from robots.outer import called, outer;"
+        "print(outer(1.0), called.ctypes(1.0), sum(outer.stats.cache_hits.values()),"
+        "called.cache_hits)"
+    )
     environment = {**os.environ, "PYTHONPATH": str(checkout), "PYTHONDONTWRITEBYTECODE": "1"}
     environment.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run(
         [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True,
         cwd=checkout,
     )  # fmt: skip
-    value, hits = map(int, done.stdout.split())
-    return value, hits > 0
+    kernel, by_address, *hits = map(float, done.stdout.split())
+    assert kernel == by_address
+    assert hits[0] == hits[1]
+    return kernel, hits[0] > 0
 
 
-def test_a_kernel_is_compiled_anew_when_another_that_it_calls_has_changed(checkout: Path) -> None:
-    assert result(checkout) == (1, False)
-    # What holds no kernels changes nothing.
-    (checkout / "surfaces" / "inside" / "plain.py").write_text("NUMBER = 3\n")
-    (checkout / "robots" / "plain.py").write_text("NUMBER = 3\n")
-    assert result(checkout) == (1, True)
-    (checkout / "robots" / "inner.py").write_text(INNER.format(2))
-    assert result(checkout) == (2, False)  # numba alone would have said 1
-
-
-def test_what_was_compiled_holds_in_a_copy(checkout: Path, tmp_path: Path) -> None:
-    assert result(checkout) == (1, False)
+def test_a_kernel_is_compiled_anew_when_another_that_it_calls_has_changed(
+    checkout: Path, tmp_path: Path
+) -> None:
+    assert result(checkout) == (7.5, False)
     copy = tmp_path / "elsewhere"
     shutil.copytree(checkout, copy, ignore=lambda *_: ["elsewhere"], copy_function=shutil.copyfile)
-    assert result(copy) == (1, True)  # although every file is younger
-    (copy / "robots" / "inner.py").write_text(INNER.format(3))
-    assert result(copy) == (3, False)
-    assert result(checkout) == (1, True)
+    (copy / "robots" / "inner.py").write_text(INNER + "\n@njit()\ndef unrelated():\n    return 3\n")
+    assert result(copy) == (7.5, True)  # although every file is younger, and one another
+    (copy / "robots" / "inner.py").write_text(INNER.replace("x + 1.0", "x + 2.0"))
+    assert result(copy) == (9.5, False)  # numba alone would have said 7.5
+    assert result(checkout) == (7.5, True)
 
 
 def test_no_kernel_of_ours_is_kept_by_its_own_file_alone() -> None:
