@@ -85,18 +85,22 @@ def check(
     """
     from feasibility.paper import greedy_search
     from feasibility.roadmap import complete_search
+    from feasibility.speed import at_rates, check_asked
 
     search = Search() if search is None else search
     settings = (search, "search", Search, "a Search, such as Search(seed=1)")
     if collision is not None and isinstance(task, Task):
         task = replace(task, collision=collision)
     problem = Problem.of(robot, cells, task, settings)
+    check_asked(robot, task, search)
     if search.method == "greedy":
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
         from_start = partial(greedy_search, start=robot.start)
         return _decided(problem, search, progress, from_start, clock)
-    return _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
+    clock = Clock(search.time_limit, progress) if clock is None else clock
+    found = _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
+    return at_rates(found, clock)
 
 
 def greedy_check(

@@ -78,6 +78,16 @@ class Task:
     coverage: float | None = None
     """The share of the area that has to be treated for "feasible", besides every cell."""
 
+    speed: float | None = None
+    """m/s, of the tool relative to the surface: what the joints' velocity limits have to allow all
+    along the motion, but where it stops (`feasibility.certification.rates`). None asks for none."""
+    min_manipulability: float | None = None
+    """What the smallest singular value along the motion has to be at least: of the Jacobian of tool
+    point (over the arm's reach) and approach axis, a pure number. None asks for none."""
+    home_deg: tuple[float, ...] | None = None
+    """(n,) degrees, where a path comes from and goes back to; None where it begins and ends over
+    the surface. For arms whose joints all turn."""
+
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task; keep them as plain floats."""
         checks = Checks("task")
@@ -92,6 +102,9 @@ class Task:
             if self.tolerance is None
             else checks.positive("tolerance", self.tolerance),
         }
+        for name, unit in (("speed", "m/s"), ("min_manipulability", "a pure number")):
+            given = getattr(self, name)
+            kept[name] = None if given is None else checks.positive(name, given, unit)
         if not isinstance(self.collision, Collision | None):
             expected = "must be a Collision, such as Collision(clearance=0.005), or None"
             checks.wrong("collision", self.collision, expected)
@@ -101,8 +114,12 @@ class Task:
             "roll_reference": None
             if self.roll_reference is None
             else tuple(checks.direction("roll_reference", self.roll_reference)),
+<<<<<<< HEAD
             "footprint": self._checked_footprint(checks),
             "coverage": self._checked_coverage(checks),
+=======
+            "home_deg": self._checked_home(checks),
+>>>>>>> 8bc9f25 (task.speed and task.min_manipulability: the verdict holds at a speed, and away from singularities)
         }
         checks.done()
         for name, value in {**kept, **kept_too}.items():
@@ -143,6 +160,15 @@ class Task:
                 checks.wrong("approach", self.approach, expected)
             return self.approach
         return tuple(checks.direction("approach", self.approach))
+
+    def _checked_home(self, checks: Checks) -> tuple[float, ...] | None:
+        """Numbers, one for each joint; how many there are, only the arm tells."""
+        if self.home_deg is None:
+            return None
+        count = np.size(self.home_deg) if np.ndim(self.home_deg) == 1 else 1
+        expected = "must be finite numbers, one per joint (degrees)"
+        found = checks.numbers("home_deg", self.home_deg, max(count, 1), expected, 1e6)
+        return None if found is None else tuple(found)
 
     def _checked_roll(self, checks: Checks, cone_deg: Any) -> tuple[float, float] | None:
         """The range of the roll, which may be a single one."""

@@ -100,6 +100,15 @@ class Certificate:
     max_roll: float | None = None
     """rad, bound on how far the roll is from the middle of its range along the walk; None where it
     is free."""
+    max_speed: float | None = None
+    """m/s, lower bound of the speed that the tool may have all along but for the stops, inside the
+    joints' velocity limits; None where no speed is asked for."""
+    min_singular_value: float | None = None
+    """Lower bound of the smallest singular value along the walk; None where it is not asked for."""
+    stops_in_place: int | None = None
+    """How often the tool waits while the arm changes its posture; None as for the speed."""
+    corners: int | None = None
+    """At how many rows the tool's path turns sharply; None as for the speed."""
 
 
 @dataclass(frozen=True, slots=True)

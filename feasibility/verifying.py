@@ -20,6 +20,7 @@ from feasibility.certification import (
     replay_over_surface,
     verify_proof,
 )
+from feasibility.certification.rates import check_rates, replay_rates
 from feasibility.collisions import checked_words
 from feasibility.cut_tree import CutTree
 from feasibility.problem import Problem
@@ -158,7 +159,19 @@ def _of_motion(claim: Literal["motion", "witness"], problem: Problem, q: Any) ->
     robot, cells, task = problem.robot, problem.cells, problem.task
     found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies)
     faults = (*found.faults, *_begun_elsewhere(robot, q))
+    if found.holds and len(cells):
+        faults = (*faults, *_too_fast(problem, Walk(q, np.full(len(q), -1, dtype=np.int64))))
     return Verification(claim, robot, cells, task, faults, found.certificate, q, found.reached)
+
+
+def _too_fast(problem: Problem, walk: Walk) -> tuple[MotionFault, ...]:
+    """What is wrong with speeds and singular values, where the task asks for them."""
+    task = problem.task
+    if task.speed is None and task.min_manipulability is None:
+        return ()
+    check_rates(problem.robot, task)
+    judged = replay_rates(problem.robot, problem.cells, task, walk)
+    return tuple(MotionFault(-1, 0.0, text) for text in judged.refusals)
 
 
 def _begun_elsewhere(robot: Robot, q: Any) -> tuple[MotionFault, ...]:
@@ -179,7 +192,7 @@ def _of_witness(problem: Problem, walk: Walk) -> Verification:
     robot, cells, task = problem.robot, problem.cells, problem.task
     every = np.ones(len(cells), dtype=bool)
     along = replay(robot, cells, task, walk, every)
-    if not along.accepted or _begun_elsewhere(robot, walk.q):
+    if not along.accepted or _begun_elsewhere(robot, walk.q) or _too_fast(problem, walk):
         return found
     return replace(found, faults=(), certificate=along.certificate, reached=every)
 

@@ -70,8 +70,10 @@ feasibility.roadmap.causes
 feasibility.roadmap: walk
 feasibility.roadmap.forward
 feasibility.roadmap: between_rounds complete graph_g outcome refinement warmup
-feasibility: checking
+feasibility.certification.rates
 feasibility.paths
+feasibility.speed
+feasibility: checking
 feasibility.timing
 feasibility.programs
 feasibility.division

@@ -42,7 +42,7 @@ LARGEST_FILE = 256 * 1024  # bytes
 TABLES = ("robot", "surface", "task", "collision", "search")
 TASK = (
     "standoff", "cone_deg", "tolerance", "approach", "roll_deg", "roll_reference", "footprint",
-    "coverage",
+    "coverage", "speed", "min_manipulability", "home_deg",
 )  # fmt: skip
 
 Tables = dict[str, Any]

@@ -1,6 +1,10 @@
 from .coverage import CoveragePath as CoveragePath
 from .coverage import coverage_path as coverage_path
 from .metrics import PathFigures as PathFigures
+from .motion_graph import MotionGraph as MotionGraph
+from .motion_graph import join_self_motions as join_self_motions
+from .motion_graph import motion_graph_of as motion_graph_of
+from .motion_graph import step_to as step_to
 from .order import Order as Order
 from .order import PathError as PathError
 from .order import check_order as check_order

@@ -131,7 +131,23 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     }
     if certificate.max_roll is not None:
         found["max_roll_deg"] = plain(math.degrees(certificate.max_roll))
+    if certificate.stops_in_place is not None:
+        found["max_speed_m_per_s"] = plain(certificate.max_speed)
+        found["stops_in_place"], found["corners"] = certificate.stops_in_place, certificate.corners
+    if certificate.min_singular_value is not None:
+        found["min_singular_value"] = plain(float(certificate.min_singular_value))
     return found
+
+
+def rates_text(certificate: Certificate, task: Task) -> str:
+    """The largest speed, and the smallest singular value; empty where neither is asked for."""
+    parts = []
+    if task.speed is not None and certificate.max_speed is not None:
+        parts.append(f"tool speeds up to {certificate.max_speed:.3g} m/s (asked {task.speed:g})")
+    if task.min_manipulability is not None and certificate.min_singular_value is not None:
+        least = f"singular values of at least {certificate.min_singular_value:.3g}"
+        parts.append(f"{least} (asked {task.min_manipulability:g})")
+    return "; ".join(parts)
 
 
 def roll_text(certificate: Certificate, task: Task) -> str:

@@ -21,6 +21,7 @@ from feasibility.reports.parts import (
     csv_text,
     left_out_json,
     left_out_text,
+    rates_text,
     roll_text,
     seconds,
     seconds_text,
@@ -202,6 +203,7 @@ def _certificate_text(verdict: Verdict) -> str:
     ]
     if found["min_limit_margin_deg"] is not None:
         parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
+    parts.append(rates_text(verdict.certificate, verdict.task))
     return "; ".join(filter(None, [*parts, clearance_text(verdict.certificate)]))
 
 

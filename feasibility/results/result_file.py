@@ -304,12 +304,21 @@ def _certificate(fields: Fields) -> Certificate | None:
         min_clearance=_maybe(row, "min_clearance"),
         nearest_pair=_pair(row, "nearest_pair"),
         max_roll=_maybe(row, "max_roll"),
+        max_speed=_maybe(row, "max_speed"),
+        min_singular_value=_maybe(row, "min_singular_value"),
+        stops_in_place=_count(row, "stops_in_place"),
+        corners=_count(row, "corners"),
     )
 
 
 def _maybe(row: Fields, key: str) -> float | None:
     """A number that may be missing or null; files of earlier versions say nothing of collisions."""
     return None if row.entries.get(key) is None else row.number(key)
+
+
+def _count(row: Fields, key: str) -> int | None:
+    """A whole number that may be missing or null."""
+    return None if row.entries.get(key) is None else row.get(key, int, "a whole number")
 
 
 def _names(row: Fields, key: str) -> tuple[str, ...]:

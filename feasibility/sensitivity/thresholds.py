@@ -159,3 +159,5 @@ class Explanation:
     alone: Verdict | None = None
     """What `check` says with the seed given and no motion known, where `verdict` owes its motion to
     the witness of a threshold; None where `verdict` is that."""
+    rates: RateFigures | None = None
+    """Largest speed and smallest singular value of a feasible case; None of another."""

@@ -1,0 +1,196 @@
+"""The verdict at a speed, and at a distance from singularities.
+
+A motion that covers everything is known; the question is whether one does so at the speed. It is
+judged first. Where it is too slow, motions that hold the speed are put together anew, from all that
+are known and more that are made (`rated_graph`). What is found is replayed like any motion.
+That nothing is found proves nothing: the answer is undecided then.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from coverable_errors import ArgumentError, Fault
+from feasibility.certification import replay
+from feasibility.certification.rates import RateReplay, check_rates, replay_rates
+from feasibility.clock import Clock, OutOfTime
+from feasibility.search import Search
+from feasibility.speed.largest import begin_of, largest_speed
+from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
+from feasibility.speed.routes import covered, route
+from feasibility.task import Task
+from feasibility.verdict import (
+    Answer,
+    Cause,
+    CauseKind,
+    Certificate,
+    Evidence,
+    Verdict,
+    Walk,
+    deferred,
+)
+from robots import Robot
+
+FEW = 5  # cells that are named
+
+
+def check_asked(robot: Robot, task: Task, search: Search) -> None:
+    """Refuse what cannot be asked of speed and singularities.
+
+    Raises:
+        ArgumentError: joints without velocity limits, a speed beyond all of them, or the greedy
+            search.
+    """
+    if task.speed is None and task.min_manipulability is None:
+        return
+    if search.method != "complete":
+        what = "needs the complete search: the greedy one has no motion over the cells' centres"
+        raise ArgumentError(Fault("speed" if task.speed else "min_manipulability", what), "task")
+    check_rates(robot, task)
+
+
+def at_rates(verdict: Verdict, clock: Clock) -> Verdict:
+    """The same verdict where it is not feasible, or nothing is asked; else the one at the speed."""
+    task, walk = verdict.task, verdict.witness
+    asked = task.speed is not None or task.min_manipulability is not None
+    if not asked or not verdict.feasible or walk is None or not len(verdict.cells):
+        return verdict
+    judged = replay_rates(verdict.robot, verdict.cells, task, walk)
+    if judged.accepted:
+        return _accepted(verdict, walk, verdict.certificate, "")
+    rated = rated_graph(verdict)
+    begin, late = begin_of(rated), ""
+    found = route(rated, _fine(rated), begin)
+    try:
+        if found is None:
+            with clock.enforced():
+                grow(rated, clock)
+            found = route(rated, _fine(rated), begin)
+    except OutOfTime:
+        late = " The time limit ran out before all that might be faster was tried."
+    if found is not None:
+        other = rated.walk(found)
+        every = np.ones(len(verdict.cells), dtype=bool)
+        replayed = replay(verdict.robot, verdict.cells, task, other, every)
+        again = replay_rates(verdict.robot, verdict.cells, task, other)
+        if replayed.accepted and again.accepted:
+            said = " It is not the first motion that was found."
+            return _accepted(verdict, other, replayed.certificate, said)
+    return _not_found(verdict, rated, judged, begin, late)
+
+
+def _fine(rated: RatedGraph) -> list[tuple[int, int]]:
+    speed, sigma = rated.task.speed, rated.task.min_manipulability
+    return rated.fine(speed or -np.inf, sigma or -np.inf)
+
+
+def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, said: str) -> Verdict:
+    """The verdict with a motion that is fast enough, and what the judge measured of it."""
+    task = verdict.task
+    judged = replay_rates(verdict.robot, verdict.cells, task, walk, closely=True)
+    places = [stop.cell for stop in judged.stops if stop.why == "in place"]
+    corners = len(judged.stops) - len(places)
+    words = ""
+    if task.speed is not None:
+        waits = _counted(len(places), "wait", "waits") + f" in place{_named(verdict, places)}"
+        time = f", {judged.waiting:.2g} s together," if places else ""
+        words = (
+            f" The tool can have {task.speed:g} m/s all along it inside the joints' velocities, "
+            f"but for {waits}{time} and {_counted(corners, 'corner', 'corners')}."
+        )
+    if task.min_manipulability is not None:
+        words += f" Its smallest singular value is at least {judged.sigma:.3g}."
+    fast = task.speed is not None
+    kept = certificate and replace(
+        certificate,
+        max_speed=judged.speed if fast and np.isfinite(judged.speed) else None,
+        min_singular_value=None if task.min_manipulability is None else judged.sigma,
+        stops_in_place=len(places) if fast else None,
+        corners=corners if fast else None,
+    )
+    message = verdict.message
+    if said and verdict.certificate is not None:
+        old, new = f"{verdict.certificate.waypoints} waypoints", f"{len(walk.q)} waypoints"
+        message = message.replace(old, new, 1)
+    start = int(walk.cell[0])
+    return replace(
+        verdict, witness=walk, certificate=kept, message=message + words + said,
+        start=start if start >= 0 else verdict.start,
+    )  # fmt: skip
+
+
+def _counted(count: int, one: str, many: str) -> str:
+    return f"{count} {one if count == 1 else many}"
+
+
+def _named(verdict: Verdict, cells: list[int]) -> str:
+    """' at cells [0, 1], [2, 3], ...', or nothing."""
+    if not cells:
+        return ""
+    unique = list(dict.fromkeys(cells))
+    names = ", ".join(str(list(verdict.cells.unravel(c))) for c in unique[:FEW])
+    more = ", ..." if len(unique) > FEW else ""
+    return f" at cell{'s' if len(unique) > 1 else ''} {names}{more}"
+
+
+def _not_found(
+    verdict: Verdict, rated: RatedGraph, judged: RateReplay, begin: int | None, late: str
+) -> Verdict:
+    """Undecided: what is wrong with the motion that is known, and how much is possible."""
+    task, total = verdict.task, len(verdict.cells)
+    reached = covered(rated, _fine(rated), begin)
+    asked = []
+    if task.speed is not None:
+        asked.append(f"at {task.speed:g} m/s")
+    if task.min_manipulability is not None:
+        asked.append(f"with singular values of {task.min_manipulability:g} at least")
+    best = largest_speed(rated, begin, task.min_manipulability or -np.inf)
+    message = (
+        f"One continuous motion covers every cell, but none was found that does so "
+        f"{' and '.join(asked)}: on the one that is known {'; '.join(judged.refusals)}. The best "
+        f"of those known covers {int(reached.sum())} of {total} cells."
+    )
+    if task.speed is not None and best > 0.0:
+        message += f" All of them can be covered at {best:.3g} m/s."
+    return replace(
+        verdict, answer=Answer.UNDECIDED, evidence=Evidence.BUDGET, message=message + late,
+        covered=reached, witness=None, certificate=None,
+        causes=deferred(lambda: _causes(rated, reached)),
+    )  # fmt: skip
+
+
+def _causes(rated: RatedGraph, reached: NDArray[np.bool_]) -> tuple[Cause, ...]:
+    """Why cells are missed: what the best motion that leads to each would need."""
+    task, robot = rated.task, rated.robot
+    best: dict[int, tuple[int, int]] = {}
+    for edge in rated.graph.edges.edges:
+        x, y = min(edge), max(edge)
+        for node in (x, y):
+            cell = rated.graph.cell[node]
+            if reached[cell] or rated.graph.cell[x] == rated.graph.cell[y]:
+                continue
+            if cell not in best or rated.rated[x, y].speed > rated.rated[best[cell]].speed:
+                best[cell] = (x, y)
+    causes = []
+    for cell in np.flatnonzero(~reached).tolist():
+        edge = best.get(cell)
+        detail = "no motion to it is known that holds the speed"
+        if edge is not None and task.speed is not None and rated.rated[edge].speed < task.speed:
+            one = rated.rated[edge]
+            unit = "m/s" if robot.prismatic[one.joint] else "rad/s"
+            needed = task.speed / one.share if one.share > 0.0 else np.inf
+            name, place = robot.joint_names[one.joint], list(rated.cells.unravel(cell))
+            detail = (
+                f"{name} would need {needed:.3g} {unit} at cell {place}; it allows "
+                f"{float(robot.max_velocity[one.joint]):.3g}"
+            )
+        elif edge is not None and task.min_manipulability is not None:
+            detail = (
+                f"singular values fall to {rated.rated[edge].sigma:.3g} on the way to it; "
+                f"{task.min_manipulability:g} is asked"
+            )
+        causes.append(Cause(cell, CauseKind.DISCONNECTED, False, detail))
+    return tuple(causes)

@@ -1,0 +1,67 @@
+"""The largest speed of the tool, and how near singularities a motion comes: figures to explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from feasibility.certification.rates import RateReplay, replay_rates
+from feasibility.clock import Clock, OutOfTime
+from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
+from feasibility.speed.routes import route
+from feasibility.verdict import Verdict
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RateFigures:
+    """What the motions of a feasible verdict allow."""
+
+    witness: RateReplay
+    """Of the covering motion itself."""
+    largest: float
+    """m/s, the largest speed that a motion over all cells is known to hold."""
+
+
+def rate_figures(verdict: Verdict, clock: Clock | None = None) -> RateFigures | None:
+    """Look for the largest speed; None where the verdict has no motion.
+
+    Where the joints have no velocity limits, it is inf.
+
+    Args:
+        verdict: a feasible one, of the complete search.
+        clock: when its time is over, what is known by then is returned.
+    """
+    if verdict.witness is None or not len(verdict.cells):
+        return None
+    free = replace(verdict.task, speed=None, min_manipulability=None)
+    judged = replay_rates(verdict.robot, verdict.cells, free, verdict.witness, closely=True)
+    if not np.isfinite(judged.speed):
+        return RateFigures(judged, judged.speed)
+    rated = rated_graph(replace(verdict, task=free))
+    try:
+        grow(rated, Clock() if clock is None else clock)
+    except OutOfTime:
+        rated.rate()
+    return RateFigures(judged, max(judged.speed, largest_speed(rated, begin_of(rated))))
+
+
+def begin_of(rated: RatedGraph) -> int | None:
+    """The node that the motion has to begin at; None where the arm has no start."""
+    start = rated.robot.start
+    if start is None:
+        return None
+    return int(np.argmin([np.abs(q - start).max() for q in rated.graph.q]))
+
+
+def largest_speed(rated: RatedGraph, begin: int | None, sigma: float = -np.inf) -> float:
+    """m/s, the largest speed that a motion over all cells allows; 0 where there is no motion."""
+    speeds = np.unique([r.speed for r in rated.rated.values() if r.sigma >= sigma])
+    low, high = -1, len(speeds)  # speeds[low] is possible, speeds[high] is not
+    while high - low > 1:
+        middle = (low + high) // 2
+        if route(rated, rated.fine(float(speeds[middle]), sigma), begin) is None:
+            high = middle
+        else:
+            low = middle
+    return float(speeds[low]) if low >= 0 else 0.0

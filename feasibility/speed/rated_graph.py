@@ -1,0 +1,121 @@
+"""The motions that a verdict knows, each with the speed and the singular values it allows.
+
+More motions are made from cell to cell, from every configuration that is known, whatever the speed
+that is asked for: so what is found at one speed is found at every lower one, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.rates import SegmentRates, in_place, segment_rates
+from feasibility.clock import Clock
+from feasibility.paths import MotionGraph, join_self_motions, motion_graph_of, step_to
+from feasibility.task import Task
+from feasibility.verdict import Verdict, Walk
+from robots import Robot
+from surfaces import Cells
+
+Array = NDArray[np.float64]
+Edge = tuple[int, int]
+"""Two nodes, the lower index first."""
+
+MOST_STEPS = 20_000  # ways from a configuration to a cell beside it that are tried
+
+
+@dataclass(frozen=True, slots=True)
+class Rated:
+    """What one motion between two configurations allows."""
+
+    speed: float
+    """m/s, lower bound."""
+    sigma: float
+    """Lower bound of the smallest singular value."""
+    joint: int
+    """The joint that allows no more speed."""
+    share: float
+    """m/s allowed over that joint's limit: v / share is what the joint needs for v."""
+
+
+@dataclass
+class RatedGraph:
+    """Nodes, motions, and what they allow."""
+
+    robot: Robot
+    cells: Cells
+    task: Task
+    graph: MotionGraph
+    rated: dict[Edge, Rated] = field(default_factory=dict)
+
+    def rate(self) -> None:
+        """Rate the motions that are not yet rated, all at once."""
+        new = [(min(x, y), max(x, y)) for x, y in self.graph.edges.edges]
+        new = [edge for edge in new if edge not in self.rated]
+        if not new:
+            return
+        rows = [np.asarray(self.graph.motion(*edge)) for edge in new]
+        q = np.vstack(rows)
+        owner = np.repeat(np.arange(len(new)), [len(motion) for motion in rows])
+        inside = owner[:-1] == owner[1:]
+        resting = in_place(self.robot, self.cells, self.task, q)[inside]
+        found = segment_rates(
+            self.robot, q[:-1][inside], q[1:][inside],
+            sigma=self.task.min_manipulability, group=owner[:-1][inside], resting=resting,
+        )  # fmt: skip
+        self._keep(new, owner[:-1][inside], found)
+
+    def _keep(self, new: list[Edge], owner: NDArray[np.int64], found: SegmentRates) -> None:
+        """Take the least of each motion's segments."""
+        order = np.lexsort((found.speed, owner))
+        first = np.searchsorted(owner[order], np.arange(len(new)))
+        sigma = np.full(len(new), np.inf)
+        np.minimum.at(sigma, owner, found.sigma)
+        for k, edge in enumerate(new):
+            if first[k] >= len(order) or owner[order[first[k]]] != k:
+                self.rated[edge] = Rated(np.inf, np.inf, 0, np.inf)
+                continue
+            row = order[first[k]]
+            joint = int(found.joint[row])
+            exact = float(found.sampled_speed[row]) / float(self.robot.max_velocity[joint])
+            self.rated[edge] = Rated(float(found.speed[row]), float(sigma[k]), joint, exact)
+
+    def fine(self, speed: float, sigma: float) -> list[Edge]:
+        """The motions that allow both."""
+        return [e for e, r in self.rated.items() if r.speed >= speed and r.sigma >= sigma]
+
+    def walk(self, nodes: list[int]) -> Walk:
+        """The motion from node to node."""
+        return self.graph.walk(nodes)
+
+
+def rated_graph(verdict: Verdict) -> RatedGraph:
+    """The motions of a verdict of the complete search, rated."""
+    graph = RatedGraph(verdict.robot, verdict.cells, verdict.task, motion_graph_of(verdict))
+    graph.rate()
+    return graph
+
+
+def grow(rated: RatedGraph, clock: Clock) -> None:
+    """Make more motions from every known configuration to the cells beside it, and over its own.
+
+    Raises:
+        OutOfTime: the deadline passed.
+    """
+    graph, cells = rated.graph, rated.cells
+    beside: dict[int, list[int]] = {}
+    for i, j in cells.pairs.tolist():
+        beside.setdefault(i, []).append(j)
+        beside.setdefault(j, []).append(i)
+    left = MOST_STEPS
+    for x in range(len(graph.cell)):
+        clock.tick(0, None, "looking for faster motions")
+        join_self_motions(graph, x)
+        for cell in beside.get(graph.cell[x], []):
+            step_to(graph, x, cell)
+        left -= len(beside.get(graph.cell[x], []))
+        if left <= 0:
+            break
+    rated.rate()
