@@ -97,10 +97,10 @@ def check(
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
         from_start = partial(greedy_search, start=robot.start)
-        return _decided(problem, search, progress, from_start, clock)
+        return _measured(_decided(problem, search, progress, from_start, clock), clock)
     clock = Clock(search.time_limit, progress) if clock is None else clock
     found = _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
-    return at_rates(found, clock)
+    return _measured(at_rates(found, clock), clock)
 
 
 def greedy_check(
@@ -128,7 +128,7 @@ def greedy_check(
         return greedy_search(problem, search, clock, start)
 
     search = Search(method="greedy") if search is None else search
-    return _decided(Problem.of(robot, cells, task), search, progress, from_start)
+    return _measured(_decided(Problem.of(robot, cells, task), search, progress, from_start))
 
 
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
@@ -203,14 +203,7 @@ def _decided(
     last = tried[-1].replayed
     chosen = tried[-1] if last is not None and last.accepted else tried[0]
     found, replayed = chosen.found, chosen.replayed
-    decision = _answer(problem, found, replayed)
-    treated: Any = None
-    if decision.answer is Answer.FEASIBLE and problem.task.footprint is not None:
-        treated = deferred(lambda: _treated(problem, found, clock))
-    if treated is not None and problem.task.coverage is not None:
-        treated = _treated(problem, found, clock)
-        decision = with_coverage(decision, problem.task, treated)
-    answer, evidence, message = decision
+    answer, evidence, message = _answer(problem, found, replayed)
     feasible = answer is Answer.FEASIBLE
     return Verdict(
         answer=answer,
@@ -240,7 +233,6 @@ def _decided(
         n_edges=found.n_edges,
         unchecked_links=() if bodies is None else bodies.unchecked,
         pairs_left_out=() if bodies is None else bodies.left_out,
-        treated=treated,
         statistics={**found.counts, "fk": sum(one.found.counts["fk"] for one in tried)},
     )
 
@@ -254,15 +246,32 @@ def _causes(found: Found, clock: Clock) -> tuple[Cause, ...]:
         return ()
 
 
-def _treated(problem: Problem, found: Found, clock: Clock) -> TreatedArea | None:
+def _measured(verdict: Verdict, clock: Clock | None = None) -> Verdict:
+    """The verdict with what its motion treats, which may be too little for the coverage asked."""
+    task = verdict.task
+    if not verdict.feasible or task.footprint is None:
+        return verdict
+    clock = Clock() if clock is None else clock
+    if task.coverage is None:
+        return replace(verdict, treated=deferred(lambda: _treated(verdict, clock)))
+    treated = _treated(verdict, clock)
+    said = Decision(verdict.answer, verdict.evidence, verdict.message)
+    decision = with_coverage(said, task, treated)
+    kept: dict[str, Any] = {"treated": treated, **decision._asdict()}
+    if decision.answer is not Answer.FEASIBLE:
+        kept |= {"witness": None, "certificate": None}
+    return replace(verdict, **kept)
+
+
+def _treated(verdict: Verdict, clock: Clock) -> TreatedArea | None:
     """What the motion treats; None where there is no motion, or no time to measure it."""
     from feasibility.treated import treated_by_walk
 
-    if found.motion is None:
+    if verdict.witness is None:
         return None
     try:
         with clock.enforced():
-            return treated_by_walk(problem.robot, problem.cells, problem.task, found.motion)
+            return treated_by_walk(verdict.robot, verdict.cells, verdict.task, verdict.witness)
     except OutOfTime:
         return None
 

@@ -114,12 +114,9 @@ class Task:
             "roll_reference": None
             if self.roll_reference is None
             else tuple(checks.direction("roll_reference", self.roll_reference)),
-<<<<<<< HEAD
             "footprint": self._checked_footprint(checks),
             "coverage": self._checked_coverage(checks),
-=======
             "home_deg": self._checked_home(checks),
->>>>>>> 8bc9f25 (task.speed and task.min_manipulability: the verdict holds at a speed, and away from singularities)
         }
         checks.done()
         for name, value in {**kept, **kept_too}.items():

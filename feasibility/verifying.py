@@ -159,7 +159,7 @@ def _of_motion(claim: Literal["motion", "witness"], problem: Problem, q: Any) ->
     robot, cells, task = problem.robot, problem.cells, problem.task
     found = replay_over_surface(robot, cells, task, q, bodies=problem.bodies)
     faults = (*found.faults, *_begun_elsewhere(robot, q))
-    if found.holds and len(cells):
+    if found.accepted and len(cells):
         faults = (*faults, *_too_fast(problem, Walk(q, np.full(len(q), -1, dtype=np.int64))))
     return Verification(claim, robot, cells, task, faults, found.certificate, q, found.reached)
 

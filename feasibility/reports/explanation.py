@@ -24,6 +24,7 @@ from feasibility.reports.explanation_words import (
     what_it_opens,
 )
 from feasibility.reports.parts import aligned, csv_text, filled, framed, page, table
+from feasibility.reports.rates import rates_object, rates_sentence
 from feasibility.sensitivity import Change, Dropped, Explanation, Finding, Quantity, Threshold
 from feasibility.verdict import Answer, Verdict, Walk
 from feasibility.version import version
@@ -111,6 +112,7 @@ def _remarks(explanation: Explanation) -> list[str]:
     opens = [(row_of(t).change, what_it_opens(t, verdict)) for t in helps]
     texts = [f"{change}: {said}." for change, said in opens if said]
     texts.append(idle_limits(explanation))
+    texts.append(rates_sentence(explanation))
     texts += in_the_way(explanation)
     if not helps and not best_changes(explanation) and explanation.thresholds:
         texts.append("No single change that was tried was found to make it feasible.")
@@ -225,6 +227,7 @@ def as_json(explanation: Explanation, case_name: str, case: Case | None = None) 
         },
         "pair": explanation.pair and [_change(change) for change in explanation.pair.changes],
         "joints": _joints(explanation),
+        "rates": rates_object(explanation),
         "not_looked_at": list(explanation.left_out),
         "dropped": dropped
         and {

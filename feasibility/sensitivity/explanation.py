@@ -22,6 +22,7 @@ from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Kind, Quantity, Variant, quantities
 from feasibility.sensitivity.threshold_search import BEYOND, ThresholdSearch
 from feasibility.sensitivity.thresholds import Dropped, Explanation, Finding, Threshold
+from feasibility.speed import check_asked, rate_figures
 from feasibility.task import Task
 from feasibility.verdict import Evidence, Verdict, Walk
 from robots import Robot
@@ -93,19 +94,24 @@ def explain(
     reporting = progress and (lambda *_: progress(0, None, AS_GIVEN))
     first = clock.part(VERDICT_SHARE, reporting)
     robot = replace(robot, start=None)  # with other numbers it is not on the motion set
+    check_asked(robot, task, search)
+    asked, task = task, replace(task, speed=None, min_manipulability=None)  # of no threshold
     verdict = check(robot, cells, task, search, clock=first)
     began = time.monotonic()
     if len(cells) == 0:
         return Explanation(verdict, (), (), None, 0, 0.0)
     found, motion = _explained(verdict, began, clock, progress)
     if motion is None:
-        return found
+        fast = asked.speed is not None
+        with suppress(OutOfTime), clock.enforced():
+            return replace(found, rates=rate_figures(verdict, clock, fast), asked=asked)
+        return replace(found, asked=asked)
     seeded = check(robot, cells, task, search, seeds=motion, clock=clock.part(1.0))
     if not seeded.feasible:
         return found
     again, _ = _explained(seeded, began, clock, progress)
     evaluations = found.evaluations + again.evaluations
-    return replace(again, alone=verdict, evaluations=evaluations)
+    return replace(again, alone=verdict, evaluations=evaluations, asked=asked)
 
 
 def _explained(

@@ -163,34 +163,32 @@ def _not_found(
 
 
 def _causes(rated: RatedGraph, reached: NDArray[np.bool_]) -> tuple[Cause, ...]:
-    """Why cells are missed: what the best motion that leads to each would need."""
+    """Why cells are missed: what the best motion to each that is not fast enough would need."""
+    fine, best = set(_fine(rated)), dict[int, tuple[int, int]]()
+    for edge, one in rated.rated.items():
+        for cell in {rated.graph.cell[node] for node in edge if edge not in fine}:
+            if cell not in best or one.speed > rated.rated[best[cell]].speed:
+                best[cell] = edge
+    missed = np.flatnonzero(~reached).tolist()
+    details = [_detail(rated, cell, best.get(cell)) for cell in missed]
+    kind = CauseKind.DISCONNECTED
+    return tuple(Cause(c, kind, False, text) for c, text in zip(missed, details, strict=True))
+
+
+def _detail(rated: RatedGraph, cell: int, edge: tuple[int, int] | None) -> str:
+    """Why a motion to a cell does not do; None where none is known that does not."""
     task, robot = rated.task, rated.robot
-    best: dict[int, tuple[int, int]] = {}
-    for edge in rated.graph.edges.edges:
-        x, y = min(edge), max(edge)
-        for node in (x, y):
-            cell = rated.graph.cell[node]
-            if reached[cell] or rated.graph.cell[x] == rated.graph.cell[y]:
-                continue
-            if cell not in best or rated.rated[x, y].speed > rated.rated[best[cell]].speed:
-                best[cell] = (x, y)
-    causes = []
-    for cell in np.flatnonzero(~reached).tolist():
-        edge = best.get(cell)
-        detail = "no motion to it is known that holds the speed"
-        if edge is not None and task.speed is not None and rated.rated[edge].speed < task.speed:
-            one = rated.rated[edge]
-            unit = "m/s" if robot.prismatic[one.joint] else "rad/s"
-            needed = task.speed / one.share if one.share > 0.0 else np.inf
-            name, place = robot.joint_names[one.joint], list(rated.cells.unravel(cell))
-            detail = (
-                f"{name} would need {needed:.3g} {unit} at cell {place}; it allows "
-                f"{float(robot.max_velocity[one.joint]):.3g}"
-            )
-        elif edge is not None and task.min_manipulability is not None:
-            detail = (
-                f"singular values fall to {rated.rated[edge].sigma:.3g} on the way to it; "
-                f"{task.min_manipulability:g} is asked"
-            )
-        causes.append(Cause(cell, CauseKind.DISCONNECTED, False, detail))
-    return tuple(causes)
+    if edge is None:
+        return "the motions to it do what is asked, but are not joined with the best one"
+    one = rated.rated[edge]
+    if task.speed is not None and one.speed < task.speed:
+        unit = "m/s" if robot.prismatic[one.joint] else "rad/s"
+        needed = f"{task.speed / one.share:.3g} {unit}" if one.share > 0.0 else "endless speed"
+        return (
+            f"{robot.joint_names[one.joint]} would need {needed} at cell "
+            f"{list(rated.cells.unravel(cell))}; it allows {robot.max_velocity[one.joint]:.3g}"
+        )
+    return (
+        f"singular values fall to {one.sigma:.3g} on the way to it; "
+        f"{task.min_manipulability:g} is asked"
+    )

@@ -23,7 +23,9 @@ class RateFigures:
     """m/s, the largest speed that a motion over all cells is known to hold."""
 
 
-def rate_figures(verdict: Verdict, clock: Clock | None = None) -> RateFigures | None:
+def rate_figures(
+    verdict: Verdict, clock: Clock | None = None, more: bool = True
+) -> RateFigures | None:
     """Look for the largest speed; None where the verdict has no motion.
 
     Where the joints have no velocity limits, it is inf.
@@ -31,6 +33,7 @@ def rate_figures(verdict: Verdict, clock: Clock | None = None) -> RateFigures | 
     Args:
         verdict: a feasible one, of the complete search.
         clock: when its time is over, what is known by then is returned.
+        more: whether motions beyond those of the verdict are tried, as `check` does at a speed.
     """
     if verdict.witness is None or not len(verdict.cells):
         return None
@@ -40,7 +43,8 @@ def rate_figures(verdict: Verdict, clock: Clock | None = None) -> RateFigures | 
         return RateFigures(judged, judged.speed)
     rated = rated_graph(replace(verdict, task=free))
     try:
-        grow(rated, Clock() if clock is None else clock)
+        if more:
+            grow(rated, Clock() if clock is None else clock)
     except OutOfTime:
         rated.rate()
     return RateFigures(judged, max(judged.speed, largest_speed(rated, begin_of(rated))))

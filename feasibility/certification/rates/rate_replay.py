@@ -1,8 +1,8 @@
 """The replay of speeds: may the tool have its speed along a motion, but where it rests?
 
-A motion, straight in joint space between its rows, **holds the speed v** where on every segment, and
-all along it, the tool may move at v relative to the surface with every joint inside its velocity
-limit (`segment_rates`), except where it stops:
+A motion, straight in joint space between its rows, **holds the speed v** where on every segment,
+and all along it, the tool may move at v relative to the surface with every joint inside its
+velocity limit (`segment_rates`), except where it stops:
 
 - **in place**: a segment along which the tool point stays within a tenth of the tolerance of the
   target of one cell. There the arm changes its posture, and the tool waits; where the speed is
