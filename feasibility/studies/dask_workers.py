@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import time
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, wait
@@ -44,6 +45,9 @@ class DaskWorkers:
         from distributed import Client
 
         address = self._address
+        # A client that could not connect lives on in its own traceback. Where the garbage collector
+        # closes it while another starts a thread, both wait for one lock for ever; so it goes now.
+        gc.collect()
         try:
             self._client = Client(address, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:  # a timeout is an OSError

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import subprocess
 import sys
+import weakref
 from pathlib import Path
 
 import pytest
@@ -78,6 +80,29 @@ def test_one_worker_of_a_machine_loads_first(cluster, monkeypatch, capsys) -> No
         assert there.submit(study_works.marks).result() in ([], [1])
         marks = there._client.run(study_works.marks)
     assert sorted(marks.values()) == [[], [1]]
+
+
+def test_what_could_not_connect_is_gone_before_the_next_client_starts(monkeypatch) -> None:
+    """Else the garbage collector may close it inside the other's lock, and both wait for ever."""
+    left = []
+
+    class Client:
+        def __init__(self, *given, **options) -> None:
+            left.append([one() for one in made if one() is not None])
+            made.append(weakref.ref(self))
+            self.itself = self  # only the garbage collector ends it
+            raise OSError("nobody there")
+
+    made: list[weakref.ref] = []
+    monkeypatch.setattr("distributed.Client", Client)
+    gc.disable()
+    try:
+        for _ in range(3):
+            with pytest.raises(WorkersError, match="no Dask scheduler answers"):
+                open_workers(address="tcp://127.0.0.1:1").__enter__()
+    finally:
+        gc.enable()
+    assert left == [[], [], []]
 
 
 def test_no_scheduler(monkeypatch) -> None:
