@@ -16,6 +16,7 @@ from feasibility.roll import Roll, projected, roll_of_range
 from surfaces import Cells
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
+FIXED_DEG = 0.1  # [deg] to either side: "fixed", where a task leaves an angle no room at all
 
 
 class Targets(NamedTuple):
@@ -68,7 +69,9 @@ class Task:
     roll_deg: tuple[float, float] | None = None
     """The least and the largest roll, degrees: the angle about the approach direction from the
     reference direction on the surface to the reference axis of the TCP (`feasibility.roll`). None,
-    or 360 degrees and more, leaves it free."""
+    or 360 degrees and more, leaves it free. One roll alone, such as (0, 0), means that one up to
+    `FIXED_DEG` to either side, for no motion could be certified without any room; then a cone of 0
+    is one of `FIXED_DEG` too, and the orientation is fixed: eq. (2)."""
     roll_reference: Direction | None = None
     """The reference direction in the surface's own frame; its part square to the approach counts.
     None for the direction in which u grows, or the tangents of poses."""
@@ -108,7 +111,7 @@ class Task:
         if not isinstance(self.collision, Collision | None):
             expected = "must be a Collision, such as Collision(clearance=0.005), or None"
             checks.wrong("collision", self.collision, expected)
-        kept_too = {
+        kept_too: dict[str, Any] = {
             "approach": self._checked_approach(checks),
             "roll_deg": self._checked_roll(checks, kept["cone_deg"]),
             "roll_reference": None
@@ -119,6 +122,9 @@ class Task:
             "home_deg": self._checked_home(checks),
         }
         checks.done()
+        if self.roll_deg is not None and kept_too["roll_deg"][0] == kept_too["roll_deg"][1]:
+            kept_too["roll_deg"] = _about(kept_too["roll_deg"][0])
+            kept["cone_deg"] = kept["cone_deg"] or FIXED_DEG
         for name, value in {**kept, **kept_too}.items():
             object.__setattr__(self, name, value)
 
@@ -282,6 +288,17 @@ def check_footprint(cells: Cells, task: Task) -> None:
             Fault("footprint", "is given, but between poses there is no surface to treat",
                   expected=expected), "task",
         )  # fmt: skip
+
+
+def _about(roll_deg: float) -> tuple[float, float]:
+    """The range of a roll that is fixed, within -360 .. 360 degrees.
+
+    Example:
+        >>> _about(0.0), _about(360.0)
+        ((-0.1, 0.1), (-0.1, 0.1))
+    """
+    middle = math.fmod(roll_deg, 360.0)
+    return middle - FIXED_DEG, middle + FIXED_DEG
 
 
 def unit(direction: Direction) -> NDArray[np.float64]:

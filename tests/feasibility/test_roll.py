@@ -109,6 +109,19 @@ def test_a_square_under_a_tool_that_points_down_and_never_turns(size):
     assert verify(verdict).holds
 
 
+def test_no_room_at_all_is_a_tenth_of_a_degree():
+    still = Task(0.005, 0, roll_deg=(0, 0), roll_reference=(1, 0, 0))
+    assert (still.cone_deg, still.roll_deg) == (0.1, (-0.1, 0.1))
+    assert replace(still, standoff=0.01).roll_deg == still.roll_deg
+    verdict = check(load_robot("ur5"), TABLE, still)
+    assert "1 mm and 0.1 deg, at a roll of " in verdict.message
+    assert np.abs(sampled_rolls(verdict)).max() <= np.radians(0.1)
+    assert verify(verdict).holds
+    turned = Task(0.005, 20, roll_deg=(-360, -360))
+    assert (turned.cone_deg, turned.roll.half) == (20, pytest.approx(np.radians(0.1)))
+    assert Task(0.005, 0).cone_deg == Task(0.005, 0, roll_deg=(0, 5)).cone_deg == 0.0
+
+
 def test_an_approach_of_its_own_is_kept_over_a_bent_surface():
     cap = sphere(0.3, (10, 40), (0, 60), side="outside", position=(0.4, -0.1, 0.0)).cells(3, 3)
     task = Task(0.01, 3.0, approach=(0.2, 0, -1), roll_deg=(-20, 20), roll_reference=(1, 0, 0))
