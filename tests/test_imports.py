@@ -77,6 +77,7 @@ feasibility: checking
 feasibility.timing
 feasibility.programs
 feasibility.division
+feasibility.runs
 feasibility.sensitivity
 feasibility.results
 feasibility: verifying
@@ -84,9 +85,12 @@ feasibility.studies
 feasibility.placement
 feasibility.viewer: threejs html_page meshes robot playback
 feasibility.viewer.frames
-feasibility.viewer: cell_meshes cut_sides figures live_server nearest obstacles painter path_and_division placements poses readout scene stage view_figures viewer
+feasibility.viewer: cell_meshes cut_sides scene
+feasibility.viewer.treated
+feasibility.viewer: figures live_server nearest obstacles painter path_and_division placements poses readout stage view_figures viewer
+feasibility.viewer.passes
 feasibility.reports
-feasibility.cli: case_commands command console listing main path place study_compare verify
+feasibility.cli: case_commands command console listing main passes path place study_compare verify
 coverable_command
 feasibility.cli: __main__
 coverable

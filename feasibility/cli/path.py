@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from coverable_errors import CoverableError, Fault
 from feasibility.cli.command import (
     STATUS,
     add_case,
@@ -19,26 +18,30 @@ from feasibility.cli.command import (
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
+from feasibility.cli.passes import add_passes, check_passes, in_runs, plan_passes
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
     from feasibility.cases import Case
+    from feasibility.cli.command import OpenCase
+    from feasibility.paths import CoveragePath
+    from feasibility.runs import PlannedPasses
+    from feasibility.timing import Trajectory
+    from feasibility.treated import TreatedArea
     from feasibility.verdict import Verdict
+    from feasibility.viewer import View
     from robots import Robot
-    from surfaces import Surface
-    from surfaces.passes import Passes
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
 WHY_COMPLETE = "a path needs 'complete': the greedy search does not visit the cells' centres"
 PERIOD = 0.02  # [s] between samples
-BY = ("distance", "planes", "parameters")
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     add_command(
-        subcommands, "path", path, add_case, add_html, _add_passes, _add_timing,
+        subcommands, "path", path, add_case, add_html, add_passes, _add_timing,
         _add_programs,
         help="a coverage motion that an arm can run",
         description="Plan a path over every cell in a chosen order, time it within the limits of "
@@ -111,86 +114,6 @@ def _six(text: str) -> list[float]:
     return numbers
 
 
-def _add_passes(parser: argparse.ArgumentParser) -> None:
-    """Parallel passes in place of the cells."""
-    parser.add_argument(
-        "--passes", metavar="DIRECTION",
-        help="run parallel passes over the surface, whatever its cells: an angle in degrees at its "
-        "middle, from the u direction (or the x axis of a mesh's frame), or an axis as X,Y,Z",
-    )  # fmt: skip
-    parser.add_argument(
-        "--pitch", type=positive, metavar="M", help="largest distance between passes, m"
-    )
-    parser.add_argument(
-        "--by", choices=BY, default="distance",
-        help="how it is measured: on the surface (default), between section planes, or by "
-        "parameters",
-    )  # fmt: skip
-    parser.add_argument(
-        "--overrun", type=positive, default=0.0, metavar="M",
-        help="how far passes go on beyond the border, m",
-    )  # fmt: skip
-    parser.add_argument(
-        "--retract", type=positive, default=0.05, metavar="M",
-        help="how far the tool is lifted between stretches that are not side by side, m "
-        "(default 0.05)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--one-way", action="store_true", help="run all passes in the same direction"
-    )
-
-
-def check_passes(args: argparse.Namespace) -> None:
-    """Refuse arguments of passes that do not go together.
-
-    Raises:
-        CoverableError: there is one without another, or an order besides.
-    """
-    faults = []
-    if (args.passes is None) != (args.pitch is None):
-        missing = "--pitch" if args.pitch is None else "--passes"
-        faults.append(Fault(missing, "is missing", expected="--passes and --pitch go together"))
-    if args.passes is not None and args.order is not None:
-        faults.append(
-            Fault(
-                "--order",
-                f"got {args.order!r}, but passes have an order of their own",
-                expected="leave it out",
-            )
-        )
-    if faults:
-        raise CoverableError(faults)
-
-
-def direction_of(text: str) -> Any:
-    """An angle (rad) from degrees, or a vector (x, y, z).
-
-    Raises:
-        CoverableError: the text is neither.
-    """
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) == 1 and math.isfinite(numbers[0]):
-        return math.radians(numbers[0])
-    if len(numbers) == 3 and all(map(math.isfinite, numbers)):
-        return numbers
-    raise CoverableError(
-        Fault("--passes", f"got {text!r:.60}", expected="must be degrees, or an axis as 1,0,0")
-    )
-
-
-def lay_passes(args: argparse.Namespace, surface: Surface) -> Passes:
-    """The passes that the arguments ask for."""
-    from surfaces.passes import parallel_passes
-
-    return parallel_passes(
-        surface, args.pitch, direction_of(args.passes),
-        by=args.by, overrun=args.overrun, one_way=args.one_way,
-    )  # fmt: skip
-
-
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
@@ -211,25 +134,23 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.results import check_ending
         from feasibility.timing import motion_limits, trajectory
         from feasibility.verdict import Answer
-        from surfaces.passes import pass_toolpath
 
         for out in args.out:
             check_ending(out)
         robot, loaded = opened.setup.robot, opened.so_far()
         period = _check_programs(args, robot)
         limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
-        setup, laid = opened.setup, None
-        if args.passes is not None:
-            opened.progress(0, None, "laying passes")
-            laid = lay_passes(args, setup.cells.surface)
-            setup = setup._replace(cells=pass_toolpath(laid, args.retract))
-        verdict = check(*setup, clock=opened.clock)
+        along = None if args.passes is None else plan_passes(args, opened)
+        verdict = check(*opened.setup, clock=opened.clock) if along is None else along.verdict
+        if not verdict.feasible and along is not None and "time limit" not in verdict.message:
+            return in_runs(args, opened, along)
         if not verdict.feasible:
             return _no_path(args, opened.case.name, verdict, loaded)
         try:
             with opened.clock.enforced():
                 opened.progress(0, None, "planning the path")
                 found = coverage_path(verdict, args.order)
+                treated = _treated(opened, along, found)
                 opened.progress(0, None, "timing the path")
                 run = trajectory(
                     found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
@@ -239,10 +160,12 @@ def path(args: argparse.Namespace, began: float) -> int:
             late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
             verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
             return _no_path(args, opened.case.name, verdict, loaded)
+    laid = None if along is None else along.passes
+    short = report.short_words(treated, opened.setup.task.coverage)
     if args.json:
-        print_out(json_text(report.as_json(found, run, limits, laid)))
+        print_out(json_text(report.as_json(found, run, limits, laid, treated)))
     else:
-        print_out(report.as_text(found, run, limits, laid))
+        print_out(report.as_text(found, run, limits, laid, treated))
     for out in args.out:
         from feasibility.results import save_trajectory
 
@@ -254,10 +177,37 @@ def path(args: argparse.Namespace, began: float) -> int:
         save_program(file, robot, run, opened.case.name, args.axis_signs, args.axis_offsets_deg)
         print_err(f"program: {shown_path(file)}")
     if args.html is not None:
-        from feasibility.viewer import view_path
+        write_text(args.html, _view(opened, along, found, treated, run).html(), "view")
+    if short:
+        print_err(short)
+    return STATUS["undecided" if short else "feasible"]
 
-        write_text(args.html, view_path(found, run, opened.case.name).html(), "view")
-    return 0
+
+def _view(
+    opened: OpenCase,
+    along: PlannedPasses | None,
+    found: CoveragePath,
+    treated: TreatedArea | None,
+    run: Trajectory,
+) -> View:
+    """The picture of a path over cells, or along passes."""
+    from feasibility.viewer import view_path
+    from feasibility.viewer.passes import view_passes
+
+    if along is None:
+        return view_path(found, run, opened.case.name)
+    return view_passes(along, [found], treated, run, opened.case.name)
+
+
+def _treated(
+    opened: OpenCase, along: PlannedPasses | None, found: CoveragePath
+) -> TreatedArea | None:
+    """What the path treats; None where no footprint is asked for."""
+    from feasibility.treated import treated_by_walk
+
+    if along is not None:
+        return along.treated(found.walk)
+    return treated_by_walk(found.robot, found.cells, opened.setup.task, found.walk)
 
 
 def _check_programs(args: argparse.Namespace, robot: Robot) -> float:

@@ -1,8 +1,11 @@
+from .between_patches import clear_moves as clear_moves
 from .division import Apart as Apart
 from .division import Division as Division
 from .division import Plan as Plan
 from .division import SubPatch as SubPatch
 from .fewest_patches import divide as divide
+from .plans import collect_components as collect_components
+from .plans import connect_pairs as connect_pairs
 from .reconfiguration import Reconfiguration as Reconfiguration
 from .set_covering import set_cover as set_cover
 from .set_covering import undominated as undominated

@@ -1,6 +1,7 @@
 from .coverage import CoveragePath as CoveragePath
 from .coverage import coverage_path as coverage_path
 from .metrics import PathFigures as PathFigures
+from .metrics import figures_of as figures_of
 from .motion_graph import MotionGraph as MotionGraph
 from .motion_graph import join_self_motions as join_self_motions
 from .motion_graph import motion_graph_of as motion_graph_of

@@ -21,6 +21,7 @@ from feasibility.reports.parts import (
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results import plain
 from feasibility.timing import MotionLimits, Trajectory, used
+from feasibility.treated import TreatedArea, share_words, treated_json, treated_words
 from feasibility.verdict import Verdict
 from feasibility.version import version
 from robots import Robot
@@ -32,6 +33,7 @@ def as_json(
     trajectory: Trajectory | None = None,
     limits: MotionLimits | None = None,
     laid: Passes | None = None,
+    treated: TreatedArea | None = None,
 ) -> dict[str, Any]:
     """The object that `coverable path --json` prints, without NaN.
 
@@ -42,6 +44,7 @@ def as_json(
         trajectory: its timing, if it was asked for.
         limits: of the timing.
         laid: the passes that it runs, if it does.
+        treated: what it treats, where a footprint is asked for.
     """
     figures = path.figures
     sliding = path.robot.prismatic
@@ -69,7 +72,8 @@ def as_json(
             "singular_value": plain(figures.singular_value),
         },
         "certificate": certificate_json(path.certificate) | clearance_json(path.certificate),
-        "passes": None if laid is None else _passes_json(laid),
+        "treated": treated_json(treated),
+        "passes": None if laid is None else passes_json(laid),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,
@@ -80,6 +84,16 @@ def as_json(
 def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[str, Any]:
     """What `coverable path --json` prints where there is no path: the verdict's object, and why."""
     return verdict_json(verdict, before_s) | {"message": reason, "trajectory": None}
+
+
+def short_words(treated: TreatedArea | None, coverage: float | None) -> str:
+    """That a path treats less of the area than is asked for; empty where that is not so."""
+    if treated is None or coverage is None or treated.lower >= coverage:
+        return ""
+    return (
+        f"undecided: the path treats {share_words(treated)} of the area, and "
+        f"{100.0 * coverage:g} % is asked; passes or cells that are closer treat more."
+    )
 
 
 def at_most(value: float, digits: int) -> str:
@@ -141,7 +155,7 @@ def _timing(
     return found
 
 
-def _passes_json(laid: Passes) -> dict[str, Any]:
+def passes_json(laid: Passes) -> dict[str, Any]:
     """Passes as they were laid."""
     return {
         "count": laid.count,
@@ -156,7 +170,7 @@ def _passes_json(laid: Passes) -> dict[str, Any]:
     }
 
 
-def _passes_text(laid: Passes) -> str:
+def passes_text(laid: Passes) -> str:
     """Passes in words."""
     words = f"{laid.count}, {1e3 * laid.spacing:.4g} mm apart"
     if laid.widest > 1.001 * laid.spacing:
@@ -174,6 +188,7 @@ def as_text(
     trajectory: Trajectory | None = None,
     limits: MotionLimits | None = None,
     laid: Passes | None = None,
+    treated: TreatedArea | None = None,
 ) -> str:
     """The path for people: its length compared with the least possible, margins, and times.
 
@@ -194,6 +209,7 @@ def as_text(
         ),
         ("roll", roll_text(path.certificate, path.task)),
         ("clearance", clearance_text(path.certificate)),
+        ("treated", "" if treated is None else treated_words(treated)),
     ]
     if trajectory is not None:
         speed = at_most(float(trajectory.tool_speed.max()), 4)
@@ -204,7 +220,7 @@ def as_text(
         ]
     head = f"path: one continuous motion over {over}."
     if laid is not None:
-        rows[0] = ("passes", _passes_text(laid))
+        rows[0] = ("passes", passes_text(laid))
         head = (
             f"path: one continuous motion along {laid.count} pass{'' if laid.count == 1 else 'es'}."
         )

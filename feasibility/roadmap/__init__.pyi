@@ -5,6 +5,7 @@ from .complete import complete_search as complete_search
 from .expansion import CONNECT_STEPS as CONNECT_STEPS
 from .exploration import Exploration as Exploration
 from .exploration import wound as wound
+from .graph import EDGES as EDGES
 from .graph import NODES as NODES
 from .graph import root_of as root_of
 from .motions import CONE_SLACK as CONE_SLACK
@@ -43,6 +44,7 @@ from .walk import covering_walk as covering_walk
 from .walk import edge_motion as edge_motion
 from .walk import links_of as links_of
 from .walk import patch_walk as patch_walk
+from .walk import route_walk as route_walk
 from .warmup import SharedLock as SharedLock
 from .warmup import warm_up as warm_up
 from .warmup import warm_up_in_turn as warm_up_in_turn

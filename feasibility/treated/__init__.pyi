@@ -5,5 +5,6 @@ from .decision import Decision as Decision
 from .decision import with_coverage as with_coverage
 from .regions import Region as Region
 from .words import region_words as region_words
+from .words import share_words as share_words
 from .words import treated_json as treated_json
 from .words import treated_words as treated_words

@@ -36,6 +36,7 @@ from feasibility.viewer.readout import readout_of, with_nearest
 from feasibility.viewer.scene import Layer, counted, layers, trail
 from feasibility.viewer.stage import camera_on, ground
 from feasibility.viewer.threejs import Command
+from feasibility.viewer.treated import area_layers
 from robots import Robot
 from surfaces import Cells
 
@@ -129,6 +130,8 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     """
     motion = motion_of(verdict)
     parts = layers(verdict)
+    if verdict.treated is not None:
+        parts += area_layers(verdict.treated, verdict.cells.surface.side_sign)
     if motion is not None:
         parts.append(trail(verdict.cells, motion))
     covered = f"{verdict.n_covered} of {counted(len(verdict.cells))}"

@@ -1,3 +1,5 @@
+from .directions import crossed as crossed
+from .directions import ranked_directions as ranked_directions
 from .net import WorkingMesh as WorkingMesh
 from .parallel import Passes as Passes
 from .parallel import parallel_passes as parallel_passes

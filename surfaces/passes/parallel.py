@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,12 +106,11 @@ def parallel_passes(
     _check(pitch, overrun, step, shortest, by)
     edge = pitch / EDGES_PER_PITCH
     lidded = with_lids(working_mesh(surface, edge), edge)
-    field = _field(surface, lidded, direction, by)
-    own = field.parent < lidded.faces
-    levels, spacing = _levels(field, own, pitch)
+    laid = lay_lines(surface, lidded, direction, by, pitch)
+    field, spacing = laid.field, laid.spacing
     kept = SHORTEST * pitch if shortest is None else shortest
     lines, dropped = list[LevelLine](), 0.0
-    for each in _lines(field, own, levels):
+    for each in laid.lines:
         if each.line.length >= kept:
             lines.append(each)
         else:
@@ -130,6 +129,27 @@ def parallel_passes(
         dropped=dropped,
         notes=_notes(lidded.holes, lines, field, by),
     )
+
+
+class Laid(NamedTuple):
+    """Lines over a surface, as they come."""
+
+    field: Field
+    lines: list[LevelLine]
+    levels: int
+    """How many there are."""
+    spacing: float
+    """m, between levels."""
+
+
+def lay_lines(
+    surface: Surface, lidded: Lidded, direction: float | ArrayLike, by: By, pitch: float
+) -> Laid:
+    """The lines of all levels, cut at holes; for the arguments see `parallel_passes`."""
+    field = _field(surface, lidded, direction, by)
+    own = field.parent < lidded.faces
+    levels, spacing = _levels(field, own, pitch)
+    return Laid(field, list(_lines(field, own, levels)), len(levels), spacing)
 
 
 def _check(

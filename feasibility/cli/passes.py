@@ -1,0 +1,180 @@
+"""Passes for `coverable path`: arguments, directions, and runs where one motion is not enough."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from coverable_errors import CoverableError, Fault
+from feasibility.cli.command import STATUS, json_text, positive, write_text
+from feasibility.cli.console import print_err, print_out
+from feasibility.safe_files import shown_path
+
+if TYPE_CHECKING:
+    from feasibility.cli.command import OpenCase
+    from feasibility.runs import PassRuns, PlannedPasses
+    from feasibility.timing import Trajectory
+    from surfaces import Surface
+    from surfaces.passes import Passes
+
+BEST = "best"
+BY = ("distance", "planes", "parameters")
+SQUARE = math.pi / 2
+
+
+def add_passes(parser: argparse.ArgumentParser) -> None:
+    """Parallel passes in place of the cells."""
+    parser.add_argument(
+        "--passes", metavar="DIRECTION",
+        help="run parallel passes over the surface, whatever its cells: an angle in degrees at its "
+        "middle, from the u direction (or the x axis of a mesh's frame), an axis as X,Y,Z, or "
+        "best: the direction with the fewest passes that one motion runs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--pitch", type=positive, metavar="M", help="largest distance between passes, m"
+    )
+    parser.add_argument(
+        "--by", choices=BY, default="distance",
+        help="how it is measured: on the surface (default), between section planes, or by "
+        "parameters",
+    )  # fmt: skip
+    parser.add_argument(
+        "--overrun", type=positive, default=0.0, metavar="M",
+        help="how far passes go on beyond the border, m",
+    )  # fmt: skip
+    parser.add_argument(
+        "--retract", type=positive, default=0.05, metavar="M",
+        help="how far the tool is lifted between stretches that are not side by side, m "
+        "(default 0.05)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--one-way", action="store_true", help="run all passes in the same direction"
+    )
+    parser.add_argument(
+        "--cross",
+        action="store_true",
+        help="then run passes square to them too (an angle, or best)",
+    )
+
+
+def check_passes(args: argparse.Namespace) -> None:
+    """Refuse arguments of passes that do not go together.
+
+    Raises:
+        CoverableError: there is one without another, or an order besides.
+    """
+    faults = []
+    if (args.passes is None) != (args.pitch is None):
+        missing = "--pitch" if args.pitch is None else "--passes"
+        faults.append(Fault(missing, "is missing", expected="--passes and --pitch go together"))
+    if args.passes is not None and args.order is not None:
+        faults.append(
+            Fault(
+                "--order",
+                f"got {args.order!r}, but passes have an order of their own",
+                expected="leave it out",
+            )
+        )
+    if args.cross and (args.passes is None or "," in args.passes):
+        wanted = "give --passes an angle in degrees, or best"
+        faults.append(Fault("--cross", "needs a direction that can be turned", expected=wanted))
+    if faults:
+        raise CoverableError(faults)
+
+
+def direction_of(text: str) -> Any:
+    """An angle (rad) from degrees, or a vector (x, y, z).
+
+    Raises:
+        CoverableError: the text is neither.
+    """
+    try:
+        numbers = [float(part) for part in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) == 1 and math.isfinite(numbers[0]):
+        return math.radians(numbers[0])
+    if len(numbers) == 3 and all(map(math.isfinite, numbers)):
+        return numbers
+    wanted = "must be degrees, or an axis as 1,0,0, or best"
+    raise CoverableError(Fault("--passes", f"got {text!r:.60}", expected=wanted))
+
+
+def _lay(args: argparse.Namespace, surface: Surface, direction: Any) -> Passes:
+    """The passes that the arguments ask for, in one direction."""
+    from surfaces.passes import crossed, parallel_passes
+
+    laid = [
+        parallel_passes(
+            surface, args.pitch, direction + turn if turn else direction,
+            by=args.by, overrun=args.overrun, one_way=args.one_way,
+        )
+        for turn in (0.0, SQUARE)[: 1 + args.cross]
+    ]  # fmt: skip
+    return crossed(*laid) if args.cross else laid[0]
+
+
+def plan_passes(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
+    """Lay the passes that the arguments ask for, and look for one motion along all of them."""
+    from feasibility.runs import best_planned, planned
+
+    robot, cells, task, search = opened.setup
+    opened.progress(0, None, "laying passes")
+    if args.passes.strip() != BEST:
+        laid = _lay(args, cells.surface, direction_of(args.passes))
+        return planned(robot, laid, task, args.retract, search, opened.clock)
+
+    def lay(angle: float) -> Passes:
+        return _lay(args, cells.surface, angle)
+
+    return best_planned(
+        robot, cells.surface, task, args.pitch, lay, args.retract, search, opened.clock
+    )
+
+
+def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) -> int:
+    """Passes that no single motion is known to run: cut them, and say why; the verdict's status."""
+    from feasibility.reports import pass_runs as report
+    from feasibility.runs import pass_runs
+    from feasibility.timing import trajectory
+
+    verdict = along.verdict
+    opened.progress(0, None, "cutting passes into runs")
+    found = pass_runs(
+        verdict.robot, along.cells, verdict.task, along.places, verdict.seed, opened.clock
+    )
+    timed = [
+        trajectory(
+            run, args.speed, velocity=args.velocity, acceleration=args.acceleration,
+            **({} if args.period is None else {"period": args.period}),
+        )
+        for run in found.runs
+    ]  # fmt: skip
+    treated = along.treated(*(run.walk for run in found.runs)) if found.runs else None
+    if args.json:
+        print_out(json_text(report.as_json(along, found, timed, treated)))
+    else:
+        print_out(report.as_text(along, found, timed, treated))
+    _write(args, found, timed)
+    for file in args.program:
+        print_err(f"--program: nothing written to {shown_path(file)}: there are several motions")
+    if args.html is not None:
+        from feasibility.viewer.passes import view_passes
+
+        drawn = view_passes(along, found.runs, treated, case=opened.case.name)
+        write_text(args.html, drawn.html(), "view")
+    return STATUS[str(verdict.answer)]
+
+
+def _write(args: argparse.Namespace, found: PassRuns, timed: list[Trajectory]) -> None:
+    """A trajectory a run, numbered from 1 in the order in which they are run."""
+    from feasibility.results import save_trajectory
+
+    for out in args.out:
+        for number, run in enumerate(timed, start=1):
+            file = Path(out)
+            numbered = file.with_name(f"{file.stem}_{number}{file.suffix}")
+            save_trajectory(numbered, run)
+            print_err(f"trajectory {number} of {len(found.runs)}: {shown_path(str(numbered))}")

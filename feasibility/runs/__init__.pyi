@@ -1,0 +1,9 @@
+from .fewest import Stations as Stations
+from .fewest import Way as Way
+from .fewest import fewest_ways as fewest_ways
+from .pass_runs import Cut as Cut
+from .pass_runs import PassRuns as PassRuns
+from .pass_runs import pass_runs as pass_runs
+from .planning import PlannedPasses as PlannedPasses
+from .planning import best_planned as best_planned
+from .planning import planned as planned

@@ -1,0 +1,120 @@
+"""Passes over a surface and their verdict: in one direction, or in the best of several."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from feasibility.checking import check
+from feasibility.clock import Clock
+from feasibility.search import Search
+from feasibility.task import Task
+from feasibility.treated import TreatedArea, treated_by_passes
+from feasibility.verdict import Verdict, Walk
+from robots import Robot
+from surfaces import Surface
+from surfaces.passes import (
+    Passes,
+    PassPlaces,
+    pass_places,
+    pass_toolpath,
+    ranked_directions,
+)
+from surfaces.toolpaths import PoseCells
+
+CERTIFIED = 3  # directions of the fewest pieces that are looked at with the arm
+
+Lay = Callable[[float], Passes]
+"""Lays passes in a direction, an angle in rad."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PlannedPasses:
+    """Passes, and what can be said of one motion along all of them."""
+
+    passes: Passes
+    places: PassPlaces
+    cells: PoseCells
+    """The same as a toolpath."""
+    task: Task
+    """As it was asked, with footprint and coverage."""
+    verdict: Verdict
+    """Of the toolpath, without a demand on the coverage."""
+
+    def treated(self, *walks: Walk) -> TreatedArea | None:
+        """What motions along the passes treat; None where no footprint is asked for."""
+        robot, surface = self.verdict.robot, self.passes.surface
+        return treated_by_passes(surface, self.places, robot, self.task, walks)
+
+
+def planned(
+    robot: Robot,
+    laid: Passes,
+    task: Task,
+    retract: float,
+    search: Search | None = None,
+    clock: Clock | None = None,
+) -> PlannedPasses:
+    """Ask whether one motion runs passes that have been laid.
+
+    Args:
+        robot: the arm.
+        laid: the passes.
+        task: what is asked; footprint and coverage are those of the whole surface.
+        retract: m > 0, how far the tool is lifted between stretches that are apart.
+        search: settings.
+        clock: of the command that this is a part of.
+
+    Raises:
+        SurfaceError: see `surfaces.passes.pass_toolpath`.
+    """
+    cells = pass_toolpath(laid, retract)
+    asked = replace(task, footprint=None, coverage=None)
+    verdict = check(robot, cells, asked, search, clock=clock)
+    laid = replace(laid, notes=(*laid.notes, *_stripes(laid, task)))
+    return PlannedPasses(laid, pass_places(laid, retract), cells, task, verdict)
+
+
+def best_planned(
+    robot: Robot,
+    surface: Surface,
+    task: Task,
+    pitch: float,
+    lay: Lay,
+    retract: float,
+    search: Search | None = None,
+    clock: Clock | None = None,
+) -> PlannedPasses:
+    """The direction with the fewest passes that one motion runs.
+
+    Directions are ranked by the number of pieces of passes, and the best three are looked at with
+    the arm. Where none of them can be run in one motion, it is the first of them.
+
+    Args:
+        robot, task, retract, search, clock: see `planned`.
+        surface: what is to be covered.
+        pitch: m, the largest distance between passes.
+        lay: lays passes in a direction.
+
+    Raises:
+        SurfaceError: see `surfaces.passes.parallel_passes` and `pass_toolpath`.
+    """
+    found = [
+        planned(robot, lay(angle), task, retract, search, clock)
+        for angle in ranked_directions(surface, pitch)[:CERTIFIED]
+    ]
+    feasible = [each for each in found if each.verdict.feasible]
+    if not feasible:
+        return found[0]
+    return min(feasible, key=lambda each: (each.passes.count, len(each.passes.stretches)))
+
+
+def _stripes(laid: Passes, task: Task) -> tuple[str, ...]:
+    """Whether the footprint is too small for the distance between passes."""
+    if task.disc is None or laid.widest <= task.disc[1]:
+        return ()
+    across, between = 1e3 * task.disc[1], 1e3 * laid.widest
+    return (
+        f"the passes are up to {between:.4g} mm apart and the footprint is {across:.4g} mm wide: "
+        f"stripes up to {between - across:.3g} mm wide stay untreated",
+    )

@@ -1,0 +1,64 @@
+"""What stops an arm that goes on along passes."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.collisions import Pair
+from feasibility.roadmap import MOST_STEPS, Exploration, track
+from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
+
+WORDS = {
+    CONE: "the tool axis would leave the cone",
+    ROLL: "the roll of the tool would leave its range",
+    SINGULAR: "the arm comes to a singularity",
+    LONG: "the motion takes too many steps",
+    FOLD: "the surface is creased, or its offset folds",
+}
+
+
+class Stop(NamedTuple):
+    """Where a motion along poses ends."""
+
+    pose: int
+    """The last pose that it reaches."""
+    cause: str
+    """Why it does not reach the next one; empty where it reaches the last."""
+
+
+def where_it_stops(
+    exploration: Exploration, pose: int, q: NDArray[np.float64], pairs: tuple[Pair, ...]
+) -> Stop:
+    """Follow the poses from a configuration over one of them, as far as it goes.
+
+    Args:
+        exploration: a finished search.
+        pose: where the arm is.
+        q: (n,) its configuration.
+        pairs: that had to stay clear of each other.
+    """
+    q, rows = np.array(q), np.empty((MOST_STEPS + 1, len(q)))
+    while pose < len(exploration.cells) - 1:
+        curve = exploration.curve(pose, pose + 1)
+        count = track(exploration.arrays, exploration.work, curve, 0.0, 1.0, q, q, False, rows, 0)
+        if count < 0:
+            code, joint = (int(value) for value in exploration.work.stop_reason)
+            return Stop(pose, _words(exploration, code, joint, pairs))
+        pose += 1
+    return Stop(pose, "")
+
+
+def _words(exploration: Exploration, code: int, joint: int, pairs: tuple[Pair, ...]) -> str:
+    """A reason that tracking stopped."""
+    names = exploration.robot.joint_names
+    if code == LIMIT:
+        which = names[joint] if 0 <= joint < len(names) else "a joint"
+        return f"{which} comes to its limit"
+    if code == COLLISION:
+        if not 0 <= joint < len(pairs):
+            return "bodies come too near to each other"
+        return f"{pairs[joint].first} and {pairs[joint].second} come too near to each other"
+    return WORDS.get(code, "no motion is found")

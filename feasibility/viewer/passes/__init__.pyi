@@ -1,0 +1,1 @@
+from .pass_view import view_passes as view_passes

@@ -1,0 +1,119 @@
+"""Pictures of passes: the surface itself, passes with their numbers, and the area behind the tool.
+
+from coverable import view_passes
+view_passes(along, [path], treated, trajectory).save_html("passes.html")
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.paths import CoveragePath
+from feasibility.runs import PlannedPasses
+from feasibility.timing import Trajectory
+from feasibility.treated import TreatedArea, share_words
+from feasibility.viewer import robot as robot_visuals
+from feasibility.viewer.passes.digits import digit_lines
+from feasibility.viewer.playback import LONGEST, Motion, paced
+from feasibility.viewer.scene import OUTLINES, PATCHES, Layer, drawn_lines
+from feasibility.viewer.treated import painted_layers, surface_layer
+from feasibility.viewer.viewer import View, compose, titled
+from robots import Kinematics, Robot
+from surfaces.passes import Pass, working_mesh
+
+Floats = NDArray[np.float64]
+
+FRAMES = 3_000  # samples of a trajectory that are drawn, at most
+THIN = 0.03  # [1] of the distance between passes: radius of their lines
+TALL = 0.5  # [1] of it: height of their numbers
+
+
+def view_passes(
+    along: PlannedPasses,
+    paths: Sequence[CoveragePath],
+    treated: TreatedArea | None = None,
+    trajectory: Trajectory | None = None,
+    case: str | None = None,
+) -> View:
+    """The arm along passes, and the area that it treats painted behind the tool.
+
+    Args:
+        along: the passes.
+        paths: the motion along all of them, or several that work on a part each.
+        treated: what they treat, where there is a footprint.
+        trajectory: of a single path; played as fast as it is, or in a minute if it takes longer.
+        case: name of the case, for the title.
+    """
+    robot, laid = along.verdict.robot, along.passes
+    motion = _motion(robot, paths, trajectory)
+    mesh = working_mesh(laid.surface, laid.spacing) if treated is None else treated.mesh
+    parts, tracks = [surface_layer(mesh)], list[dict[str, Any]]()
+    if treated is not None and motion is not None:
+        side, height = laid.surface.side_sign, along.task.standoff
+        painted = painted_layers(treated, side, motion, height)
+        parts, tracks = [*parts, *painted.layers], painted.tracks
+    parts += _pass_layers(along, paths)
+    count = f"{laid.count} pass{'' if laid.count == 1 else 'es'}"
+    runs = "one motion" if len(paths) == 1 else f"{len(paths)} motions"
+    text = f"{robot.name}: {count}, {1e3 * laid.spacing:.4g} mm apart, {laid.length:.4g} m"
+    if treated is not None:
+        text += f"; treated {share_words(treated)} of the area"
+    if trajectory is not None:
+        text += f"; {trajectory.duration:.1f} s"
+    return compose(
+        robot, along.cells, titled(f"{count} in {runs}", case), text, parts, motion,
+        resting=robot_visuals.home(robot) if motion is None else motion.walk[0], tracks=tracks,
+        task=along.task,
+    )  # fmt: skip
+
+
+def _motion(
+    robot: Robot, paths: Sequence[CoveragePath], trajectory: Trajectory | None
+) -> Motion | None:
+    """What is played: the trajectory, or all paths in even time, with the moves between them."""
+    if trajectory is None:
+        walks = [path.walk.q for path in paths]
+        return paced(robot, np.concatenate(walks), False, "passes") if walks else None
+    kept = np.linspace(0, len(trajectory) - 1, min(len(trajectory), FRAMES)).astype(int)
+    kept = np.unique(kept)
+    q, time = trajectory.q[kept], trajectory.time[kept] - trajectory.time[0]
+    time = time * min(1.0, LONGEST / max(float(time[-1]), 1e-9))
+    return Motion(q, time, Kinematics(robot).tools(q)[0], False, "passes")
+
+
+def _pass_layers(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[Layer]:
+    """Passes as lines, those of each run in a colour of their own, and their numbers."""
+    places, spacing = along.places, along.passes.spacing
+    layers = []
+    for number, path in enumerate(paths):
+        colour = PATCHES[number % len(PATCHES)]
+        lines = []
+        for stretch in range(len(along.passes.stretches)):
+            own = (places.stretch == stretch) & path.needed
+            if own.sum() > 1:
+                lines.append(places.points[own])
+        label = "passes" if len(paths) == 1 else f"run {number + 1}"
+        if lines:
+            layers.append(drawn_lines(lines, THIN * spacing, colour, f"/passes/{label}", label))
+    digits = [line for each in along.passes.stretches for line in _number(each, along)]
+    layers.append(drawn_lines(digits, THIN * spacing, OUTLINES, "/passes/numbers", "numbers"))
+    return layers
+
+
+def _number(each: Pass, along: PlannedPasses) -> list[Floats]:
+    """The number of a pass, beside the beginning of one of its stretches."""
+    spacing, normal = along.passes.spacing, each.normals[0]
+    heading = each.points[1] - each.points[0]
+    heading = heading / max(float(np.linalg.norm(heading)), 1e-300)
+    first = along.passes.stretches[0]
+    reading = first.points[1] - first.points[0]
+    reading = heading if reading @ heading >= 0.0 else -heading
+    up = np.cross(normal, reading) * TALL * spacing
+    name = each.level + 1
+    wide = 0.75 * TALL * spacing * len(str(name))
+    start = each.points[0] - heading * (0.3 * spacing + (wide if reading @ heading > 0.0 else 0.0))
+    return digit_lines(name, start - 0.5 * up, reading, up)

@@ -1,0 +1,116 @@
+"""The treated area as a heat map of how often the tool comes by, and what is untreated in red."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.treated import TreatedArea
+from feasibility.viewer import threejs
+from feasibility.viewer.html_page import Entry
+from feasibility.viewer.playback import Motion
+from feasibility.viewer.scene import SURFACE, Layer
+from feasibility.viewer.threejs import Colour, Command
+from surfaces.passes import WorkingMesh
+
+Ints = NDArray[np.int64]
+
+UNTREATED: Colour = (0.84, 0.12, 0.12)
+TIMES: tuple[tuple[str, Colour], ...] = (  # a sequence that colour-blind readers can tell apart
+    ("treated once", (0.45, 0.75, 0.55)),
+    ("treated twice", (0.10, 0.48, 0.62)),
+    ("three times or more", (0.20, 0.10, 0.42)),
+)
+STROKES = 40  # groups of faces that appear one after the other
+ABOVE = 1e-3  # [1] of the surface's extent, so that colours lie over the surface
+HALF = 0.5  # [1] of a face: with more of it treated it counts as treated
+
+
+class Painted(NamedTuple):
+    """Layers, and the tracks that show parts of them when the tool has passed."""
+
+    layers: list[Layer]
+    tracks: list[dict[str, Any]]
+
+
+def surface_layer(mesh: WorkingMesh) -> Layer:
+    """The surface itself."""
+    path = "/surface/itself"
+    command = threejs.mesh(path, mesh.vertices, mesh.faces, SURFACE, opacity=0.6)
+    return Layer((command,), Entry("surface", SURFACE, path), 1)
+
+
+def area_layers(found: TreatedArea, side: float) -> list[Layer]:
+    """Faces by how often the tool comes by, all at once.
+
+    Args:
+        found: the treated area.
+        side: 1.0 where the tool is outside, -1.0 inside: colours are drawn on that side.
+    """
+    return _layers(found, side, [np.arange(len(found.shares))])[0]
+
+
+def painted_layers(found: TreatedArea, side: float, motion: Motion, height: float) -> Painted:
+    """The same, each face when the tool comes by first.
+
+    Args:
+        found: the treated area.
+        side: see `area_layers`.
+        motion: what the picture plays.
+        height: m, of the tool point over the surface.
+    """
+    from scipy.spatial import KDTree
+
+    middles = found.mesh.corners.mean(axis=1)
+    reach = float(np.hypot(0.5 * max(found.footprint), height))
+    end = float(motion.seconds[-1])
+    even = np.linspace(0.0, end, STROKES * 12 + 1)
+    points = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
+    first = np.full(len(middles), STROKES - 1)
+    for number in reversed(range(STROKES)):  # the earliest one is written last
+        near, _ = KDTree(points[12 * number : 12 * number + 13]).query(
+            middles, distance_upper_bound=reach
+        )
+        first[np.isfinite(near)] = number
+    groups = [np.flatnonzero(first == number) for number in range(STROKES)]
+    layers, paths = _layers(found, side, groups)
+    times = np.linspace(0.0, end, STROKES + 1)[1:]
+    return Painted(layers, [threejs.appearing(path, times[k], end) for path, k in paths])
+
+
+def _layers(
+    found: TreatedArea, side: float, groups: Sequence[Ints]
+) -> tuple[list[Layer], list[tuple[str, int]]]:
+    """A layer for each number of times and for what is untreated; paths of groups in the scene."""
+    mesh = found.mesh
+    times = np.where(found.shares >= HALF, np.maximum(found.times(), 1), 0)
+    extent = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+    lift = side * ABOVE * extent * mesh.doubled_areas
+    lift /= np.maximum(np.linalg.norm(mesh.doubled_areas, axis=1), 1e-300)[:, None]
+    layers, paths = list[Layer](), list[tuple[str, int]]()
+    for level, (name, colour) in enumerate(TIMES, start=1):
+        root, commands = f"/treated/{name}", list[Command]()
+        for k, group in enumerate(groups):
+            own = times[group] == level if level < len(TIMES) else times[group] >= level
+            if own.any():
+                path = f"{root}/{k:03d}"
+                commands.append(_faces(mesh, group[own], lift, colour, path))
+                paths.append((path, k))
+        if commands:
+            layers.append(Layer(tuple(commands), Entry(name, colour, root), len(commands)))
+    missed = np.flatnonzero(times == 0)
+    if len(missed):
+        path, name = "/treated/untreated", f"untreated ({100.0 * (1.0 - found.lower):.2g} %)"
+        command = _faces(mesh, missed, lift, UNTREATED, path)
+        layers.append(Layer((command,), Entry(name, UNTREATED, path), 1))
+    return layers, paths
+
+
+def _faces(mesh: WorkingMesh, which: Ints, lift: Any, colour: Colour, path: str) -> Command:
+    """Some faces in one colour, a little above the surface."""
+    corners = (mesh.corners[which] + lift[which][:, None]).reshape(-1, 3)
+    faces = np.arange(len(corners)).reshape(-1, 3)
+    return threejs.mesh(path, corners, faces, colour, opacity=0.9, lit=False)
