@@ -115,7 +115,7 @@ def test_greedy_beside_complete(kind: str, seed: int) -> None:
     assert greedy.answer is not Answer.UNDECIDED, greedy.message
     complete = check(ARM, cells, task, Search(time_limit=60.0))
     print(kind, seed, greedy.n_covered, complete.n_covered, len(cells), complete.answer)
-    if complete.evidence is Evidence.PROOF and len(greedy.tree.edges):
+    if complete.evidence is Evidence.PROOF and greedy.tree is not None and greedy.tree.edges:
         at_centres = reached(task, cells, motions_of(greedy.tree))
         assert not at_centres[[cause.cell for cause in complete.causes if cause.proved]].any()
 
