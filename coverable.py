@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from feasibility.certification import replay
     from feasibility.collisions import Collision, Obstacle, ToolShape
     from feasibility.division import Division, divide
+    from feasibility.live import Live, live
     from feasibility.paper import LiteralSearch, starts
     from feasibility.paths import CoveragePath, PathError, coverage_path
     from feasibility.paths import coverage_path as path
@@ -133,14 +134,14 @@ if TYPE_CHECKING:
 # fmt: off
 __all__ = [
     "Answer", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Collision",
-    "Comparison", "CoveragePath", "Division", "Evidence", "Explanation", "LiteralSearch",
+    "Comparison", "CoveragePath", "Division", "Evidence", "Explanation", "LiteralSearch", "Live",
     "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "Patch", "PathError", "Piecewise",
     "Placements", "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store", "Study",
     "Surface", "SurfaceError", "Task", "ToolShape", "Trajectory", "Verdict", "Verification",
     "View", "__version__", "bspline", "builtin_cases", "check", "compare", "comparison_chart",
     "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane", "cylinder", "divide",
     "division_text", "ellipsoid", "explain", "explanation_text", "faces_within_cone",
-    "greedy_check", "grid", "hyperboloid", "list_robots", "load_case", "load_motion",
+    "greedy_check", "grid", "hyperboloid", "list_robots", "live", "load_case", "load_motion",
     "load_result", "load_robot", "load_study", "load_trajectory", "mesh", "motion_limits",
     "open_workers", "parallel_passes", "parametric", "pass_toolpath", "path", "path_text",
     "piecewise", "place", "placement_map", "placement_text", "plane", "plot_causes",
@@ -171,6 +172,7 @@ _ROOMS = (
     "feasibility.studies",
     "feasibility.placement",
     "feasibility.viewer",
+    "feasibility.live",
 )
 _RENAMED = {  # name -> module, name there
     "Local": ("feasibility.placement", "LocalEvaluator"),

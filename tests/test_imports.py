@@ -90,7 +90,8 @@ feasibility.viewer.treated
 feasibility.viewer: figures live_server nearest obstacles painter path_and_division placements poses readout stage view_figures viewer
 feasibility.viewer.passes
 feasibility.reports
-feasibility.cli: case_commands command console listing main passes path place study_compare verify
+feasibility.live
+feasibility.cli: case_commands command console listing live main passes path place study_compare verify
 coverable_command
 feasibility.cli: __main__
 coverable

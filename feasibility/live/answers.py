@@ -1,0 +1,163 @@
+"""Answers for a page: a quick look while something is dragged, the certified verdict afterwards.
+
+A quick look is the search alone, without replay and causes, and ends after a number of steps: it
+colours the cells, and calls nothing feasible. On the paper's cases it takes 12 to 50 ms, where the
+replay of a motion takes 8 more, and with collisions 90. The certified answer is that of `check`, in
+its words.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import numpy as np
+
+from coverable_errors import CoverableError
+from feasibility.cases import Case, Setup
+from feasibility.checking import check
+from feasibility.clock import Clock, OutOfTime
+from feasibility.collisions import checked_words
+from feasibility.found import Found
+from feasibility.live import picture
+from feasibility.live.controls import Controls
+from feasibility.live.jobs import Answer, Job, Superseded
+from feasibility.live.workbench import Workbench
+from feasibility.paper import greedy_search
+from feasibility.problem import Problem
+from feasibility.reports import verdict as report
+from feasibility.roadmap import complete_search
+
+STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most
+STEPS_WITH_BODIES = 12  # the same where distances of bodies make an evaluation ten times dearer
+BUG = "this is a bug in coverable: {}: {}; the page goes on working"
+
+
+class Watch(Clock):
+    """A clock that also ends a search after some steps, or when nobody waits for it any more."""
+
+    def __init__(self, job: Job, limit: float | None = None, steps: float = np.inf) -> None:
+        """A clock that does not run yet.
+
+        Args:
+            job: what the search is for.
+            limit: seconds, see `Clock`.
+            steps: looks at the clock after which the search ends.
+        """
+        super().__init__(limit)
+        self._job, self._left = job, steps
+
+    def report(self, done: int, total: int | None, text: str) -> None:
+        """Tell whoever waits."""
+        cells = f"{done} of {total} cells" if total else f"{done} cells"
+        self._job.said = f"{cells} so far; {text}"
+
+    def tick(self, done: int, total: int | None, text: str) -> None:
+        """Report, and stop where nobody waits or enough has been tried.
+
+        Raises:
+            OutOfTime: the steps are used up, or the deadline has passed.
+            Superseded: the job has been dropped.
+        """
+        if self._job.dropped:
+            raise Superseded
+        self._left -= 1
+        if self._left < 0:
+            raise OutOfTime
+        super().tick(done, total, text)
+
+    @contextmanager
+    def enforced(self) -> Iterator[None]:
+        """Nothing: the alarms that this is done with in commands belong to the main thread."""
+        yield
+
+
+class Answers:
+    """Answers the questions of all pages of one case."""
+
+    def __init__(self, controls: Controls, bench: Workbench) -> None:
+        """Answer for a case.
+
+        Args:
+            controls: what can be changed in it.
+            bench: builds the changed cases.
+        """
+        self.controls, self.bench = controls, bench
+
+    def __call__(self, job: Job) -> Answer:
+        """The answer as the page has it; bad values and faults of ours are answers, too.
+
+        Raises:
+            Superseded: nobody waits for it any more.
+        """
+        try:
+            case = self.controls.changed(job.values)
+            setup = self.bench.build(case)
+            began = time.perf_counter()
+            found = certified(case, setup, job) if job.final else quick_look(setup, job)
+            return {**found, "seconds": time.perf_counter() - began}
+        except CoverableError as error:
+            return {"kind": "error", "head": str(error)}
+        except (Superseded, KeyboardInterrupt):
+            raise
+        except Exception as error:  # noqa: BLE001 - the page goes on working
+            return {"kind": "error", "head": BUG.format(type(error).__name__, error)}
+
+
+def quick_look(setup: Setup, job: Job) -> Answer:
+    """How much of the surface a short search covers; neither certified nor complete."""
+    robot, cells, task, search = setup
+    problem = Problem.of(robot, cells, task)
+    covered, q = np.zeros(len(cells), dtype=bool), None
+    method: Callable[[Problem, Any, Clock], Found] = complete_search
+    if search.method == "greedy":
+        method = greedy_search
+    watch = Watch(job, steps=STEPS if task.collision is None else STEPS_WITH_BODIES)
+    try:
+        found = method(problem, search, watch)
+    except OutOfTime:  # before it had found anything
+        found = None
+    if found is not None:
+        covered = found.covered
+        q = None if found.postures is None or not len(found.postures) else found.postures[0]
+    number, total = int(covered.sum()), len(cells)
+    paint = picture.quick_paint(covered)
+    return {
+        "kind": "quick",
+        "head": f"quick look: one motion reaches {number:,} of {total:,} cells"
+        + ("" if number == total else " so far"),
+        "covered": number,
+        "cells": total,
+        "rows": [],
+        "groups": [],
+        "note": checked_words(task.collision),
+        "paint": {"classes": paint.classes, "entries": paint.entries},
+        "commands": picture.packed(picture.posed(robot, q, task.collision is not None)),
+        "parts": {"paths": [], "entries": [], "seconds": 0.0},
+    }
+
+
+def certified(case: Case, setup: Setup, job: Job) -> Answer:
+    """What `coverable check` says of the case, with the cells in the colours of their causes."""
+    watch = Watch(job, limit=setup.search.time_limit)
+    verdict = check(*setup, clock=watch)
+    paint, parts = picture.certified_paint(verdict), picture.certified_parts(verdict)
+    q = None if verdict.postures is None or not len(verdict.postures) else verdict.postures[0]
+    if verdict.witness is not None and len(verdict.witness.q):
+        q = verdict.witness.q[0]
+    posed = picture.posed(setup.robot, q, setup.task.collision is not None)
+    return {
+        "kind": str(verdict.answer),
+        "head": report.as_text(verdict, case).splitlines()[0],
+        "covered": verdict.n_covered,
+        "cells": len(verdict.cells),
+        "evidence": str(verdict.evidence),
+        "rows": [[name, text] for name, text in report.rows_of(verdict) if text],
+        "groups": list(report.causes_listed(verdict.causes, verdict.cells)),
+        "note": checked_words(verdict.task.collision),
+        "paint": {"classes": paint.classes, "entries": paint.entries},
+        "commands": picture.packed([*parts.commands, *posed]),
+        "parts": {"paths": parts.paths, "entries": parts.entries, "seconds": parts.seconds},
+    }

@@ -1,0 +1,209 @@
+"""What a live page draws: the picture that a view has, and what each answer changes in it.
+
+The surface is drawn once, where it stands at first, and its group is moved. Its cells are triangles
+with a number each, which the page paints.
+"""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.cases import Setup
+from feasibility.verdict import Answer, Evidence, Verdict
+from feasibility.viewer import (
+    HULLS,
+    ROOT,
+    Colour,
+    Command,
+    View,
+    animate,
+    hex_colour,
+    layers,
+    missed_groups,
+    motion_of,
+    pack,
+    pose,
+    trail,
+    view,
+)
+from feasibility.viewer import MISSED as NOT_YET
+from feasibility.viewer import patch as filled
+from feasibility.viewer.frames import GROUP, carried, world_tracks
+from robots import Robot
+from surfaces import Cells
+
+Array = NDArray[np.float64]
+
+SURFACE, CELLS = "/surface", "/cells"
+COVERED: Colour = (0.13, 0.60, 0.33)
+INSET = 0.06  # [1] of a cell's width that its triangles are smaller by
+
+
+class Paint(NamedTuple):
+    """The colours of the cells, and what they stand for."""
+
+    classes: list[int]
+    """(N,) which entry each cell is of."""
+    entries: list[dict[str, str]]
+    """Label and colour."""
+
+
+def first_view(setup: Setup, name: str) -> View:
+    """The case before anything is known of it: arm, ground, scene and surface."""
+    robot, cells, task, search = setup
+    nothing = Verdict(
+        answer=Answer.UNDECIDED,
+        evidence=Evidence.BUDGET,
+        message="",
+        robot=robot,
+        cells=cells,
+        task=task,
+        method=search.method,
+        seed=search.seed,
+        graph=nx.Graph(),
+        covered=np.zeros(len(cells), dtype=bool),
+    )
+    return view(nothing, name, play=False)
+
+
+def group_of(robot: Robot) -> str:
+    """Where in the scene tree all stands that is drawn in the root frame."""
+    return "" if robot.surface_link is None else GROUP
+
+
+def scene_bytes(drawn: View) -> bytes:
+    """The drawing commands of a view without its cells, each behind its length in four bytes."""
+    cells = group_of(drawn.robot) + CELLS
+    return _joined(one for one in drawn.commands if not one["path"].startswith(cells))
+
+
+def entries_of(drawn: View) -> list[dict[str, Any]]:
+    """The lines of the legend that stay."""
+    cells = group_of(drawn.robot) + CELLS
+    return [
+        {
+            "label": entry.label,
+            "colour": f"#{hex_colour(entry.colour):06x}",
+            "path": entry.path,
+            "shown": entry.shown,
+        }
+        for entry in drawn.legend.entries
+        if entry.path is None or not entry.path.startswith(cells)
+    ]
+
+
+def cell_triangles(cells: Cells) -> dict[str, str]:
+    """The triangles of all cells as base64: float32 positions, uint32 corners, cell of a vertex."""
+    positions, corners, owners, count = [], [], [], 0
+    for k in range(len(cells)):
+        vertices, faces, _ = filled(cells, np.array([k]), inset=INSET)
+        positions.append(vertices)
+        corners.append(faces + count)
+        owners.append(np.full(len(vertices), k))
+        count += len(vertices)
+    arrays = {
+        "positions": np.concatenate(positions).astype("<f4"),
+        "corners": np.concatenate(corners).astype("<u4"),
+        "owners": np.concatenate(owners).astype("<u4"),
+    }
+    return {name: _base64(array.tobytes()) for name, array in arrays.items()}
+
+
+def quick_paint(covered: NDArray[np.bool_]) -> Paint:
+    """Two colours: what one motion reaches, and the rest."""
+    missed = int((~covered).sum())
+    entries = [_entry(f"reached ({len(covered) - missed})", COVERED)]
+    if missed:
+        entries.append(_entry(f"not reached so far ({missed})", NOT_YET))
+    return Paint((~covered).astype(int).tolist(), entries)
+
+
+def certified_paint(verdict: Verdict) -> Paint:
+    """Covered cells, and the missed ones in the colours of their causes."""
+    classes = np.zeros(len(verdict.cells), dtype=int)
+    entries = [_entry(f"covered ({verdict.n_covered})", COVERED)]
+    for group in missed_groups(verdict.causes, np.flatnonzero(~verdict.covered)):
+        classes[group.which] = len(entries)
+        entries.append(_entry(f"not covered: {group.words} ({len(group.which)})", group.colour))
+    return Paint(classes.tolist(), entries)
+
+
+def posed(robot: Robot, q: Array | None, collides: bool) -> list[Command]:
+    """Put the arm into a configuration (n,), and the group of a surface that it carries."""
+    if q is None:
+        return []
+    roots = [ROOT, HULLS] if collides else [ROOT]
+    commands = [command for root in roots for command in pose(robot, q, root)]
+    return carried(robot, commands, [], q)[0]
+
+
+class Parts(NamedTuple):
+    """What only a certified answer has."""
+
+    commands: list[Command]
+    paths: list[str]
+    """What has to go before the next answer."""
+    entries: list[dict[str, Any]]
+    """Lines of the legend, with the parts that they switch."""
+    seconds: float
+    """How long the motion is played; 0 where there is none."""
+
+
+def certified_parts(verdict: Verdict) -> Parts:
+    """Graph G, start, sides of a cut, and the motion."""
+    parts = [
+        part
+        for part in layers(verdict)
+        if part.entry.path is None or not part.entry.path.startswith((SURFACE, CELLS))
+    ]
+    robot, moving, seconds = verdict.robot, list[Command](), 0.0
+    motion = motion_of(verdict)
+    q = None if verdict.postures is None or not len(verdict.postures) else verdict.postures[0]
+    if motion is not None:
+        parts.append(trail(verdict.cells, motion))
+        q, seconds = motion.walk[0], float(motion.seconds[-1])
+        times = np.linspace(0.0, seconds, 2 if robot.surface_link is None else 400)
+        tracks = world_tracks(robot, times, motion.at(times))
+        collides = verdict.task.collision is not None
+        roots = [ROOT, HULLS] if collides else [ROOT]
+        moving = [animate(robot, motion, play=False, tracks=tracks, roots=roots)]
+    drawn = [command for part in parts for command in part.commands]
+    shown, entries = carried(
+        robot,
+        [*drawn, *moving],
+        [part.entry for part in parts],
+        np.zeros(robot.n) if q is None else q,
+    )
+    lines = [
+        {
+            "label": e.label,
+            "colour": f"#{hex_colour(e.colour):06x}",
+            "path": e.path,
+            "shown": e.shown,
+        }
+        for e in entries
+    ]
+    return Parts(shown, [str(e.path) for e in entries if e.path is not None], lines, seconds)
+
+
+def packed(commands: Sequence[Command]) -> str:
+    """Commands as base64, each behind its length in four bytes."""
+    return _base64(_joined(commands))
+
+
+def _joined(commands: Iterable[Command]) -> bytes:
+    return b"".join(len(one).to_bytes(4, "little") + one for one in pack(commands))
+
+
+def _base64(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")
+
+
+def _entry(label: str, colour: Colour) -> dict[str, str]:
+    return {"label": label, "colour": f"#{hex_colour(colour):06x}"}

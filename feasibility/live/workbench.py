@@ -1,0 +1,103 @@
+"""From a changed case to what is decided, without making anew what has not changed.
+
+An arm takes 5 ms to load and a mesh seconds to cut; a slider that is dragged waits for neither.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, TypeVar
+
+from coverable_errors import ArgumentError
+from feasibility.cases import Case, CaseError, Setup, in_robot_table
+from feasibility.placement import Pose, moved_cells
+from feasibility.targets import check_references
+from feasibility.task import Task
+from robots import Robot, RobotError
+from surfaces import Cells
+
+KEPT = 8  # arms and surfaces that are remembered: undo comes back to them
+
+Made = TypeVar("Made")
+
+
+class Workbench:
+    """Arm, cells and task of a case and of its changes; for several threads at once."""
+
+    def __init__(self, case: Case, setup: Setup | None = None) -> None:
+        """Build the case as it is.
+
+        Args:
+            case: as it was given.
+            setup: what it builds, where that is known.
+
+        Raises:
+            CaseError: it cannot be built.
+        """
+        self.case = case
+        self.setup = case.build() if setup is None else setup
+        self._lock = threading.Lock()
+        self._robots: OrderedDict[str, Robot] = OrderedDict({_key(case.robot): self.setup.robot})
+        self._cells: OrderedDict[str, Cells] = OrderedDict({_pose_key(case): self.setup.cells})
+
+    def build(self, case: Case) -> Setup:
+        """What the case builds, which differs from the first in pose, task and limits alone.
+
+        Raises:
+            CaseError: the arm or the task do not go together with these values.
+        """
+        if case == self.case:
+            return self.setup
+        robot = self._kept(self._robots, _key(case.robot), lambda: _robot(case))
+        cells = self._kept(self._cells, _pose_key(case), lambda: self._moved(case))
+        task: Task = replace(case.task, collision=self.setup.task.collision)
+        try:
+            check_references(cells, task)
+        except ArgumentError as error:
+            named = [fault.renamed({}, "task") for fault in error.faults]
+            raise CaseError(named, case.name) from error
+        return Setup(robot, cells, task, case.search)
+
+    def _moved(self, case: Case) -> Cells:
+        """The cells at the pose that the case has."""
+        surface = case.surface
+        return moved_cells(self.setup.cells, Pose(surface.position, surface.rpy_deg))
+
+    def _kept(self, known: OrderedDict[str, Made], key: str, make: Callable[[], Made]) -> Made:
+        """What was made before for that key, or is made now; the oldest ones are forgotten."""
+        with self._lock:
+            if key in known:
+                known.move_to_end(key)
+                return known[key]
+        made = make()
+        with self._lock:
+            known[key] = made
+            while len(known) > KEPT:
+                known.popitem(last=False)
+        return made
+
+
+def _robot(case: Case) -> Robot:
+    """Load the arm.
+
+    Raises:
+        CaseError: it cannot be loaded so.
+    """
+    try:
+        return case.robot.build(case.surface.frame)
+    except RobotError as error:
+        raise CaseError(in_robot_table(error), case.name) from error
+
+
+def _key(part: Any) -> str:
+    """A table of a case as text."""
+    return json.dumps(part.table(), sort_keys=True, default=dict)
+
+
+def _pose_key(case: Case) -> str:
+    """Where the surface stands, as text."""
+    return json.dumps([case.surface.position, case.surface.rpy_deg])
