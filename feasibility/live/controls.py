@@ -39,7 +39,7 @@ class Controls:
         >>> case = load_case("paper/4a")
         >>> controls = Controls(case, case.robot.build())
         >>> controls.values["standoff"], controls.values["limits"]["joint5"]
-        (5.0, [-100.0, 100.0])
+        (5.0, [-180.0, 180.0])
         >>> moved = controls.changed({"position": [0, 0, 20.5], "cone_deg": 30})
         >>> moved.surface.position, moved.task.cone_deg
         ((0.0, 0.0, 0.0205), 30.0)

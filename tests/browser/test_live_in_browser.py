@@ -1,0 +1,318 @@
+"""The live page in a real browser, by mouse and keyboard: `make test-browser`.
+
+It needs the extra `browser` (playwright) and a Chromium, which `CHROMIUM` names or the path holds.
+Without them it fails.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import shutil
+import time
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import expect, sync_playwright
+
+from feasibility import check
+from feasibility.cases import Case, load_case
+from feasibility.live import Live
+from feasibility.reports import verdict as report
+
+PATIENCE_MS = 120_000
+NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+PLATE = """
+[robot]
+name = "ur5"
+
+[surface]
+kind = "plane"
+u = [0.35, 0.65]
+v = [-0.2, 0.2]
+position = [0, 0, 0.1]
+side = "outside"
+cells = [6, 8]
+
+[task]
+standoff = 0.02
+cone_deg = 20
+"""
+GREEN, RED = "#219954", "#d61f1f"
+
+
+@pytest.fixture(scope="module")
+def browser():
+    path = os.environ.get("CHROMIUM") or next(filter(None, map(shutil.which, NAMES)), None)
+    if path is None:
+        pytest.fail("there is no Chromium on the path, and CHROMIUM names none")
+    flags = ["--use-gl=angle", "--use-angle=swiftshader", "--disable-dev-shm-usage"]
+    root = ["--no-sandbox"] if os.geteuid() == 0 else []
+    with sync_playwright() as tools:
+        opened = tools.chromium.launch(executable_path=path, args=[*flags, *root])
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def served():
+    with Live(Case.from_toml(PLATE, name="plate")) as live:
+        yield live
+
+
+@pytest.fixture
+def tab(browser, served):
+    page = opened(browser, served)
+    yield page
+    page.close()
+
+
+def opened(browser, live):
+    """A page that has its first answer; what goes wrong on it fails the test."""
+    page = browser.new_page(viewport={"width": 1000, "height": 640})
+    page.set_default_timeout(PATIENCE_MS)
+    page.on("pageerror", lambda error: pytest.fail(f"on the page: {error}"))
+    page.goto(live.url)
+    certified(page)
+    return page
+
+
+def certified(page, kind="feasible|infeasible|undecided"):
+    """Wait for the certified answer."""
+    expect(page.locator("#answer")).to_have_class(re.compile(rf"^({kind}) *$"), timeout=PATIENCE_MS)
+
+
+def quick(page):
+    """Wait for a quick look, which is marked."""
+    expect(page.locator("#badge")).to_be_visible(timeout=PATIENCE_MS)
+    expect(page.locator("#answer")).to_have_class(re.compile(r"^quick "))
+    expect(page.locator("#verdict")).to_have_text(
+        re.compile(r"^one motion reaches \d+ of 48 cells")
+    )
+
+
+def values(page):
+    return page.evaluate("window.page.panel.values")
+
+
+def colours(page):
+    """The colour of each cell."""
+    return page.evaluate("window.page.scene.colours()")
+
+
+def painted(page, of="green"):
+    """How many pixels of the picture are green, or red or purple as missed cells are."""
+    pixels = np.asarray(Image.open(io.BytesIO(page.locator("canvas").screenshot()))).astype(int)
+    red, green, blue = pixels[..., 0], pixels[..., 1], pixels[..., 2]
+    if of == "green":
+        return int(((green > red + 40) & (green > blue + 20)).sum())
+    return int(((red > green + 40) & (red > blue)).sum())
+
+
+def handle(page, point=(0.0, 0.0, 0.0)):
+    """Where a point of the handle, in its own lengths, is on the screen."""
+    return page.evaluate(
+        """(point) => {
+          const {viewer, handle} = window.page.scene;
+          const box = document.getElementById("meshcat-pane").getBoundingClientRect();
+          handle.group.updateMatrixWorld(true);
+          viewer.camera.updateMatrixWorld();
+          const place = handle.body.localToWorld(new MeshCat.THREE.Vector3(...point));
+          place.project(viewer.camera);
+          return [box.left + (place.x + 1) / 2 * box.width,
+                  box.top + (1 - place.y) / 2 * box.height];
+        }""",
+        list(point),
+    )
+
+
+def test_a_slider_is_dragged_and_the_cells_change_colour(tab):
+    assert tab.inner_text("#verdict") == report.SENTENCES["feasible"]
+    expect(tab.locator("#progress")).to_have_text("certified · 48 of 48 cells · evidence: witness")
+    assert set(colours(tab)) == {GREEN}
+    green, red = painted(tab), painted(tab, "red")
+    assert green > 2000
+
+    slider = tab.locator("#position-x")
+    box = slider.bounding_box()
+    middle, height = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.mouse.move(middle, height)
+    tab.mouse.down()
+    tab.mouse.move(middle + 0.22 * box["width"], height, steps=6)
+    quick(tab)
+    assert GREEN not in colours(tab)  # paler while it is not certified
+    tab.mouse.up()
+    certified(tab, "infeasible")
+    assert values(tab)["position"][0] > 250
+    assert tab.inner_text("#verdict") == report.SENTENCES["infeasible"]
+    expect(tab.locator("#badge")).to_be_hidden()
+    missed = [colour for colour in colours(tab) if colour != GREEN]
+    assert 0 < len(missed) <= 48
+    assert painted(tab) < green
+    assert painted(tab, "red") > red + 500
+    assert f"{48 - len(missed)} of 48 cells" in tab.inner_text("#progress")
+    assert "out of reach" in tab.inner_text("#causes")
+    assert "proof: a bound shows" in tab.inner_text("#rows")
+
+    tab.keyboard.press("Control+z")
+    certified(tab, "feasible")
+    assert values(tab)["position"] == [0, 0, 100]
+    assert set(colours(tab)) == {GREEN}
+    tab.click("#redo")
+    certified(tab, "infeasible")
+    tab.click("#reset")
+    certified(tab, "feasible")
+    assert values(tab)["position"] == [0, 0, 100]
+
+
+def test_the_handle_is_dragged_along_an_axis_in_the_plane_and_around(tab):
+    before = values(tab)
+    begin, end = handle(tab, (0.9, 0, 0)), handle(tab, (3.6, 0, 0))
+    tab.mouse.move(*begin)
+    expect(tab.locator("#meshcat-pane")).to_have_class("handle")
+    tab.mouse.down()
+    tab.mouse.move(*end, steps=6)
+    quick(tab)
+    moved = values(tab)
+    assert moved["position"][0] > before["position"][0] + 50
+    assert moved["position"][1:] == before["position"][1:]  # the arrow of x moves along x alone
+    tab.mouse.up()
+    certified(tab)
+    assert values(tab) == moved
+    answered = tab.evaluate("window.page.questions.number")
+
+    tab.mouse.move(*handle(tab))
+    tab.mouse.down()
+    x, y = handle(tab)
+    tab.mouse.move(x - 60, y - 40, steps=4)
+    tab.mouse.up()
+    certified(tab)
+    lifted = values(tab)["position"]
+    assert lifted != moved["position"]
+    assert lifted[2] > moved["position"][2]
+
+    tab.mouse.move(*handle(tab, (0, -0.62, 0)))
+    tab.mouse.down()
+    tab.mouse.move(*handle(tab, (0.44, -0.44, 0)), steps=4)
+    tab.mouse.up()
+    certified(tab)
+    turned = values(tab)
+    assert 35 <= turned["rpy_deg"][2] <= 55
+    assert turned["rpy_deg"][:2] == [0, 0]
+    assert tab.evaluate("window.page.questions.number") > answered
+    # The middle of the surface stays where it is while the surface turns.
+    centre = tab.evaluate("window.page.scene.handle.body.position.toArray()")
+    yaw = np.radians(turned["rpy_deg"][2])
+    middle = np.array([0.5 * np.cos(yaw), 0.5 * np.sin(yaw), 0.0])
+    assert np.allclose(1e-3 * np.array(turned["position"]) + middle, centre, atol=2e-5)
+    assert np.allclose(1e-3 * np.array(lifted) + [0.5, 0, 0], centre, atol=2e-5)
+
+
+def test_keys_move_a_slider_by_steps(tab):
+    tab.focus("#cone")
+    tab.keyboard.press("ArrowRight")
+    certified(tab)
+    assert values(tab)["cone_deg"] == 20.5
+    tab.keyboard.press("PageDown")
+    certified(tab)
+    assert values(tab)["cone_deg"] == 15.5
+    tab.focus("#limit-2-high")
+    tab.keyboard.press("Shift+ArrowLeft")
+    certified(tab)
+    low, high = values(tab)["limits"]["elbow_joint"]
+    assert (low, high) == (
+        tab.evaluate("window.page.described.controls.values")["limits"]["elbow_joint"][0],
+        175,
+    )
+
+
+def test_what_makes_no_sense_is_said_and_the_page_goes_on(tab):
+    tab.fill("#standoff-number", "-3")
+    tab.keyboard.press("Enter")
+    expect(tab.locator("#answer")).to_have_class(re.compile("^error"), timeout=PATIENCE_MS)
+    assert "task.standoff: must be a finite number >= 0" in tab.inner_text("#verdict")
+    tab.fill("#limit-2-low-number", "170")
+    tab.fill("#limit-2-high-number", "160")
+    tab.fill("#standoff-number", "15")
+    tab.keyboard.press("Enter")
+    expect(tab.locator("#verdict")).to_contain_text("the wrong way round", timeout=PATIENCE_MS)
+    tab.click("#reset")
+    certified(tab, "feasible")
+
+
+def test_the_saved_case_is_what_is_shown(tab, served, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tab.fill("#position-x-number", "130.5")
+    tab.fill("#rotation-yaw-number", "12")
+    tab.fill("#standoff-number", "31")
+    tab.keyboard.press("Enter")
+    certified(tab)
+    with tab.expect_download() as begun:
+        tab.click("#save")
+    assert begun.value.suggested_filename == "plate-live.toml"
+    assert list(tmp_path.iterdir()) == []  # the browser keeps it; the program writes nothing
+    begun.value.save_as(tmp_path / "saved.toml")
+    saved = load_case(tmp_path / "saved.toml")
+    assert saved.surface.position == (0.1305, 0.0, 0.1)
+    assert saved.surface.rpy_deg == (0.0, 0.0, 12.0)
+    assert saved.task.standoff == 0.031
+    verdict = check(*saved.build())
+    assert tab.inner_text("#verdict") == report.as_text(verdict, saved).splitlines()[0]
+    assert f"{verdict.n_covered} of 48 cells · evidence: {verdict.evidence}" in tab.inner_text(
+        "#progress"
+    )
+    assert np.array_equal([colour == GREEN for colour in colours(tab)], verdict.covered)
+
+
+def test_two_pages_do_not_mix_and_a_closed_one_is_forgotten(browser, served, tab):
+    sessions = served._server.sessions
+    others = len(sessions)
+    other = opened(browser, served)
+    assert len(sessions) == others + 1
+    other.fill("#position-x-number", "900")
+    other.keyboard.press("Enter")
+    certified(other, "infeasible")
+    tab.fill("#cone-number", "25")
+    tab.keyboard.press("Enter")
+    certified(tab, "feasible")
+    assert values(tab)["position"] == [0, 0, 100]
+    assert (values(other)["position"][0], values(other)["cone_deg"]) == (900, 20)
+    assert other.inner_text("#verdict") == report.SENTENCES["infeasible"]
+    other.goto("about:blank")
+    end = time.monotonic() + PATIENCE_MS / 1e3
+    while len(sessions) > others and time.monotonic() < end:
+        time.sleep(0.05)
+    assert len(sessions) == others
+    other.close()
+    certified(tab, "feasible")
+
+
+def test_answers_while_something_is_dragged(browser):
+    """Prints how many there are in a second, for paper/4a; nothing is asked of that number."""
+    with Live(load_case("paper/4a")) as live:
+        page = opened(browser, live)
+        counted = page.evaluate(
+            """async () => {
+              const {panel, questions} = window.page, from = questions.counts.answered;
+              const begin = performance.now();
+              for (let k = 0; performance.now() - begin < 6000; k += 1) {
+                panel.change((values) => { values.position[0] = 20 * Math.sin(k / 30); }, false);
+                await new Promise((done) => setTimeout(done, 10));
+              }
+              const seconds = (performance.now() - begin) / 1000;
+              return [questions.counts.answered - from, seconds];
+            }"""
+        )
+        quick_looks, seconds = counted
+        assert quick_looks > 0
+        print(f"paper/4a, 90 cells: {quick_looks / seconds:.1f} quick looks a second")
+        began, count = time.perf_counter(), 0
+        while time.perf_counter() - began < 4.0:
+            page.evaluate("window.page.panel.change((v) => { v.position[0] += 1; }, true)")
+            certified(page, "feasible")
+            count += 1
+        taken = (time.perf_counter() - began) / count
+        print(f"paper/4a: {1e3 * taken:.0f} ms from letting go to the certified answer")
+        page.close()
