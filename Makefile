@@ -12,7 +12,7 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test lint kernels greedy bench campaign clean distclean
+.PHONY: help demo test test-browser lint kernels greedy bench campaign clean distclean
 
 help:
 	@sed -n '1,4s/^# //p' Makefile
@@ -60,6 +60,10 @@ test: .venv/installed
 ifneq ($(NOTEBOOKS),)
 	$(BIN)/python -m pytest -n 2 --dist loadfile --nbmake --nbmake-timeout=900 $(NOTEBOOKS)
 endif
+
+# Installs nothing: it needs the extra `browser`, and a Chromium on the path or named by CHROMIUM.
+test-browser:
+	$(BIN)/python -m pytest -rP -p no:nbmake tests/browser/test_live_in_browser.py
 
 campaign: .venv/installed
 	$(BIN)/python -m pytest -n 2 --dist loadfile -rP tests/campaigns/test_$(NAME).py

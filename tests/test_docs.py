@@ -68,6 +68,11 @@ def test_case_file_of_the_readme_is_feasible(tmp_path: Path) -> None:
     assert clear.task.collision.checked == ("self", "surface", "scene")
 
 
+def interrupted(page: coverable.Live) -> None:
+    """The user looks at a page, and presses Ctrl-C."""
+    raise KeyboardInterrupt
+
+
 def test_commands_of_the_readme_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -76,10 +81,13 @@ def test_commands_of_the_readme_run(
         (tmp_path / f"{name}.toml").write_text(text)
     lines = [line for block in blocks(README, "") for line in block.splitlines()]
     commands = [shlex.split(x, comments=True) for x in lines if x.startswith("coverable")]
+    monkeypatch.setattr(coverable.Live, "wait", interrupted)
     assert len(commands) >= 8
     for _, *arguments in commands:
         if arguments[0] == "show":  # without it, a browser window
             arguments += ["--html", "shown.html"]
+        if arguments[0] == "live":
+            arguments += ["--no-browser"]
         # Fewer cells and placements, and no processes but for the study, to save time.
         if arguments[0] in ("path", "compare", "explain"):
             arguments += ["--set", "surface.cells=[3, 4]"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import html
-import importlib.util
 import json
 import os
 import sys
@@ -20,7 +19,7 @@ from feasibility.live.controls import Controls
 from feasibility.live.server import File, PageServer
 from feasibility.live.sessions import Sessions
 from feasibility.live.workbench import Workbench
-from feasibility.viewer import View
+from feasibility.viewer import View, in_notebook, meshcat_program
 
 FILES = Path(__file__).with_name("page")
 KINDS = {
@@ -141,7 +140,7 @@ def live(
         OSError: the system gives no port.
     """
     page = Live(case if isinstance(case, Case) else load_case(case))
-    if _in_notebook():
+    if in_notebook():
         return page
     if open_browser:
         page.open()
@@ -151,12 +150,6 @@ def live(
         except KeyboardInterrupt:
             page.close()
     return page
-
-
-def _in_notebook() -> bool:
-    """True where a Jupyter kernel runs this."""
-    ipython = sys.modules.get("IPython")
-    return ipython is not None and getattr(ipython.get_ipython(), "kernel", None) is not None
 
 
 def _files(setup: Setup, controls: Controls, drawn: View) -> dict[str, File]:
@@ -183,16 +176,7 @@ def _files(setup: Setup, controls: Controls, drawn: View) -> dict[str, File]:
     return {
         "": files.pop("live.html"),
         **files,
-        "meshcat.js": File(KINDS[".js"], _meshcat()),
+        "meshcat.js": File(KINDS[".js"], meshcat_program()),
         "scene": File("application/octet-stream", picture.scene_bytes(drawn)),
         "case.json": File("application/json", text.encode()),
     }
-
-
-def _meshcat() -> bytes:
-    """The program of meshcat's viewer, which is not imported."""
-    spec = importlib.util.find_spec("meshcat")
-    if spec is None or not spec.submodule_search_locations:
-        raise ModuleNotFoundError("the page needs meshcat: pip install 'meshcat>=0.3.2,<0.4'")
-    folder = Path(next(iter(spec.submodule_search_locations)))
-    return (folder / "viewer" / "dist" / "main.min.js").read_bytes()

@@ -6,6 +6,7 @@ from .figures import plot_map as plot_map
 from .figures import plot_sides as plot_sides
 from .figures import plot_transition as plot_transition
 from .figures import unrolled_edges as unrolled_edges
+from .html_page import meshcat_program as meshcat_program
 from .obstacles import HULLS as HULLS
 from .path_and_division import view_division as view_division
 from .path_and_division import view_path as view_path
@@ -26,5 +27,6 @@ from .threejs import pack as pack
 from .view_figures import plot_view as plot_view
 from .view_figures import plot_views as plot_views
 from .viewer import View as View
+from .viewer import in_notebook as in_notebook
 from .viewer import show as show
 from .viewer import view as view

@@ -148,11 +148,20 @@ def _base64(data: bytes) -> str:
 @cache
 def _program() -> str:
     """The meshcat viewer's JavaScript, packed for the page."""
+    return _base64(meshcat_program())
+
+
+def meshcat_program() -> bytes:
+    """The meshcat viewer's JavaScript.
+
+    Raises:
+        ModuleNotFoundError: meshcat is not installed.
+    """
     spec = importlib.util.find_spec("meshcat")  # does not import it
     if spec is None or not spec.submodule_search_locations:
         raise ModuleNotFoundError("the viewer needs meshcat: pip install 'meshcat>=0.3.2,<0.4'")
     file = Path(next(iter(spec.submodule_search_locations)), "viewer", "dist", "main.min.js")
-    return _base64(file.read_bytes())
+    return file.read_bytes()
 
 
 _TEMPLATE = """<!DOCTYPE html>

@@ -238,7 +238,7 @@ def show(
         In a notebook the view, which the notebook displays; else what serves the window.
     """
     drawn = view(verdict, case)
-    if _in_notebook():
+    if in_notebook():
         return drawn
     live = drawn.show()
     if block or (block is None and not hasattr(sys, "ps1")):
@@ -249,7 +249,7 @@ def show(
     return live
 
 
-def _in_notebook() -> bool:
+def in_notebook() -> bool:
     """True where a Jupyter kernel runs this."""
     ipython = sys.modules.get("IPython")
     return ipython is not None and getattr(ipython.get_ipython(), "kernel", None) is not None

@@ -1,10 +1,11 @@
-// The handle on the surface: arrows along x, y and z, a ball for all directions, a ring for the yaw.
+// The handle on the surface: arrows along x, y and z, a ball for x and y, a ring for the yaw.
 
 const {THREE} = MeshCat;
 
 const COLOURS = [0xd91a1a, 0x1aa61a, 0x1a33e6];
 const RING = 0x7a3fb8, BALL = 0x222a33, HELD = 0xffa31a;
 const AXES = [new THREE.Vector3(1, 0, 0), new THREE.Vector3(0, 1, 0), new THREE.Vector3(0, 0, 1)];
+const LEVEL = 0.2; // [1] of a line of sight's slope, below which the ball moves square to it
 const SHARE = 0.11; // of the distance to the camera: the handle looks equally large everywhere
 
 function part(name, geometry, colour) {
@@ -34,7 +35,7 @@ export class Handle {
     this.parts = {};
     this.grips = [];
     ["x", "y", "z"].forEach((name, k) => this.arrow(name, k));
-    this.add("all", new THREE.SphereGeometry(0.13, 24, 16), new THREE.SphereGeometry(0.2, 12, 8),
+    this.add("level", new THREE.SphereGeometry(0.13, 24, 16), new THREE.SphereGeometry(0.2, 12, 8),
       BALL);
     this.add("yaw", new THREE.TorusGeometry(0.62, 0.028, 8, 64),
       new THREE.TorusGeometry(0.62, 0.09, 6, 32), RING);
@@ -106,7 +107,7 @@ export class Handle {
   // Where the pointer is as a number or a point, in the way that the held part moves.
   measure(event) {
     const ray = this.ray(event), {centre, name} = this.held;
-    if (name === "all" || name === "yaw") {
+    if (name === "level" || name === "yaw") {
       const normal = name === "yaw" ? AXES[2].clone() : this.held.facing;
       const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, centre);
       const point = ray.intersectPlane(plane, new THREE.Vector3());
@@ -127,7 +128,8 @@ export class Handle {
     const name = event.button === 0 ? this.under(event) : null;
     if (name === null) return;
     event.preventDefault();
-    const facing = this.ray(event).direction.clone().negate();
+    const sight = this.ray(event).direction;
+    const facing = Math.abs(sight.z) > LEVEL ? AXES[2].clone() : sight.clone().negate();
     this.held = {name, facing, centre: this.body.position.clone(), last: null};
     this.held.begin = this.measure(event);
     if (this.held.begin === null) {
