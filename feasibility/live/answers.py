@@ -1,17 +1,14 @@
 """Answers for a page: a quick look while something is dragged, the certified verdict afterwards.
 
-A quick look is the search alone, without replay and causes, and ends after a number of steps: it
-colours the cells, and calls nothing feasible. On the paper's cases it takes 12 to 50 ms, where the
-replay of a motion takes 8 more, and with collisions 90. The certified answer is that of `check`, in
-its words.
+A quick look colours the cells and calls nothing feasible: it is a short search without replay,
+proofs and causes. The certified answer is that of `check`, in its words.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
 
 import numpy as np
 
@@ -20,15 +17,13 @@ from feasibility.cases import Case, Setup
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import checked_words
-from feasibility.found import Found
 from feasibility.live import picture
 from feasibility.live.controls import Controls
 from feasibility.live.jobs import Answer, Job, Superseded
+from feasibility.live.quick_search import quick_search
 from feasibility.live.workbench import Workbench
-from feasibility.paper import greedy_search
 from feasibility.problem import Problem
 from feasibility.reports import verdict as report
-from feasibility.roadmap import complete_search
 
 STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most
 STEPS_WITH_BODIES = 12  # the same where distances of bodies make an evaluation ten times dearer
@@ -107,26 +102,16 @@ class Answers:
 
 
 def quick_look(setup: Setup, job: Job) -> Answer:
-    """How much of the surface a short search covers; neither certified nor complete."""
+    """How much of the surface a short search reaches; neither certified nor complete."""
     robot, cells, task, search = setup
-    problem = Problem.of(robot, cells, task)
-    covered, q = np.zeros(len(cells), dtype=bool), None
-    method: Callable[[Problem, Any, Clock], Found] = complete_search
-    if search.method == "greedy":
-        method = greedy_search
     watch = Watch(job, steps=STEPS if task.collision is None else STEPS_WITH_BODIES)
-    try:
-        found = method(problem, search, watch)
-    except OutOfTime:  # before it had found anything
-        found = None
-    if found is not None:
-        covered = found.covered
-        q = None if found.postures is None or not len(found.postures) else found.postures[0]
+    covered, q = quick_search(Problem.of(robot, cells, task), search, watch)
     number, total = int(covered.sum()), len(cells)
+    what = "cells" if not cells.in_order else "poses, in any order,"
     paint = picture.quick_paint(covered)
     return {
         "kind": "quick",
-        "head": f"quick look: one motion reaches {number:,} of {total:,} cells"
+        "head": f"quick look: one motion reaches {number:,} of {total:,} {what}".rstrip(",")
         + ("" if number == total else " so far"),
         "covered": number,
         "cells": total,
