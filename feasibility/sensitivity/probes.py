@@ -20,6 +20,7 @@ from feasibility.roadmap import (
     Ruling,
     SearchArrays,
     arrays_of,
+    close,
     collisions_of,
     covering_walk,
     evenly,
@@ -30,6 +31,7 @@ from feasibility.roadmap import (
     work_for,
     wound,
 )
+from feasibility.roadmap.forward import run_in_order
 from feasibility.sensitivity.limited_search import (
     NO_CELL,
     Attempt,
@@ -243,7 +245,7 @@ class Prober:
         needed = np.ones(len(cells), dtype=bool) if needed is None else needed
         clock = self.clock.part(1.0, lambda *_: self.tick())
         exploration = LimitedExploration(robot, cells, arrays, self.seed, clock, most=most)
-        ended = False
+        ended, run = False, None
         try:
             self._add_seeds(exploration, seeds, deep)
             if hard != NO_CELL and not exploration.complete:
@@ -251,13 +253,18 @@ class Prober:
             if deep and not exploration.complete:
                 explore(exploration)
                 ended = True
+            if cells.in_order and needed.all() and exploration.complete:
+                close(exploration)
+                run = run_in_order(exploration)
         except OutOfTime:
             pass
         finally:
             self.spent_before += int(exploration.work.counts[0])
         q = configurations(exploration)
-        if needed.any() and exploration.covered[needed].all():
+        walk = None if run is None else run.walk
+        if not cells.in_order and needed.any() and exploration.covered[needed].all():
             walk = covering_walk(exploration.roadmap, exploration.best)
+        if walk is not None:
             detail = f"one motion of {len(walk.q)} waypoints"
             return Attempt(Answer.FEASIBLE, Evidence.WITNESS, detail, q, walk)
         proved = [k for k, ruling in exploration.rulings.items() if ruling is Ruling.PROVED]
@@ -266,6 +273,8 @@ class Prober:
             detail = f"cell {list(cells.unravel(proved[0]))} is proved uncoverable"
             return Attempt(Answer.INFEASIBLE, Evidence.PROOF, detail, q, None)
         best = f"the best motion covers {int(exploration.covered.sum())} of {len(cells)} cells"
+        if run is not None:
+            best = f"the best run in order ends over pose {run.furthest}"
         if ended and certifiable(arrays):
             detail = f"the search ended without a covering motion; {best}"
             return Attempt(Answer.INFEASIBLE, Evidence.EXHAUSTED, detail, q, None)

@@ -15,7 +15,7 @@ from feasibility.sensitivity import Explanation, Kind, explain
 from feasibility.sensitivity.quantities import Variant, quantities
 from feasibility.verdict import Walk
 from robots import load_robot
-from surfaces import plane
+from surfaces import plane, poses
 
 NARROW = """
 [robot]
@@ -55,6 +55,24 @@ def setup() -> Case:
 def explained(seed: int) -> Explanation:
     robot, cells, task, _ = setup()
     return explain(robot, cells, task, Search(seed=seed))
+
+
+def test_a_toolpath_stays_in_its_order() -> None:
+    """The covering motion of a component goes back; what is tried has to be a run."""
+    s = np.linspace(0.0, 1.0, 6)
+    points = np.column_stack([0.4 + 0.2 * s, 0.1 * np.sin(5.0 * s), 0.2 + 0.0 * s])
+    walk = poses(points, np.tile((0.0, 0.0, 1.0), (6, 1)), side="outside")
+    robot, task = load_robot("ur5"), Task(0.01, 10.0)
+    found = explain(robot, walk, task)
+    assert len(found.thresholds) >= 6
+    for threshold in found.thresholds:
+        assert threshold.other is None or "replay refuses" not in threshold.other.detail
+        assert threshold.feasible is not None
+        motion = threshold.feasible.witness
+        assert motion is not None
+        marks = motion.cell[motion.cell >= 0]
+        assert np.array_equal(np.unique(marks), np.arange(6))
+        assert (np.diff(marks) >= 0).all()
 
 
 @pytest.mark.parametrize("seed", [0, 1])
