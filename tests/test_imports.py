@@ -46,6 +46,7 @@ surfaces.step_files
 surfaces: sheet tiles triangle_kernel cell_triangles
 surfaces.passes
 surfaces.places
+surfaces.cell_tiles
 feasibility: cell_graph clock compiled cone cut_tree cut_words interrupts notices read_only roll safe_files search version
 feasibility.collisions
 feasibility.collisions.kernels
@@ -58,6 +59,7 @@ feasibility.certification.collisions
 feasibility.certification.tool_alone
 feasibility.certification.rolls
 feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region lever_bounds linear_models motion_replay order parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
+feasibility.certification.areas
 feasibility.paper
 feasibility.cases
 feasibility.roadmap.motions
@@ -71,6 +73,8 @@ feasibility.roadmap: walk
 feasibility.roadmap.forward
 feasibility.roadmap: between_rounds complete graph_g outcome refinement warmup
 feasibility.certification.rates
+feasibility.area.kernels
+feasibility.area
 feasibility.paths
 feasibility.speed
 feasibility: checking

@@ -11,4 +11,5 @@ from .motion_replay import replay_along_curves as replay_along_curves
 from .proof_verification import ProofCheck as ProofCheck
 from .proof_verification import verify_proof as verify_proof
 from .surface_replay import MotionReplay as MotionReplay
+from .surface_replay import less_deviations as less_deviations
 from .surface_replay import replay_over_surface as replay_over_surface

@@ -85,7 +85,7 @@ def replay_over_surface(
     surface = cells.surface
     if isinstance(surface, PoseSurface) and task.approach == "normal":
         surface = replace(surface, axes=None)  # those of the poses' own do not count
-    judge = Judge(robot, _within(task, surface), offset_surface(surface, height), cells)
+    judge = Judge(robot, less_deviations(task, surface), offset_surface(surface, height), cells)
     margin, faults = _limits(robot, rows)
     poses = placements(robot, rows)
     count = np.arange(len(rows))
@@ -117,7 +117,7 @@ def replay_over_surface(
     return MotionReplay(certificate, tuple(faults), reached)
 
 
-def _within(task: Task, surface: Surface) -> Task:
+def less_deviations(task: Task, surface: Surface) -> Task:
     """The task less what the surface may deviate from the one meant."""
     off, leans = surface.deviations
     if not (off or leans):
