@@ -81,6 +81,7 @@ feasibility: checking
 feasibility.timing
 feasibility.programs
 feasibility.division
+feasibility.entry
 feasibility.runs
 feasibility.sensitivity
 feasibility.results
@@ -95,7 +96,7 @@ feasibility.viewer: figures live_server nearest obstacles painter path_and_divis
 feasibility.viewer.passes
 feasibility.reports
 feasibility.live
-feasibility.cli: case_commands command console listing live main passes path place study_compare verify
+feasibility.cli: case_commands command console listing live main passes path path_outputs place study_compare verify
 coverable_command
 feasibility.cli: __main__
 coverable

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -19,6 +18,13 @@ from feasibility.cli.command import (
 )
 from feasibility.cli.console import print_err, print_out
 from feasibility.cli.passes import add_passes, check_passes, in_runs, plan_passes
+from feasibility.cli.path_outputs import (
+    add_ends,
+    add_programs,
+    approach_of,
+    check_programs,
+    write_path,
+)
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -26,23 +32,22 @@ if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
     from feasibility.paths import CoveragePath
     from feasibility.runs import PlannedPasses
-    from feasibility.timing import Trajectory
+    from feasibility.timing import MotionLimits, Trajectory
     from feasibility.treated import TreatedArea
     from feasibility.verdict import Verdict
     from feasibility.viewer import View
-    from robots import Robot
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
 WHY_COMPLETE = "a path needs 'complete': the greedy search does not visit the cells' centres"
-PERIOD = 0.02  # [s] between samples
+SPEED = 0.1  # [m/s] of the tool point
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     add_command(
         subcommands, "path", path, add_case, add_html, add_passes, _add_timing,
-        _add_programs,
+        add_programs, add_ends,
         help="a coverage motion that an arm can run",
         description="Plan a path over every cell in a chosen order, time it within the limits of "
         "joints and tool, and write it as a trajectory.",
@@ -58,8 +63,8 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
         help="default: rows on a grid of cells, given of a toolpath, shortest on others",
     )
     parser.add_argument(
-        "--speed", type=positive, default=0.1, metavar="M_PER_S",
-        help="maximum speed of the tool point, m/s (default 0.1)",
+        "--speed", type=positive, metavar="M_PER_S",
+        help="maximum speed of the tool point, m/s (default task.speed, else 0.1)",
     )  # fmt: skip
     parser.add_argument(
         "--velocity", type=positive, metavar="RAD_PER_S",
@@ -81,39 +86,6 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
-def _add_programs(parser: argparse.ArgumentParser) -> None:
-    """Programs of robot controllers."""
-    parser.add_argument(
-        "--program", metavar="FILE", action="append", default=[],
-        help="write the trajectory as a program: .script (URScript), .mod (ABB RAPID) or .src "
-        "(KUKA KRL); can be repeated",
-    )  # fmt: skip
-    parser.add_argument(
-        "--axis-signs", metavar="S1,..,S6", type=_six,
-        help="of a program: 1 or -1 for each axis of the controller, where its sense is not that "
-        "of the URDF's joint; write --axis-signs=-1,1,1,1,1,1",
-    )  # fmt: skip
-    parser.add_argument(
-        "--axis-offsets-deg", metavar="D1,..,D6", type=_six,
-        help="of a program: degrees that are added to each axis, where its zero is another",
-    )  # fmt: skip
-
-
-def _six(text: str) -> list[float]:
-    """Six finite numbers with commas between them.
-
-    Raises:
-        ArgumentTypeError: the text is something else.
-    """
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != 6 or not all(map(math.isfinite, numbers)):
-        raise argparse.ArgumentTypeError(f"must be six numbers with commas, got {text!r:.60}")
-    return numbers
-
-
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
@@ -129,17 +101,20 @@ def path(args: argparse.Namespace, began: float) -> int:
     with open_case(args, began, outputs, WHY_COMPLETE, judge) as opened:
         from feasibility.checking import check
         from feasibility.clock import OutOfTime
+        from feasibility.entry import ends_of, entered
         from feasibility.paths import coverage_path
         from feasibility.reports import path as report
         from feasibility.results import check_ending
+        from feasibility.speed import path_rates
         from feasibility.timing import motion_limits, trajectory
         from feasibility.verdict import Answer
 
         for out in args.out:
             check_ending(out)
         robot, loaded = opened.setup.robot, opened.so_far()
-        period = _check_programs(args, robot)
-        limits = motion_limits(robot, args.speed, args.velocity, args.acceleration)
+        period = check_programs(args, robot)
+        speed = args.speed or opened.setup.task.speed or SPEED
+        limits = motion_limits(robot, speed, args.velocity, args.acceleration)
         along = None if args.passes is None else plan_passes(args, opened)
         verdict = check(*opened.setup, clock=opened.clock) if along is None else along.verdict
         if not verdict.feasible and along is not None and "time limit" not in verdict.message:
@@ -151,33 +126,25 @@ def path(args: argparse.Namespace, began: float) -> int:
                 opened.progress(0, None, "planning the path")
                 found = coverage_path(verdict, args.order)
                 treated = _treated(opened, along, found)
+                approach, rates = approach_of(args, found.task), path_rates(found)
+                ends = None if approach is None else ends_of(found, approach)
                 opened.progress(0, None, "timing the path")
                 run = trajectory(
-                    found, args.speed, velocity=args.velocity, acceleration=args.acceleration,
+                    found, speed, velocity=args.velocity, acceleration=args.acceleration,
                     period=period,
                 )  # fmt: skip
+                run = run if ends is None else entered(found, run, ends, limits, period)
         except OutOfTime:
             late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
             verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
             return _no_path(args, opened.case.name, verdict, loaded)
     laid = None if along is None else along.passes
     short = report.short_words(treated, opened.setup.task.coverage)
-    if args.json:
-        print_out(json_text(report.as_json(found, run, limits, laid, treated)))
-    else:
-        print_out(report.as_text(found, run, limits, laid, treated))
-    for out in args.out:
-        from feasibility.results import save_trajectory
-
-        save_trajectory(out, run)
-        print_err(f"trajectory: {shown_path(out)}")
-    for file in args.program:
-        from feasibility.programs import save_program
-
-        save_program(file, robot, run, opened.case.name, args.axis_signs, args.axis_offsets_deg)
-        print_err(f"program: {shown_path(file)}")
+    told = (found, run, limits, laid, treated, rates, ends)
+    print_out(json_text(report.as_json(*told)) if args.json else report.as_text(*told))
+    write_path(args, robot, run, opened.case.name)
     if args.html is not None:
-        write_text(args.html, _view(opened, along, found, treated, run).html(), "view")
+        write_text(args.html, _view(opened, along, found, treated, run, limits).html(), "view")
     if short:
         print_err(short)
     return STATUS["undecided" if short else "feasible"]
@@ -189,13 +156,14 @@ def _view(
     found: CoveragePath,
     treated: TreatedArea | None,
     run: Trajectory,
+    limits: MotionLimits,
 ) -> View:
     """The picture of a path over cells, or along passes."""
     from feasibility.viewer import view_path
     from feasibility.viewer.passes import view_passes
 
     if along is None:
-        return view_path(found, run, opened.case.name)
+        return view_path(found, run, opened.case.name, limits)
     return view_passes(along, [found], treated, run, opened.case.name)
 
 
@@ -208,23 +176,6 @@ def _treated(
     if along is not None:
         return along.treated(found.walk)
     return treated_by_walk(found.robot, found.cells, opened.setup.task, found.walk)
-
-
-def _check_programs(args: argparse.Namespace, robot: Robot) -> float:
-    """Refuse programs that this arm has not, before the search; s between samples.
-
-    Raises:
-        CoverableError: a file's ending is that of no program, or the arm has none of that kind.
-    """
-    from feasibility.programs import check_program, language_of
-
-    languages = [language_of(file) for file in args.program]
-    for language in languages:
-        check_program(language, robot, args.axis_signs, args.axis_offsets_deg)
-    if args.period is not None:
-        return float(args.period)
-    slow = [language.period for language in languages]
-    return PERIOD if args.out or not slow else min(slow)
 
 
 def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: float) -> int:

@@ -4,6 +4,8 @@ from .division import Division as Division
 from .division import Plan as Plan
 from .division import SubPatch as SubPatch
 from .fewest_patches import divide as divide
+from .free_motion import FreeSpace as FreeSpace
+from .free_motion import free_motion as free_motion
 from .plans import collect_components as collect_components
 from .plans import connect_pairs as connect_pairs
 from .reconfiguration import Reconfiguration as Reconfiguration

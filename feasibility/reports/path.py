@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from feasibility.certification.rates import RateReplay
 from feasibility.collisions import checked
+from feasibility.entry import Ends
 from feasibility.paths import CoveragePath, PathFigures
 from feasibility.reports.parts import (
     certificate_json,
@@ -18,6 +20,7 @@ from feasibility.reports.parts import (
     roll_text,
     summary,
 )
+from feasibility.reports.path_ends import ends_json, ends_words, rates_json, rates_words
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results import plain
 from feasibility.timing import MotionLimits, Trajectory, used
@@ -34,6 +37,8 @@ def as_json(
     limits: MotionLimits | None = None,
     laid: Passes | None = None,
     treated: TreatedArea | None = None,
+    rates: RateReplay | None = None,
+    ends: Ends | None = None,
 ) -> dict[str, Any]:
     """The object that `coverable path --json` prints, without NaN.
 
@@ -45,6 +50,8 @@ def as_json(
         limits: of the timing.
         laid: the passes that it runs, if it does.
         treated: what it treats, where a footprint is asked for.
+        rates: what its motion allows, if the task asks.
+        ends: how it is entered and left, if it is.
     """
     figures = path.figures
     sliding = path.robot.prismatic
@@ -75,6 +82,8 @@ def as_json(
         "treated": treated_json(treated),
         "passes": None if laid is None else passes_json(laid),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
+        **rates_json(path, rates),
+        **ends_json(ends),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,
         "version": version(),
@@ -189,6 +198,8 @@ def as_text(
     limits: MotionLimits | None = None,
     laid: Passes | None = None,
     treated: TreatedArea | None = None,
+    rates: RateReplay | None = None,
+    ends: Ends | None = None,
 ) -> str:
     """The path for people: its length compared with the least possible, margins, and times.
 
@@ -218,6 +229,7 @@ def as_text(
             ("time", f"{trajectory.duration:.4g} s in {samples}, tool at up to {speed} m/s"),
             ("limits", _limits_text(path.robot, trajectory, limits)),
         ]
+    rows += [("speed", rates_words(path, rates)), ("ends", ends_words(ends))]
     head = f"path: one continuous motion over {over}."
     if laid is not None:
         rows[0] = ("passes", passes_text(laid))

@@ -33,9 +33,10 @@ from feasibility.timing.sampled_trajectory import (
     past_limits,
     used,
 )
-from feasibility.timing.smoothing import Curve, blended
+from feasibility.timing.smoothing import Curve, blended, control_points
 from feasibility.timing.speed_limits import MotionLimits, motion_limits, number
 from feasibility.timing.timed_curve import samples, timed_curve
+from feasibility.verdict import Walk
 from robots import Robot
 
 Array = NDArray[np.float64]
@@ -149,6 +150,45 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
     )
 
 
+def timed_moves(
+    robot: Robot, rows: Array, share: float, limits: MotionLimits, period: float, slower: float
+) -> Trajectory:
+    """Samples of a motion that is over no surface: straight lines between rows, turns blended.
+
+    Args:
+        robot: the arm.
+        rows: (k, n) rad or m.
+        share: of the shorter line next to each row that its turn uses on either side.
+        limits: to keep to.
+        period: s between samples.
+        slower: times that it is run slower than it might be.
+
+    Raises:
+        PathError: no such timing was found.
+    """
+    apart = np.append(True, np.abs(np.diff(rows, axis=0)).max(axis=1) > 0.0)
+    kept = rows[apart] if apart.sum() > 1 else rows[:1]
+    cell = np.full(len(kept), -1, dtype=np.int64)
+    cell[[0, -1]] = 0  # marked, so that both ends are sampled
+    walk = Walk(q=kept, cell=cell)
+    curve = control_points(walk, np.full(len(kept), share))
+    less = MotionLimits(
+        limits.velocity / slower, limits.acceleration / slower**2, limits.tool_speed / slower
+    )
+    run = within_limits(robot, curve, less, period)
+    return replace(run, cell=np.full(len(run), -1, dtype=np.int64))
+
+
+def move_refusal(path: CoveragePath, run: Trajectory) -> str:
+    """Why a timed motion that is over no surface is refused: limits, bodies; empty if it is not."""
+    robot = path.robot
+    past = float(past_limits(robot, run).max(initial=0.0))
+    if past > 0.0:
+        return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
+    bodies = gather(robot, path.cells.surface, path.task.collision, path.task.standoff)
+    return "" if bodies is None else _collisions(robot, bodies, run)
+
+
 def _refusal(path: CoveragePath, run: Trajectory) -> str:
     """Why the samples are refused, as straight lines or interpolated; empty if they are not."""
     robot, cells = path.robot, path.cells
@@ -164,8 +204,14 @@ def _refusal(path: CoveragePath, run: Trajectory) -> str:
     bodies = gather(robot, cells.surface, path.task.collision, path.task.standoff)
     if bodies is None:
         return ""
+    return _collisions(robot, bodies, run)
+
+
+def _collisions(robot: Robot, bodies: Bodies, run: Trajectory) -> str:
+    """Which bodies come too near, as straight lines or interpolated; empty if all stay clear."""
     found = _collision(robot, bodies, run.walk.q, run.time)
-    for kind, walk in motions.items():
+    for kind in KINDS:
+        walk = motion_between(run, kind, PLACES)
         share = np.arange(len(walk.q)) / PLACES
         time = np.interp(share, np.arange(len(run)), run.time)
         strays = strays_between(run, kind, walk.q)

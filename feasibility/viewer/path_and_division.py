@@ -36,9 +36,14 @@ from robots import Kinematics, Robot
 if TYPE_CHECKING:
     from feasibility.division import Division, Reconfiguration
     from feasibility.paths import CoveragePath
-    from feasibility.timing import Trajectory
+    from feasibility.timing import MotionLimits, Trajectory
 
 RECONFIGURED: Colour = (0.80, 0.05, 0.05)
+BANDS: tuple[tuple[float, Colour, str], ...] = (
+    (0.5, (0.10, 0.55, 0.25), "joints below half of their velocities"),
+    (0.9, (0.95, 0.70, 0.10), "joints at 50 to 90 % of them"),
+    (np.inf, (0.80, 0.10, 0.10), "joints above 90 % of them"),
+)  # share of the velocity limits, colour and words of a piece of the trail
 STROKES = 160  # pieces of the trail that appear one after the other
 DENSE = 24  # points drawn of one move between patches
 FEW = 2  # joints of a move that the legend names
@@ -46,7 +51,10 @@ FRAMES = 3_000  # samples of a trajectory that are drawn, at most
 
 
 def view_path(
-    path: CoveragePath, trajectory: Trajectory | None = None, case: str | None = None
+    path: CoveragePath,
+    trajectory: Trajectory | None = None,
+    case: str | None = None,
+    limits: MotionLimits | None = None,
 ) -> View:
     """The arm along a path, and the trail of the tool growing behind it.
 
@@ -55,6 +63,8 @@ def view_path(
         trajectory: its timing; played as fast as it is, or in a minute if it takes longer. Without
             one the tool travels evenly.
         case: name of the case, for the title.
+        limits: of the timing: where the task has a speed, the trail is coloured by how much of
+            them the joints use.
     """
     robot, cells, figures = path.robot, path.cells, path.figures
     count = int(path.needed.sum())
@@ -64,7 +74,8 @@ def view_path(
     else:
         motion = _timed(robot, trajectory)
         speed = f"{trajectory.duration:.1f} s"
-    strokes, tracks = _strokes(motion, 0.06 * cell_size(cells))
+    times, use = _painting(trajectory, motion, limits if path.task.speed is not None else None)
+    strokes, tracks = _strokes(motion, 0.06 * cell_size(cells), times, use)
     again = f", {figures.revisited:.2g} m of it revisited" if figures.revisited > 0.0 else ""
     text = (
         f"{robot.name}: {counted(count)} in order {path.order}, "
@@ -72,7 +83,7 @@ def view_path(
     )
     title = titled(f"feasible, one path over {counted(count)}", case)
     drawn = compose(
-        robot, cells, title, text, [*cells_layers(cells), strokes], motion,
+        robot, cells, title, text, [*cells_layers(cells), *strokes], motion,
         resting=path.walk.q[0], tracks=tracks, task=path.task,
     )  # fmt: skip
     if trajectory is None or drawn.readout is None:
@@ -121,12 +132,47 @@ def _timed(robot: Robot, trajectory: Trajectory) -> Motion:
     return Motion(q, time, points, False, "coverage path")
 
 
-def _strokes(motion: Motion, radius: float) -> tuple[Layer, list[dict[str, Any]]]:
-    """The tool's trail in pieces, and the tracks that show each when the tool has passed."""
-    root = "/motion/painted trail"
+def _painting(
+    trajectory: Trajectory | None, motion: Motion, limits: MotionLimits | None
+) -> tuple[tuple[float, float], NDArray[np.float64] | None]:
+    """When the tool is over the surface, s, and the share (k,) of their velocities that joints use.
+
+    Entry and exit leave no trail. None in place of the shares without limits.
+    """
     end = float(motion.seconds[-1])
-    edges = np.linspace(0.0, end, STROKES + 1)
-    commands, tracks = [], []
+    if trajectory is None or len(trajectory) < 2:
+        return (0.0, end), None
+    over = trajectory.time[trajectory.cell >= 0] - trajectory.time[0]
+    played = end / trajectory.duration
+    times = (float(over.min()) * played, float(over.max()) * played) if len(over) else (0.0, end)
+    if limits is None:
+        return times, None
+    at = (trajectory.time - trajectory.time[0]) * played
+    used = (np.abs(trajectory.dq) / limits.velocity).max(axis=1)
+    return times, np.interp(motion.seconds, at, used)
+
+
+def _strokes(
+    motion: Motion,
+    radius: float,
+    when: tuple[float, float],
+    use: NDArray[np.float64] | None = None,
+) -> tuple[list[Layer], list[dict[str, Any]]]:
+    """The tool's trail in pieces, and the tracks that show each when the tool has passed.
+
+    Args:
+        motion: what is played.
+        radius: m, of the trail.
+        when: s, between which there is one.
+        use: (k,) of the joints' velocities, by which it is coloured; None for one colour.
+    """
+    end, root = float(motion.seconds[-1]), "/motion/painted trail"
+    bands = [(np.inf, TRAIL, "painted trail", root)]
+    if use is not None:
+        bands = [(most, colour, name, f"{root}, {name}") for most, colour, name in BANDS]
+    edges = np.linspace(*when, STROKES + 1)
+    commands: list[list[Any]] = [[] for _ in bands]
+    tracks = []
     for k, (start, stop) in enumerate(pairwise(edges)):
         inside = (motion.seconds > start) & (motion.seconds < stop)
         times = np.concatenate([[start], motion.seconds[inside], [stop]])
@@ -134,10 +180,17 @@ def _strokes(motion: Motion, radius: float) -> tuple[Layer, list[dict[str, Any]]
         vertices, faces = tubes([line], radius)
         if len(faces) == 0:
             continue
-        path = f"{root}/{k:03d}"
-        commands.append(threejs.mesh(path, vertices, faces, TRAIL, lit=False))
+        most = 0.0 if use is None else float(np.interp(times, motion.seconds, use).max())
+        band = next(j for j, one in enumerate(bands) if most <= one[0])
+        path = f"{bands[band][3]}/{k:03d}"
+        commands[band].append(threejs.mesh(path, vertices, faces, bands[band][1], lit=False))
         tracks.append(threejs.appearing(path, stop, end))
-    return Layer(tuple(commands), Entry("painted trail", TRAIL, root), len(commands)), tracks
+    layers = [
+        Layer(tuple(made), Entry(name, colour, path), len(made))
+        for made, (_, colour, name, path) in zip(commands, bands, strict=True)
+        if made
+    ]
+    return layers, tracks
 
 
 def _along(move: Reconfiguration, count: int) -> NDArray[np.float64]:

@@ -1,0 +1,3 @@
+from .ends import Ends as Ends
+from .ends import ends_of as ends_of
+from .timed_ends import entered as entered

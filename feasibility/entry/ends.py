@@ -1,0 +1,100 @@
+"""The moves before and after a motion over a surface.
+
+In: from home, where there is one, to a place behind the first one over the surface, then straight
+along its approach direction. Out: straight back along that of the last place, then home. The way to
+and from home is a straight line of the joints, or leads around what is in its way; all of it is
+inside the limits, and judged like any motion where collisions are checked.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification import collision_replay
+from feasibility.collisions import Bodies, collision_buffer, gather
+from feasibility.division import FreeSpace, free_motion
+from feasibility.entry.drawing_back import drawn_back
+from feasibility.paths import CoveragePath, PathError
+from feasibility.read_only import ReadOnlyArrays
+from robots import Robot
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Ends(ReadOnlyArrays):
+    """The two moves, straight in joint space between their rows."""
+
+    approach: float
+    """m, length of the straight lines of the tool point."""
+    entry: Floats
+    """(k, n) rad or m; the last row is the first one over the surface."""
+    exit: Floats
+    """(k, n) rad or m; the first row is the last one over the surface."""
+    from_home: bool
+
+
+def ends_of(path: CoveragePath, approach: float) -> Ends:
+    """How a path is entered and left.
+
+    Args:
+        path: over the surface; `task.home_deg` is where it comes from and goes to.
+        approach: m, how far the tool is drawn back along the approach direction.
+
+    Raises:
+        PathError: the tool cannot be drawn back, something is in its way, or no way home is found.
+    """
+    q, cell = path.walk.q, path.walk.cell
+    marks = np.flatnonzero(cell >= 0)
+    if not len(marks):
+        raise PathError("the path passes no cell, so there is no approach direction")
+    into, out = (
+        _move(path, q[row], int(cell[mark]), approach, what)
+        for row, mark, what in ((0, marks[0], "entry"), (-1, marks[-1], "exit"))
+    )
+    home = path.task.home_deg is not None
+    return Ends(approach=approach, entry=into[::-1], exit=out, from_home=home)
+
+
+def _move(path: CoveragePath, q: Floats, cell: int, approach: float, what: str) -> Floats:
+    """(k, n) from a configuration over the surface back, and home where there is one."""
+    robot, task = path.robot, path.task
+    direction = -task.approaches(path.cells)[cell]
+    try:
+        back = drawn_back(robot, q, direction, approach, task.effective_tolerance)
+    except PathError as error:
+        raise PathError(f"{what}: {error}; give another --approach") from error
+    surface = path.cells.surface
+    bodies = gather(robot, surface, task.collision, task.standoff)
+    # A tool that touches the surface may do so only until it is drawn back.
+    lifted = gather(robot, surface, task.collision, task.standoff + approach)
+    _judged(robot, bodies, back, f"{what}: the tool cannot be drawn back along its approach")
+    if task.home_deg is None:
+        return back
+    home = np.array([math.radians(angle) for angle in task.home_deg])
+    if lifted is None:
+        return np.vstack([back, home])
+    _judged(robot, lifted, home[None], f"{what}: home_deg")
+    space = FreeSpace(robot, collision_buffer(lifted, robot))
+    way = free_motion(space, back[-1], home, seed=0)
+    if way is None:
+        raise PathError(f"{what}: no way between home and the surface was found that keeps clear")
+    _judged(robot, lifted, way, f"{what}: the way home")
+    return np.vstack([back, way[1:]])
+
+
+def _judged(robot: Robot, bodies: Bodies | None, rows: Floats, what: str) -> None:
+    """Refuse rows (k, n) along which bodies come too near to each other.
+
+    Raises:
+        PathError: they do.
+    """
+    if bodies is None:
+        return
+    found = collision_replay(robot, bodies, rows)
+    if not found.accepted:
+        raise PathError(f"{what}: {found.refusal}")
