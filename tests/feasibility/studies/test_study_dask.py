@@ -78,6 +78,7 @@ def test_one_worker_of_a_machine_loads_first(cluster, monkeypatch, capsys) -> No
     monkeypatch.setattr("feasibility.studies.dask_workers.warm_up", study_works.mark_loaded)
     with open_workers(address=cluster.scheduler_address) as there:
         assert there.submit(study_works.marks).result() in ([], [1])
+        there._client.wait_for_workers(2)  # one was killed above, and another comes in its place
         marks = there._client.run(study_works.marks)
     assert sorted(marks.values()) == [[], [1]]
 
