@@ -1,3 +1,4 @@
+from .deciding import TOO_SLOW as TOO_SLOW
 from .deciding import at_rates as at_rates
 from .deciding import check_asked as check_asked
 from .largest import RateFigures as RateFigures

@@ -35,6 +35,8 @@ from feasibility.verdict import (
 from robots import Robot
 
 FEW = 5  # cells that are named
+TOO_SLOW = "covered, but not as fast or as far from singularities as asked"
+"""A key of the statistics of such a verdict."""
 
 
 def check_asked(robot: Robot, task: Task, search: Search) -> None:
@@ -185,6 +187,7 @@ def _not_found(
         verdict, answer=Answer.UNDECIDED, evidence=Evidence.BUDGET, message=message + late,
         covered=reached, witness=None, certificate=None,
         causes=deferred(lambda: _causes(rated, reached)),
+        statistics={**verdict.statistics, TOO_SLOW: True},
     )  # fmt: skip
 
 

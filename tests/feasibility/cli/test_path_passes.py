@@ -118,3 +118,11 @@ def test_bad_arguments_are_named(case, arguments, said, capsys):
     err = capsys.readouterr().err
     assert said in " ".join(err.split())
     assert "Traceback" not in err
+
+
+def test_passes_too_fast_for_the_joints_are_not_cut_but_refused(case, capsys):
+    asked = ["--passes", "0", "--pitch", "0.1", "--set", "task.speed=6"]
+    assert main(["path", case, *asked]) == 3
+    err = " ".join(capsys.readouterr().err.split())
+    assert "none was found that does so at 6 m/s" in err
+    assert "rad/s at cell" in err
