@@ -26,7 +26,7 @@ from feasibility.problem import Problem
 from feasibility.reports import verdict as report
 
 STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most
-STEPS_WITH_BODIES = 12  # the same where distances of bodies make an evaluation ten times dearer
+STEPS_WITH_BODIES = 24  # the same where distances of bodies make an evaluation dearer
 BUG = "this is a bug in coverable: {}: {}; the page goes on working"
 
 

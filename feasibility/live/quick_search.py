@@ -27,7 +27,7 @@ from feasibility.roadmap import (
 from feasibility.search import Search
 from feasibility.targets import start_cell
 
-SEEDS = 4  # guesses at a cell that is not reached
+SEEDS = 2  # guesses at a cell that is not reached
 ROUNDS = 3
 LARGEST = 3  # parts that a round tries to join
 

@@ -5,6 +5,7 @@ import http.client
 import json
 import re
 import socket
+import threading
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -197,6 +198,41 @@ def test_what_is_saved_is_what_is_shown_and_nothing_is_written(client, tmp_path,
     again = Controls(saved, saved.robot.build()).values
     assert again == {**values, "limits": {**again["limits"], **values["limits"]}}
     assert client.post("save", values={"cone_deg": -1})["error"].startswith("plate: task.cone_deg")
+
+
+def test_a_slow_page_never_gets_an_old_answer(page, client, monkeypatch):
+    """The reply to a question that a newer one has replaced says so, whenever it is fetched."""
+    begun, go = threading.Event(), threading.Event()
+    answer = Answers.__call__
+
+    def slow(answers, job):
+        begun.set()
+        assert go.wait(GUARD_S)
+        return answer(answers, job)
+
+    monkeypatch.setattr(Answers, "__call__", slow)
+    asked = {"session": client.session, "final": False}
+    replies = {}
+
+    def ask(number):
+        reply = client.post("ask", **asked, number=number, values={"cone_deg": number})
+        while reply["status"] == "deciding":
+            reply = client.post("ask", **asked, number=number, values={"cone_deg": number})
+        replies[number] = reply["status"]
+
+    first = threading.Thread(target=ask, args=(21,))
+    first.start()
+    assert begun.wait(GUARD_S)
+    last = threading.Thread(target=ask, args=(25,))
+    last.start()
+    first.join(GUARD_S)
+    assert replies == {21: "superseded"}  # at once, while it is still worked on
+    for number in (22, 23, 24):  # questions that were held up on their way
+        ask(number)
+    go.set()
+    last.join(GUARD_S)
+    superseded = dict.fromkeys((21, 22, 23, 24), "superseded")
+    assert replies == {**superseded, 25: "answered"}
 
 
 def test_two_pages_have_answers_of_their_own(page, client):
