@@ -21,6 +21,7 @@ from feasibility import check
 from feasibility.cases import Case, load_case
 from feasibility.live import Live
 from feasibility.reports import verdict as report
+from feasibility.viewer.live_server import LiveView
 
 PATIENCE_MS = 120_000
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -316,3 +317,30 @@ def test_answers_while_something_is_dragged(browser):
         taken = (time.perf_counter() - began) / count
         print(f"paper/4a: {1e3 * taken:.0f} ms from letting go to the certified answer")
         page.close()
+
+
+def test_a_notebook_shows_the_page_over_a_picture_that_outlives_it(browser):
+    """The output stands on a page of another origin, as Jupyter's do."""
+    live = Live(Case.from_toml(PLATE, name="plate"))
+    try:
+        with LiveView(live._repr_mimebundle_()["text/html"]) as notebook:
+            page = browser.new_page(viewport={"width": 1000, "height": 700})
+            page.goto(notebook.url)
+            inner = page.frame_locator("iframe")
+            expect(inner.locator("#answer")).to_have_class(
+                re.compile("^feasible *$"), timeout=PATIENCE_MS
+            )
+            inner.locator("#cone-number").fill("5")
+            inner.locator("#cone-number").press("Enter")
+            expect(inner.locator("#undo")).to_be_enabled()
+            expect(inner.locator("#answer")).to_have_class(
+                re.compile("^(feasible|infeasible|undecided) *$"), timeout=PATIENCE_MS
+            )
+            live.close()
+            page.reload()
+            page.wait_for_timeout(1000)
+            assert page.locator("iframe").count() == 0
+            assert page.evaluate("document.querySelector('img').naturalWidth") > 400
+            page.close()
+    finally:
+        live.close()
