@@ -57,7 +57,7 @@ class Kinematics:
         return values if self._plain else pin.integrate(self._model, self._neutral, values)
 
     def tool(self, q: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Tool point (3,) m and unit approach axis (3,) in the frame of the URDF's root link."""
+        """Tool point (3,) m and unit approach axis (3,) in the root frame, see `Robot`."""
         pin.forwardKinematics(self._model, self._data, self.configuration(q))
         pin.updateFramePlacement(self._model, self._data, self._frame)
         return self._translation.copy(), self._rotation @ self._approach
@@ -151,7 +151,7 @@ class Kinematics:
     def tool_velocities(self, q: ArrayLike, dq: ArrayLike) -> NDArray[np.float64]:
         """Velocities (m, 3) of the tool point at configurations q (m, n) with dq (m, n).
 
-        In m/s in the frame of the URDF's root link, when dq is in rad/s or m/s.
+        In m/s in the root frame, see `Robot`, when dq is in rad/s or m/s.
 
         Raises:
             ArgumentError: q or dq does not have the shape (m, n), or they differ in m.

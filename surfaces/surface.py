@@ -53,7 +53,7 @@ class ClosestPoint:
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
 class Surface(Protected, ABC):
-    """A surface placed in the frame of the URDF's root link.
+    """A surface placed in the root frame: the world, or the frame of the link that carries it.
 
     All methods are vectorised and use the root frame. Surfaces are values: they pickle and are
     never changed in place. `surfaces.sphere` and the like build them from checked numbers.

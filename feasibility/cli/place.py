@@ -42,8 +42,8 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     parser = add_command(
         subcommands, "place", run_place, add_case, add_csv, add_workers,
         help="where the surface can stand",
-        description="Search a region of positions and orientations of the surface (in the frame of "
-        "the URDF's root link) for placements at which one continuous motion covers it.",
+        description="Search a region of positions and orientations of the surface (in the "
+        "world, or in surface.frame) for placements at which one continuous motion covers it.",
         epilog="exit status: 0 a placement is feasible, 1 none was found, 3 undecided",
     )  # fmt: skip
     for name, unit in AXES.items():

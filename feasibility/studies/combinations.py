@@ -23,7 +23,7 @@ from feasibility.cases import (
     toml_document,
 )
 from feasibility.studies.axes import POSES, Variation
-from feasibility.studies.outcome import HOME, arm_of, case_of
+from feasibility.studies.outcome import HOME, arm_of, case_of, mounted_as
 from feasibility.studies.run import StudyTask
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -64,6 +64,8 @@ def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[Stud
         if name not in checked:
             tables = copy.deepcopy(base)
             for entry, value in others:
+                if entry.path == ("robot",):
+                    value = mounted_as(value, base.get("robot", {}))
                 put(tables, entry.path, copy.deepcopy(value))
             found = faults_of(tables)
             # Defaults of the case are filled in.

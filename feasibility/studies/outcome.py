@@ -141,6 +141,20 @@ def _load(table: str, surface_link: str | None) -> Robot:
     return part.build(surface_link)
 
 
+def mounted_as(robot: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The [robot] table of an arm that stands where another one does, unless it says otherwise.
+
+    The base, and the axes that carry it or the surface, belong to the cell; tool, limits and locked
+    joints belong to the arm.
+
+    Example:
+        >>> mounted_as({"name": "ur5"}, {"name": "panda", "base": {"position": [0, 0, 1]}})
+        {'base': {'position': [0, 0, 1]}, 'name': 'ur5'}
+    """
+    cell = {key: given[key] for key in ("base", "axis") if given.get(key) is not None}
+    return {**cell, **robot}
+
+
 def cut_of(case: Case) -> Cells:
     """The cells of a case; a mesh or STEP faces are read and cut once, and then placed.
 

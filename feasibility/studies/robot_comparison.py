@@ -12,7 +12,16 @@ from feasibility.cases import Case, CaseError, CollisionPart, as_read
 from feasibility.clock import Clock, OutOfTime
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
-from feasibility.studies.outcome import arm_of, case_of, clock_of, cut_of, finite, merit, outcome_of
+from feasibility.studies.outcome import (
+    arm_of,
+    case_of,
+    clock_of,
+    cut_of,
+    finite,
+    merit,
+    mounted_as,
+    outcome_of,
+)
 from feasibility.studies.run import StudyTask, run_tasks
 from feasibility.studies.stored import arm_fault
 
@@ -90,7 +99,7 @@ def compare(
     store: Store | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Ask the same of several arms, each mounted where the case's arm is.
+    """Ask the same of several arms, each mounted where the case's arm is: on its base and axes.
 
     Args:
         case: surface, task and search; its own arm keeps its limits and tool if it is among the
@@ -146,7 +155,8 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
             faults.append(Fault(place, f"{name!r} is named twice"))
             continue
         own = base["robot"].get("name") == name
-        tables = base if own else {**base, "robot": {"name": name}}
+        arm = base["robot"] if own else mounted_as({"name": name}, base["robot"])
+        tables = {**base, "robot": arm}
         try:
             arm_of(case_of(tables))
         except CaseError as error:

@@ -17,6 +17,7 @@ from surfaces.patches.nurbs import read_net
 from surfaces.surface import SurfaceError
 
 MOST_BYTES = 16 << 20
+WHAT = "a grid of points (.npy or .csv)"
 UNITS = {"m": 1.0, "mm": 1e-3}
 
 
@@ -44,13 +45,13 @@ def read_grid(path: str | os.PathLike[str], units: str = "m") -> NDArray[np.floa
     suffix = file.suffix.lower()
     if suffix not in (".npy", ".csv"):
         raise SurfaceError("a grid of points must be a .npy or a .csv file", name)
-    try:
-        data = read_regular(path, MOST_BYTES, "a grid of points (.npy or .csv)")
-    except CoverableError as error:
-        raise SurfaceError(error.faults, name) from error
     if suffix == ".npy":
+        try:
+            data = read_regular(path, MOST_BYTES, WHAT)
+        except CoverableError as error:
+            raise SurfaceError(error.faults, name) from error
         return scale * _from_npy(data, name)
-    net = read_net(path)
+    net = read_net(path, WHAT)
     if net.weights is not None:
         raise SurfaceError("has a column weight, which a grid of points has not", name)
     return scale * np.array(net.points, dtype=float).reshape(len(net.points), -1, 3)

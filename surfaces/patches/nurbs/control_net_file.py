@@ -28,7 +28,7 @@ class NetFile(NamedTuple):
     weights: Any = None
 
 
-def read_net(path: str | os.PathLike[str]) -> NetFile:
+def read_net(path: str | os.PathLike[str], what: str = "a control net (.json or .csv)") -> NetFile:
     """Read a control net, in metres.
 
     A `.json` file holds one object: `points` as rows of [x, y, z], and where wanted `degree`
@@ -38,6 +38,7 @@ def read_net(path: str | os.PathLike[str]) -> NetFile:
 
     Args:
         path: the file, at most 16 MB.
+        what: the file should be, for messages.
 
     Returns:
         The arguments: `bspline(**read_net("hood.json")._asdict())`.
@@ -51,7 +52,7 @@ def read_net(path: str | os.PathLike[str]) -> NetFile:
     if suffix not in (".json", ".csv"):
         raise SurfaceError("a control net must be a .json or a .csv file", name)
     try:
-        data = read_regular(path, MOST_BYTES, "a control net (.json or .csv)")
+        data = read_regular(path, MOST_BYTES, what)
         text = data.decode("utf-8-sig")
         return _from_json(text) if suffix == ".json" else _from_csv(text)
     except UnicodeDecodeError as error:

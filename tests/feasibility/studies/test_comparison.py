@@ -56,6 +56,26 @@ def compared(strip):
         return compare(strip, ROBOTS, workers)
 
 
+CELL = """
+    base = { position = [0, 0, 0.1] }
+    axis = [{ name = "table", type = "revolute", carries = "surface", limits_deg = [-9, 9] }]
+"""
+
+
+def test_other_arms_stand_in_the_same_cell() -> None:
+    """The base and the axes are the cell's: another arm gets them, and the part stands on them."""
+    of_robot = f'[robot]\nname = "ur3"{CELL}'
+    rest = STRIP.partition("\n    robot")[2].partition("\n")[2]
+    case = Case.from_toml(f"{rest}{of_robot}", name="cell")
+    other = Case.from_toml(f"{rest}{of_robot.replace('ur3', 'ur5')}").build()
+    with open_workers(0) as workers:
+        found = compare(case, ["ur3", "ur5"], workers, divide=False)
+    assert [arm.joints for arm in found.arms] == [7, 7]
+    verdict = check(other.robot, other.cells, other.task, other.search)
+    assert found.arms[1].message == verdict.message
+    assert found.arms[1].covered == int(verdict.covered.sum()) > 0
+
+
 def test_each_arm_says_what_its_verdict_says(strip, compared) -> None:
     assert [arm.robot for arm in compared.arms] == list(ROBOTS)
     verdicts = {arm.verdict for arm in compared.arms}

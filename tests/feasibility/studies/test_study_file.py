@@ -63,6 +63,17 @@ def test_tasks_are_cases_written_in_full() -> None:
             assert json.loads(json.dumps(task.tables)) == as_read(case.to_tables())
 
 
+def test_arms_stand_where_the_case_has_its_arm_unless_they_say_otherwise() -> None:
+    text = """
+        base.case = "paper/4a"
+        base.robot = { name = "puma560", base = { position = [0, 0, 0.1] } }
+        vary.robots = ["ur5", { name = "ur10", base = { position = [0, 0, 0.2] } }]
+    """
+    one, other = (task.tables["robot"] for task in read_study(text).tasks)
+    assert (one["name"], one["base"]["position"]) == ("ur5", [0.0, 0.0, 0.1])
+    assert other["base"]["position"] == [0.0, 0.0, 0.2]
+
+
 def test_the_key_says_what_a_task_is_and_nothing_else() -> None:
     def keys(text: str) -> list[str]:
         return [task.key for task in read_study(text).tasks]
