@@ -91,6 +91,7 @@ feasibility.placement
 feasibility.viewer: threejs html_page meshes robot playback
 feasibility.viewer.frames
 feasibility.viewer: cell_meshes cut_sides scene
+feasibility.viewer.areas
 feasibility.viewer.treated
 feasibility.viewer: figures live_server nearest obstacles painter path_and_division placements poses readout stage view_figures viewer
 feasibility.viewer.passes

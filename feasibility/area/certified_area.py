@@ -87,6 +87,8 @@ def why_no_area(cells: Cells, task: Task) -> str:
     """Why there is no certified area for a question; empty where there is."""
     if task.collision is not None:
         return "where collisions are checked: how near bodies come all over a tile is not known"
+    if task.min_manipulability is not None:
+        return "where the distance from singularities is limited: it is not known all over a tile"
     if task.roll is not None:
         return "where the roll is limited: how it changes all over a tile is not known"
     if cells.approaches is not None or not len(cells) or not cells.areas.sum() > 0.0:

@@ -50,6 +50,11 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         help="write the covering motion as CSV (feasible only); with --json, - puts it into the "
         "object",
     )
+    parser.add_argument(
+        "--area", action="store_true",
+        help="certify the area too, not the cells' centres alone: the part of the surface over "
+        "which the motion is known to reach every place",
+    )  # fmt: skip
     parser.add_argument("--save", metavar="RESULT", help="write a result file for `coverable show`")
     parser.add_argument(
         "--seeds", metavar="MOTION",
@@ -96,6 +101,7 @@ def check(args: argparse.Namespace, began: float) -> int:
     witness = None if within else args.witness
     outputs = {"--save": args.save, "--html": args.html, "--witness": witness}
     with open_case(args, began, outputs) as opened:
+        from feasibility.area import measured_area
         from feasibility.checking import check as run
         from feasibility.reports import verdict as report
 
@@ -104,11 +110,12 @@ def check(args: argparse.Namespace, began: float) -> int:
         verdict = run(*opened.setup, seeds=seeds, clock=opened.clock)
         verdict.causes  # noqa: B018 - looked into within the time limit
         verdict.treated  # noqa: B018 - measured within the time limit
+        area = measured_area(verdict, opened.clock) if args.area else None
     if args.json:
-        found = report.as_json(verdict, loaded)
+        found = report.as_json(verdict, loaded, area)
         print_out(json_text(found | ({"witness": report.witness_json(verdict)} if within else {})))
     else:
-        print_out(report.as_text(verdict, case, loaded))
+        print_out(report.as_text(verdict, case, loaded, area))
     if args.save is not None:
         from feasibility.results import save_result
 

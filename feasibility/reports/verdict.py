@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from feasibility.area import CertifiedArea, area_json, area_words
 from feasibility.cases import OWN_KEYS, Case
 from feasibility.collisions import checked
 from feasibility.cut_words import lines as proof_lines
@@ -61,12 +62,15 @@ CAUSES = {
 }
 
 
-def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
+def as_json(
+    verdict: Verdict, before_s: float = 0.0, area: CertifiedArea | str | None = None
+) -> dict[str, Any]:
     """The verdict as the object that `coverable check --json` prints.
 
     Args:
         verdict: of either method.
         before_s: seconds of imports and files before the check began; they count as loading.
+        area: the certified area, or why there is none; None where nobody asked for it.
     """
     return {
         "verdict": str(verdict.answer),
@@ -83,6 +87,7 @@ def as_json(verdict: Verdict, before_s: float = 0.0) -> dict[str, Any]:
         if verdict.proof is None
         else proof_json(verdict.proof, verdict.robot, verdict.cells),
         "treated": treated_json(verdict.treated),
+        **({} if area is None else area_json(area)),
         "timing": seconds(verdict.timing, PHASES, before_s),
         "robot": verdict.robot.name,
         "method": verdict.method,
@@ -127,8 +132,16 @@ def _revolute_margin(verdict: Verdict) -> float:
     return math.degrees(float(margins.min(initial=np.inf)))
 
 
-def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
-    """The verdict for people: the answer first, its evidence, why cells are missed."""
+def as_text(
+    verdict: Verdict,
+    case: Case,
+    before_s: float = 0.0,
+    area: CertifiedArea | str | None = None,
+) -> str:
+    """The verdict for people: the answer first, its evidence, why cells are missed.
+
+    The arguments are those of `as_json`, and the case for its name.
+    """
     title = ("case", f"{case.name}  {case.description}".rstrip())
     if not len(verdict.cells):
         return "\n".join(summary(EMPTY, [title], verdict.task.collision))
@@ -145,6 +158,7 @@ def as_text(verdict: Verdict, case: Case, before_s: float = 0.0) -> str:
         ("found", _message(verdict)),
         ("certificate", _certificate_text(verdict)),
         ("treated", _treated_text(verdict)),
+        ("certified", "" if area is None else area_words(area)),
         ("no shape", ", ".join(verdict.unchecked_links)),
         ("left out", left_out_text(verdict.pairs_left_out)),
         ("time", seconds_text(verdict.timing, PHASES, before_s)),

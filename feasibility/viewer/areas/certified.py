@@ -1,0 +1,65 @@
+"""Certified tiles tinted on the surface, and the share of the cell under the tool."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.area import CertifiedArea
+from feasibility.viewer import threejs
+from feasibility.viewer.cell_meshes import cell_size
+from feasibility.viewer.html_page import Entry, Readout
+from feasibility.viewer.playback import Motion
+from feasibility.viewer.scene import Layer
+from feasibility.viewer.threejs import Colour
+from robots import Kinematics, Robot
+from surfaces.cell_tiles import cell_tiles
+from surfaces.places import Places
+
+CERTIFIED: Colour = (0.00, 0.62, 0.45)
+ABOVE = 0.012  # [1] of a cell's width, so that tiles lie over the surface
+PIECES = 3  # of a tile's side: a large one is bent
+
+
+def certified_layer(area: CertifiedArea) -> Layer:
+    """The certified tiles, tinted on the side where the tool works."""
+    cells, path = area.cells, "/cells/certified area"
+    height = cells.surface.side_sign * ABOVE * cell_size(cells)
+    cut = cell_tiles(cells, height)
+    count, label = len(area.areas), f"certified area ({100.0 * area.share:.3g} %)"
+    if cut is None or not count:
+        return Layer((), Entry(label, CERTIFIED, path), 0)
+    weights, faces = _triangle() if area.tiles.corners.shape[1] == 3 else _square()
+    x = np.einsum("wc,kci->kwi", weights, area.tiles.corners).reshape(-1, 2)
+    vertices, normals = cut.offset.at(Places(np.repeat(area.tiles.chart, len(weights)), x))
+    every = (faces + len(weights) * np.arange(count)[:, None, None]).reshape(-1, 3)
+    command = threejs.mesh(path, vertices, every, CERTIFIED, normals=normals, opacity=0.55)
+    return Layer((command,), Entry(label, CERTIFIED, path), count)
+
+
+def _triangle() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Corners of a triangle as shares of themselves, and its face."""
+    return np.eye(3), np.array([[0, 1, 2]])
+
+
+def _square() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """A grid of places on a rectangle as shares of its corners, and its faces."""
+    s, t = (part.ravel() for part in np.meshgrid(*[np.linspace(0.0, 1.0, PIECES + 1)] * 2))
+    i, j = (part.ravel() for part in np.meshgrid(*[np.arange(PIECES)] * 2))
+    low = i * (PIECES + 1) + j
+    right, up = low + 1, low + PIECES + 1
+    faces = np.concatenate([np.stack([low, right, up + 1], 1), np.stack([low, up + 1, up], 1)])
+    return np.stack([(1 - s) * (1 - t), s * (1 - t), s * t, (1 - s) * t], axis=1), faces
+
+
+def with_certified_share(
+    readout: Readout, robot: Robot, area: CertifiedArea, motion: Motion
+) -> Readout:
+    """The same values, and how much of the cell under the tool is certified, in percent."""
+    points, _ = Kinematics(robot).tools(motion.at(np.array(readout.times)))
+    cell = area.cells.locate(points)
+    shares = np.where(cell >= 0, area.shares[cell], 0.0)
+    row = ("certified", "%", np.round(100.0 * shares, 1).tolist())
+    return replace(readout, rows=(*readout.rows, row))
