@@ -64,6 +64,7 @@ if TYPE_CHECKING:
         save_result,
         save_trajectory,
     )
+    from feasibility.runs import PassRuns, PlannedPasses, pass_runs, plan_best_passes, plan_passes
     from feasibility.sensitivity import Explanation, explain
     from feasibility.studies import (
         Comparison,
@@ -76,6 +77,7 @@ if TYPE_CHECKING:
         run_tasks,
     )
     from feasibility.timing import Trajectory, motion_limits, trajectory
+    from feasibility.treated import TreatedArea, treated_words
     from feasibility.viewer import (
         Plot,
         View,
@@ -94,6 +96,7 @@ if TYPE_CHECKING:
         view_placements,
         view_study,
     )
+    from feasibility.viewer.passes import view_passes
     from robots import Axis, Robot, RobotError, list_robots, load_robot
     from surfaces import (
         Cells,
@@ -134,24 +137,24 @@ if TYPE_CHECKING:
 # fmt: off
 __all__ = [
     "Answer", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Collision",
-    "Comparison", "CoveragePath", "Division", "Evidence", "Explanation", "LiteralSearch", "Live",
-    "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "Patch", "PathError", "Piecewise",
-    "Placements", "Plot", "Pose", "Region", "Robot", "RobotError", "Search", "Store", "Study",
-    "Surface", "SurfaceError", "Task", "ToolShape", "Trajectory", "Verdict", "Verification",
-    "View", "__version__", "bspline", "builtin_cases", "check", "compare", "comparison_chart",
-    "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane", "cylinder", "divide",
-    "division_text", "ellipsoid", "explain", "explanation_text", "faces_within_cone",
-    "greedy_check", "grid", "hyperboloid", "list_robots", "live", "load_case", "load_motion",
-    "load_result", "load_robot", "load_study", "load_trajectory", "mesh", "motion_limits",
-    "open_workers", "parallel_passes", "parametric", "pass_toolpath", "path", "path_text",
-    "piecewise", "place", "placement_map", "placement_text", "plane", "plot_causes",
-    "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view", "plot_views",
-    "poses", "read_grid", "read_net", "read_poses", "read_study", "replay", "revolution",
-    "run_tasks", "save_program", "save_result", "save_trajectory", "settings_of", "show",
-    "sphere", "starts", "station_plan", "step", "step_faces", "study_text", "take_faces", "torus",
-    "trajectory",
-    "unrolled_edges", "verify", "view", "view_division", "view_path", "view_placements",
-    "view_study",
+    "Comparison", "CoveragePath", "Division", "Evidence", "Explanation", "LiteralSearch",
+    "Live", "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns", "Patch",
+    "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose", "Region", "Robot",
+    "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError", "Task", "ToolShape",
+    "Trajectory", "TreatedArea", "Verdict", "Verification", "View", "__version__", "bspline",
+    "builtin_cases", "check", "compare", "comparison_chart", "comparison_text", "cone",
+    "coverage_path", "cut_box", "cut_plane", "cylinder", "divide", "division_text", "ellipsoid",
+    "explain", "explanation_text", "faces_within_cone", "greedy_check", "grid", "hyperboloid",
+    "list_robots", "live", "load_case", "load_motion", "load_result", "load_robot",
+    "load_study", "load_trajectory", "mesh", "motion_limits", "open_workers", "parallel_passes",
+    "parametric", "pass_runs", "pass_toolpath", "path", "path_text", "piecewise", "place",
+    "placement_map", "placement_text", "plan_best_passes", "plan_passes", "plane",
+    "plot_causes", "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view",
+    "plot_views", "poses", "read_grid", "read_net", "read_poses", "read_study", "replay",
+    "revolution", "run_tasks", "save_program", "save_result", "save_trajectory", "settings_of",
+    "show", "sphere", "starts", "station_plan", "step", "step_faces", "study_text",
+    "take_faces", "torus", "trajectory", "treated_words", "unrolled_edges", "verify", "view",
+    "view_division", "view_passes", "view_path", "view_placements", "view_study",
 ]
 # fmt: on
 
@@ -167,11 +170,14 @@ _ROOMS = (
     "feasibility.timing",
     "feasibility.programs",
     "feasibility.division",
+    "feasibility.treated",
+    "feasibility.runs",
     "feasibility.sensitivity",
     "feasibility.results",
     "feasibility.studies",
     "feasibility.placement",
     "feasibility.viewer",
+    "feasibility.viewer.passes",
     "feasibility.live",
 )
 _RENAMED = {  # name -> module, name there

@@ -116,20 +116,20 @@ def _lay(args: argparse.Namespace, surface: Surface, direction: Any) -> Passes:
     return crossed(*laid) if args.cross else laid[0]
 
 
-def plan_passes(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
+def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
     """Lay the passes that the arguments ask for, and look for one motion along all of them."""
-    from feasibility.runs import best_planned, planned
+    from feasibility.runs import plan_best_passes, plan_passes
 
     robot, cells, task, search = opened.setup
     opened.progress(0, None, "laying passes")
     if args.passes.strip() != BEST:
         laid = _lay(args, cells.surface, direction_of(args.passes))
-        return planned(robot, laid, task, args.retract, search, opened.clock)
+        return plan_passes(robot, laid, task, args.retract, search, opened.clock)
 
     def lay(angle: float) -> Passes:
         return _lay(args, cells.surface, angle)
 
-    return best_planned(
+    return plan_best_passes(
         robot, cells.surface, task, args.pitch, lay, args.retract, search, opened.clock
     )
 

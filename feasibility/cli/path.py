@@ -17,7 +17,7 @@ from feasibility.cli.command import (
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
-from feasibility.cli.passes import add_passes, check_passes, in_runs, plan_passes
+from feasibility.cli.passes import add_passes, check_passes, in_runs, passes_asked
 from feasibility.cli.path_outputs import (
     add_ends,
     add_programs,
@@ -115,7 +115,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         period = check_programs(args, robot)
         speed = args.speed = args.speed or opened.setup.task.speed or SPEED
         limits = motion_limits(robot, speed, args.velocity, args.acceleration)
-        along = None if args.passes is None else plan_passes(args, opened)
+        along = None if args.passes is None else passes_asked(args, opened)
         verdict = check(*opened.setup, clock=opened.clock) if along is None else along.verdict
         whole = "time limit" in verdict.message or TOO_SLOW in verdict.statistics
         if not verdict.feasible and along is not None and not whole:

@@ -5,5 +5,5 @@ from .pass_runs import Cut as Cut
 from .pass_runs import PassRuns as PassRuns
 from .pass_runs import pass_runs as pass_runs
 from .planning import PlannedPasses as PlannedPasses
-from .planning import best_planned as best_planned
-from .planning import planned as planned
+from .planning import plan_best_passes as plan_best_passes
+from .planning import plan_passes as plan_passes

@@ -22,6 +22,7 @@ from surfaces.passes import (
 )
 from surfaces.toolpaths import PoseCells
 
+RETRACT = 0.05  # m, unless it is said
 CERTIFIED = 3  # directions of the fewest pieces that are looked at with the arm
 
 Lay = Callable[[float], Passes]
@@ -47,15 +48,15 @@ class PlannedPasses:
         return treated_by_passes(surface, self.places, robot, self.task, walks)
 
 
-def planned(
+def plan_passes(
     robot: Robot,
     laid: Passes,
     task: Task,
-    retract: float,
+    retract: float = RETRACT,
     search: Search | None = None,
     clock: Clock | None = None,
 ) -> PlannedPasses:
-    """Ask whether one motion runs passes that have been laid.
+    """Look for one motion along passes that have been laid.
 
     Args:
         robot: the arm.
@@ -67,6 +68,16 @@ def planned(
 
     Raises:
         SurfaceError: see `surfaces.passes.pass_toolpath`.
+
+    Example:
+        >>> from feasibility import Task
+        >>> from robots import load_robot
+        >>> from surfaces import parallel_passes, plane
+        >>> plate = plane((0, 0.2), (0, 0.1), "outside", (0.4, -0.1, 0.2))
+        >>> task = Task(standoff=0.02, cone_deg=20, footprint=0.06)
+        >>> along = plan_passes(load_robot("ur5"), parallel_passes(plate, 0.05), task)
+        >>> along.verdict.feasible, round(along.treated(along.verdict.witness).lower, 2)
+        (True, 1.0)
     """
     cells = pass_toolpath(laid, retract)
     asked = replace(task, footprint=None, coverage=None)
@@ -75,13 +86,13 @@ def planned(
     return PlannedPasses(laid, pass_places(laid, retract), cells, task, verdict)
 
 
-def best_planned(
+def plan_best_passes(
     robot: Robot,
     surface: Surface,
     task: Task,
     pitch: float,
     lay: Lay,
-    retract: float,
+    retract: float = RETRACT,
     search: Search | None = None,
     clock: Clock | None = None,
 ) -> PlannedPasses:
@@ -91,7 +102,7 @@ def best_planned(
     the arm. Where none of them can be run in one motion, it is the first of them.
 
     Args:
-        robot, task, retract, search, clock: see `planned`.
+        robot, task, retract, search, clock: see `plan_passes`.
         surface: what is to be covered.
         pitch: m, the largest distance between passes.
         lay: lays passes in a direction.
@@ -100,7 +111,7 @@ def best_planned(
         SurfaceError: see `surfaces.passes.parallel_passes` and `pass_toolpath`.
     """
     found = [
-        planned(robot, lay(angle), task, retract, search, clock)
+        plan_passes(robot, lay(angle), task, retract, search, clock)
         for angle in ranked_directions(surface, pitch)[:CERTIFIED]
     ]
     feasible = [each for each in found if each.verdict.feasible]
