@@ -4,9 +4,9 @@ A motion, straight in joint space between its rows, **holds the speed v** where 
 and all along it, the tool may move at v relative to the surface with every joint inside its
 velocity limit (`segment_rates`), except where it stops:
 
-- **in place**: a segment along which the tool point stays within a tenth of the tolerance of the
-  target of one cell. There the arm changes its posture, and the tool waits; where the speed is
-  possible there too, it is no stop.
+- **in place**: a segment with the tool point at both its ends within a tenth of the tolerance of
+  the target of one cell, and within the tolerance of it in between. There the arm changes its
+  posture, and the tool waits; where the speed is possible there too, it is no stop.
 - **at a corner**: a row at which the tool's path turns by more than `CORNER_DEG`. Velocities may
   jump at rows anyway, accelerations are the business of timing; a corner is counted, no more.
 
@@ -34,7 +34,7 @@ from surfaces import Cells
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-IN_PLACE = 0.1  # [1] share of the tolerance within which the tool point stays in place
+IN_PLACE = 0.1  # [1] share of the tolerance within which the tool point begins and ends in place
 CORNER_DEG = 30.0  # [deg] by which the tool's path turns at a corner
 CLOSE_TO_ZERO = 1e-12  # [m]: rounding
 
@@ -141,14 +141,15 @@ def in_place(robot: Robot, cells: Cells, task: Task, q: Array) -> Mask:
 
     Between its ends the tool point is off its chord by D / 8 at most, see `segment_rates`.
     """
-    targets, near = task.targets(cells).points, IN_PLACE * task.effective_tolerance
+    targets, tolerance = task.targets(cells).points, task.effective_tolerance
     if len(q) < 2 or not len(targets):
         return np.zeros(max(len(q) - 1, 0), dtype=bool)
     poses = placements(robot, q)
     off, nearest = cKDTree(targets).query(poses.points)
     after = np.linalg.norm(poses.points[1:] - targets[nearest[:-1]], axis=1)
     bend = second_derivatives(np.abs(np.diff(q, axis=0)), robot.prismatic, poses.levers, np.inf)
-    return np.asarray(np.maximum(off[:-1], after) + bend / 8.0 <= near)
+    ends = np.maximum(off[:-1], after)
+    return np.asarray((ends <= IN_PLACE * tolerance) & (ends + bend / 8.0 <= tolerance))
 
 
 def too_slow(
