@@ -27,6 +27,7 @@ from feasibility.reports import verdict as report
 
 STEPS = 60  # looks at the clock, between which a search does 8,000 evaluations at most
 STEPS_WITH_BODIES = 24  # the same where distances of bodies make an evaluation dearer
+JSON_HINT = " (--json lists all)"  # of the command, which a page has not
 BUG = "this is a bug in coverable: {}: {}; the page goes on working"
 
 
@@ -140,7 +141,10 @@ def certified(case: Case, setup: Setup, job: Job) -> Answer:
         "cells": len(verdict.cells),
         "evidence": str(verdict.evidence),
         "rows": [[name, text] for name, text in report.rows_of(verdict) if text],
-        "groups": list(report.causes_listed(verdict.causes, verdict.cells)),
+        "groups": [
+            line.removesuffix(JSON_HINT)
+            for line in report.causes_listed(verdict.causes, verdict.cells)
+        ],
         "note": checked_words(verdict.task.collision),
         "paint": {"classes": paint.classes, "entries": paint.entries},
         "commands": picture.packed([*parts.commands, *posed]),

@@ -8,11 +8,14 @@ is dropped where it waits, and given up where it is worked on.
 from __future__ import annotations
 
 import threading
+import time
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any
 
 Answer = dict[str, Any]
+
+ALONE = 60.0  # [s] without anybody asking for an answer, after which it is given up
 
 
 class Superseded(Exception):
@@ -35,6 +38,7 @@ class Job:
         self.answer: Answer | None = None
         self.said = ""
         """What is going on, for whoever waits."""
+        self._heard = time.monotonic()
         self._dropped = threading.Event()
         self._ended = threading.Event()
 
@@ -45,7 +49,9 @@ class Job:
 
     @property
     def dropped(self) -> bool:
-        """Is the answer not wanted any more?"""
+        """Is the answer not wanted any more, or was nobody there for long to take it?"""
+        if time.monotonic() - self._heard > ALONE:
+            self.drop()
         return self._dropped.is_set()
 
     def finish(self, answer: Answer) -> None:
@@ -55,6 +61,7 @@ class Job:
 
     def wait(self, seconds: float) -> bool:
         """Wait until the job is answered or dropped; False where it is not by then."""
+        self._heard = time.monotonic()
         return self._ended.wait(seconds)
 
 

@@ -34,7 +34,7 @@ class Page {
     this.answer = null;
     this.questions = new Questions({
       heard: (answer) => this.hear(answer),
-      waits: (said) => { $("progress").textContent = `still deciding ... ${said}`; },
+      waits: (said) => this.wait(said),
       broken: (trouble) => { $("trouble").hidden = !trouble; $("trouble").textContent = trouble; },
     });
     this.scene.handle.moved = (what, how) => this.drag(what, how);
@@ -42,6 +42,7 @@ class Page {
     this.player();
     $("case").textContent = `${described.name} · ${described.robot}`;
     document.title = `${described.name} · coverable live`;
+    this.note(described.note);
     for (const entry of described.entries) {
       line(entry, $("standing"),
         entry.path && ((visible) => this.scene.show(entry.path, visible)));
@@ -136,6 +137,16 @@ class Page {
     this.questions.ask(this.panel.values, final);
   }
 
+  // It takes longer: what stood there before was the answer to something else.
+  wait(said) {
+    if (this.answer === null || this.answer.kind !== "quick") {
+      $("answer").className = "waiting";
+      $("verdict").textContent = "still deciding ...";
+    }
+    $("progress").textContent = said || "still deciding ...";
+    $("progress").title = said;
+  }
+
   hear(answer) {
     this.answer = answer;
     const quick = answer.kind === "quick";
@@ -148,8 +159,7 @@ class Page {
         + `evidence: ${answer.evidence}` : "";
     if (answer.kind === "error") return;
     this.scene.draw(answer);
-    $("note").textContent = answer.note;
-    $("note").classList.toggle("unchecked", answer.note === "collisions are not checked");
+    this.note(answer.note);
     $("rows").replaceChildren(...answer.rows.map(([name, text]) => {
       const row = document.createElement("tr");
       for (const [kind, said] of [["th", name], ["td", text]]) {
@@ -171,6 +181,11 @@ class Page {
     $("player").hidden = !(answer.parts.seconds > 0);
     $("time").max = answer.parts.seconds;
     $("time").value = 0;
+  }
+
+  note(said) {
+    $("note").textContent = said;
+    $("note").classList.toggle("unchecked", said === "collisions are not checked");
   }
 
   // -- buttons -----------------------------------------------------------------------------------

@@ -65,10 +65,11 @@ export class Questions {
         } else if (reply.status === "deciding" && number === this.number) {
           this.waits(reply.said);
         } else {
-          if (reply.status === "answered" && number === this.number) {
-            this.counts.answered += 1;
-            this.heard(reply.answer, final);
-          }
+          if (number !== this.number) return;
+          // Given up, since nothing was heard of this page for long: a computer that slept.
+          if (reply.status !== "answered") return await this.send(values, final);
+          this.counts.answered += 1;
+          this.heard(reply.answer, final);
           return;
         }
       }

@@ -1,10 +1,11 @@
 """Of each page the newest question alone is answered, and pages do not mix."""
 
 import threading
+from types import SimpleNamespace
 
 import pytest
 
-from feasibility.live.jobs import Superseded
+from feasibility.live.jobs import ALONE, Job, Superseded
 from feasibility.live.sessions import LEASE, MOST, Gone, Sessions, TooManyPages
 
 GUARD_S = 120.0
@@ -146,6 +147,21 @@ def test_pages_that_say_nothing_any_more_are_forgotten():
     sessions.beat(pages[1])
     sessions.beat(pages[2])
     sessions.close_all()
+
+
+def test_an_answer_that_nobody_asks_for_any_more_is_given_up(monkeypatch):
+    clock = [100.0]
+    told = SimpleNamespace(monotonic=lambda: clock[0])
+    monkeypatch.setattr("feasibility.live.jobs.time", told)
+    job = Job("page", 1, True, None)
+    clock[0] += 0.9 * ALONE
+    assert not job.dropped
+    job.finish({})
+    assert job.wait(0)
+    clock[0] += 0.9 * ALONE
+    assert not job.dropped
+    clock[0] += 0.2 * ALONE
+    assert job.dropped
 
 
 def test_an_end_is_an_end(worker):
