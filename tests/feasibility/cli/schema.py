@@ -60,6 +60,17 @@ CHECK = {
     "unchecked_links": [str],
     "pairs_left_out": [{"pair": [str], "why": str}],
     "proof": Maybe({"kind": OneOf("cell", "cut"), "opened": Named(float), "tree": ProofTree()}),
+    "treated": Maybe(
+        {
+            "lower": float,
+            "upper": float,
+            "twice": float,
+            "area_m2": float,
+            "footprint_m": [float],
+            "untreated": [{"centre": [float], "area_m2": float}],
+            "notes": [str],
+        }
+    ),
     "timing": SECONDS,
     "robot": str,
     "method": OneOf("complete", "greedy"),
