@@ -27,7 +27,7 @@ from feasibility.certification.areas import joined, tiles_hold
 from feasibility.notices import compiling_notice
 from feasibility.roadmap.motions import arrays_of, work_for
 from feasibility.task import Task
-from feasibility.verdict import Verdict
+from feasibility.verdict import Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 from surfaces.cell_tiles import CellTiles, Tiles, cell_tiles
@@ -124,7 +124,13 @@ def certified_area(verdict: Verdict, budget: int | None = None) -> CertifiedArea
 
 
 def area_from(
-    robot: Robot, cells: Cells, task: Task, cell: Ints, q: Array, budget: int | None = None
+    robot: Robot,
+    cells: Cells,
+    task: Task,
+    cell: Ints,
+    q: Array,
+    budget: int | None = None,
+    within: NDArray[np.bool_] | None = None,
 ) -> CertifiedArea:
     """The certified area of one motion.
 
@@ -134,11 +140,15 @@ def area_from(
         q: (k, n) its configurations over them, rad or m.
         budget: evaluations of the arm after which no more tiles are looked at; by default 2,000 for
             each cell and 20 for each face of a mesh, and at least 300,000.
+        within: (N,) the cells that are looked at; all by default.
 
     Raises:
         ArgumentError: see `certified_area`.
     """
     _refuse(why_no_area(cells, task))
+    which = np.arange(len(cells)) if within is None else np.flatnonzero(within)
+    some = np.isin(cell, which)
+    cell, q = np.asarray(cell)[some], np.asarray(q, dtype=float)[some]
     asked = less_deviations(task, cells.surface)
     cut = cell_tiles(cells, cells.surface.side_sign * task.standoff)
     if cut is None:
@@ -149,13 +159,13 @@ def area_from(
         return _made(cells, cut, none, nodes, 0, 0)
     faces = len(cut.touching[0]) if cut.touching is not None else 0
     if budget is None:
-        budget = max(BUDGET * len(cells) + FACE_BUDGET * faces, LEAST_BUDGET)
+        budget = max(BUDGET * len(which) + FACE_BUDGET * faces, LEAST_BUDGET)
     with compiling_notice():
         lander = Lander(
             arrays_of(robot, cells, asked), work_for(robot.n), tile_memory(robot.n), cut,
             task.fixed_approach(cells), budget,
         )  # fmt: skip
-        held = spread_over(lander, np.asarray(cell), np.asarray(q, dtype=float))
+        held = spread_over(lander, which, cell, q)
     nodes, number = lander.nodes.back_from(held.node)
     held = held._replace(node=number[held.node])
     good = _judged(robot, cells, asked, cut, held, nodes)
@@ -193,12 +203,17 @@ def _over_centres(verdict: Verdict) -> tuple[Ints, Array]:
     """Cells, and a configuration of the best component over the centre of each."""
     walk, n = verdict.witness, verdict.robot.n
     if walk is not None:
-        cell, first = np.unique(walk.cell, return_index=True)
-        return cell[cell >= 0], walk.q[first[cell >= 0]]
+        return visited(walk)
     found = verdict.graph.nodes(data="q")
     some = [(cell, q) for cell, q in found if q is not None and verdict.covered[cell]]
     cells = np.array([cell for cell, _ in some], dtype=np.int64)
     return cells, np.array([q for _, q in some], dtype=float).reshape(len(some), n)
+
+
+def visited(walk: Walk) -> tuple[Ints, Array]:
+    """The cells that a motion visits, and its first configuration over each."""
+    cell, first = np.unique(walk.cell, return_index=True)
+    return cell[cell >= 0], walk.q[first[cell >= 0]]
 
 
 def _refuse(why: str) -> None:

@@ -26,22 +26,23 @@ COARSE = 4  # halvings up to which tiles are looked at however far they are from
 NEAR = 4.0  # [1] of a tile's diameter: the distance of a node from which it may be reached
 
 
-def spread_over(lander: Lander, cell: Ints, q: Array) -> HeldTiles:
-    """Tiles of all cells that hold.
+def spread_over(lander: Lander, which: Ints, cell: Ints, q: Array) -> HeldTiles:
+    """Tiles of some cells that hold.
 
     Args:
         lander: lands on tiles; receives the nodes.
-        cell: (k,) different cells; k >= 1.
+        which: (m,) these cells, in order.
+        cell: (k,) different ones among them; k >= 1.
         q: (k, n) configurations over their centres, all of one motion.
     """
     cut = lander.cut
     begun = lander.settled(lander.add(Nodes(q, cut.centres(cell), np.full(len(q), -1))))
-    tiles = cut.whole(np.arange(len(cut.cells)))
+    tiles = cut.whole(which)
     if cut.touching is None:
-        source = np.full(len(tiles.cell), -1)
-        source[cell] = begun
+        source, rows = np.full(len(which), -1), np.searchsorted(which, cell)
+        source[rows] = begun
         landed = Landed.nowhere(len(source), q.shape[1])
-        landed.put(cell, lander.land(tiles.of(cell), begun))
+        landed.put(rows, lander.land(tiles.of(rows), begun))
     else:
         source, landed = _over_faces(lander, tiles, begun)
     held = [lander.holding(tiles, landed)]

@@ -73,12 +73,16 @@ def add(subcommands: argparse._SubParsersAction) -> None:
         "--no-browser", dest="browser", action="store_false",
         help="only print the address of the view",
     )  # fmt: skip
-    add_command(
+    parser = add_command(
         subcommands, "divide", divide, add_case, add_html,
         help="the fewest sub-patches, each covered by one continuous motion",
         description="Divide a surface that one motion cannot cover into the fewest patches, and "
         "report how the joints move from one to the next.",
         epilog=LATER_STATUSES,
+    )  # fmt: skip
+    parser.add_argument(
+        "--area", action="store_true",
+        help="certify the area of each patch too, not the centres of its cells alone",
     )  # fmt: skip
     parser = add_command(
         subcommands, "explain", explain, add_case, add_html,
@@ -180,14 +184,16 @@ def divide(args: argparse.Namespace, began: float) -> int:
     """`coverable divide CASE`: the fewest sub-patches, each covered by one continuous motion."""
     with open_case(args, began, {"--html": args.html}, WHY_COMPLETE["divide"]) as opened:
         from feasibility.division import divide as run
+        from feasibility.division import patch_areas
         from feasibility.reports import division as report
 
         loaded = opened.so_far()
         division = run(*opened.setup, clock=opened.clock)
+        areas = patch_areas(division, opened.clock) if args.area else None
     if args.json:
-        print_out(json_text(report.as_json(division, loaded)))
+        print_out(json_text(report.as_json(division, loaded, areas)))
     else:
-        print_out(report.as_text(division, opened.case.name, loaded))
+        print_out(report.as_text(division, opened.case.name, loaded, areas))
     if args.html is not None:
         from feasibility.viewer import view_division
 

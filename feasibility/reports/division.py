@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from feasibility.area import percent_down
 from feasibility.collisions import checked
 from feasibility.cut_words import lines as proof_lines
-from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatch
+from feasibility.division import Apart, Division, PatchAreas, Plan, Reconfiguration, SubPatch
 from feasibility.reports.parts import (
     causes_json,
     certificate_json,
@@ -45,12 +46,17 @@ def answer_of(division: Division) -> str:
     return "complete" if division.whole else "partial"
 
 
-def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
+Areas = PatchAreas | str | None
+"""The certified areas, or why there are none; None where nobody asked for them."""
+
+
+def as_json(division: Division, before_s: float = 0.0, areas: Areas = None) -> dict[str, Any]:
     """The division as the object that `coverable divide --json` prints.
 
     Args:
         division: the division.
         before_s: seconds of imports and files before it was asked for; they count as loading.
+        areas: of the plan with the fewest motions.
     """
     cells, fewest, connected = division.cells, division.fewest, division.connected
     return {
@@ -69,11 +75,22 @@ def as_json(division: Division, before_s: float = 0.0) -> dict[str, Any]:
         "unsettled": [list(cells.unravel(k)) for k in division.unsettled.tolist()],
         "collisions": checked(division.task.collision),
         "message": division.message,
+        **_areas_json(areas),
         "timing": seconds(division.timing, PHASES, before_s),
         "robot": division.robot.name,
         "seed": int(division.seed),
         "version": version(),
     }
+
+
+def _areas_json(areas: Areas) -> dict[str, Any]:
+    """Certified areas: of all patches together as a share of all cells, and of each."""
+    if areas is None:
+        return {}
+    if isinstance(areas, str):
+        return {"certified_area": None, "certified_area_note": areas}
+    each = [None if found is None else found.area for found in areas.patches]
+    return {"certified_area": areas.share, "certified_area_m2": areas.area, "of_patches_m2": each}
 
 
 def _apart_json(apart: Apart, division: Division) -> dict[str, Any]:
@@ -131,7 +148,7 @@ def _move_json(move: Reconfiguration, k: int) -> dict[str, Any]:
     }
 
 
-def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
+def as_text(division: Division, title: str, before_s: float = 0.0, areas: Areas = None) -> str:
     """The division for people: the answer, the patches and moves in order, what is left out."""
     head = SENTENCES[answer_of(division)]
     if division.decided and not division.patches and len(division.cells):
@@ -141,6 +158,7 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
         ("case", title),
         ("covered", f"{covered}, in {_motions(division)}"),
         ("found", division.message),
+        ("certified", _areas_text(areas, division)),
         ("time", seconds_text(division.timing, PHASES, before_s)),
     ]
     lines = summary(head, rows, division.task.collision)
@@ -161,6 +179,18 @@ def as_text(division: Division, title: str, before_s: float = 0.0) -> str:
         unsettled = counted(len(division.unsettled), "cell")
         lines += ["", "Not decided:", f"  {unsettled}: the time limit ran out first"]
     return "\n".join(lines)
+
+
+def _areas_text(areas: Areas, division: Division) -> str:
+    """What is certified of the patches together, and of each."""
+    if areas is None or isinstance(areas, str):
+        return areas or ""
+    each = [
+        f"patch {k + 1} {'none' if found is None else percent_down(found.area / patch.area)}"
+        for k, (found, patch) in enumerate(zip(areas.patches, division.patches, strict=True))
+    ]
+    of_all = f"{percent_down(areas.share)} of the area, {areas.area:.3g} of {areas.whole:.3g} m2"
+    return of_all + (f" ({', '.join(each)})" if each else "")
 
 
 def _indented(line: str) -> str:
