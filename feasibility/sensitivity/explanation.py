@@ -320,7 +320,8 @@ def drop(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> Dropped:
     covered = verdict.covered
     rest = prober.attempt(prober.arrays, q, 2 * cost_of(verdict), deep=False, needed=covered)
     walk = prober.confirmed(prober.given, rest, covered).walk
-    if walk is None and covered.any() and not prober.clock.out_of_time:
+    divisible = covered.any() and not verdict.cells.in_order  # a toolpath is not divided
+    if walk is None and divisible and not prober.clock.out_of_time:
         patches = []
         with suppress(OutOfTime):
             division = divide(

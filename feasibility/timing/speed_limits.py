@@ -78,7 +78,8 @@ def motion_limits(
         if names:
             faults.append(
                 f"robot {robot.name!r} has no velocity limit for {', '.join(names)}; give velocity "
-                "(rad/s or m/s), one number for all joints or one for each"
+                "(rad/s or m/s), one number for all joints or one for each; an axis of "
+                "[[robot.axis]] takes max_velocity_deg or max_velocity_m"
             )
     else:
         fastest = _per_joint(robot, "velocity", "rad/s or m/s", velocity, faults)

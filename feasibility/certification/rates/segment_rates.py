@@ -74,6 +74,7 @@ class _Pieces:
         )  # fmt: skip
 
 
+@np.errstate(invalid="ignore")  # NaN where the velocity of a joint is not known
 def segment_rates(
     robot: Robot,
     starts: Array,

@@ -75,6 +75,16 @@ def test_a_toolpath_stays_in_its_order() -> None:
         assert (np.diff(marks) >= 0).all()
 
 
+def test_a_toolpath_out_of_reach_is_explained_and_not_divided() -> None:
+    points = np.column_stack([np.linspace(0.7, 1.1, 4), np.zeros(4), np.full(4, 0.2)])
+    walk = poses(points, np.tile((0.0, 0.0, 1.0), (4, 1)), side="outside")
+    found = explain(load_robot("ur5"), walk, Task(0.01, 10.0))
+    assert found.verdict.answer is Answer.INFEASIBLE
+    helping = [t for t in found.thresholds if t.feasible is not None]
+    assert [t.quantity.kind for t in helping] == [Kind.SHIFT]
+    assert helping[0].quantity.axis == (-1, 0, 0)
+
+
 @pytest.mark.parametrize("seed", [0, 1])
 def test_a_motion_found_beside_a_case_is_tried_on_the_case_itself(seed: int) -> None:
     """`check` alone may end without it; `explain` must not call a case infeasible and say how its
