@@ -134,6 +134,7 @@ def path(args: argparse.Namespace, began: float) -> int:
                     found, speed, velocity=args.velocity, acceleration=args.acceleration,
                     period=period,
                 )  # fmt: skip
+                path_rates(found, run.walk)
                 run = run if ends is None else entered(found, run, ends, limits, period)
         except OutOfTime:
             late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
@@ -165,7 +166,7 @@ def _view(
 
     if along is None:
         return view_path(found, run, opened.case.name, limits)
-    return view_passes(along, [found], treated, run, opened.case.name)
+    return view_passes(along, [found], treated, run, opened.case.name, limits)
 
 
 def _treated(

@@ -82,7 +82,7 @@ def as_json(
         "treated": treated_json(treated),
         "passes": None if laid is None else passes_json(laid),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
-        **rates_json(path, rates),
+        **rates_json(path, rates, trajectory),
         **ends_json(ends),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,
@@ -229,7 +229,7 @@ def as_text(
             ("time", f"{trajectory.duration:.4g} s in {samples}, tool at up to {speed} m/s"),
             ("limits", _limits_text(path.robot, trajectory, limits)),
         ]
-    rows += [("speed", rates_words(path, rates)), ("ends", ends_words(ends))]
+    rows += [("speed", rates_words(path, rates, trajectory)), ("ends", ends_words(ends))]
     head = f"path: one continuous motion over {over}."
     if laid is not None:
         rows[0] = ("passes", passes_text(laid))

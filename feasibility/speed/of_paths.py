@@ -27,7 +27,7 @@ def path_rates(path: CoveragePath, walk: Walk | None = None) -> RateReplay | Non
     least = task.min_manipulability
     if least is not None and not judged.sigma >= least:
         raise PathError(
-            f"the path in this order comes too near to a singularity: {judged.refusals[-1]}; try "
-            "another --order"
+            f"the {'path' if walk is None else 'timed path'} in this order comes too near to a "
+            f"singularity: {judged.refusals[-1]}; try another --order"
         )
     return judged

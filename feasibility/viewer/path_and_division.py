@@ -74,8 +74,8 @@ def view_path(
     else:
         motion = _timed(robot, trajectory)
         speed = f"{trajectory.duration:.1f} s"
-    times, use = _painting(trajectory, motion, limits if path.task.speed is not None else None)
-    strokes, tracks = _strokes(motion, 0.06 * cell_size(cells), times, use)
+    times, use = painting(trajectory, motion, limits if path.task.speed is not None else None)
+    strokes, tracks = trail_pieces(motion, 0.06 * cell_size(cells), times, use)
     again = f", {figures.revisited:.2g} m of it revisited" if figures.revisited > 0.0 else ""
     text = (
         f"{robot.name}: {counted(count)} in order {path.order}, "
@@ -132,7 +132,7 @@ def _timed(robot: Robot, trajectory: Trajectory) -> Motion:
     return Motion(q, time, points, False, "coverage path")
 
 
-def _painting(
+def painting(
     trajectory: Trajectory | None, motion: Motion, limits: MotionLimits | None
 ) -> tuple[tuple[float, float], NDArray[np.float64] | None]:
     """When the tool is over the surface, s, and the share (k,) of their velocities that joints use.
@@ -152,7 +152,7 @@ def _painting(
     return times, np.interp(motion.seconds, at, used)
 
 
-def _strokes(
+def trail_pieces(
     motion: Motion,
     radius: float,
     when: tuple[float, float],

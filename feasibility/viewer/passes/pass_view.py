@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 
 from feasibility.paths import CoveragePath
 from feasibility.runs import PlannedPasses
-from feasibility.timing import Trajectory
+from feasibility.timing import MotionLimits, Trajectory
 from feasibility.treated import TreatedArea, share_words
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.passes.digits import digit_lines
+from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import LONGEST, Motion, paced
 from feasibility.viewer.scene import OUTLINES, PATCHES, Layer, drawn_lines
 from feasibility.viewer.treated import painted_layers, surface_layer
@@ -38,6 +39,7 @@ def view_passes(
     treated: TreatedArea | None = None,
     trajectory: Trajectory | None = None,
     case: str | None = None,
+    limits: MotionLimits | None = None,
 ) -> View:
     """The arm along passes, and the area that it treats painted behind the tool.
 
@@ -47,6 +49,8 @@ def view_passes(
         treated: what they treat, where there is a footprint.
         trajectory: of a single path; played as fast as it is, or in a minute if it takes longer.
         case: name of the case, for the title.
+        limits: of the timing: where the task has a speed, the tool's trail is coloured by how much
+            of them the joints use.
     """
     robot, laid = along.verdict.robot, along.passes
     motion = _motion(robot, paths, trajectory)
@@ -56,6 +60,11 @@ def view_passes(
         side, height = laid.surface.side_sign, along.task.standoff
         painted = painted_layers(treated, side, motion, height)
         parts, tracks = [*parts, *painted.layers], painted.tracks
+    if trajectory is not None and motion is not None and limits and along.task.speed is not None:
+        trail, more = trail_pieces(
+            motion, 2.0 * THIN * laid.spacing, *painting(trajectory, motion, limits)
+        )
+        parts, tracks = [*parts, *trail], [*tracks, *more]
     parts += _pass_layers(along, paths)
     count = f"{laid.count} pass{'' if laid.count == 1 else 'es'}"
     runs = "one motion" if len(paths) == 1 else f"{len(paths)} motions"
