@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -206,23 +207,37 @@ def tubes(lines: Sequence[Array], radius: float, sides: int = 5) -> tuple[Array,
     """
     vertices, faces, offset = [np.empty((0, 3))], [np.empty((0, 3), np.int64)], 0
     angle = 2.0 * np.pi * np.arange(sides) / sides
-    for line in lines:
-        steps = np.diff(line, axis=0)
-        line = line[np.concatenate([[True], np.linalg.norm(steps, axis=1) > 1e-9])]
-        if len(line) < 2:
+    # Lines of as many points, such as the edges of a graph, are drawn at once.
+    for count, alike in itertools.groupby(_without_repeats(lines), key=len):
+        if count < 2:
             continue
-        along = np.gradient(line, axis=0)
-        helper = np.eye(3)[np.argmin(np.abs(line[-1] - line[0]))]
-        side = _unit(np.cross(along, helper), 1e-12)
-        up = _unit(np.cross(along, side), 1e-12)
-        ring = np.cos(angle)[:, None] * side[:, None] + np.sin(angle)[:, None] * up[:, None]
-        vertices.append((line[:, None] + radius * ring).reshape(-1, 3))
-        i, j = np.meshgrid(np.arange(len(line) - 1), np.arange(sides), indexing="ij")
+        points = np.stack(list(alike))
+        along = np.gradient(points, axis=1)
+        helper = np.eye(3)[np.argmin(np.abs(points[:, -1] - points[:, 0]), axis=1)]
+        side = _unit(np.cross(along, helper[:, None]), 1e-12)[:, :, None]
+        up = _unit(np.cross(along, side[:, :, 0]), 1e-12)[:, :, None]
+        ring = np.cos(angle)[:, None] * side + np.sin(angle)[:, None] * up
+        vertices.append((points[:, :, None] + radius * ring).reshape(-1, 3))
+        i, j = np.meshgrid(np.arange(count - 1), np.arange(sides), indexing="ij")
         a, b = i * sides + j, i * sides + (j + 1) % sides
-        quads = np.stack([a, b, b + sides, a, b + sides, a + sides], axis=-1)
-        faces.append(offset + quads.reshape(-1, 3))
-        offset += len(line) * sides
+        quads = np.stack([a, b, b + sides, a, b + sides, a + sides], axis=-1).reshape(-1, 3)
+        firsts = offset + count * sides * np.arange(len(points))
+        faces.append((firsts[:, None, None] + quads).reshape(-1, 3))
+        offset += len(points) * count * sides
     return np.concatenate(vertices), np.concatenate(faces)
+
+
+def _without_repeats(lines: Sequence[Array]) -> list[Array]:
+    """The lines without points that lie on the one before them."""
+    if not len(lines):
+        return []
+    points = np.concatenate(lines)
+    ends = np.cumsum([len(line) for line in lines])
+    kept = np.ones(len(points), dtype=bool)
+    kept[1:] = np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9
+    kept[ends[:-1][ends[:-1] < len(points)]] = True
+    left = np.cumsum(kept)[ends - 1]
+    return np.split(points[kept], left[:-1])
 
 
 def _merged(mesh: Mesh, spacing: float) -> Mesh:
@@ -235,8 +250,8 @@ def _merged(mesh: Mesh, spacing: float) -> Mesh:
 
 
 def _unit(vectors: Array, least: float = 1e-300) -> Array:
-    """Vectors (k, 3) at length 1; those shorter than `least` stay short."""
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), least))
+    """Vectors (..., 3) at length 1; those shorter than `least` stay short."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least))
 
 
 def _doubled_areas(vertices: Array, faces: Ints) -> Array:
