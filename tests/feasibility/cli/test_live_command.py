@@ -25,8 +25,8 @@ def test_bad_input_is_one_message(capsys):
 
 
 def test_a_page_is_served_until_ctrl_c_which_is_its_end_and_no_fault():
-    """While a question is being decided, too."""
-    command = [sys.executable, "-m", "feasibility.cli", "live", "paper/4d", "--no-browser"]
+    """Right after a question, too."""
+    command = [sys.executable, "-m", "feasibility.cli", "live", "paper/4a", "--no-browser"]
     with subprocess.Popen(
         command, cwd=ROOT, env={**os.environ, "PYTHONPATH": str(ROOT)}, text=True,
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
