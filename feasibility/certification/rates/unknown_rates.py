@@ -26,7 +26,7 @@ def check_rates(robot: Robot, task: Task) -> None:
     if unknown:
         what = f"cannot be judged: the URDF of {robot.name!r} limits no velocity of "
         named = ", ".join(unknown)
-        add = 'add velocity="..." to their <limit>, or velocity to their [[robot.axis]]'
+        add = 'add velocity="..." to <limit>, or max_velocity_deg (_m) to [[robot.axis]]'
         raise ArgumentError(Fault("speed", what + named, expected=add), "task")
     most = fastest_anywhere(robot)
     if task.speed > most:
