@@ -57,6 +57,7 @@ feasibility.treated
 feasibility.certification: faults kinematic_bounds
 feasibility.certification.collisions
 feasibility.certification.tool_alone
+feasibility.certification.joint_boxes
 feasibility.certification.rolls
 feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region lever_bounds linear_models motion_replay order parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
 feasibility.certification.areas
@@ -65,8 +66,9 @@ feasibility.cases
 feasibility.roadmap.motions
 feasibility.roadmap: graph
 feasibility.roadmap.branch_and_bound
-feasibility.roadmap.cuts
 feasibility.roadmap.tool_alone
+feasibility.roadmap.joint_boxes
+feasibility.roadmap.cuts
 feasibility.roadmap: bridging expansion exploration proving search seeding
 feasibility.roadmap.causes
 feasibility.roadmap: walk

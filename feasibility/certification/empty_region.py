@@ -5,6 +5,9 @@ claims are looked at together, as a step over a thousand boxes takes hardly long
 ten. Boxes that the linear models do not prove empty are contracted and cut (`box_cutting`). What is
 dropped is proved empty: when no box is left, every claim holds. Of the boxes that are left a few
 give starts for a search for a configuration that refutes its claim.
+
+Where bodies are to stay clear of each other, a box in which some overlap everywhere is empty too
+(`joint_boxes`), and only a configuration that is clear refutes a claim.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.box_cutting import smaller
 from feasibility.certification.box_exclusion import contract, directions_for, nearest, separated
+from feasibility.certification.joint_boxes import Overlapping
 from feasibility.certification.linear_models import Allowed, Arm, Array, Boxes, Models, Parts
 from feasibility.certification.refutation import Refuter
 from feasibility.certification.region import Region
@@ -60,6 +64,7 @@ class Emptiness:
         roots: Callable[[int | None], int],
         allowed: Allowed,
         tick: Callable[[], object],
+        overlapping: Overlapping | None = None,
     ) -> None:
         """Work for one arm and one surface.
 
@@ -69,7 +74,9 @@ class Emptiness:
             roots: the part of a cell's target, or of the whole surface for None.
             allowed: how far the tool may be off.
             tick: called between batches; may raise.
+            overlapping: finds boxes in which bodies overlap; None where they may.
         """
+        self.overlapping = overlapping
         self.arm = arm
         self.parts = parts
         self.roots = roots
@@ -111,7 +118,7 @@ class Emptiness:
                 starts = (left.centre[some] + place[some])[:, :n]
                 at = [(regions[k], claims[k].cell) for k in left.claim[some]]
                 found = refuter.find(starts, at, shared)
-                if found is not None:
+                if found is not None and self._clear(found.q):
                     failed = int(left.claim[some[found.start]])
                     return Outcome(done, failed, found.q)
             waiting.append(smaller(left, models, self.parts, self.allowed.length))
@@ -144,7 +151,26 @@ class Emptiness:
         models = replace(models, low=low, high=high)
         place, missed = nearest(models)
         kept = ~separated(models, missed)
+        boxes, models, place = boxes[kept], models[kept], place[kept]
+        if self.overlapping is None:
+            return boxes, models, place
+        kept = ~self._overlap(self.overlapping, boxes, models)
         return boxes[kept], models[kept], place[kept]
+
+    def _overlap(self, overlapping: Overlapping, boxes: Boxes, models: Models) -> NDArray[np.bool_]:
+        """(m,) boxes, as far as their models leave them, in which bodies overlap everywhere."""
+        n, parts, part = self.arm.n, self.parts, boxes.part
+        low, high = boxes.centre + models.low, boxes.centre + models.high
+        at, half = 0.5 * (low + high)[:, n:], 0.5 * (high - low)[:, n:]
+        slopes = parts.slopes[part][..., :3]
+        target = parts.centre[part, :3] + (at[..., None] * slopes).sum(axis=1)
+        off = self.allowed.position + parts.radius[part, 0]
+        off = off + (half * np.linalg.norm(slopes, axis=2)).sum(axis=1)
+        return overlapping.everywhere(low[:, :n], high[:, :n], target, off)
+
+    def _clear(self, q: Array) -> bool:
+        """Is a configuration one in which no pair is too near?"""
+        return self.overlapping is None or self.overlapping.clear(q)
 
 
 def _next(waiting: list[Boxes]) -> Boxes:

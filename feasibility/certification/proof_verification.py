@@ -8,7 +8,8 @@ tool on the surface, within tolerance and cone, and its roll in the range,
     no q in the region of a leaf has the tool at its cell's target, and held likewise.
 
 A tree of one leaf proves its claim too where the tool collides in every pose within tolerance and
-cone of the cell's target, whatever the arm does (`feasibility.certification.tool_alone`).
+cone of the cell's target, whatever the arm does (`feasibility.certification.tool_alone`). And where
+bodies are to stay clear of each other, M and leaves hold only what is clear.
 
 Both say that a region is empty, which `feasibility.certification.empty_region` proves by bounds
 (`linear_models`, `box_exclusion`). A joint that the tree opens at t is to have no q in M at any
@@ -26,6 +27,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from feasibility.certification.empty_region import Claim, Emptiness, Outcome
+from feasibility.certification.joint_boxes import Overlapping, overlapping_of
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.certification.linear_models import (
     Allowed,
@@ -47,6 +49,7 @@ from robots import Robot
 from surfaces import Cells, SurfaceError, SurfaceParts
 
 MOST_BOXES = 2_000_000
+WITHOUT_BODIES = 20_000  # boxes after which it is looked into whether bodies overlap
 FINE = 0.25  # of tolerance and cone, that the finest parts of the surface may be off by
 TYPICAL = 0.2  # of the longest lever: what a difference of axes is weighed by; found by trying
 NARROWEST = 1e-6  # a chord that parts of the surface are made for, at least
@@ -142,15 +145,17 @@ def verify_on(
     def root_of(cell: int | None) -> int:
         return 0 if cell is None else len(parts) + cell
 
-    emptiness = Emptiness(
-        arm,
-        with_cells(surface, targets),
-        root_of,
-        allowed,
-        tick or (lambda: None),
-    )
-    claims = list(_claims(robot, cells, tree, limits))
-    found = emptiness.test(claims, Refuter(arm, cells, task, length), most)
+    claims, refuter = list(_claims(robot, cells, tree, limits)), Refuter(arm, cells, task, length)
+    bodies = gather(robot, cells.surface, task.collision, task.standoff)
+
+    def tested(boxes: int, overlapping: Overlapping | None = None) -> Outcome:
+        held = with_cells(surface, targets)
+        emptiness = Emptiness(arm, held, root_of, allowed, tick or (lambda: None), overlapping)
+        return emptiness.test(claims, refuter, boxes)
+
+    found = tested(most if bodies is None else min(most, WITHOUT_BODIES))
+    if found.failed is not None and bodies is not None:
+        found = tested(most, overlapping_of(robot, bodies))
     if found.failed is None:
         return ProofCheck("", found.boxes)
     return ProofCheck(_refusal(claims[found.failed], found), found.boxes)

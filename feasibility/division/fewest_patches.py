@@ -25,8 +25,8 @@ from feasibility.roadmap import (
     warm_up,
     within,
 )
-from feasibility.roadmap.causes import causes_of, diagnose, disconnected
-from feasibility.roadmap.tool_alone import tool_alone_of
+from feasibility.roadmap.causes import cause_of, causes_of, diagnose, disconnected
+from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.search import Progress, Search
 from feasibility.targets import blocked_curves
 from feasibility.task import Task
@@ -186,8 +186,8 @@ def _searched(
     """The search with all components that it found, a bound, and whether it ran to its end."""
     with clock.enforced():
         arrays = arrays_of(robot, cells, task)
-    alone = tool_alone_of(robot, cells.surface, task)
-    exploration = Exploration(robot, cells, arrays, seed, clock, alone)
+    blockers = blockers_of(robot, cells.surface, task)
+    exploration = Exploration(robot, cells, arrays, seed, clock, blockers)
     ended, apart = True, ProvedBound(min(1, len(cells)))
     try:
         explore(exploration)
@@ -216,7 +216,7 @@ def _cause(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> Caus
     """Why a cell that the best motion covers is in no patch all the same."""
     if exploration.reached[cell]:
         return disconnected(exploration, cell, None, pairs)
-    return diagnose(exploration, cell)
+    return cause_of(exploration, cell, pairs)
 
 
 def _no_motion(arrays: SearchArrays) -> bool:

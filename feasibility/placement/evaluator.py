@@ -26,7 +26,7 @@ from feasibility.placement.quick_search import (
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
 from feasibility.roadmap import Exploration, SearchArrays, arrays_of, collisions_of
-from feasibility.roadmap.tool_alone import tool_alone_of
+from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.search import Search
 from feasibility.studies import cause_counts
 from feasibility.task import Task
@@ -246,8 +246,8 @@ class LocalEvaluator:
         from feasibility.roadmap import explore
 
         problem = arrays_of(self.robot, cells, self.task)
-        alone = tool_alone_of(self.robot, cells.surface, self.task)
-        exploration = Exploration(self.robot, cells, problem, self.search.seed, tool_alone=alone)
+        blockers = blockers_of(self.robot, cells.surface, self.task)
+        exploration = Exploration(self.robot, cells, problem, self.search.seed, blockers=blockers)
         explore(exploration)
         return exploration
 

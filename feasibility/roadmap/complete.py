@@ -19,6 +19,7 @@ from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.forward import Run, changes_in_place, run_in_order
 from feasibility.roadmap.graph_g import graph_of
+from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.outcome import (
     exhausted_words,
@@ -28,7 +29,6 @@ from feasibility.roadmap.outcome import (
 )
 from feasibility.roadmap.proving import Proving
 from feasibility.roadmap.search import close, explore
-from feasibility.roadmap.tool_alone import tool_alone_of
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
@@ -66,8 +66,8 @@ def complete_search(
     clock.start()
     with clock.enforced():
         arrays = arrays_of(problem.robot, problem.cells, problem.searched)
-    alone = tool_alone_of(problem.robot, problem.cells.surface, problem.task)
-    exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock, alone)
+    blockers = blockers_of(problem.robot, problem.cells.surface, problem.task)
+    exploration = Exploration(problem.robot, problem.cells, arrays, search.seed, clock, blockers)
     proving = Proving(exploration, problem.task)
     in_time, known, run = True, None, None
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +29,9 @@ from feasibility.roadmap.graph import (
     joined_pairs,
     root_of,
 )
+from feasibility.roadmap.joint_boxes import Blockers
 from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
 from feasibility.roadmap.seeding import seed_cell
-from feasibility.roadmap.tool_alone import Blocking, ToolAlone
 from robots import Robot
 from surfaces import Cells, components
 
@@ -49,14 +50,12 @@ class Exploration:
     arrays: SearchArrays
     seed: int
     clock: Clock = field(default_factory=Clock)
-    tool_alone: ToolAlone | None = None
-    """What the tool may hit by itself; None where that is not looked into."""
+    blockers: Blockers | None = None
+    """Proofs that collisions keep the arm from cells; None where they are not looked for."""
     work: Work = field(init=False)
     roadmap: Roadmap = field(init=False)
     rulings: dict[int, Ruling] = field(default_factory=dict)
     """Outcomes of branch and bound, by cell."""
-    blocking: dict[int, Blocking | None] = field(default_factory=dict)
-    """What keeps the tool from a cell in every pose, None where that is not proved, by cell."""
     boxes: int = 0
     rounds: int = 0
     stopped: bool = False
@@ -313,17 +312,15 @@ class Exploration:
         owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
         return np.unique(owners[inside[owners] & ~inside[self.indices]])
 
-    def blocked(self, cell: int) -> bool:
-        """Is it proved that the tool collides over a cell, however it is brought there?"""
-        if self.tool_alone is None:
+    def blocked(self, cell: int, arm: bool = False) -> bool:
+        """Is it proved that the tool collides wherever it is over a cell, or any of the `arm`?"""
+        if self.blockers is None:
             return False
-        if cell not in self.blocking:
-            place = self.arrays.points[cell], self.arrays.approaches[cell]
-            self.blocking[cell] = self.tool_alone.blocking(*place)
-        if self.blocking[cell] is None:
-            return False
-        self.rulings[cell] = Ruling.PROVED
-        return True
+        tick = partial(self.tick, "proving that the arm collides")
+        found = self.blockers.over(self.arrays, self.work, cell, tick if arm else None)
+        if found:
+            self.rulings[cell] = Ruling.PROVED
+        return found
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds becomes a seed."""

@@ -30,13 +30,20 @@ def proved_words(problem: Problem, proving: Proving, proof: CutTree) -> str:
             f"{sentence(proof, problem.robot, problem.cells)} ({proving.boxes} boxes); {best}."
         )
     proved = sum(ruling is Ruling.PROVED for ruling in exploration.rulings.values())
-    blocked = [found for found in exploration.blocking.values() if found is not None]
-    how = [f"reach bound and branch and bound, {exploration.boxes} boxes"]
-    if blocked:
-        boxes = sum(found.boxes for found in blocked)
-        over = "there" if proved == len(blocked) else f"over {len(blocked)} of them"
-        alone = f"the tool collides {over} in every pose, {boxes} boxes of tilt and roll"
-        how = [alone] if proved == len(blocked) else [*how, alone]
+    how = list[str]()
+    blockers, counted = exploration.blockers, 0
+    if blockers is not None:
+        for found, what in (
+            (blockers.tool, "the tool collides {} in every pose, {} boxes of tilt and roll"),
+            (blockers.arm, "something collides {} wherever the tool is, {} boxes of the joints"),
+        ):
+            boxes = [one.boxes for one in found.values() if one is not None]
+            if boxes:
+                over = "there" if proved == len(boxes) else f"over {len(boxes)} of them"
+                how.append(what.format(over, sum(boxes)))
+                counted += len(boxes)
+    if proved > counted:
+        how.insert(0, f"reach bound and branch and bound, {exploration.boxes} boxes")
     return (
         f"{proved} cell{'s are' if proved > 1 else ' is'} proved uncoverable {problem.within} "
         f"({'; '.join(how)}); {best}."

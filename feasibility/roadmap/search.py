@@ -6,7 +6,8 @@ In this order, because each step is much cheaper than the next:
    does not cover yet. Most feasible cases end here.
 2. Branch and bound over every cell that no component has reached: it either proves that no
    configuration covers the cell, or finds one (which becomes a seed). Before that, whether the tool
-   collides over the cell in every pose, whatever the arm does.
+   collides over the cell in every pose, whatever the arm does; and after it, over a few cells,
+   whether something collides wherever the tool is there.
 3. Rounds: seed cells that the best component misses; explore self-motions at the border of the
    largest components, to find configurations that reach further; bridge two components, and explore
    self-motions over cells that both cover. The search is exhausted when some rounds in a row have
@@ -40,6 +41,7 @@ FIRST_BOXES = 1000  # boxes for each cell that no component has reached
 MORE_BOXES = 20_000  # boxes once Newton has failed there too
 DEEP_BOXES = 2_000_000  # boxes for the few cells that are examined until one is proved
 DEEP_CELLS = 3
+ARM_CELLS = 4  # that are asked whether the whole arm collides
 MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid the rest are alike
 NEWTON_STARTS = 25
 
@@ -108,13 +110,17 @@ def _unreached(exploration: Exploration) -> None:
     if exploration.proved:
         return
     _at_the_target(exploration)
+    _where_the_arm_collides(exploration)
+    if exploration.proved:
+        return
     # One proof is enough for the verdict: examine the furthest of the remaining cells deeper.
     left = [
         c
         for c in open_boxes
         if exploration.rulings[c] is Ruling.OPEN and not exploration.reached[c]
     ]
-    for cell in sorted(left, key=lambda c: -distance[c])[:DEEP_CELLS]:
+    left.sort(key=lambda c: -distance[c])
+    for cell in left[:DEEP_CELLS]:
         if exploration.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
             return
 
@@ -138,6 +144,20 @@ def _at_the_target(exploration: Exploration) -> None:
             exploration.add_seeds(cell, exploration.guesses(NEWTON_STARTS))
         if not exploration.reached[cell]:
             exploration.rule(cell, root_box(exploration.arrays), MORE_BOXES)
+
+
+def _where_the_arm_collides(exploration: Exploration) -> None:
+    """Ask of a few cells that are still open whether something collides wherever the tool is there.
+
+    Over these the tool can be, as far as limits, cone and roll go.
+    """
+    if exploration.blockers is None:
+        return
+    landed = (Ruling.REACHED, Ruling.UNKNOWN)
+    left = [cell for cell, ruling in exploration.rulings.items() if ruling in landed]
+    left = [cell for cell in left if not exploration.reached[cell]]
+    for cell in evenly(np.array(left, dtype=np.int64))[:ARM_CELLS].tolist():
+        exploration.blocked(cell, arm=True)
 
 
 def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -28,7 +28,7 @@ from feasibility.roadmap import (
     route_walk,
     warm_up,
 )
-from feasibility.roadmap.tool_alone import tool_alone_of
+from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.runs.fewest import Stations, Way, fewest_ways
 from feasibility.runs.stopping import Stop, where_it_stops
 from feasibility.task import Task
@@ -106,8 +106,8 @@ def pass_runs(
     clock.start()
     with clock.enforced():
         arrays = arrays_of(robot, cells, task)
-    alone = tool_alone_of(robot, cells.surface, task)
-    exploration = Exploration(robot, cells, arrays, seed, clock, alone)
+    blockers = blockers_of(robot, cells.surface, task)
+    exploration = Exploration(robot, cells, arrays, seed, clock, blockers)
     try:
         explore(exploration)
         collect_components(exploration)

@@ -32,6 +32,7 @@ from feasibility.roadmap import (
     wound,
 )
 from feasibility.roadmap.forward import run_in_order
+from feasibility.sensitivity.collision_proofs import CollisionProofs, Steps
 from feasibility.sensitivity.limited_search import (
     NO_CELL,
     Attempt,
@@ -66,6 +67,7 @@ class Prober:
         self.clock = clock
         self.arrays = arrays_of(*variant)
         self._made = dict[tuple[str, int], SearchArrays]()
+        self._collisions = CollisionProofs(variant)
         beyond = replace(variant.task, standoff=variant.task.standoff + 1.0)
         self.outwards = beyond.targets(variant.cells).points - self.arrays.points
         """(N, 3) how the target points move with the standoff."""
@@ -176,8 +178,19 @@ class Prober:
         self.suspect(int(order[projected]))
         return int(order[projected]), found
 
-    def rule(self, arrays: SearchArrays, cell: int, boxes: int) -> tuple[Ruling, Floats | None]:
+    def rule(
+        self, arrays: SearchArrays, cell: int, boxes: int, at: Steps | None = None
+    ) -> tuple[Ruling, Floats | None]:
         """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
+
+        Where the tool collides over the cell in every pose no arm is asked; where the arm can be
+        there, but no configuration was found to be clear, the arm's collisions are looked into.
+
+        Args:
+            arrays: see `arrays_at`.
+            cell: the cell.
+            boxes: of branch and bound.
+            at: the quantity and the steps that the arrays are for; None for the case as given.
 
         Returns:
             The ruling; and, unless it is PROVED or OPEN, a configuration (n,) on the cell's
@@ -185,6 +198,10 @@ class Prober:
         """
         self.tick()
         if self.beyond_reach(arrays)[cell]:
+            self.suspect(cell)
+            return Ruling.PROVED, None
+        blockers = self._collisions.at(at)
+        if blockers is not None and blockers.over(arrays, self.work, cell):
             self.suspect(cell)
             return Ruling.PROVED, None
         boxes = max(int(self.allowance * boxes), min(boxes, LEAST_BOXES))
@@ -201,7 +218,10 @@ class Prober:
         row = np.full((len(arrays.points), len(q)), np.nan)
         row[cell] = wound(arrays, q)
         projected = int(project_all(arrays, self.work, np.array([cell]), row)) == 1
-        return ruling, row[cell] if projected else None
+        if projected or blockers is None:
+            return ruling, row[cell] if projected else None
+        blocked = blockers.over(arrays, self.work, cell, self.tick)
+        return Ruling.PROVED if blocked else ruling, None
 
     def beyond_reach(self, arrays: SearchArrays) -> Bools:
         """(N,) cells that are further away than the arm reaches.

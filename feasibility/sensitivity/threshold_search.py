@@ -187,7 +187,7 @@ class ThresholdSearch:
             return self._proof(k, int(far.argmax()))
         seeds = seeds.copy()
         for cell in list(dict.fromkeys([*hard, *spread.tolist()]))[:PROOFS]:
-            ruling, q = self.prober.rule(arrays, cell, HINT_BOXES)
+            ruling, q = self.prober.rule(arrays, cell, HINT_BOXES, (self.quantity, k))
             if ruling is Ruling.PROVED:
                 return self._proof(k, cell)
             if q is None:
@@ -317,7 +317,7 @@ class ThresholdSearch:
         for steps in (s for s in BEYOND if (far - bracket.good.k) * sign > s):
             k = bracket.good.k + sign * steps
             arrays = self.prober.arrays_at(self.quantity, k)
-            ruling, q = self.prober.rule(arrays, bracket.failed, PROOF_BOXES)
+            ruling, q = self.prober.rule(arrays, bracket.failed, PROOF_BOXES, (self.quantity, k))
             if ruling is not Ruling.PROVED:
                 break
             proof = self._proof(k, bracket.failed)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
 from feasibility.clock import Clock
+from feasibility.collisions import gather
 from feasibility.division import undominated
 from feasibility.verdict import CauseKind, Verdict
 
@@ -50,7 +51,8 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
         kinds = [str(cause.kind) for cause in verdict.causes]
         return CauseCounts(_counted(kinds), len(kinds))
     from feasibility.roadmap import Exploration, arrays_of
-    from feasibility.roadmap.causes import diagnose
+    from feasibility.roadmap.causes import cause_of
+    from feasibility.roadmap.joint_boxes import blockers_of
 
     reached = np.zeros(len(verdict.cells), dtype=bool)
     for cells in verdict.components:
@@ -59,11 +61,16 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     lost = missed[~reached[missed]]
     if len(lost) == 0:
         return CauseCounts(_counted(kinds), 0)
-    # A new exploration: only its Newton's method and its random starts are used.
+    # A new exploration: its Newton's method, its random starts, and proofs by the tool are used.
+    case = verdict.robot, verdict.cells.surface, verdict.task
     arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
-    exploration = Exploration(verdict.robot, verdict.cells, arrays, verdict.seed)
+    blockers, bodies = blockers_of(*case), gather(*case[:2], case[2].collision, case[2].standoff)
+    exploration = Exploration(verdict.robot, verdict.cells, arrays, verdict.seed, blockers=blockers)
+    pairs = () if bodies is None else bodies.pairs
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
-    examined = [diagnose(exploration, int(cell)) for cell in few]
+    for cell in few.tolist():
+        exploration.blocked(cell)
+    examined = [cause_of(exploration, cell, pairs) for cell in few.tolist()]
     centres = verdict.cells.centres
     away = np.linalg.norm(centres[lost][:, None] - centres[few][None], axis=2)  # (L, E)
     kinds += [str(examined[int(k)].kind) for k in away.argmin(axis=1)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from feasibility.collisions import Pair, configuration_bounds
 from feasibility.roadmap.branch_and_bound import Ruling
 from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.joint_boxes import ArmBlocked
 from feasibility.roadmap.motions import PROJECTION_STEPS, project_near_cell
 from feasibility.roadmap.seeding import moved_clear
 from feasibility.verdict import Cause, CauseKind
@@ -28,7 +30,9 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
         pairs: those that are asked for, in the order of the search's arrays.
     """
     arrays, work = exploration.arrays, exploration.work
-    if not len(arrays.collisions) or exploration.rulings.get(cell) is Ruling.PROVED:
+    proof = None if exploration.blockers is None else exploration.blockers.arm.get(cell)
+    proved = exploration.rulings.get(cell) is Ruling.PROVED
+    if not len(arrays.collisions) or (proved and proof is None):
         return None
     needed = np.array([pair.clearance for pair in pairs])
     landed, spare = [], []  # spare: of each landing, distance beyond the clearance by pair
@@ -39,21 +43,25 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
             if (spare[-1] > 0.0).all():
                 return None
     if not spare:
-        return None
+        return None if proof is None else _proved(cell, proof)
     best = spare[int(np.argmax([row.min() for row in spare]))]
     for k in np.argsort([-row.min() for row in spare], kind="stable")[:PUSHED].tolist():
         if moved_clear(arrays, work, cell, landed[k]):
             return None
         pushed = configuration_bounds(arrays.collisions, landed[k]) - needed
         best = pushed if pushed.min() > best.min() else best
-    return _worded(cell, np.array(spare), best, pairs)
+    cause = _worded(cell, np.array(spare), best, pairs)
+    return cause if proof is None else _proved(cell, proof, cause)
 
 
 def blocked(exploration: Exploration, cell: int) -> Cause | None:
-    """The cause of a cell over which the tool is proved to collide in every pose; or None."""
-    found = exploration.blocking.get(cell)
-    if found is None:
+    """The cause of a cell over which the tool, or the arm, is proved to collide; or None."""
+    if exploration.blockers is None:
         return None
+    found = exploration.blockers.tool.get(cell)
+    if found is None:
+        arm = exploration.blockers.arm.get(cell)
+        return None if arm is None else _proved(cell, arm)
     pairs = [f"{first} and {second}" for first, second in found.pairs]
     one = f"{pairs[0]} collide"
     if len(pairs) > 1:
@@ -65,6 +73,22 @@ def blocked(exploration: Exploration, cell: int) -> Cause | None:
         f"{pairs[0]} {how} or so"
     )
     return Cause(cell, CauseKind.COLLISION, True, detail, found.pairs[0], found.distance)
+
+
+def _proved(cell: int, proof: ArmBlocked, found: Cause | None = None) -> Cause:
+    """The cause of a cell from which collisions are proved to keep the arm.
+
+    Args:
+        cell: the cell.
+        proof: which pairs they are.
+        found: what some configurations over it told.
+    """
+    named = ", ".join(f"{first} and {second}" for first, second in proof.pairs)
+    detail = f"wherever the tool is there, one of these pairs collides: {named}"
+    if found is None:
+        return Cause(cell, CauseKind.COLLISION, True, detail, proof.pairs[0])
+    detail = f"{detail}; {found.detail}"
+    return replace(found, proved=True, detail=detail)
 
 
 def _worded(

@@ -272,6 +272,17 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
     return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
 
 
+def cause_of(exploration: Exploration, cell: int, pairs: tuple[Pair, ...] = ()) -> Cause:
+    """Why no component reaches a cell, collisions considered; see `diagnose`.
+
+    Args:
+        exploration: a finished search.
+        cell: a cell that no component covers.
+        pairs: that have to stay clear of each other.
+    """
+    return colliding(exploration, cell, pairs) or diagnose(exploration, cell)
+
+
 def causes_of(
     exploration: Exploration, proof: CutTree | None = None, pairs: tuple[Pair, ...] = ()
 ) -> tuple[Cause, ...]:
@@ -297,7 +308,7 @@ def causes_of(
     examined = evenly(lost)[:MOST_EXAMINED]
     for cell in examined.tolist():
         exploration.tick("finding causes")
-        causes[cell] = colliding(exploration, cell, pairs) or diagnose(exploration, cell)
+        causes[cell] = cause_of(exploration, cell, pairs)
     for cell in lost.tolist():
         if cell not in causes:
             near = int(examined[np.argmin(np.linalg.norm(points[examined] - points[cell], axis=1))])

@@ -96,21 +96,30 @@ def _in_box(half: Array) -> Array:
     return np.concatenate(found)
 
 
-def _in_mesh(mesh: Triangles) -> Array:
-    """Balls in a solid, and corners that are far from each other."""
+def corners_of(mesh: Triangles) -> Array:
+    """(k, 4) balls of no radius at corners that are far from each other."""
     corners = mesh.vertices[np.unique(mesh.faces)]
     chosen = [int(np.linalg.norm(corners - corners.mean(axis=0), axis=1).argmax())]
     away = np.linalg.norm(corners - corners[chosen[0]], axis=1)
     while len(chosen) < min(CORNERS, len(corners)):
         chosen.append(int(away.argmax()))
         away = np.minimum(away, np.linalg.norm(corners - corners[chosen[-1]], axis=1))
-    points = np.column_stack([corners[chosen], np.zeros(len(chosen))])
-    planes = face_planes(mesh)
+    return np.column_stack([corners[chosen], np.zeros(len(chosen))])
+
+
+def is_convex(shape: object) -> bool:
+    """Is it a convex solid?"""
+    return not isinstance(shape, Triangles) or face_planes(shape) is not None
+
+
+def _in_mesh(mesh: Triangles) -> Array:
+    """Balls in a solid, and corners that are far from each other."""
+    points, planes = corners_of(mesh), face_planes(mesh)
     if planes is None:
         return np.concatenate([balls_in(mesh), points])
     # From the middle of a convex body towards its corners.
-    middle = corners.mean(axis=0)
-    ways = corners[chosen] - middle
+    middle = mesh.vertices[np.unique(mesh.faces)].mean(axis=0)
+    ways = points[:, :3] - middle
     inner = np.concatenate([middle[None], *(middle + share * ways for share in TOWARDS)])
     radii = (planes[:, 3] - inner @ planes[:, :3].T).min(axis=1) - ROUNDING
     some = radii > 0.0

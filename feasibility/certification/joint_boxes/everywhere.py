@@ -1,0 +1,218 @@
+"""Boxes of joint values in which two bodies overlap everywhere: what must confirm such proofs.
+
+No code is shared with the search. A point of body i that is r deep in it and s deep in another one
+at the middle of a box shows that they come nearer than the clearance c all over the box if
+
+    r + s + c > M,
+
+M being how far the point can move in the box, seen from the other body. With x the point, v_k + w_k
+x its velocity by joint k (Pinocchio's), and h_k the half widths, M = sum_k m_k over the joints
+between the two, where m_k = min(h_k, 2) (|v_k + w_k x| + sum of m_l behind k) if joint k turns, and
+h_k if it slides: the joints are moved one by one, the last first. Or else, where the tool point p
+is within e of a place T, the point is as far from T + x - p as that difference changes, and e:
+joints beyond i move p, those up to i turn the difference.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.certification.collisions import collision_replay
+from feasibility.certification.joint_boxes.depths import depths, points_inside
+from feasibility.collisions import Bodies
+from robots import Kinematics, Robot
+
+Array = NDArray[np.float64]
+
+GUARD = 1e-7  # [m] that an overlap has to be larger by
+
+
+class _Points(NamedTuple):
+    """Points of a body that moves."""
+
+    joint: int
+    places: Array
+    """(k, 3) m, in the frame of the joint."""
+    deep: Array
+    """(k,) m"""
+
+
+class _Inside(NamedTuple):
+    """A body that has a known inside."""
+
+    joint: int
+    """0 at rest."""
+    shape: object
+    placement: Array
+    """(4, 4) in the frame of the joint."""
+
+
+class _Couples(NamedTuple):
+    """Points, and the bodies that they may be inside."""
+
+    points: _Points
+    bodies: list[tuple[_Inside, float]]
+    """Each with the clearance that the pair has to have, m."""
+
+
+class _Middles(NamedTuple):
+    """Of m boxes, their half widths and what Pinocchio says of the arm at their middles."""
+
+    half: Array
+    """(m, n)"""
+    rotations: Array
+    """(m, n + 1, 3, 3)"""
+    origins: Array
+    """(m, n + 1, 3) m"""
+    linear: Array
+    """(m, n, 3) v_k"""
+    angular: Array
+    """(m, n, 3) w_k"""
+    tool: Array
+    """(m, 3) m"""
+    target: Array
+    """(m, 3) m"""
+    off: Array
+    """(m,) m, how far the tool point may be from the target in the box."""
+
+    def some(self, which: NDArray[np.int64]) -> _Middles:
+        """Some of the boxes."""
+        return _Middles(*(part[which] for part in self))
+
+
+class Overlapping:
+    """Finds boxes in which bodies of one problem overlap everywhere."""
+
+    def __init__(self, robot: Robot, bodies: Bodies) -> None:
+        """Lay points into the bodies of all pairs that are asked for."""
+        self._robot, self._bodies, self._kinematics = robot, bodies, Kinematics(robot)
+        self._couples = _couples(bodies)
+
+    def everywhere(self, low: Array, high: Array, target: Array, off: Array) -> NDArray[np.bool_]:
+        """(m,) boxes in which some pair is too near all over, wherever the tool is at its target.
+
+        Args:
+            low, high: (m, n) rad or m.
+            target: (m, 3) m, where the tool point is to be in each.
+            off: (m,) m, how far it may be from there.
+        """
+        if not len(low):
+            return np.zeros(0, dtype=bool)
+        q = 0.5 * (low + high)
+        frames, twists = self._kinematics.joints(q), self._kinematics.twists(q).transpose(0, 2, 1)
+        tool, _ = self._kinematics.tools(q)
+        boxes = _Middles(
+            0.5 * (high - low), frames.rotations, frames.points, twists[..., :3], twists[..., 3:],
+            tool, target, off,
+        )  # fmt: skip
+        found = np.zeros(len(low), dtype=bool)
+        hits = np.zeros(len(self._couples), dtype=int)
+        for k, couples in enumerate(self._couples):
+            left = np.flatnonzero(~found)
+            if not len(left):
+                break
+            blocked = self._overlap(couples, boxes.some(left))
+            found[left] = blocked
+            hits[k] = blocked.sum()
+        order = np.argsort(-hits, kind="stable")
+        self._couples = [self._couples[k] for k in order]
+        return found
+
+    def clear(self, q: Array) -> bool:
+        """Does the judge of collisions find all pairs apart at a configuration (n,)?"""
+        return collision_replay(self._robot, self._bodies, np.array([q, q])).accepted
+
+    def _overlap(self, couples: _Couples, boxes: _Middles) -> NDArray[np.bool_]:
+        """(m,) boxes in which some points are inside a body everywhere."""
+        points = couples.points
+        turned = points.places @ boxes.rotations[:, points.joint].transpose(0, 2, 1)
+        x = turned + boxes.origins[:, points.joint, None]
+        moved = self._moved(boxes, x, points.joint)
+        from_tool = self._moved_from_tool(boxes, x, points.joint) + boxes.off[:, None]
+        shifted = x + (boxes.target - boxes.tool)[:, None]
+        found = np.zeros(len(x), dtype=bool)
+        for body, clearance in couples.bodies:
+            room = points.deep + clearance - GUARD
+            over = room + _depths(body, boxes, x) > moved[body.joint]
+            if body.joint == 0:
+                over |= room + _depths(body, boxes, shifted) > from_tool
+            found |= over.any(axis=1)
+        return found
+
+    def _moved(self, boxes: _Middles, x: Array, joint: int) -> list[Array]:
+        """M of points of a joint, (m, k), as seen from each joint up to it."""
+        seen = [np.zeros(x.shape[:2])]
+        for k in range(joint - 1, -1, -1):
+            seen.append(seen[-1] + self._step(boxes, k, x, seen[-1]))
+        return seen[::-1]
+
+    def _moved_from_tool(self, boxes: _Middles, x: Array, joint: int) -> Array:
+        """(m, k) how far the difference of points (m, k, 3) and the tool point changes."""
+        tool = boxes.tool[:, None]
+        moved = np.zeros((len(x), 1))
+        for k in range(self._robot.n - 1, joint - 1, -1):
+            moved = moved + self._step(boxes, k, tool, moved)
+        moved = np.broadcast_to(moved, x.shape[:2])
+        for k in range(joint - 1, -1, -1):
+            if not self._robot.prismatic[k]:
+                turning = _length_of_cross(boxes.angular[:, k, None], x - tool)
+                moved = moved + np.minimum(boxes.half[:, k, None], 2.0) * (turning + moved)
+        return moved
+
+    def _step(self, boxes: _Middles, k: int, x: Array, moved: Array) -> Array:
+        """m_k of points that the joints behind k have moved so far."""
+        if self._robot.prismatic[k]:
+            return np.broadcast_to(boxes.half[:, k, None], moved.shape)
+        lever = _length_of_cross(boxes.angular[:, k, None], x, boxes.linear[:, k, None]) + moved
+        return np.asarray(np.minimum(boxes.half[:, k, None], 2.0) * lever)
+
+
+def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
+    """(m, k) lengths of a x b + more (m, k, 3); `np.cross` takes several times as long."""
+    x = a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1]
+    y = a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2]
+    z = a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    if more is not None:
+        x, y, z = x + more[..., 0], y + more[..., 1], z + more[..., 2]
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
+def overlapping_of(robot: Robot, bodies: Bodies | None) -> Overlapping | None:
+    """What looks for boxes in which bodies overlap; None where collisions are not checked."""
+    return None if bodies is None else Overlapping(robot, bodies)
+
+
+def _depths(body: _Inside, boxes: _Middles, x: Array) -> Array:
+    """(m, k) m, how deep points (m, k, 3) are inside a body; -inf outside."""
+    own = (x - boxes.origins[:, body.joint, None]) @ boxes.rotations[:, body.joint]
+    own = (own - body.placement[:3, 3]) @ body.placement[:3, :3]
+    deep = depths(body.shape, own)
+    return np.full(x.shape[:2], -np.inf) if deep is None else np.where(deep >= 0.0, deep, -np.inf)
+
+
+def _couples(bodies: Bodies) -> list[_Couples]:
+    """The points of every body that moves, with all bodies with an inside that it may not meet."""
+    held: list[tuple[str, int, object, Array]]
+    held = [(one.owner, one.joint, one.geometry, one.placement) for one in bodies.solids]
+    held += [(one.name, 0, one.geometry, one.placement) for one in bodies.scene]
+    inside = dict[str, list[_Inside]]()
+    for owner, joint, shape, placement in held:
+        if depths(shape, np.zeros(3)) is not None:
+            inside.setdefault(owner, []).append(_Inside(joint, shape, np.asarray(placement)))
+    found = []
+    for solid in bodies.solids:
+        met = [
+            (body, pair.clearance)
+            for pair in bodies.pairs
+            for one, other in ((pair.first, pair.second), (pair.second, pair.first))
+            for body in (inside.get(other, ()) if one == solid.owner else ())
+            if solid.joint > body.joint
+        ]
+        if met:
+            places, deep = points_inside(solid.geometry)
+            places = places @ solid.placement[:3, :3].T + solid.placement[:3, 3]
+            found.append(_Couples(_Points(solid.joint, places, deep), met))
+    return found
