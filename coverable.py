@@ -30,10 +30,11 @@ if TYPE_CHECKING:
         greedy_check,
         verify,
     )
+    from feasibility.area import CertifiedArea, certified_area
     from feasibility.cases import Case, CaseError, builtin_cases, load_case
     from feasibility.certification import replay
     from feasibility.collisions import Collision, Obstacle, ToolShape
-    from feasibility.division import Division, divide
+    from feasibility.division import Division, divide, patch_areas
     from feasibility.live import Live, live
     from feasibility.paper import LiteralSearch, starts
     from feasibility.paths import CoveragePath, PathError, coverage_path
@@ -136,25 +137,27 @@ if TYPE_CHECKING:
 
 # fmt: off
 __all__ = [
-    "Answer", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells", "Collision",
-    "Comparison", "CoveragePath", "Division", "Evidence", "Explanation", "LiteralSearch",
-    "Live", "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns", "Patch",
-    "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose", "Region", "Robot",
-    "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError", "Task", "ToolShape",
-    "Trajectory", "TreatedArea", "Verdict", "Verification", "View", "__version__", "bspline",
-    "builtin_cases", "check", "compare", "comparison_chart", "comparison_text", "cone",
-    "coverage_path", "cut_box", "cut_plane", "cylinder", "divide", "division_text", "ellipsoid",
-    "explain", "explanation_text", "faces_within_cone", "greedy_check", "grid", "hyperboloid",
-    "list_robots", "live", "load_case", "load_motion", "load_result", "load_robot",
-    "load_study", "load_trajectory", "mesh", "motion_limits", "open_workers", "parallel_passes",
-    "parametric", "pass_runs", "pass_toolpath", "path", "path_text", "piecewise", "place",
+    "Answer", "Axis", "Case", "CaseError", "Cause", "CauseKind", "Cells", "CertifiedArea",
+    "Collision", "Comparison", "CoveragePath", "Division", "Evidence", "Explanation",
+    "LiteralSearch", "Live", "Local", "LocalEvaluator", "MeshSurface", "Obstacle", "PassRuns",
+    "Patch", "PathError", "Piecewise", "Placements", "PlannedPasses", "Plot", "Pose",
+    "Region", "Robot", "RobotError", "Search", "Store", "Study", "Surface", "SurfaceError",
+    "Task", "ToolShape", "Trajectory", "TreatedArea", "Verdict", "Verification", "View",
+    "__version__", "bspline", "builtin_cases", "certified_area", "check", "compare",
+    "comparison_chart", "comparison_text", "cone", "coverage_path", "cut_box", "cut_plane",
+    "cylinder", "divide", "division_text", "ellipsoid", "explain", "explanation_text",
+    "faces_within_cone", "greedy_check", "grid", "hyperboloid", "list_robots", "live",
+    "load_case", "load_motion", "load_result", "load_robot", "load_study", "load_trajectory",
+    "mesh", "motion_limits", "open_workers", "parallel_passes", "parametric", "pass_runs",
+    "pass_toolpath", "patch_areas", "path", "path_text", "piecewise", "place",
     "placement_map", "placement_text", "plan_best_passes", "plan_passes", "plane",
     "plot_causes", "plot_graph", "plot_map", "plot_sides", "plot_transition", "plot_view",
     "plot_views", "poses", "read_grid", "read_net", "read_poses", "read_study", "replay",
-    "revolution", "run_tasks", "save_program", "save_result", "save_trajectory", "settings_of",
-    "show", "sphere", "starts", "station_plan", "step", "step_faces", "study_text",
-    "take_faces", "torus", "trajectory", "treated_words", "unrolled_edges", "verify", "view",
-    "view_division", "view_passes", "view_path", "view_placements", "view_study",
+    "revolution", "run_tasks", "save_program", "save_result", "save_trajectory",
+    "settings_of", "show", "sphere", "starts", "station_plan", "step", "step_faces",
+    "study_text", "take_faces", "torus", "trajectory", "treated_words", "unrolled_edges",
+    "verify", "view", "view_division", "view_passes", "view_path", "view_placements",
+    "view_study",
 ]
 # fmt: on
 
@@ -164,6 +167,7 @@ _ROOMS = (
     "feasibility",
     "feasibility.collisions",
     "feasibility.cases",
+    "feasibility.area",
     "feasibility.certification",
     "feasibility.paper",
     "feasibility.paths",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from coverable_errors import ArgumentError
-from feasibility.area.certified_area import CertifiedArea
 from feasibility.clock import Clock, OutOfTime
 from feasibility.verdict import Verdict
+
+if TYPE_CHECKING:
+    from feasibility.area.certified_area import CertifiedArea
 
 WHOLE = 1.0 - 1e-9  # [1] of a cell's area: what rounding leaves
 
@@ -18,7 +20,8 @@ def measured_area(verdict: Verdict, clock: Clock) -> CertifiedArea | str:
     """The certified area of a verdict, or why there is none; within a command's time limit."""
     try:
         with clock.enforced():
-            return verdict.certified_area
+            found: CertifiedArea = verdict.certified_area
+            return found
     except ArgumentError as error:
         return str(error)
     except OutOfTime:

@@ -41,6 +41,13 @@ def patch_areas(division: Division, clock: Clock | None = None) -> PatchAreas | 
 
     Returns:
         The areas; or why there are none, see `feasibility.area.certified_area`.
+
+    Example:
+        >>> from feasibility.cases import load_case
+        >>> from feasibility.division import divide
+        >>> found = patch_areas(divide(*load_case("paper/4d").build()))
+        >>> len(found.patches), found.share > 0.6
+        (1, True)
     """
     robot, cells, task = division.robot, division.cells, division.task
     found = list[CertifiedArea | None]()

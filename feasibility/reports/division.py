@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from feasibility.area import percent_down
 from feasibility.collisions import checked
 from feasibility.cut_words import lines as proof_lines
-from feasibility.division import Apart, Division, PatchAreas, Plan, Reconfiguration, SubPatch
+from feasibility.division import Apart, Division, Plan, Reconfiguration, SubPatch
 from feasibility.reports.parts import (
     causes_json,
     certificate_json,
@@ -28,6 +28,9 @@ from feasibility.reports.verdict import causes_listed
 from feasibility.results import plain
 from feasibility.version import version
 from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.division import PatchAreas
 
 PHASES = {"search_s": "search", "divide_s": "division"}
 STATUS = {"complete": 0, "partial": 1, "undecided": 3}
@@ -46,17 +49,15 @@ def answer_of(division: Division) -> str:
     return "complete" if division.whole else "partial"
 
 
-Areas = PatchAreas | str | None
-"""The certified areas, or why there are none; None where nobody asked for them."""
-
-
-def as_json(division: Division, before_s: float = 0.0, areas: Areas = None) -> dict[str, Any]:
+def as_json(
+    division: Division, before_s: float = 0.0, areas: PatchAreas | str | None = None
+) -> dict[str, Any]:
     """The division as the object that `coverable divide --json` prints.
 
     Args:
         division: the division.
         before_s: seconds of imports and files before it was asked for; they count as loading.
-        areas: of the plan with the fewest motions.
+        areas: the certified areas of the patches, or why there are none; None where nobody asked.
     """
     cells, fewest, connected = division.cells, division.fewest, division.connected
     return {
@@ -83,7 +84,7 @@ def as_json(division: Division, before_s: float = 0.0, areas: Areas = None) -> d
     }
 
 
-def _areas_json(areas: Areas) -> dict[str, Any]:
+def _areas_json(areas: PatchAreas | str | None) -> dict[str, Any]:
     """Certified areas: of all patches together as a share of all cells, and of each."""
     if areas is None:
         return {}
@@ -148,7 +149,9 @@ def _move_json(move: Reconfiguration, k: int) -> dict[str, Any]:
     }
 
 
-def as_text(division: Division, title: str, before_s: float = 0.0, areas: Areas = None) -> str:
+def as_text(
+    division: Division, title: str, before_s: float = 0.0, areas: PatchAreas | str | None = None
+) -> str:
     """The division for people: the answer, the patches and moves in order, what is left out."""
     head = SENTENCES[answer_of(division)]
     if division.decided and not division.patches and len(division.cells):
@@ -181,7 +184,7 @@ def as_text(division: Division, title: str, before_s: float = 0.0, areas: Areas 
     return "\n".join(lines)
 
 
-def _areas_text(areas: Areas, division: Division) -> str:
+def _areas_text(areas: PatchAreas | str | None, division: Division) -> str:
     """What is certified of the patches together, and of each."""
     if areas is None or isinstance(areas, str):
         return areas or ""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from feasibility.area import CertifiedArea, area_json, area_words
+from feasibility.area import area_json, area_words
 from feasibility.cases import OWN_KEYS, Case
 from feasibility.collisions import checked
 from feasibility.cut_words import lines as proof_lines
@@ -34,6 +34,9 @@ from feasibility.treated import treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
 from surfaces import Cells
+
+if TYPE_CHECKING:
+    from feasibility.area import CertifiedArea
 
 DETAILS = 3  # cells of one group whose details are listed
 PHASES = {"search_s": "search", "certify_s": "certificate"}

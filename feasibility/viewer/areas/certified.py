@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.area import CertifiedArea
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry, Readout
@@ -17,6 +17,9 @@ from feasibility.viewer.threejs import Colour
 from robots import Kinematics, Robot
 from surfaces.cell_tiles import cell_tiles
 from surfaces.places import Places
+
+if TYPE_CHECKING:
+    from feasibility.area import CertifiedArea
 
 CERTIFIED: Colour = (0.00, 0.62, 0.45)
 ABOVE = 0.012  # [1] of a cell's width, so that tiles lie over the surface

@@ -131,12 +131,12 @@ def assert_the_annulus_is_approached(budgets):
         assert (least > inner).all()
         assert (most < outer).all()
     assert (np.diff(found) > 0.0).all()
-    assert found[0] > 0.2
+    assert found[0] > 0.05
     return found[-1]
 
 
 def test_a_planar_arm_s_annulus_is_approached_from_below():
-    assert assert_the_annulus_is_approached((150_000, 250_000)) > 0.5
+    assert assert_the_annulus_is_approached((120_000, 200_000)) > 0.6
 
 
 def test_a_mesh_and_pieces_are_certified_as_the_patch_is():
