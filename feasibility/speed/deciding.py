@@ -125,9 +125,10 @@ def _accepted(verdict: Verdict, walk: Walk, certificate: Certificate | None, sai
     if task.speed is not None:
         waits = _counted(len(places), "wait", "waits") + f" in place{_named(verdict, places)}"
         time = f", {judged.waiting:.2g} s together," if places else ""
+        stops = f", but for {waits}{time} and {_counted(corners, 'corner', 'corners')}"
         words = (
-            f" The tool can have {task.speed:g} m/s all along it inside the joints' velocities, "
-            f"but for {waits}{time} and {_counted(corners, 'corner', 'corners')}."
+            f" The tool can have {task.speed:g} m/s all along it inside the joints' velocities"
+            f"{stops if judged.stops else ''}."
         )
     if task.min_manipulability is not None:
         words += f" Its smallest singular value is at least {judged.sigma:.3g}."

@@ -25,7 +25,12 @@ from scipy.spatial import cKDTree
 
 from feasibility.certification.kinematic_bounds import placements, second_derivatives
 from feasibility.certification.rates.jacobians import Jacobians, jacobians
-from feasibility.certification.rates.segment_rates import SegmentRates, segment_rates
+from feasibility.certification.rates.segment_rates import (
+    SegmentRates,
+    length_unit,
+    segment_rates,
+    smallest_singular,
+)
 from feasibility.task import Task
 from feasibility.verdict import Walk
 from robots import Robot
@@ -104,18 +109,19 @@ def replay_rates(
         slow = np.flatnonzero(moving & ~(found.speed >= speed))
         if len(slow):
             refusals.append(too_slow(robot, cells, targets, points, found, slow, speed))
-    if sigma is not None:
-        near = np.flatnonzero(~(found.sigma >= sigma))
-        if len(near):
-            worst = int(near[np.argmin(found.sampled_sigma[near])])
-            place = _named(cells, targets, points[worst])
-            least = float(found.sampled_sigma[worst])
-            refusals.append(
-                f"the smallest singular value is {least:.3g} at cell {place}; {sigma:g} is asked"
-                + _others(len(near) - 1)
-            )
+    # Segments know their ends; a motion of one row has none.
+    alone = smallest_singular(at, length_unit(robot)) if len(walk.q) == 1 else np.empty(0)
+    least, exact = np.append(found.sigma, alone), np.append(found.sampled_sigma, alone)
+    near = np.flatnonzero(~(least >= (-np.inf if sigma is None else sigma)))
+    if len(near):
+        worst = int(near[np.argmin(exact[near])])
+        place = _named(cells, targets, points[worst])
+        refusals.append(
+            f"the smallest singular value is {exact[worst]:.3g} at cell {place}; {sigma:g} is asked"
+            + _others(len(near) - 1)
+        )
     return RateReplay(
-        float(found.speed[moving].min(initial=np.inf)), float(found.sigma.min(initial=np.inf)),
+        float(found.speed[moving].min(initial=np.inf)), float(least.min(initial=np.inf)),
         found, stops, float(_times(robot, starts, ends)[waits].sum()), tuple(refusals),
     )  # fmt: skip
 

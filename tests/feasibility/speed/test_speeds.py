@@ -70,6 +70,16 @@ def test_singular_values_are_kept_above_what_is_asked():
     assert "smallest singular value is" in beyond.message
 
 
+def test_a_motion_that_never_moves_is_judged_where_it_stands():
+    cells = PLATE.cells(1, 1)
+    still = check(UR5, cells, replace(TASK, speed=0.2, min_manipulability=1e-3))
+    assert len(still.witness.q) == 1
+    assert 1e-3 <= still.certificate.min_singular_value < 1.0
+    assert "0.2 m/s all along it inside the joints' velocities." in still.message
+    beyond = check(UR5, cells, replace(TASK, min_manipulability=0.99))
+    assert str(beyond.answer) == "undecided"
+
+
 def test_bad_questions_are_refused():
     robot, cells = CASES["ur5"]
     with pytest.raises(ArgumentError, match="m/s anywhere"):
