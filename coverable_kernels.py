@@ -20,10 +20,12 @@ from pathlib import Path
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
-import numba
 import numpy as np
 from numba.core import caching, types
 from numba.core.ccallback import CFunc
+
+import coverable_inner_kernels
+from coverable_inner_kernels import compiled_for_python
 
 __all__ = ["cfunc", "njit"]
 
@@ -31,7 +33,8 @@ OURS = ("robots", "surfaces", "feasibility", "coverable_")
 PLAIN = (int, float, complex, str, bytes, type(None), type(...), np.generic, np.dtype)
 LIBRARY = (ModuleType, FunctionType, BuiltinFunctionType, np.ufunc, types.Type)
 COMPILED = ("py_func", "_defn", "_pyfunc")  # what compiled functions and intrinsics are made of
-HOW = Path(__file__).read_bytes()  # how kernels are compiled is in this file
+# How kernels are compiled is in these files.
+HOW = b"".join(Path(str(f)).read_bytes() for f in (__file__, coverable_inner_kernels.__file__))
 Function = Any
 """A Python function."""
 
@@ -41,7 +44,7 @@ def njit(**options: Any) -> Callable[[Function], Any]:
     kept = options.pop("cache", False)
 
     def decorate(function: Function) -> Any:
-        compiled: Any = numba.njit(**options)(function)
+        compiled = compiled_for_python(function, options)
         if kept and compiled is not function:  # as it is where the compiler is switched off
             compiled._cache = KeptKernels(function, options)
         return compiled

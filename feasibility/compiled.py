@@ -22,9 +22,6 @@ COUNTED: dict[str, Any] = {"_nrt": True}
 UNCOUNTED: dict[str, Any] = {"_nrt": False}
 kernel = njit(cache=True, error_model="numpy", **UNCOUNTED)
 allocating = njit(cache=True, error_model="numpy", **COUNTED)
-# Written into its caller: a call copies every field of every array in its `NamedTuple`s, which are
-# hundreds of numbers and take longer than what a small kernel does.
-inlined = njit(cache=True, error_model="numpy", inline="always")
 
 
 @kernel

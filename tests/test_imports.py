@@ -21,6 +21,7 @@ MOST_MODULES = 20  # of one folder
 ORDER = """
 coverable_errors
 coverable_files
+coverable_inner_kernels
 coverable_kernels
 coverable_processes
 coverable_meshes

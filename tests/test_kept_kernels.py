@@ -167,7 +167,8 @@ def test_names_of_fields_are_part_of_the_key() -> None:
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     """A checkout of kernels that call each other."""
-    shutil.copy(ROOT / "coverable_kernels.py", tmp_path)
+    for name in ("coverable_kernels.py", "coverable_inner_kernels.py"):
+        shutil.copy(ROOT / name, tmp_path)
     for name, text in (("robots/inner.py", INNER), ("robots/outer.py", OUTER)):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import allocating, inlined, kernel, put
+from feasibility.compiled import allocating, kernel, put
 from feasibility.roadmap.graph import (
     BUDGET,
     COVERED,
@@ -219,7 +219,7 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
     return DONE, guesses.shape[0], merged
 
 
-@inlined
+@kernel
 def _nearest_nodes(roadmap, i, j, component):  # type: ignore[no-untyped-def]
     """The two nodes of a component over cells i and j that are nearest to each other; or -1, -1."""
     best_x, best_y, nearest = -1, -1, np.inf

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.compiled import allocating, inlined, put
+from feasibility.compiled import allocating, put
 from feasibility.roadmap.graph import EDGES, NODES, Roadmap, root_of
 from feasibility.verdict import Walk
 
@@ -29,7 +29,7 @@ class Links(NamedTuple):
     """(2 edges, 2) the node that a step leads to, and its edge + 1, negative if run backwards."""
 
 
-@inlined
+@allocating
 def _adjacency(roadmap, component):  # type: ignore[no-untyped-def]
     """The arrays of `Links`."""
     nodes = roadmap.counters[NODES]
@@ -68,7 +68,7 @@ def _filled(size, value):  # type: ignore[no-untyped-def]
     return result
 
 
-@inlined
+@allocating
 def _appended(route, length, path):  # type: ignore[no-untyped-def]
     """The route with more signed edges behind its first `length`, in an array that holds them."""
     more = path.shape[0]
@@ -82,7 +82,7 @@ def _appended(route, length, path):  # type: ignore[no-untyped-def]
     return route
 
 
-@inlined
+@allocating
 def _open_ends(roadmap, links, wanted, node):  # type: ignore[no-untyped-def]
     """Number of steps from a node to wanted cells."""
     count = 0
@@ -92,7 +92,7 @@ def _open_ends(roadmap, links, wanted, node):  # type: ignore[no-untyped-def]
     return count
 
 
-@inlined
+@allocating
 def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ignore[no-untyped-def]
     """Signed edges of a shortest path to a node over a wanted cell, and that node.
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.area.kernels.lemma import tile_holds
-from feasibility.compiled import inlined, kernel, put
+from feasibility.compiled import kernel, put
 from feasibility.roadmap.motions import (
     CONE_SLACK,
     HERE,
@@ -35,7 +35,7 @@ LEAST_PUSH = 0.02  # rad, of a step
 NO_PUSH = 0.0
 
 
-@inlined
+@kernel
 def aim_at(work, target):  # type: ignore[no-untyped-def]
     """Set `work.target` from a row (2, 3) of point and approach direction."""
     for k in range(3):
@@ -43,7 +43,7 @@ def aim_at(work, target):  # type: ignore[no-untyped-def]
         work.target[1, k] = target[1, k]
 
 
-@inlined
+@kernel
 def allow(arrays, work, bend):  # type: ignore[no-untyped-def]
     """Bounds and allowances of a step whose target bends by `bend` (2,), see `PlacePaths.bends`.
 
@@ -90,7 +90,7 @@ def step_to(arrays, work, q, target, bend, size, inner):  # type: ignore[no-unty
     return segment_holds(arrays, work, q, work.trial)
 
 
-@inlined
+@kernel
 def certified_step(arrays, work, q, target, bend, size):  # type: ignore[no-untyped-def]
     """`step_to` with the axis led inwards, or else without: a tile's turn needs most of the cone.
 

@@ -38,7 +38,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import inlined, kernel
+from feasibility.compiled import kernel
 from feasibility.roadmap.motions import HERE, cholesky_solve, linearise
 
 HOLDS, BENT, PAST_LIMIT, PAST_CONE = 0, 1, 2, 3
@@ -48,7 +48,7 @@ SINGULAR = 1e-8  # [1] of the largest: the least square of a pivot
 POINT, WITH_AXIS = np.int64(3), np.int64(5)  # rows of the inverse
 
 
-@inlined
+@kernel
 def across(work, tile):  # type: ignore[no-untyped-def]
     """Set rows 3 and 4 of `tile.rows` and `tile.wanted`: how the axis tilts with the joints, and b
     along the tile, where it changes by N dT, with N of least squares for the tile's two sides.
@@ -90,7 +90,7 @@ def across(work, tile):  # type: ignore[no-untyped-def]
         tile.wanted[4, k] = gs * u + hs * w
 
 
-@inlined
+@kernel
 def gain_of(work, tile, m):  # type: ignore[no-untyped-def]
     """Set G by the first m rows; False where they are nearly dependent."""
     n = work.step.shape[0]
@@ -122,7 +122,7 @@ def gain_of(work, tile, m):  # type: ignore[no-untyped-def]
     return True
 
 
-@inlined
+@kernel
 def most_bent(arrays, tile, rows, radius, cap):  # type: ignore[no-untyped-def]
     """M on |v| <= radius, of `rows` (3, n): of the tool point, or of its axis with the cap 1."""
     before, behind, most = 0.0, 0.0, 0.0
@@ -146,7 +146,7 @@ def most_bent(arrays, tile, rows, radius, cap):  # type: ignore[no-untyped-def]
     return most
 
 
-@inlined
+@kernel
 def solution_radius(arrays, work, tile, rho):  # type: ignore[no-untyped-def]
     """y and M of the module's text; y is -1 where nothing is known."""
     radius, most = 2.0 * rho, 0.0
@@ -159,7 +159,7 @@ def solution_radius(arrays, work, tile, rho):  # type: ignore[no-untyped-def]
     return radius, most
 
 
-@inlined
+@kernel
 def tilt(arrays, work, tile, radius, most):  # type: ignore[no-untyped-def]
     """The largest |a - b| over the tile."""
     n = tile.rate.shape[0]
@@ -186,7 +186,7 @@ def tilt(arrays, work, tile, radius, most):  # type: ignore[no-untyped-def]
     return np.sqrt(furthest) + ROUNDING * lost
 
 
-@inlined
+@kernel
 def holds_with(arrays, work, tile, q, rho, m):  # type: ignore[no-untyped-def]
     """`tile_holds` with G by the first m rows."""
     if not gain_of(work, tile, m):

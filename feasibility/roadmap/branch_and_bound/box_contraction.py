@@ -29,7 +29,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import inlined, kernel
+from feasibility.compiled import kernel
 from feasibility.roadmap.branch_and_bound.box_bounds import contract, contract_to_ball, reach_of_box
 from feasibility.roadmap.branch_and_bound.roll_bounds import (
     contract_roll,
@@ -50,7 +50,7 @@ PASSES = 3  # contractions of a box
 GAIN = 0.3  # [1] of the volume left: contracting again would gain little
 
 
-@inlined
+@kernel
 def _place_centre(arrays, work, places, part, low, high, space):  # type: ignore[no-untyped-def]
     """Evaluate the arm and the target at a box's centre."""
     n, m = space.q.shape[0], low.shape[0]
@@ -75,7 +75,7 @@ def _place_centre(arrays, work, places, part, low, high, space):  # type: ignore
     place(arrays, work, NEXT, space.q)
 
 
-@inlined
+@kernel
 def _first_and_second(arrays, work, places, part, space):  # type: ignore[no-untyped-def]
     """Bounds of first and second order, for the point and for the axis, over the present box."""
     n, m = space.q.shape[0], space.half.shape[0]
@@ -92,7 +92,7 @@ def _first_and_second(arrays, work, places, part, space):  # type: ignore[no-unt
     return first, second, first_axis, second_axis
 
 
-@inlined
+@kernel
 def _contract_second(arrays, work, places, part, directions, space, low, high):  # type: ignore[no-untyped-def]
     """Cut the present box by the lemma of this module; False when nothing is left.
 
@@ -141,7 +141,7 @@ def _contract_second(arrays, work, places, part, directions, space, low, high): 
     return True
 
 
-@inlined
+@kernel
 def _first_and_second_of_roll(arrays, work, places, part, space):  # type: ignore[no-untyped-def]
     """Bounds of first and second order for the reference axis over a box; sets its gap."""
     n, m = space.q.shape[0], space.half.shape[0]
@@ -153,7 +153,7 @@ def _first_and_second_of_roll(arrays, work, places, part, space):  # type: ignor
     return first, second
 
 
-@inlined
+@kernel
 def _is_solution(arrays, work, places, part):  # type: ignore[no-untyped-def]
     """Does slot 1 hold the tool at a place of the part, wherever the model may be off by?"""
     off, turned = places.radius[part, 0], places.radius[part, 1]
@@ -167,7 +167,7 @@ def _is_solution(arrays, work, places, part):  # type: ignore[no-untyped-def]
     return inside
 
 
-@inlined
+@kernel
 def _inside_slabs(slabs, q):  # type: ignore[no-untyped-def]
     """Do the slabs hold a configuration, but for what no box is cut to?"""
     inside = True

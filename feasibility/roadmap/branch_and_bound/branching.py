@@ -16,7 +16,7 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.compiled import allocating, inlined, kernel, put
+from feasibility.compiled import allocating, kernel, put
 from feasibility.roadmap.branch_and_bound.box_bounds import static_levers
 from feasibility.roadmap.branch_and_bound.box_contraction import THINNEST, shrink
 from feasibility.roadmap.branch_and_bound.boxes import (
@@ -65,7 +65,7 @@ def root_box(arrays: SearchArrays) -> Boxes:
     return box_of(low, high)
 
 
-@inlined
+@kernel
 def _split(arrays, places, part, driver, space, low, high):  # type: ignore[no-untyped-def]
     """Which interval of a box to halve; m where the part is to be cut, -1 where all are too thin.
 
@@ -114,7 +114,7 @@ def _push(boxes, low, high, part, weight):  # type: ignore[no-untyped-def]
     boxes.counts[0] += 1
 
 
-@inlined
+@kernel
 def _push_children(places, boxes, part, weight, n, low, high):  # type: ignore[no-untyped-def]
     """Hand a box to the children of its part (low and high are lost)."""
     axis = places.axis[part]

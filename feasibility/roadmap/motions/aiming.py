@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import inlined, kernel
+from feasibility.compiled import kernel
 from feasibility.roadmap.motions.arrays import NEAR_COST
 from feasibility.roadmap.motions.roll import frame_turning, level
 
@@ -105,7 +105,7 @@ def bounds_between(arrays, work, curve, t0, t1):  # type: ignore[no-untyped-def]
         _frames_between(arrays, work, curve, t0, t1, first + low, first + high)
 
 
-@inlined
+@kernel
 def _frames_between(arrays, work, curve, t0, t1, low, high):  # type: ignore[no-untyped-def]
     """`bounds_between` for roll; low and high are the first and the last piece."""
     step = abs(t1 - t0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import allocating, inlined, kernel
+from feasibility.compiled import allocating, kernel
 
 
 @kernel
@@ -32,7 +32,7 @@ def cholesky_solve(a, b, m):  # type: ignore[no-untyped-def]
     return True
 
 
-@inlined
+@kernel
 def least_step(arrays, work, q, m, damping):  # type: ignore[no-untyped-def]
     """The step nearest to `work.secondary_step` with rows @ step = rhs, inside the limits.
 

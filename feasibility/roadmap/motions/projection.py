@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import inlined, kernel
+from feasibility.compiled import kernel
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import CONE, LIMIT, ROLL, SINGULAR
 from feasibility.roadmap.motions.linear_steps import least_step
@@ -68,7 +68,7 @@ def linearise(arrays, work, slot):  # type: ignore[no-untyped-def]
     return np.sqrt(norm)
 
 
-@inlined
+@kernel
 def tilts(work, goal):  # type: ignore[no-untyped-def]
     """Rows 3 and 4: the tilts of the axis along two directions across the target's.
 
@@ -94,7 +94,7 @@ def tilts(work, goal):  # type: ignore[no-untyped-def]
         work.rows[4, j] = sx * rx + sy * ry + sz * rz
 
 
-@inlined
+@kernel
 def add_row(work, m, which, change):  # type: ignore[no-untyped-def]
     """Make row m that of a gradient: 0 the cone's, 1 that of roll; returns the number of rows."""
     for j in range(work.step.shape[0]):
@@ -103,14 +103,14 @@ def add_row(work, m, which, change):  # type: ignore[no-untyped-def]
     return m + 1
 
 
-@inlined
+@kernel
 def roll_change(work, goal):  # type: ignore[no-untyped-def]
     """rad by which roll has to change in slot 1 to be `goal` off the middle of its range."""
     off = work.error[1, 2]
     return goal - off if off > 0.0 else -goal - off
 
 
-@inlined
+@kernel
 def enough_left(work, m):  # type: ignore[no-untyped-def]
     """Are as many joints left as there are rows?"""
     free = 0
@@ -120,7 +120,7 @@ def enough_left(work, m):  # type: ignore[no-untyped-def]
     return free >= m
 
 
-@inlined
+@kernel
 def bounded_step(arrays, work, q, cone, roll, goal, roll_goal):  # type: ignore[no-untyped-def]
     """`least_step` with cone and roll, where they are asked for.
 
@@ -147,7 +147,7 @@ def bounded_step(arrays, work, q, cone, roll, goal, roll_goal):  # type: ignore[
     return least_step(arrays, work, q, m, DAMPING) and (not roll or enough_left(work, m))
 
 
-@inlined
+@kernel
 def predicted_chord(work):  # type: ignore[no-untyped-def]
     """|a - b| after `work.step`, to first order."""
     square = 0.0
@@ -159,7 +159,7 @@ def predicted_chord(work):  # type: ignore[no-untyped-def]
     return np.sqrt(square)
 
 
-@inlined
+@kernel
 def predicted_roll(work):  # type: ignore[no-untyped-def]
     """Roll off the middle of its range after `work.step`, to first order."""
     roll = work.error[1, 2]
@@ -168,7 +168,7 @@ def predicted_roll(work):  # type: ignore[no-untyped-def]
     return abs(roll)
 
 
-@inlined
+@kernel
 def corrected(arrays, work, q, usable, goal, roll_goal):  # type: ignore[no-untyped-def]
     """The step with cone and roll where they are violated, or would be.
 
@@ -201,7 +201,7 @@ def corrected(arrays, work, q, usable, goal, roll_goal):  # type: ignore[no-unty
     return done, cone, roll
 
 
-@inlined
+@kernel
 def first_roll_goal(arrays, work, hard, slack, before):  # type: ignore[no-untyped-def]
     """How far off the middle of its range the first step leads roll, as it does the chord."""
     comfort = COMFORT * arrays.roll[1]
@@ -212,7 +212,7 @@ def first_roll_goal(arrays, work, hard, slack, before):  # type: ignore[no-untyp
     return min(hard, comfort)
 
 
-@inlined
+@kernel
 def inside(arrays, work):  # type: ignore[no-untyped-def]
     """Is slot 1 at its target, and inside what there is of cone and roll?"""
     return (

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.collisions import clearance_gradient
-from feasibility.compiled import inlined, kernel, put
+from feasibility.compiled import kernel, put
 from feasibility.roadmap.motions.aiming import look_at
 from feasibility.roadmap.motions.arrays import OVERFLOW, SearchArrays
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -95,7 +95,7 @@ def margin_objective(arrays, work, q, size):  # type: ignore[no-untyped-def]
         clearance_gradient(arrays.collisions, q, work.secondary_step, size)
 
 
-@inlined
+@kernel
 def _step_towards(arrays, work, q, goal, share, slack, off_target):  # type: ignore[no-untyped-def]
     """Put a share of the way from q to the goal, projected, into `work.trial`; True on success."""
     copy_slot(arrays, work)

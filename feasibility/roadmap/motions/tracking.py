@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from feasibility.compiled import inlined, kernel, put
+from feasibility.compiled import kernel, put
 from feasibility.roadmap.motions.aiming import aim, bounds_between
 from feasibility.roadmap.motions.arrays import FOLD, LONG, OVERFLOW, SINGULAR, STOPPED
 from feasibility.roadmap.motions.off_target import STEPS_FROM_NEAR, project_off_target
@@ -30,7 +30,7 @@ MOST_STEPS = 400  # accepted steps of one motion
 NEWTON_STEPS = np.int64(8)  # of one step
 
 
-@inlined
+@kernel
 def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
     """Distance between the targets of a curve at two parameters, over `arrays.scale`."""
     aim(arrays, work, curve, begin)
@@ -40,7 +40,7 @@ def span_of(arrays, work, curve, begin, end):  # type: ignore[no-untyped-def]
     return np.sqrt(dx * dx + dy * dy + dz * dz) / arrays.scale
 
 
-@inlined
+@kernel
 def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
     """Project q, with its secondary step, onto the target ahead; `work.trial` is the result.
 
@@ -58,14 +58,14 @@ def _step_from(arrays, work, q, dt, off_target):  # type: ignore[no-untyped-def]
     return segment_holds(arrays, work, q, work.trial)
 
 
-@inlined
+@kernel
 def _something_left(arrays, work):  # type: ignore[no-untyped-def]
     """Is anything left of tolerance, cone and roll on the present step?"""
     left = work.allowance[0] > 0.0 and work.allowance[1] > 0.0
     return left and (work.allowance[2] > 0.0 or not arrays.roll[1] < np.inf)
 
 
-@inlined
+@kernel
 def _starts_inside(arrays, work):  # type: ignore[no-untyped-def]
     """Does slot 0 obey tolerance, cone and roll?"""
     inside = work.error[0, 0] <= work.allowance[0] and work.error[0, 1] <= work.allowance[1]

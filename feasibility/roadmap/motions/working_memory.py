@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.compiled import inlined, kernel
+from feasibility.compiled import kernel
 from feasibility.roadmap.motions.roll import roll_off_middle
 from robots import frames
 
@@ -102,7 +102,7 @@ def work_for(n: int) -> Work:
     )
 
 
-@inlined
+@kernel
 def measure(arrays, work, slot):  # type: ignore[no-untyped-def]
     """Set the errors of a slot against `work.target`."""
     distance = 0.0
@@ -130,7 +130,7 @@ def place(arrays, work, slot, q):  # type: ignore[no-untyped-def]
     measure(arrays, work, slot)
 
 
-@inlined
+@kernel
 def _copy(work, source, slot):  # type: ignore[no-untyped-def]
     """Copy the placement of one slot to the other."""
     for i in range(work.axes.shape[1]):
@@ -158,7 +158,7 @@ def copy_slot(arrays, work):  # type: ignore[no-untyped-def]
     measure(arrays, work, NEXT)
 
 
-@inlined
+@kernel
 def off_target(arrays, work, slot):  # type: ignore[no-untyped-def]
     """m by which the tool point is off its target, less `near`.
 
@@ -168,14 +168,14 @@ def off_target(arrays, work, slot):  # type: ignore[no-untyped-def]
     return max(work.error[slot, 0] - arrays.near, 0.0)
 
 
-@inlined
+@kernel
 def cone_used(arrays, work, slot):  # type: ignore[no-untyped-def]
     """The part of the cone chord that a slot uses, with what it costs to be off the target."""
     off = off_target(arrays, work, slot)
     return work.error[slot, 1] + arrays.off_target_cost * work.derivative_bound[2] * off
 
 
-@inlined
+@kernel
 def roll_lost(arrays, work, slot):  # type: ignore[no-untyped-def]
     """rad of the roll's range that it costs a slot to be off its target."""
     off = off_target(arrays, work, slot)
@@ -183,7 +183,7 @@ def roll_lost(arrays, work, slot):  # type: ignore[no-untyped-def]
     return arrays.off_target_cost * work.derivative_bound[8] * off if off > 0.0 else 0.0
 
 
-@inlined
+@kernel
 def roll_used(arrays, work, slot):  # type: ignore[no-untyped-def]
     """rad of the roll's half range that a slot uses, as `cone_used`."""
     return abs(work.error[slot, 2]) + roll_lost(arrays, work, slot)
