@@ -1,7 +1,11 @@
-"""A small part as STEP files, made with Open CASCADE, for the tests of reading them."""
+"""Write a small part as STEP files with Open CASCADE: step_parts.py FOLDER X Y Z RADIUS (metres).
+
+A script, so that the libraries of Open CASCADE are not loaded beside those of Pinocchio.
+"""
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -20,23 +24,25 @@ from OCP.TopLoc import TopLoc_Location
 from OCP.TopoDS import TopoDS
 from OCP.XCAFDoc import XCAFDoc_ColorType, XCAFDoc_DocumentTool
 
-SIZE = (0.2, 0.1, 0.05)  # m
-ROUND = 0.01  # [m], radius of the one edge that is round
 RED, GREY = (1.0, 0.0, 0.0), (0.5, 0.5, 0.5)
 
 
-def write_part(path: Path, unit: str = "MM", placed: bool = False) -> None:
-    """A box from the origin to `SIZE`, its edge along z at the origin round and red, the rest grey.
+def write_part(
+    path: Path, size: list[float], radius: float, unit: str = "MM", placed: bool = False
+) -> None:
+    """A box from the origin to `size`, its edge along z at the origin round and red, the rest grey.
 
     Args:
         path: of the file.
+        size: m, of the box.
+        radius: m, of the edge.
         unit: of the file, as STEP calls it.
         placed: an assembly of two of it, the second turned by 90 degrees about z and 1 m up.
     """
-    box = BRepPrimAPI_MakeBox(*(1e3 * length for length in SIZE)).Shape()
+    box = BRepPrimAPI_MakeBox(*(1e3 * length for length in size)).Shape()
     fillet = BRepFilletAPI_MakeFillet(box)
     fillet.Add(
-        1e3 * ROUND, TopoDS.Edge(TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_EDGE).Current())
+        1e3 * radius, TopoDS.Edge(TopExp_Explorer(box, TopAbs_ShapeEnum.TopAbs_EDGE).Current())
     )
     shape = fillet.Shape()
     document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
@@ -71,3 +77,9 @@ def _third_face(shape: Any) -> Any:
 def _paint(colours: Any, label: Any, rgb: tuple[float, float, float]) -> None:
     colour = Quantity_Color(*rgb, Quantity_TypeOfColor.Quantity_TOC_sRGB)
     colours.SetColor(label, colour, XCAFDoc_ColorType.XCAFDoc_ColorSurf)
+
+
+if __name__ == "__main__":
+    folder, (*size, radius) = Path(sys.argv[1]), map(float, sys.argv[2:])
+    write_part(folder / "part.step", size, radius)
+    write_part(folder / "pair.step", size, radius, "INCH", placed=True)

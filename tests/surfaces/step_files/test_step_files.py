@@ -1,10 +1,12 @@
 """Faces of STEP files become surfaces in metres, and files that are none become sentences."""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
-from step_parts import ROUND, SIZE, write_part
 
 from coverable_processes import Ended, run_apart
 from feasibility.cases import Case, CaseError
@@ -12,6 +14,8 @@ from surfaces import SurfaceError, step, step_faces
 from surfaces.step_files import step_process, step_surface
 from surfaces.step_files.step_process import CAPS, CHILD, Caps, read_step
 
+SIZE = (0.2, 0.1, 0.05)  # m
+ROUND = 0.01  # [m], radius of the one edge that is round
 WHOLE = "ISO-10303-21;\n{}\nEND-ISO-10303-21;\n"
 CORNER = ROUND**2 * (1.0 - np.pi / 4.0)  # m^2, what the round edge takes off top and bottom
 AREAS = [
@@ -41,8 +45,8 @@ cone_deg = 30
 def folder(tmp_path_factory):
     """The part, and an assembly of two of it in inches."""
     folder = tmp_path_factory.mktemp("parts")
-    write_part(folder / "part.step")
-    write_part(folder / "pair.step", "INCH", placed=True)
+    script = [sys.executable, Path(__file__).with_name("step_parts.py")]
+    subprocess.run([*script, folder, *map(str, (*SIZE, ROUND))], check=True, capture_output=True)
     return folder
 
 
