@@ -199,7 +199,9 @@ def divide(args: argparse.Namespace, began: float) -> int:
     if args.html is not None:
         from feasibility.viewer import view_division
 
-        write_text(args.html, view_division(division, opened.case.name).html(), "view")
+        shown = None if isinstance(areas, str) else areas
+        page = view_division(division, opened.case.name, shown).html()
+        write_text(args.html, page, "view")
     return report.STATUS[report.answer_of(division)]
 
 

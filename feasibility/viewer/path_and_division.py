@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
+from feasibility.viewer.areas import certified_layer
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
@@ -34,7 +35,7 @@ from feasibility.viewer.viewer import View, compose, titled
 from robots import Kinematics, Robot
 
 if TYPE_CHECKING:
-    from feasibility.division import Division, Reconfiguration
+    from feasibility.division import Division, PatchAreas, Reconfiguration
     from feasibility.paths import CoveragePath
     from feasibility.timing import MotionLimits, Trajectory
 
@@ -91,12 +92,23 @@ def view_path(
     return replace(drawn, readout=replace(drawn.readout, duration=trajectory.duration))
 
 
-def view_division(division: Division, case: str | None = None) -> View:
-    """The patches of the plan with the fewest motions, and the moves between them in red."""
+def view_division(
+    division: Division, case: str | None = None, areas: PatchAreas | None = None
+) -> View:
+    """The patches of the plan with the fewest motions, and the moves between them in red.
+
+    Args:
+        division: the division.
+        case: name of the case, for the title.
+        areas: the certified area of each patch, to be tinted too.
+    """
     robot, cells, plan = division.robot, division.cells, division.fewest
     names = [f"patch {k + 1} ({counted(len(patch.cells))})" for k, patch in enumerate(plan.patches)]
     parts = [*cells_layers(cells), *patch_layers(cells, plan.patch_of(len(cells)), names)]
     parts += _left_out(division)
+    for k, area in enumerate(() if areas is None else areas.patches):
+        if area is not None:
+            parts.append(certified_layer(area, f"certified of patch {k + 1}"))
     walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
     motion = None
     if walks:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.area import percent_down
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry, Readout
@@ -26,12 +27,12 @@ ABOVE = 0.012  # [1] of a cell's width, so that tiles lie over the surface
 PIECES = 3  # of a tile's side: a large one is bent
 
 
-def certified_layer(area: CertifiedArea) -> Layer:
+def certified_layer(area: CertifiedArea, name: str = "certified area") -> Layer:
     """The certified tiles, tinted on the side where the tool works."""
-    cells, path = area.cells, "/cells/certified area"
+    cells, path = area.cells, f"/cells/{name}"
     height = cells.surface.side_sign * ABOVE * cell_size(cells)
     cut = cell_tiles(cells, height)
-    count, label = len(area.areas), f"certified area ({100.0 * area.share:.3g} %)"
+    count, label = len(area.areas), f"{name} ({percent_down(area.share)})"
     if cut is None or not count:
         return Layer((), Entry(label, CERTIFIED, path), 0)
     weights, faces = _triangle() if area.tiles.corners.shape[1] == 3 else _square()

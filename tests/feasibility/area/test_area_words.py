@@ -59,7 +59,7 @@ def test_the_command_says_it_when_asked(capsys, tmp_path):
     page = tmp_path / "plate.html"
     assert main(["check", str(file), "--area", "--html", str(page)]) == 0
     assert "certified   100.0 % of the area" in capsys.readouterr().out
-    assert "certified area (100 %)" in page.read_text()
+    assert "certified area (100.0 %)" in page.read_text()
 
 
 def test_the_picture_has_it_once_it_is_known():
@@ -70,7 +70,7 @@ def test_the_picture_has_it_once_it_is_known():
     new = {entry.label for entry in after.legend.entries} - {
         entry.label for entry in before.legend.entries
     }
-    assert new == {"certified area (100 %)"}
+    assert new == {"certified area (100.0 %)"}
     assert before.readout is not None
     assert after.readout is not None
     name, unit, shares = after.readout.rows[-1]

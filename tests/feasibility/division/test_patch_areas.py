@@ -11,6 +11,7 @@ from feasibility.area import CertifiedArea
 from feasibility.collisions import Collision
 from feasibility.division import PatchAreas, divide, patch_areas
 from feasibility.reports import division as report
+from feasibility.viewer import view_division
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +56,13 @@ def test_they_are_reported_when_asked_for(divided, areas):
     words = " ".join(report.as_text(divided, "behind", areas=areas).split())
     assert "of the area" in words
     assert f"patch {len(divided.patches)} " in words
+
+
+def test_they_are_tinted(divided, areas):
+    one = replace(divided, fewest=replace(divided.fewest, patches=divided.patches[1:]))
+    drawn = view_division(one, areas=replace(areas, patches=areas.patches[1:]))
+    entries = [entry.label for entry in drawn.legend.entries]
+    assert [entry for entry in entries if "certified" in entry] == ["certified of patch 1 (50.0 %)"]
 
 
 def test_refused_walks_and_collisions_have_none(divided):
