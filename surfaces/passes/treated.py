@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from surfaces.passes.cutting import Cut, cut_edges, edges_of
 from surfaces.passes.net import WorkingMesh
 from surfaces.protected import Protected
 
@@ -30,6 +29,7 @@ ROUNDS = 3  # how often faces between treated and untreated are cut in four
 JUNG = 3.0**-0.5  # [1] of its longest edge: no place of a triangle is further from its middle
 CLOSE = 0.1  # [1] of the radius: points of the path are no further apart
 MOST_NEAR = 64  # places of the path that are looked at for a face whose nearest one is beyond it
+MOST_CUT = 12_000  # faces that are cut in four in one round, those that are least certain
 NARROW = 0.002  # [1] of the area: a bracket this narrow is not cut further
 
 
@@ -108,13 +108,23 @@ def treated_share(
         return Treated(area, 0.0, 0.0, mesh, none, none)
     path = path.no_longer_than(CLOSE * radius)
     found = _bracket(mesh, normals, path, radius, off)
+    found = found.where(_connected(mesh, path, found.upper > 0.0))
     for _ in range(rounds):
-        open_ = found.upper - found.lower > 1e-9
-        if float(((found.upper - found.lower) * mesh.areas).sum()) <= NARROW * area:
+        gap = (found.upper - found.lower) * mesh.areas
+        if float(gap.sum()) <= NARROW * area:
             break
-        mesh, parent = _quartered(mesh, open_)
-        normals = normals[parent]
-        found = _bracket(mesh, normals, path, radius, off)
+        widest = np.argsort(-gap, kind="stable")[:MOST_CUT]
+        widest = widest[gap[widest] > 0.0]
+        rest = np.ones(len(gap), dtype=bool)
+        rest[widest] = False
+        cut = _quartered(mesh, widest)
+        parts = _bracket(_compact(cut), np.tile(normals[widest], (4, 1)), path, radius, off)
+        mesh = WorkingMesh(cut.vertices, np.concatenate([mesh.faces[rest], cut.faces]))
+        normals = np.concatenate([normals[rest], np.tile(normals[widest], (4, 1))])
+        # What bounds a face bounds its parts.
+        upper = np.concatenate([found.upper[rest], parts.upper])
+        lower = np.concatenate([found.lower[rest], np.minimum(parts.lower, parts.upper)])
+        found = _Bracket(lower, upper)
     areas = mesh.areas
     return Treated(
         area=area,
@@ -131,6 +141,11 @@ class _Bracket(NamedTuple):
 
     lower: Floats
     upper: Floats
+
+    def where(self, joined: NDArray[np.bool_]) -> _Bracket:
+        """The same with nothing on faces that are not joined with the path."""
+        lower = self.lower * joined
+        return _Bracket(lower, np.maximum(self.upper * joined, lower))
 
 
 def _bracket(
@@ -157,9 +172,7 @@ def _bracket(
     upper[rest] = np.where(within | more.cut_short, 1.0, 0.0)
     places[rest[more.found], 0] = more.place[more.found]
     lower = _at_least(corners, normals, path, places, inner)
-    joined = _connected(mesh, path, upper > 0.0)
-    lower = lower * joined
-    return _Bracket(lower, np.maximum(upper * joined, lower))
+    return _Bracket(lower, np.maximum(upper, lower))
 
 
 def _facing(path: ToolLines, places: Ints, normals: Floats) -> NDArray[np.bool_]:
@@ -260,9 +273,22 @@ def _connected(mesh: WorkingMesh, path: ToolLines, touched: NDArray[np.bool_]) -
     return found
 
 
-def _quartered(mesh: WorkingMesh, which: NDArray[np.bool_]) -> Cut:
-    """Some faces cut in four at the middles of their edges, and those next to them to fit."""
-    edges = edges_of(mesh.faces)
-    some = np.zeros(len(edges.ends), dtype=bool)
-    some[edges.of[which]] = True
-    return cut_edges(mesh, edges, some, mesh.vertices[edges.ends[some]].mean(axis=1))
+def _quartered(mesh: WorkingMesh, which: Ints) -> WorkingMesh:
+    """Some faces cut in four at the middles of their edges; first all first parts, and so on.
+
+    The vertices are those of the mesh, and new ones. Faces beside them stay as they are.
+    """
+    faces = mesh.faces[which]
+    sides = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges, of = np.unique(sides, axis=0, return_inverse=True)
+    middle = of.reshape(-1, 3) + len(mesh.vertices)
+    (a, b, c), (ab, bc, ca) = faces.T, middle.T
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    vertices = np.concatenate([mesh.vertices, mesh.vertices[edges].mean(axis=1)])
+    return WorkingMesh(vertices, np.concatenate([np.column_stack(part) for part in parts]))
+
+
+def _compact(mesh: WorkingMesh) -> WorkingMesh:
+    """Without vertices of no face."""
+    used, faces = np.unique(mesh.faces, return_inverse=True)
+    return WorkingMesh(mesh.vertices[used], faces.reshape(-1, 3).astype(np.int64))
