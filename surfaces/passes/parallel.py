@@ -17,6 +17,7 @@ from surfaces.passes.levels import Line, level_lines
 from surfaces.passes.net import WorkingMesh
 from surfaces.passes.stretches import LevelLine, Pass, in_order, stretch_of
 from surfaces.passes.triangulation import working_mesh
+from surfaces.passes.working_copy import WorkingCopy, working_copy
 from surfaces.patches import Patch
 from surfaces.surface import Surface
 
@@ -105,7 +106,8 @@ def parallel_passes(
     """
     _check(pitch, overrun, step, shortest, by)
     edge = pitch / EDGES_PER_PITCH
-    lidded = with_lids(working_mesh(surface, edge), edge)
+    copy = working_copy(surface, working_mesh(surface, edge))
+    lidded = with_lids(copy.mesh, edge)
     laid = lay_lines(surface, lidded, direction, by, pitch)
     field, spacing = laid.field, laid.spacing
     kept = SHORTEST * pitch if shortest is None else shortest
@@ -127,7 +129,7 @@ def parallel_passes(
         by=by,
         widest=spacing if by == "distance" else spacing / max(slopes.min(initial=1.0), 1e-9),
         dropped=dropped,
-        notes=_notes(lidded.holes, lines, field, by),
+        notes=(*_notes(lidded.holes, lines, field, by), *_copied(copy)),
     )
 
 
@@ -269,6 +271,16 @@ def _parts(line: Line, own: NDArray[np.bool_]) -> Iterator[Line]:
     ends = np.flatnonzero(np.diff(np.concatenate([[0], own.astype(np.int8), [0]])))
     for start, end in ends.reshape(-1, 2):
         yield Line(points[start : end + 1], faces[start:end], closed=False)
+
+
+def _copied(copy: WorkingCopy) -> tuple[str, ...]:
+    """That distances were measured on a copy."""
+    if copy.deviation <= 0.0:
+        return ()
+    return (
+        f"distances are those on a copy of {len(copy.mesh.faces):,} triangles, which is within "
+        f"{1e3 * copy.deviation:.2g} mm of the surface; the passes lie on the surface itself",
+    )
 
 
 def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[str, ...]:

@@ -143,7 +143,7 @@ def test_points_lie_on_the_surface_and_evenly() -> None:
     found = parallel_passes(surface, 0.02, step=0.005)
     for each in found.stretches:
         at = surface.closest(each.points)
-        assert np.abs(at.height).max() <= 1e-9
+        assert np.abs(at.height).max() <= 1e-7
         assert np.allclose(at.normal, each.normals, atol=1e-9)
         steps = np.linalg.norm(np.diff(each.points, axis=0), axis=1)
         assert steps.max() <= 0.0051
@@ -213,3 +213,33 @@ def test_a_spline_as_patch_and_as_mesh_gets_the_same_passes() -> None:
 def test_bad_input_is_named(arguments, said) -> None:
     with pytest.raises(CoverableError, match=said):
         parallel_passes(plane((0.0, 0.6), (0.0, 0.4)), **arguments)
+
+
+@pytest.mark.parametrize("direction", [0.0, 0.5])
+def test_over_many_triangles_distances_are_taken_on_a_copy(direction: float) -> None:
+    """The passes lie on the surface itself, and keep their pitch within 2 %."""
+    rng = np.random.default_rng(0)
+    u, v = np.meshgrid(np.linspace(0.2, 1.7, 180), np.linspace(0.0, 0.5, 150), indexing="ij")
+    for values, step in ((u, 1.5 / 180), (v, 0.5 / 150)):
+        values[1:-1, 1:-1] += rng.uniform(-0.2, 0.2, (178, 148)) * step
+    points = 0.3 * np.stack([np.cos(u), np.sin(u), v / 0.3], axis=-1).reshape(-1, 3)
+    own = points @ ARCH.rotation.T + ARCH.position
+    corner = np.arange(180 * 150).reshape(180, 150)
+    a, b, c, d = (
+        part.ravel()
+        for part in (corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:])
+    )
+    faces = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    fine = mesh(TriangleMesh(own, faces), side="outside")
+    found = parallel_passes(fine, 0.05, direction, step=0.004)
+    assert any("a copy of" in note for note in found.notes)
+    levels = by_level(found)
+    middle = (found.count - 1) / 2
+    for level, row in levels.items():
+        assert max(np.abs(fine.closest(each.points).height).max() for each in row) <= 1e-7
+        inner = level + (1 if level < middle - 0.5 else -1 if level > middle + 0.5 else 0)
+        if inner == level or inner not in levels:
+            continue
+        for each in row:
+            lines = [away("arch", each.points, other.points) for other in levels[inner]]
+            assert np.abs(np.min(lines, axis=0) / found.spacing - 1.0).max() <= 0.02
