@@ -12,6 +12,7 @@ from coverable_errors import ArgumentError
 from feasibility import Search, Task, check, verify
 from feasibility.cases import load_case
 from feasibility.cli.main import main
+from feasibility.results import load_result
 from feasibility.speed import rate_figures
 from robots import load_robot
 from surfaces import plane, sphere
@@ -93,14 +94,17 @@ def test_bad_questions_are_refused():
             replace(TASK, **bad)
 
 
-def test_a_case_says_it(capsys):
+def test_a_case_says_it(tmp_path, capsys):
     asked = ["task.speed=0.25", "task.min_manipulability=0.01", "surface.cells=[2, 2]"]
     case = load_case("paper/4a", asked)
     assert (case.task.speed, case.task.min_manipulability) == (0.25, 0.01)
     settings = [part for setting in asked for part in ("--set", setting)]
-    assert main(["check", "paper/4a", *settings]) == 0
+    saved = str(tmp_path / "fast.result")
+    assert main(["check", "paper/4a", *settings, "--save", saved]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "The tool can have 0.25 m/s all along it" in said
     assert "(asked 0.25)" in said
+    assert load_result(saved).verdict.certificate.max_speed > 0.25
+    assert main(["verify", saved]) == 0
     assert main(["check", "paper/4a", "--set", "task.speed=1e4"]) == 2
     assert "m/s anywhere" in capsys.readouterr().err
