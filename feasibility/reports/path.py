@@ -232,7 +232,7 @@ def as_text(
     rows += [("speed", rates_words(path, rates, trajectory)), ("ends", ends_words(ends))]
     head = f"path: one continuous motion over {over}."
     if laid is not None:
-        rows[0] = ("passes", passes_text(laid))
+        rows[:2] = [("passes", passes_text(laid)), ("length", f"{figures.length:.4g} m in all")]
         head = (
             f"path: one continuous motion along {laid.count} pass{'' if laid.count == 1 else 'es'}."
         )
