@@ -41,21 +41,28 @@ def clear_landing(
     """Is one of so many configurations over a cell clear, as fcl sees it?"""
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     assert bodies is not None
-    scene = ForeignScene(robot, bodies)
+    scene, order = ForeignScene(robot, bodies), list(range(len(bodies.pairs)))
     arrays, work = arrays_of(robot, cells, task), work_for(robot.n)
     low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
     for q in rng.uniform(low, high, (count, robot.n)):
         landed = project_near_cell(arrays, work, cell, q, PROJECTION_STEPS)
-        if landed and is_clear(scene, q):
+        if landed and is_clear(scene, q, order):
             return True
     return False
 
 
-def is_clear(scene: ForeignScene, q: np.ndarray) -> bool:
-    """Is no pair too near? What touches has a distance of 0."""
-    needed = np.array([one.clearance for one in scene.bodies.pairs])
-    away = scene.distances(q)
-    return bool(((away >= needed) & (away > 0.0)).all())
+def is_clear(scene: ForeignScene, q: np.ndarray, first: list[int] | None = None) -> bool:
+    """Is no pair too near? What touches has a distance of 0.
+
+    The pair that is comes to the front of `first`, the order in which they are asked.
+    """
+    order = list(range(len(scene.bodies.pairs))) if first is None else first
+    for place, k in enumerate(order):
+        away = scene.distances(q, [k])[0]
+        if not (away >= scene.bodies.pairs[k].clearance and away > 0.0):
+            order.insert(0, order.pop(place))
+            return False
+    return True
 
 
 class ClearBox(NamedTuple):
