@@ -7,6 +7,7 @@ from .errors import RobotError as RobotError
 from .kinematics import Kinematics as Kinematics
 from .library import GROUPS as GROUPS
 from .library import RobotInfo as RobotInfo
+from .library import flange_axis as flange_axis
 from .library import joint_kinds as joint_kinds
 from .library import list_robots as list_robots
 from .library import load_robot as load_robot

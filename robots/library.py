@@ -151,6 +151,21 @@ def load_robot(
     return robot if start is None else replace(robot, start=np.asarray(start))
 
 
+def flange_axis(name: str | None, tool_frame: str | None = None) -> tuple[float, float, float]:
+    """Where a tool mounted on the flange of an arm points, in its tool frame; reads no URDF.
+
+    Args:
+        name: a name that `load_robot` knows; any other is +z.
+        tool_frame: a link other than the arm's own tool frame is +z, too.
+
+    Example:
+        >>> flange_axis("ur5"), flange_axis("kinova")
+        ((0.0, 0.0, 1.0), (1, 0, 0))
+    """
+    info = _library().get(name or "")
+    return (0.0, 0.0, 1.0) if info is None else _approach_axis(info, tool_frame)
+
+
 def _approach_axis(info: RobotInfo, tool_frame: str | None) -> tuple[float, float, float]:
     """The axis of the library belongs to the tool frame of the library."""
     return info.approach_axis if tool_frame in (None, info.tool_frame) else (0.0, 0.0, 1.0)

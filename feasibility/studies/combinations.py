@@ -23,7 +23,7 @@ from feasibility.cases import (
     toml_document,
 )
 from feasibility.studies.axes import POSES, Variation
-from feasibility.studies.outcome import HOME, arm_of, case_of, mounted_as
+from feasibility.studies.outcome import HOME, arm_of, case_of, mounted_as, mounting_fault
 from feasibility.studies.run import StudyTask
 
 ORIGIN = (0.0, 0.0, 0.0)
@@ -62,12 +62,16 @@ def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[Stud
         others = [(entry, value) for entry, value in row if not entry.is_pose]
         name = json.dumps([value for _, value in others], sort_keys=True)
         if name not in checked:
-            tables = copy.deepcopy(base)
+            tables, found = copy.deepcopy(base), []
             for entry, value in others:
                 if entry.path == ("robot",):
+                    other = mounting_fault(value, base.get("robot", {}))
+                    found += (
+                        [] if other is None else [Fault("robot", f"{value.get('name')} {other}")]
+                    )
                     value = mounted_as(value, base.get("robot", {}))
                 put(tables, entry.path, copy.deepcopy(value))
-            found = faults_of(tables)
+            found = found or faults_of(tables)
             # Defaults of the case are filled in.
             checked[name] = None if found else as_read(case_of(tables).to_tables())
             texts = {k: shown(v) for k, v in parameters.items() if k.split(".")[1:2] not in POSED}

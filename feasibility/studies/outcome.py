@@ -19,6 +19,7 @@ from feasibility.clock import Clock
 from feasibility.collisions import gather
 from feasibility.division import undominated
 from feasibility.verdict import CauseKind, Verdict
+from robots import flange_axis
 
 if TYPE_CHECKING:
     from feasibility.verdict import Verdict
@@ -148,18 +149,45 @@ def _load(table: str, surface_link: str | None) -> Robot:
     return part.build(surface_link)
 
 
+TOOL = ("tcp", "approach_axis", "reference_axis")
+
+
 def mounted_as(robot: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
     """The [robot] table of an arm that stands where another one does, unless it says otherwise.
 
-    The base, and the axes that carry it or the surface, belong to the cell; tool, limits and locked
-    joints belong to the arm.
+    The base, and the axes that carry it or the surface, belong to the cell, and so does a tool
+    whose centre point is given (see `mounting_fault`); limits and locked joints belong to the arm.
 
     Example:
         >>> mounted_as({"name": "ur5"}, {"name": "panda", "base": {"position": [0, 0, 1]}})
         {'base': {'position': [0, 0, 1]}, 'name': 'ur5'}
     """
-    cell = {key: given[key] for key in ("base", "axis") if given.get(key) is not None}
-    return {**cell, **robot}
+    tool = TOOL if given.get("tcp") is not None and "tcp" not in robot else ()
+    kept = {key: given[key] for key in ("base", "axis", *tool) if given.get(key) is not None}
+    return {**kept, **robot}
+
+
+def mounting_fault(robot: Mapping[str, Any], given: Mapping[str, Any]) -> str | None:
+    """Why the other arm's tool cannot be mounted on this one as it stands; None where it can.
+
+    A tool centre point is given from the tool frame. Where the flanges of the two arms point along
+    different axes of that frame, the same numbers would be a tool that points elsewhere.
+    """
+    if given.get("tcp") is None or "tcp" in robot:
+        return None
+    ours, theirs = flange_axis(**_named(robot)), flange_axis(**_named(given))
+    if ours == theirs:
+        return None
+    return (
+        f"has a tool frame whose flange points along {list(ours)}, that of the case along "
+        f"{list(theirs)}, so robot.tcp does not fit it; expected a [robot] table with a tcp of its "
+        "own (in a study)"
+    )
+
+
+def _named(table: Mapping[str, Any]) -> dict[str, Any]:
+    """What a [robot] table says of which arm it is."""
+    return {"name": table.get("name"), "tool_frame": table.get("tool_frame")}
 
 
 def cut_of(case: Case) -> Cells:

@@ -20,6 +20,7 @@ from feasibility.studies.outcome import (
     finite,
     merit,
     mounted_as,
+    mounting_fault,
     outcome_of,
 )
 from feasibility.studies.run import StudyTask, run_tasks
@@ -157,6 +158,10 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
         own = base["robot"].get("name") == name
         arm = base["robot"] if own else mounted_as({"name": name}, base["robot"])
         tables = {**base, "robot": arm}
+        other = None if own else mounting_fault({"name": name}, base["robot"])
+        if other is not None:
+            faults.append(Fault(place, f"{name} {other}"))
+            continue
         try:
             arm_of(case_of(tables))
         except CaseError as error:

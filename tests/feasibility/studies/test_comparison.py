@@ -27,7 +27,7 @@ from feasibility.reports.study import as_csv as study_csv
 from feasibility.reports.study import as_text as study_text
 from feasibility.studies import Arm, Comparison, Row, compare, open_workers
 from feasibility.studies.file import read_study
-from feasibility.studies.robot_comparison import CONE_STEP_DEG, critical_cone
+from feasibility.studies.robot_comparison import CONE_STEP_DEG, _tables_of, critical_cone
 
 ROBOTS = ("ur3", "ur5", "puma560", "xarm7")
 
@@ -74,6 +74,25 @@ def test_other_arms_stand_in_the_same_cell() -> None:
     verdict = check(other.robot, other.cells, other.task, other.search)
     assert found.arms[1].message == verdict.message
     assert found.arms[1].covered == int(verdict.covered.sum()) > 0
+
+
+NOZZLE = "tcp = { position = [0.02, 0, 0.08], rpy_deg = [0, 30, 0] }\n    approach_axis = [0, 0, 1]"
+
+
+def test_other_arms_carry_the_same_tool(tmp_path) -> None:
+    rest = STRIP.partition("\n    robot")[2].partition("\n")[2]
+    given = f'{rest}[robot]\nname = "ur3"\n{NOZZLE}\n'
+    case = Case.from_toml(given, name="nozzle")
+    (tables,) = _tables_of(case, ["ur5"])
+    assert tables["robot"]["name"] == "ur5"
+    assert tables["robot"]["tcp"] == {"position": [0.02, 0, 0.08], "rpy_deg": [0, 30, 0]}
+    assert tables["robot"]["approach_axis"] == [0, 0, 1]
+    with pytest.raises(CaseError, match=r"robots\[1\].*points along \[1, 0, 0\].*tcp does not fit"):
+        _tables_of(case, ["ur5", "kinova"])
+    study = 'base.case = "nozzle.toml"\nvary.robots = ["ur5", "kinova"]'
+    (tmp_path / "nozzle.toml").write_text(given)
+    with pytest.raises(CaseError, match=r"kinova has a tool frame.*tcp does not fit"):
+        read_study(study, tmp_path)
 
 
 def test_each_arm_says_what_its_verdict_says(strip, compared) -> None:
