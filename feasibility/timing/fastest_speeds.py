@@ -1,0 +1,85 @@
+"""The fastest speeds along a curve: reachability analysis, as in TOPP-RA.
+
+With x = (ds/dt)^2 at the places of a grid and x running straight in between, what limits allow on
+a piece is |c x + d y| <= 1, row by row, for x at its beginning and y at its end. These sets are
+convex and hold (0, 0), so from the last place, at rest, backwards the values of x from which rest
+can be reached are 0 .. K, with K the largest x for which there is a y in 0 .. K' of the next place
+(a linear program in two variables); and forwards, from rest, the largest y is the fastest.
+
+For the largest x let lower(x) and upper(x) be the bounds on y. Their gap is concave, so where it is
+negative, the lines that bound y there cross at an x which is not smaller than the largest: one goes
+there, and on until there is a gap. As no line is met twice, that ends.
+
+H. Pham and Q.-C. Pham, A new approach to time-optimal path parameterization based on reachability
+analysis, IEEE Transactions on Robotics 34 (2018).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.compiled import kernel
+
+Array = NDArray[np.float64]
+
+CROSSINGS = 100  # per place; with what is left over then, the speed is 0 there
+ROUNDING = 1e-12  # [1]
+LEAST_SHARE = 1e-13  # [1] of c, below which d is nothing
+
+
+def fastest_speeds(most: Array, c: Array, d: Array) -> Array:
+    """(m,) the largest x from rest to rest; see the module.
+
+    Args:
+        most: (m,) upper bounds of x.
+        c, d: (m - 1, r) rows of each piece: |c x + d y| <= 1.
+
+    Example:
+        >>> x = fastest_speeds(np.full(5, 9.0), np.full((4, 1), -0.5), np.full((4, 1), 0.5))
+        >>> x.round(9).tolist()
+        [0.0, 2.0, 4.0, 2.0, 0.0]
+    """
+    alone = np.abs(d) <= LEAST_SHARE * np.abs(c)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # y is between -room - lean x and room - lean x.
+        room = np.where(alone, np.inf, 1.0 / np.abs(d))
+        lean = np.where(alone, 0.0, c / d)
+        by_itself = np.where(alone, 1.0 / np.abs(c), np.inf).min(axis=1)
+    x = np.append(np.minimum(most[:-1], by_itself), 0.0)
+    _run_through(x, room, lean)
+    return x
+
+
+@kernel
+def _run_through(x, room, lean):  # type: ignore[no-untyped-def]
+    """Set x (m,), upper bounds before, to the largest values; by two passes."""
+    for i in range(x.shape[0] - 2, -1, -1):
+        x[i] = _largest_start(x[i], x[i + 1], room[i], lean[i])
+    x[0] = 0.0
+    for i in range(x.shape[0] - 1):
+        y = x[i + 1]
+        for j in range(room.shape[1]):
+            y = min(y, room[i, j] - lean[i, j] * x[i])
+        x[i + 1] = max(y, 0.0)
+
+
+@kernel
+def _largest_start(x, end, room, lean):  # type: ignore[no-untyped-def]
+    """The largest x, at most the one given, that leads to some y in 0 .. end."""
+    for _ in range(CROSSINGS):
+        upper, upper_room, upper_lean = end, end, 0.0
+        lower, lower_room, lower_lean = 0.0, 0.0, 0.0
+        for j in range(room.shape[0]):
+            at = lean[j] * x
+            if room[j] - at < upper:
+                upper, upper_room, upper_lean = room[j] - at, room[j], lean[j]
+            if -room[j] - at > lower:
+                lower, lower_room, lower_lean = -room[j] - at, room[j], lean[j]
+        if lower <= upper:
+            return x
+        crossing = (upper_room + lower_room) / (upper_lean - lower_lean)
+        if not crossing < x * (1.0 - ROUNDING):
+            return x * (1.0 - ROUNDING)
+        x = crossing
+    return 0.0
