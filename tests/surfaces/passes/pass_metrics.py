@@ -1,10 +1,14 @@
-"""Distances on surfaces that can be unrolled, or are round, in closed form."""
+"""Distances on surfaces that can be unrolled, or are round, in closed form; a panel with a hole."""
 
 from __future__ import annotations
 
-import numpy as np
+import math
 
-from surfaces import cylinder, plane, sphere
+import numpy as np
+from scipy.spatial import Delaunay
+
+from surfaces import cylinder, mesh, plane, sphere
+from surfaces.meshes import TriangleMesh
 from surfaces.passes import Pass, Passes
 
 PLATE = plane((0.0, 0.6), (0.0, 0.4), position=(0.3, -0.2, 0.5), rpy_deg=(20, -35, 50))
@@ -40,3 +44,20 @@ def by_level(found: Passes) -> dict[int, list[Pass]]:
     for each in found.stretches:
         levels.setdefault(each.level, []).append(each)
     return levels
+
+
+def panel_with_hole(edge: float = 0.01):
+    """0.6 x 0.4 m with a hole of 80 mm radius in its middle, as irregular triangles."""
+    rng = np.random.default_rng(3)
+    x, y = np.meshgrid(np.arange(0.0, 0.6 + edge / 2, edge), np.arange(0.0, 0.4 + edge / 2, edge))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    inner = ((points > 1e-9) & (points < [0.6 - 1e-9, 0.4 - 1e-9])).all(axis=1)
+    points[inner] += rng.uniform(-0.2, 0.2, (int(inner.sum()), 2)) * edge
+    off = np.linalg.norm(points - [0.3, 0.2], axis=1)
+    angle = np.linspace(0.0, math.tau, 64, endpoint=False)
+    rim = np.array([0.3, 0.2]) + 0.08 * np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.concatenate([points[off > 0.08 + 0.4 * edge], rim])
+    faces = Delaunay(points).simplices
+    middle = points[faces].mean(axis=1)
+    faces = faces[np.linalg.norm(middle - [0.3, 0.2], axis=1) > 0.0799]
+    return mesh(TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces))

@@ -7,8 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from pass_metrics import ARCH, CAP, PLATE, away, by_level
-from scipy.spatial import Delaunay
+from pass_metrics import ARCH, CAP, PLATE, away, by_level, panel_with_hole
 
 from coverable_errors import CoverableError
 from surfaces import bspline, cylinder, mesh, piecewise, plane, sphere, torus
@@ -17,23 +16,6 @@ from surfaces.passes import parallel_passes
 
 SURFACES = {"plate": PLATE, "arch": ARCH, "cap": CAP}
 HALF = math.pi / 2
-
-
-def panel_with_hole(edge: float = 0.01):
-    """0.6 x 0.4 m with a hole of 80 mm radius in its middle, as irregular triangles."""
-    rng = np.random.default_rng(3)
-    x, y = np.meshgrid(np.arange(0.0, 0.6 + edge / 2, edge), np.arange(0.0, 0.4 + edge / 2, edge))
-    points = np.column_stack([x.ravel(), y.ravel()])
-    inner = ((points > 1e-9) & (points < [0.6 - 1e-9, 0.4 - 1e-9])).all(axis=1)
-    points[inner] += rng.uniform(-0.2, 0.2, (int(inner.sum()), 2)) * edge
-    off = np.linalg.norm(points - [0.3, 0.2], axis=1)
-    angle = np.linspace(0.0, math.tau, 64, endpoint=False)
-    rim = np.array([0.3, 0.2]) + 0.08 * np.column_stack([np.cos(angle), np.sin(angle)])
-    points = np.concatenate([points[off > 0.08 + 0.4 * edge], rim])
-    faces = Delaunay(points).simplices
-    middle = points[faces].mean(axis=1)
-    faces = faces[np.linalg.norm(middle - [0.3, 0.2], axis=1) > 0.0799]
-    return mesh(TriangleMesh(np.column_stack([points, np.zeros(len(points))]), faces))
 
 
 @pytest.mark.parametrize("direction", [0.0, HALF, 0.4])
