@@ -1,6 +1,8 @@
 # make demo   set up .venv and decide paper/4a        make bench  the table of speeds
 # make test   set up .venv and run every check        make clean  remove what was made
 # make campaign NAME=oracle   what takes too long for make test (tests/campaigns)
+# make bench BENCH=old.json   the same, with figures in that file and not in out/bench.json
+# make bench-compare OLD=old.json NEW=new.json   what became slower, and counts that changed
 # PYTHON=/path/to/python chooses the interpreter (CPython 3.11 or later).
 
 BIN := .venv/bin
@@ -12,10 +14,10 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-browser lint kernels greedy bench campaign clean distclean
+.PHONY: help demo test test-browser lint kernels greedy bench bench-compare campaign clean distclean
 
 help:
-	@sed -n '1,4s/^# //p' Makefile
+	@sed -n '1,6s/^# //p' Makefile
 
 # The stamp is younger than pyproject.toml once everything it names is installed.
 .venv/installed: pyproject.toml
@@ -68,8 +70,15 @@ test-browser:
 campaign: .venv/installed
 	$(BIN)/python -m pytest -n 2 --dist loadfile -rP tests/campaigns/test_$(NAME).py
 
+# The tables, on the screen and as JSON; TABLES="greedy path" makes those alone.
+BENCH := out/bench.json
 bench: .venv/installed
-	$(BIN)/python tests/benchmarks/run.py
+	$(BIN)/python tests/benchmarks/run.py --json "$(BENCH)" $(TABLES)
+
+# make takes words for targets, so the two files are variables; NEW is what make bench wrote last.
+bench-compare: NEW := $(BENCH)
+bench-compare: .venv/installed
+	@$(BIN)/python tests/benchmarks/benchmark_compare.py "$(OLD)" "$(NEW)"
 
 clean:
 	rm -rf out build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

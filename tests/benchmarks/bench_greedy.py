@@ -2,28 +2,10 @@
 
 from __future__ import annotations
 
-import time
-
-import numpy as np
-import pinocchio as pin
+from fk_unit import pinocchio_fk_us
 from paper_cases import PAPER_CASES
 
 from feasibility import Search, greedy_check
-
-
-def pinocchio_fk_us(calls: int = 20_000) -> float:
-    """Microseconds of one call of Pinocchio's FK with the tool frame, from Python; best of 5."""
-    model = PAPER_CASES["4a"].robot().model
-    data, q = model.createData(), pin.neutral(model)
-    frame = model.nframes - 1
-    best = np.inf
-    for _ in range(5):
-        began = time.perf_counter()
-        for _ in range(calls):
-            pin.forwardKinematics(model, data, q)
-            pin.updateFramePlacement(model, data, frame)
-        best = min(best, (time.perf_counter() - began) / calls)
-    return 1e6 * best
 
 
 def rows(repeats: int = 3) -> tuple[str, list[dict[str, object]]]:
@@ -39,8 +21,8 @@ def rows(repeats: int = 3) -> tuple[str, list[dict[str, object]]]:
             table.append(
                 {
                     "case": name,
-                    "paper": "connected" if case.connected else "not connected",
                     "moves": f"{moves} {step_deg:g}°",
+                    "paper": "connected" if case.connected else "not connected",
                     "verdict": str(verdict.answer),
                     "cells": f"{verdict.n_covered} of {len(cells)}",
                     "edges": verdict.n_edges,

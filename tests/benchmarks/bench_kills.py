@@ -67,7 +67,7 @@ def left_in_peace(folder: Path, count: int) -> dict[str, Any]:
     began = time.perf_counter()
     finish(command(folder, f"{count}", ["--workers", f"{count}"]))
     wall = time.perf_counter() - began
-    return {"run": f"{count} processes", "killed": 0, "kept when killed": "", "wall_s": wall}
+    return {"run": f"{count} processes", "killed": 0, "kept when killed": "", "wall s": wall}
 
 
 def killed(folder: Path, wall: float) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def killed(folder: Path, wall: float) -> dict[str, Any]:
     finish(command(folder, "killed", ["--workers", "2"]))
     spent = time.perf_counter() - began
     return {"run": "killed, 2 processes", "killed": len(held), "kept when killed": f"{held}",
-            "wall_s": spent}  # fmt: skip
+            "wall s": spent}  # fmt: skip
 
 
 def on_dask(folder: Path) -> dict[str, Any]:
@@ -104,7 +104,7 @@ def on_dask(folder: Path) -> dict[str, Any]:
         finish(process)
         wall = time.perf_counter() - began
     return {"run": "2 Dask workers, one killed", "killed": 1, "kept when killed": f"[{held}]",
-            "wall_s": wall}  # fmt: skip
+            "wall s": wall}  # fmt: skip
 
 
 def rows() -> tuple[str, list[dict[str, Any]]]:
@@ -113,7 +113,7 @@ def rows() -> tuple[str, list[dict[str, Any]]]:
         folder = Path(name)
         (folder / "study.toml").write_text(STUDY, encoding="utf-8")
         found = [left_in_peace(folder, count) for count in (1, 2, 4)]
-        found += [killed(folder, found[1]["wall_s"]), on_dask(folder)]
+        found += [killed(folder, found[1]["wall s"]), on_dask(folder)]
         first = (folder / "1.csv").read_bytes()
         for row, stem in zip(found, ("1", "2", "4", "killed", "dask"), strict=True):
             row["rows"] = kept(folder / f"{stem}.study")

@@ -62,8 +62,8 @@ def _sweep(placer: LocalEvaluator, region: Region, count: int) -> dict[str, obje
         "hopeless": f"{sum(not trial.complete for trial in every)} of {count}",
         "bound": stages.count(Stage.BOUND),
         "probe": stages.count(Stage.PROBE),
-        "early cpu s": early_s,
-        "all cpu s": every_s,
+        "early CPU s": early_s,
+        "all CPU s": every_s,
         "ratio (target 0.5)": early_s / every_s,
         "feasible ones lost": sum(lost),
     }

@@ -76,13 +76,13 @@ def run(kind: str, count: int) -> dict[str, Any]:
         "workers": f"{count} {kind}",
         "placements": len(rows),
         "feasible": sum(row.result["verdict"] == "feasible" for row in rows),
-        "read_s": read,
-        "wall_s": wall,
-        "work_s": sum(row.seconds for row in rows),
+        "read s": read,
+        "wall s": wall,
+        "work s": sum(row.seconds for row in rows),
         "efficiency": sum(row.seconds for row in rows) / (wall * count),
-        "workers' cpu_s": used.ru_utime + used.ru_stime,
-        "parent cpu_ms/task": 1e3 * own / len(rows),
-        "empty task_ms": 1e3 * way,
+        "workers' CPU s": used.ru_utime + used.ru_stime,
+        "parent CPU of a task ms": 1e3 * own / len(rows),
+        "empty task ms": 1e3 * way,
         "MB/worker": max(row.result["mb"] for row in seen),
     }
 
@@ -101,7 +101,7 @@ def rows() -> tuple[str, list[dict[str, Any]]]:
         found.append(json.loads(done.stdout.splitlines()[-1]))
     first = found[0]
     for row in found:
-        row["speed-up"] = first["wall_s"] / row["wall_s"]
+        row["speed-up"] = first["wall s"] / row["wall s"]
     return f"{COUNT} placements of a 90-cell sphere patch", found
 
 

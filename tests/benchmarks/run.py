@@ -1,17 +1,31 @@
 """Print the benchmark tables: every `bench_*.py` beside this file that has a function `rows`.
 
-`rows()` returns a title and a list of rows, each a mapping from column name to value.
+`rows()` returns a title and a list of rows, each a mapping from column name to value. What names
+of columns mean is said in `benchmark_files.py`. With --json the figures are written too, with times
+in FK calls of Pinocchio, which are measured right before and after each table.
 """
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
+import os
+import platform
 import sys
 from collections.abc import Mapping, Sequence
+from importlib.metadata import version
 from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracle"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "paper"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from benchmark_files import rows_by_name, write
+from fk_unit import UNIT, pinocchio_fk_us
 
 HERE = Path(__file__).resolve().parent
-sys.path[:0] = [str(HERE.parents[1]), str(HERE.parent / "paper"), str(HERE.parent / "oracle")]
 
 
 def table(rows: Sequence[Mapping[str, object]]) -> str:
@@ -32,19 +46,54 @@ def format_value(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def main() -> int:
+def loaded(path: Path) -> ModuleType:
+    """A benchmark, as a module."""
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} cannot be imported")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def where() -> dict[str, Any]:
+    """What the figures depend on beside our code."""
+    libraries = {name: version(name) for name in ("pin", "numba", "numpy")}
+    return {"python": platform.python_version(), **libraries, "processors": os.cpu_count()}
+
+
+def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     """Run all modules, or those whose names contain one of the arguments."""
-    wanted = sys.argv[1:]
-    for path in sorted(HERE.glob("bench_*.py")):
-        if wanted and not any(word in path.stem for word in wanted):
-            continue
-        spec = importlib.util.spec_from_file_location(path.stem, path)
-        if spec is None or spec.loader is None:
-            continue
-        module = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(module)
+    parser = argparse.ArgumentParser(description="Print the benchmark tables.")
+    parser.add_argument("words", nargs="*", help="only tables whose names contain one of these")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
+    given = parser.parse_args(arguments)
+    paths = [
+        path
+        for path in sorted(folder.glob("bench_*.py"))
+        if not given.words or any(word in path.stem for word in given.words)
+    ]
+    if not paths:
+        parser.error(f"no table has a name with {' or '.join(given.words)} in it")
+    # A run that is interrupted leaves what it has, and the figures of an earlier one as they were.
+    unfinished = given.json and given.json.with_name(f"{given.json.name}.unfinished")
+    tables: dict[str, Any] = {}
+    if unfinished:
+        unfinished.parent.mkdir(parents=True, exist_ok=True)
+        write(unfinished, UNIT, where(), tables)
+    for path in paths:
+        module = loaded(path)
+        before = pinocchio_fk_us()
         title, rows = module.rows()
+        fk_us = min(before, pinocchio_fk_us())
         print(f"\n{title}\n\n{table(rows)}", flush=True)
+        name = path.stem.removeprefix("bench_")
+        tables[name] = {"title": title, "fk_us": fk_us, "rows": rows_by_name(rows, fk_us)}
+        if unfinished:
+            write(unfinished, UNIT, where(), tables)
+    if unfinished:
+        os.replace(unfinished, given.json)
+        print(f"\nFigures with times in Pinocchio FK calls: {given.json}")
     return 0
 
 
