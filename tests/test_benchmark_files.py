@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmark_compare import main
-from benchmark_files import FORM, rows_by_name
+from benchmark_files import FORM, least, rows_by_name
 from run import main as run
 
 OLD: dict[str, Any] = {
@@ -239,14 +239,31 @@ def test_names_of_columns_say_what_they_hold() -> None:
     }
 
 
+def test_rounds_keep_the_least_time_of_each_figure() -> None:
+    rounds = [
+        {"a": {"times": {"one": one, "other": other}, "counts": {"FK": fk}, "others": {}}}
+        for one, other, fk in ((2.0, 5.0, 1), (3.0, 4.0, 1), (4.0, None, 2))
+    ]
+    assert least([{}, *rounds]) == {
+        "a": {"times": {"one": 2.0, "other": 4.0}, "counts": {"FK": 2}, "others": {}}
+    }
+
+
 def test_a_run_writes_what_it_prints(tmp_path: Path, capsys: Any) -> None:
     (tmp_path / "bench_made_up.py").write_text(
-        'def rows():\n    return "Made up", [{"case": "a", "search s": 0.5, "FK": 12}]\n'
+        "from pathlib import Path\n"
+        "def rows():\n"
+        "    before = Path(__file__).with_suffix('.count')\n"
+        "    taken = 0.75 if before.exists() else 0.5\n"
+        "    before.touch()\n"
+        "    return 'Made up', [{'case': 'a', 'search s': taken, 'FK': 12}]\n"
     )
     (tmp_path / "bench_broken.py").write_text("def rows():\n    raise RuntimeError('broken')\n")
     path = tmp_path / "out" / "bench.json"
-    assert run(["made", "--json", str(path)], tmp_path) == 0
-    assert "| a    | 0.5      | 12 |" in capsys.readouterr().out
+    assert run(["made", "--rounds", "2", "--json", str(path)], tmp_path) == 0
+    printed = capsys.readouterr().out
+    assert "| a    | 0.5      | 12 |" in printed
+    assert "| a    | 0.75     | 12 |" in printed
     written = json.loads(path.read_text("utf-8"))
     table = written["tables"]["made_up"]
     assert written["form"] == FORM

@@ -54,7 +54,7 @@ def toolpath(robot: Robot) -> Callable[[], Verdict]:
     return lambda: check(robot, cells, Task(0.01, 25))
 
 
-def cpu_ms(ask: Callable[[], Verdict], repeats: int = 5) -> tuple[float, Verdict]:
+def cpu_ms(ask: Callable[[], Verdict], repeats: int = 15) -> tuple[float, Verdict]:
     """Least processor time of a check, and its verdict; the first does not count."""
     verdict, taken = ask(), []
     for _ in range(repeats):

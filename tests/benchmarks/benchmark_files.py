@@ -85,6 +85,16 @@ def _sorted(row: Mapping[str, object], fk_us: float) -> Row:
     return found
 
 
+def least(rounds: Sequence[Rows]) -> Rows:
+    """The rows of the last round, with the least time of all rounds for each figure."""
+    found = rounds[-1]
+    for name, row in found.items():
+        for column in row["times"]:
+            taken = [rows[name]["times"].get(column) for rows in rounds if name in rows]
+            row["times"][column] = min((t for t in taken if t is not None), default=None)
+    return found
+
+
 def _plain(value: object) -> object:
     """A value as JSON has it."""
     if isinstance(value, float):

@@ -12,6 +12,7 @@ import importlib.util
 import os
 import platform
 import sys
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -22,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "oracle"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "paper"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from benchmark_files import rows_by_name, write
+from benchmark_files import least, rows_by_name, write
 from fk_unit import UNIT, pinocchio_fk_us
 
 HERE = Path(__file__).resolve().parent
@@ -67,6 +68,10 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     parser = argparse.ArgumentParser(description="Print the benchmark tables.")
     parser.add_argument("words", nargs="*", help="only tables whose names contain one of these")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there, too")
+    parser.add_argument(
+        "--rounds", type=int, default=1, metavar="N",
+        help="run all tables N times, and write the least of each time (machine not quiet)",
+    )  # fmt: skip
     given = parser.parse_args(arguments)
     paths = [
         path
@@ -75,20 +80,25 @@ def main(arguments: Sequence[str] | None = None, folder: Path = HERE) -> int:
     ]
     if not paths:
         parser.error(f"no table has a name with {' or '.join(given.words)} in it")
+    if given.rounds < 1:
+        parser.error(f"--rounds must be at least 1, got {given.rounds}")
     # A run that is interrupted leaves what it has, and the figures of an earlier one as they were.
     unfinished = given.json and given.json.with_name(f"{given.json.name}.unfinished")
     tables: dict[str, Any] = {}
     if unfinished:
         unfinished.parent.mkdir(parents=True, exist_ok=True)
         write(unfinished, UNIT, where(), tables)
-    for path in paths:
+    seen: dict[str, list[tuple[Sequence[Mapping[str, object]], float]]] = defaultdict(list)
+    for path in paths * given.rounds:
         module = loaded(path)
         before = pinocchio_fk_us()
         title, rows = module.rows()
-        fk_us = min(before, pinocchio_fk_us())
-        print(f"\n{title}\n\n{table(rows)}", flush=True)
         name = path.stem.removeprefix("bench_")
-        tables[name] = {"title": title, "fk_us": fk_us, "rows": rows_by_name(rows, fk_us)}
+        seen[name].append((rows, min(before, pinocchio_fk_us())))
+        print(f"\n{title}\n\n{table(rows)}", flush=True)
+        fk_us = min(unit for _, unit in seen[name])
+        figures = least([rows_by_name(rows, fk_us) for rows, _ in seen[name]])
+        tables[name] = {"title": title, "fk_us": fk_us, "rows": figures}
         if unfinished:
             write(unfinished, UNIT, where(), tables)
     if unfinished:
