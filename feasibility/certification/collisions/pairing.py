@@ -104,7 +104,7 @@ class Pairing:
         s = self.stretches
         met = self._asked(self.a, self.b, s, int(np.argmin(self._hints)))
         if not (isinstance(self.a, MeshPart) and self.a.triangles > FEW):
-            self.stretches = _raised(self.a, self.b, s, met.n)
+            self.stretches = _raised_along(self.a, self.b, s, met, np.inf)
         return met.distance
 
     def certify(self, needed: float, aim: float) -> None:
@@ -182,7 +182,7 @@ class Pairing:
                     aim = max(needed, min(aim, NEAR * met.distance))
                 if exact and self._too_near(a, b, s, met, needed):
                     return s
-                s = _raised(a, b, s, met.n)
+                s = _raised_along(a, b, s, met, aim)
                 if met.n is None or s.bound[worst] >= aim or s.delta[worst] < ROUNDING:
                     break
             if s.bound[worst] < aim:
@@ -298,14 +298,26 @@ class Pairing:
         return self.place is not None
 
 
-def _raised(a: Piece, b: Piece, s: Stretches, n: Array | None) -> Stretches:
-    """Stretches with the bounds that planes across n, (3,) or (k, 3), give."""
-    if n is None:
+def _raised_along(a: Piece, b: Piece, s: Stretches, met: Met, aim: float) -> Stretches:
+    """Stretches with the bounds that the plane where bodies were met gives, below `aim`.
+
+    It stays with the first body on all of them, or turns with the other: as a link swings about
+    the base, so does the plane between them.
+    """
+    if met.n is None:
         return s
-    across = np.broadcast_to(n, (len(s.row), 3))
-    found = parted(a, b, s, across)
+    there = (s.last if met.end else s.first).rotations[met.stretch]
+    s = _raised(a, b, s, met.n)
+    if (s.bound >= aim).all():
+        return s
+    return _raised(a, b, s, s.first.rotations @ (there.T @ met.n))
+
+
+def _raised(a: Piece, b: Piece, s: Stretches, n: Array) -> Stretches:
+    """Stretches with the bounds that planes across n, (3,) or (k, 3), give."""
+    found = parted(a, b, s, n)
     better = (found > s.bound)[:, None]
-    return replace(s, bound=np.maximum(s.bound, found), across=np.where(better, across, s.across))
+    return replace(s, bound=np.maximum(s.bound, found), across=np.where(better, n, s.across))
 
 
 def _all_of(parts: list[Stretches]) -> Stretches:

@@ -23,17 +23,19 @@ TINY = 1e-300  # what keeps quotients of zeros finite
 
 
 def lows(b: Piece, poses: Poses, n: Array) -> Array:
-    """(k,) m, least n . x over the points of b, for directions (k, 3)."""
+    """(k,) m, least n . x over the points of b, for directions (k, 3), or one (3,) for all."""
+    if n.ndim == 1:
+        return np.asarray(poses.points @ n - b.support(-(n @ poses.rotations)))
     turned = np.einsum("kji,kj->ki", poses.rotations, n)
     return np.einsum("ki,ki->k", n, poses.points) - b.support(-turned)
 
 
 def parted(a: Piece, b: Piece, s: Stretches, n: Array) -> Array:
-    """(k,) m, how far the planes across n (k, 3) part a and b along stretches, see the module."""
+    """(k,) m, how far planes across n, (k, 3) or (3,), part a and b along stretches, see above."""
     if isinstance(a, Below):
-        n = np.broadcast_to(a.thin, n.shape)
+        n = a.thin
     low = np.minimum(lows(b, s.first, n), lows(b, s.last, n))
-    return np.asarray(low - a.support(n) - s.delta - s.stray)
+    return np.asarray(low - a.support(np.atleast_2d(n)) - s.delta - s.stray)
 
 
 def guesses(a: Piece, b: Piece, s: Stretches) -> list[Array]:

@@ -151,28 +151,30 @@ class Motion:
 
         The velocity of a point that a joint alone turns at 1 rad/s: angular x point + linear.
         """
-        linear, angular = np.split(self._twists, 2, axis=2)
-        x, y, z = np.moveaxis(angular, 2, 0)
-        nothing = np.zeros_like(x)
-        cross = np.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], axis=-1)
-        (m, n), count = x.shape, points.shape[1]
-        velocities = cross.reshape(m, 3 * n, 3) @ points.transpose(0, 2, 1)
-        velocities = velocities.reshape(m, n, 3, count) + linear[..., None]
+        cross, linear = self._turns
+        velocities = cross @ points.transpose(0, 2, 1) + linear
+        velocities = velocities.reshape(len(points), -1, 3, points.shape[1])
         return np.asarray(np.sqrt(np.einsum("mnib,mnib->mnb", velocities, velocities)))
 
     @cached_property
-    def _twists(self) -> Array:
-        """(m, n, 6) unit twists of the joints in the root frame, linear part first.
+    def _turns(self) -> tuple[Array, Array]:
+        """(m, 3 n, 3) and (m, 3 n, 1): what gives each joint's velocities of a point.
 
-        In its own frame a joint's twist is always the same; Pinocchio says which at the first row.
+        The angular velocity of each joint as the matrix of its cross product, and its linear part
+        at the origin. In its own frame a joint's twist is always the same; Pinocchio says which at
+        the first row.
         """
         rotations, points = self._frames.rotations[:, 1:], self._frames.points[:, 1:]
         linear, angular = np.split(self._kinematics.twists(self.q[:1])[0].T, 2, axis=1)
         back = rotations[0].transpose(0, 2, 1)
         own = back @ (linear - np.cross(points[0], angular))[:, :, None]
-        along = rotations @ (back @ angular[:, :, None])
-        there = (rotations @ own + np.cross(points, along[..., 0])[..., None])[..., 0]
-        return np.concatenate([there, along[..., 0]], axis=2)
+        x, y, z = np.moveaxis((rotations @ (back @ angular[:, :, None]))[..., 0], 2, 0)
+        nothing = np.zeros_like(x)
+        cross = np.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], axis=-1)
+        cross = cross.reshape(*x.shape, 3, 3)
+        there = rotations @ own - cross @ points[..., None]
+        m, n = x.shape
+        return cross.reshape(m, 3 * n, 3), there.reshape(m, 3 * n, 1)
 
     def stretches(self, a: int, b: int, centre: Array, ball: float) -> Stretches:
         """Every segment, as a body on joint b within a ball moves as seen from joint a <= b."""
