@@ -25,9 +25,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
+from feasibility.certification.collisions.balls import ball_bounds, chord_bounds
 from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -125,56 +127,47 @@ class Motion:
         if list(robot.model.parents)[1:] != list(range(robot.n)):
             raise ArgumentError(f"robot {robot.name!r}: its joints form no serial chain")
         self.q, self.prismatic = q, robot.prismatic
-        self.strays = np.zeros((len(q) - 1, robot.n)) if strays is None else strays
+        self.strays = (
+            np.zeros((len(q) - 1, robot.n)) if strays is None else np.ascontiguousarray(strays)
+        )
         self._kinematics = Kinematics(robot)
         self._frames = self._kinematics.joints(q)
         self._relative: dict[tuple[int, int], Poses] = {}
 
-    def centres(self, joints: NDArray[np.intp], centres: Array) -> Array:
-        """(m, B, 3) m, points (B, 3) that `joints` (B,) carry, in the root frame at each row."""
-        turned = np.einsum("mbij,bj->mbi", self._frames.rotations[:, joints], centres)
-        return np.asarray(turned + self._frames.points[:, joints])
-
-    def seen_from(self, joint: int, points: Array) -> Array:
-        """(m, k, 3) m, points of the root frame at each row, as seen from a joint."""
-        apart = points - self._frames.points[:, None, joint]
-        return np.asarray(apart @ self._frames.rotations[:, joint])
-
-    def sways(self, joints: NDArray[np.intp], centres: Array, balls: Array) -> Sways:
+    def sways(self, joints: Indices, centres: Array, balls: Array) -> Sways:
         """How balls with `centres` (B, 3) and radii `balls` (B,), m, on `joints` (B,) move."""
-        levers = self._levers(self.centres(joints, centres)) + balls
-        steps = np.abs(np.diff(self.q, axis=0))
-        return chord_bounds(steps, levers, self.prismatic, self.strays, joints)
+        steps, n = np.abs(np.diff(self.q, axis=0)), self.q.shape[1]
+        turns = np.where(self.prismatic, 0.0, steps)
+        turned = np.cumsum(turns, axis=1) - turns
+        found = Sways(*(np.zeros((n + 1, len(steps), len(joints))) for _ in range(3)))
+        frames, levers = self._frames, np.empty((len(joints), n))
+        chord_bounds(
+            frames.rotations, frames.points, self._twists, self.prismatic, steps, turned,
+            self.strays, joints, centres, balls, levers, found.delta, found.moved, found.stray,
+        )  # fmt: skip
+        return found
 
-    def _levers(self, points: Array) -> Array:
-        """(m, n, B) m, distances of points (m, B, 3) from each joint's axis.
-
-        The velocity of a point that a joint alone turns at 1 rad/s: angular x point + linear.
-        """
-        cross, linear = self._turns
-        velocities = cross @ points.transpose(0, 2, 1) + linear
-        velocities = velocities.reshape(len(points), -1, 3, points.shape[1])
-        return np.asarray(np.sqrt(np.einsum("mnib,mnib->mnb", velocities, velocities)))
+    def ball_bounds(
+        self, sways: Sways, joints: Indices, centres: Array, balls: Array, couples: Indices
+    ) -> Array:
+        """(c, m - 1) m, how far balls, as in `sways`, of couples (c, 2) stay apart, at least."""
+        frames, low = self._frames, np.empty((len(couples), len(self.q) - 1))
+        rotations, points = frames.rotations, frames.points
+        ball_bounds(
+            rotations, points, joints, centres, balls, couples, sways.delta, sways.stray, low
+        )
+        return low
 
     @cached_property
-    def _turns(self) -> tuple[Array, Array]:
-        """(m, 3 n, 3) and (m, 3 n, 1): what gives each joint's velocities of a point.
+    def _twists(self) -> Array:
+        """(n, 6) unit twists of the joints in their own frames, linear part first.
 
-        The angular velocity of each joint as the matrix of its cross product, and its linear part
-        at the origin. In its own frame a joint's twist is always the same; Pinocchio says which at
-        the first row.
+        There they are always the same; Pinocchio says which at the first row.
         """
-        rotations, points = self._frames.rotations[:, 1:], self._frames.points[:, 1:]
+        rotations, points = self._frames.rotations[0, 1:], self._frames.points[0, 1:]
         linear, angular = np.split(self._kinematics.twists(self.q[:1])[0].T, 2, axis=1)
-        back = rotations[0].transpose(0, 2, 1)
-        own = back @ (linear - np.cross(points[0], angular))[:, :, None]
-        x, y, z = np.moveaxis((rotations @ (back @ angular[:, :, None]))[..., 0], 2, 0)
-        nothing = np.zeros_like(x)
-        cross = np.stack([nothing, -z, y, z, nothing, -x, -y, x, nothing], axis=-1)
-        cross = cross.reshape(*x.shape, 3, 3)
-        there = rotations @ own - cross @ points[..., None]
-        m, n = x.shape
-        return cross.reshape(m, 3 * n, 3), there.reshape(m, 3 * n, 1)
+        there = np.stack([linear + np.cross(angular, points), angular], axis=1)
+        return np.ascontiguousarray((there @ rotations).reshape(-1, 6))
 
     def stretches(self, a: int, b: int, centre: Array, ball: float) -> Stretches:
         """Every segment, as a body on joint b within a ball moves as seen from joint a <= b."""
@@ -223,49 +216,6 @@ class Motion:
             frames = self._frames
             self._relative[a, b] = _seen_from(frames.rotations, frames.points, a, b)
         return self._relative[a, b]
-
-
-def chord_bounds(
-    steps: Array,
-    levers: Array,
-    prismatic: NDArray[np.bool_],
-    strays: Array,
-    joints: NDArray[np.intp],
-) -> Sways:
-    """How far points of bodies may be from their chords, and move, seen from every joint.
-
-    With T_j the sum of the |d_i| of revolute joints i <= j, the sum in the module's first bound is
-
-        sum_j r_j |d_j| (|d_j| + 2 T_(j-1)) - 2 T_a sum_j r_j |d_j|,    j = a + 1 .. b,
-
-    so that running sums from the tip on give it for all a.
-
-    Args:
-        steps: (m - 1, n) |d_j|.
-        levers: (m, n, B) m, r_j at the ends of the segments.
-        prismatic: (n,) which joints slide.
-        strays: (m - 1, n) e_j.
-        joints: (B,) which joint carries each body, 0 for the root.
-    """
-    count, n = steps.shape
-    turns = np.where(prismatic, 0.0, steps)
-    before = np.cumsum(turns, axis=1) - turns
-    found = Sways(*(np.zeros((n + 1, count, len(joints))) for _ in range(3)))
-    second, first, rate, stray = (np.zeros((count, len(joints))) for _ in range(4))
-    for j in range(n - 1, -1, -1):
-        d, ahead, off = steps[:, j, None], before[:, j, None], strays[:, j, None]
-        carried = (joints > j).astype(float)
-        if prismatic[j]:
-            second, first = second + carried * (2.0 * d * ahead), first + carried * d
-            rate, stray = rate + carried * d, stray + carried * off
-        else:
-            lever = 0.5 * carried * (levers[:-1, j] + levers[1:, j] + rate)
-            way = lever * d
-            second, first = second + way * (d + 2.0 * ahead), first + way
-            rate, stray = rate + way, stray + carried * (lever + stray) * off
-        found.delta[j] = np.maximum(second - 2.0 * ahead * first, 0.0) / 8.0
-        found.moved[j], found.stray[j] = rate, stray
-    return found
 
 
 def joined(one: Stretches, other: Stretches) -> Stretches:
