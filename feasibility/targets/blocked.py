@@ -17,11 +17,6 @@ def blocked_curves(cells: Cells, task: Task) -> str:
             "A cone of 0 degrees leaves a motion no margin between samples, so none can be "
             "certified; allow a small angle."
         )
-    if task.roll is not None and not task.roll.half > 0.0:
-        return (
-            "A single roll leaves a motion no margin between samples, so none can be certified; "
-            "allow a small range."
-        )
     tolerance = task.effective_tolerance
     targets = target_curves(cells, task)
     some = f"between {{}} of {len(cells.pairs)} pairs of neighbouring cells"

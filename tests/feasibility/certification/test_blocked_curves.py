@@ -52,7 +52,8 @@ def test_no_message_where_no_curve_is_blocked() -> None:
         assert blocked_curves(cells, Task(standoff=0.02, cone_deg=30)) == ""
 
 
-def test_a_single_roll_leaves_no_margin() -> None:
+def test_a_fixed_orientation_blocks_nothing_but_a_cone_of_zero_alone_does() -> None:
     cells = plane((0, 1), (0, 1)).cells(3, 4)
-    assert "single roll" in blocked_curves(cells, Task(0.02, 30, roll_deg=(5, 5)))
-    assert blocked_curves(cells, Task(0.02, 30, roll_deg=(5, 6))) == ""
+    assert blocked_curves(cells, Task(0.02, 30, roll_deg=(5, 5))) == ""
+    assert blocked_curves(cells, Task(0.02, 0, roll_deg=(5, 5))) == ""
+    assert "cone of 0" in blocked_curves(cells, Task(0.02, 0))
