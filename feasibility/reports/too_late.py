@@ -37,6 +37,7 @@ def as_json(case: Case, text: str, seconds: float) -> dict[str, Any]:
         "unchecked_links": [],
         "pairs_left_out": [],
         "proof": None,
+        "treated": None,
         "timing": {"load_s": seconds, "search_s": 0.0, "certify_s": 0.0, "total_s": seconds},
         "robot": case.robot.name or str(case.robot.urdf),
         "method": case.search.method,
