@@ -79,7 +79,7 @@ def bad_keys(rng: random.Random, folder: Path) -> tuple[Entry, str]:
     """No kind, an unknown one, or keys of another."""
     entry = rng.choice(
         [{}, {"kind": "cone"}, {"kind": 3}, {"kind": "box", "radius": 1.0}, {"kind": "mesh"},
-         {"kind": "halfspace", "frame": "cart"}, {"kind": "sphere", "radius": 1.0, "x" * 200: 1}]
+         {"kind": "halfspace", "carrier": "cart"}, {"kind": "sphere", "radius": 1.0, "x" * 200: 1}]
     )  # fmt: skip
     return dict(entry), "is missing|must be|is no key|not supported|not known"
 
