@@ -125,6 +125,21 @@ class Kinematics:
             columns[k] = pin.computeJointJacobians(self._model, self._data, row).reshape(6, -1)
         return columns
 
+    def tools_and_twists(
+        self, q: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """`tools` and `twists` at once, which takes less time."""
+        rows = self._configurations(q)
+        points, rotations = np.empty((len(rows), 3)), np.empty((len(rows), 3, 3))
+        columns = np.empty((len(rows), 6, self.robot.n))
+        for k, row in enumerate(rows):
+            # It places the joints too. Pinocchio flattens a single column.
+            columns[k] = pin.computeJointJacobians(self._model, self._data, row).reshape(6, -1)
+            pin.updateFramePlacement(self._model, self._data, self._frame)
+            points[k] = self._translation
+            rotations[k] = self._rotation
+        return points, rotations @ self._approach, columns
+
     def _configurations(self, q: ArrayLike) -> NDArray[np.float64]:
         """Pinocchio's configuration vectors (m, nq) for joint values q (m, n)."""
         rows = np.ascontiguousarray(q, dtype=float)

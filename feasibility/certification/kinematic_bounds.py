@@ -31,9 +31,8 @@ class Placements:
 
 def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
     """Tool points, axes and lever arms at q (m, n) by Pinocchio."""
-    kinematics = Kinematics(robot)
-    points, axes = kinematics.tools(q)
-    linear, angular = np.split(kinematics.twists(q).transpose(0, 2, 1), 2, axis=2)
+    points, axes, twists = Kinematics(robot).tools_and_twists(q)
+    linear, angular = np.split(twists.transpose(0, 2, 1), 2, axis=2)
     levers = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
     sines = np.linalg.norm(np.cross(angular, axes[:, None]), axis=2)
     return Placements(points, axes, levers, sines)

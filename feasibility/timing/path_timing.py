@@ -1,15 +1,15 @@
 """Time along a path: as fast as joints and tool may, from rest to rest.
 
-The path's straight lines are blended into a smooth curve (`blend`); toppra finds the largest speed
-along it that velocities, accelerations and the tool's speed allow (`timed_curve`), so that all
+The path's straight lines are blended into a smooth curve (`blended`), along which the largest speed
+is found that velocities, accelerations and the tool's speed allow (`timed_curve`), so that all
 limits hold along the curve.
 
 A controller sees its samples only, and puts quintics or cubics through them (`sampled_trajectory`).
 The fastest timing of a curve jumps from one acceleration to another, and these swing past both. So
-the joints that would exceed a limit then are given less, the curve is timed again, and the little
-that is left is mended by running slower. The samples at last are replayed like any witness: as a
-motion of straight lines, of quintics and of cubics; collisions between samples too, along the
-polynomials themselves.
+the joints that would exceed a limit then are given less there, the curve is timed again, and the
+little that is left is mended by running slower. The samples at last are replayed like any witness:
+as a motion of straight lines, of quintics and of cubics; collisions between samples too, along the
+polynomials themselves, or along lines with bounds on how far these are from them.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from feasibility.timing.sampled_trajectory import (
     KINDS,
     PLACES,
     Trajectory,
-    accelerations_used,
+    accelerations_each,
     held_inside,
     motion_between,
     past_limits,
@@ -35,7 +35,7 @@ from feasibility.timing.sampled_trajectory import (
 )
 from feasibility.timing.smoothing import Curve, blended, control_points
 from feasibility.timing.speed_limits import MotionLimits, motion_limits, number
-from feasibility.timing.timed_curve import samples, timed_curve
+from feasibility.timing.timed_curve import TimedCurve, samples, speed_bounds, timed_curve
 from feasibility.verdict import Walk
 from robots import Robot
 
@@ -46,7 +46,7 @@ DEFAULT_PERIOD = 0.02  # [s] between samples
 SHORTEST, LONGEST = 0.0001, 10.0  # [s], periods that can be requested
 FINER = 4  # times that the period may be halved
 MENDED = 1e-6  # [rad] or [m] past a joint's limit between samples: the motion is drawn in by that
-ROUNDS = 3  # timings of a curve, each with less for joints that exceeded a limit
+ROUNDS = 6  # timings of a curve, each with less where joints exceeded a limit
 PARTS = (1.0, 0.95, 0.91, 0.86)  # [1] of a period: where samples lie between jumps is chance
 SLIGHTLY = 1.01  # [1] times a limit that is mended by slowing all of it down
 SLOWINGS = 8  # times that the last of them is slowed down a little; and then as much as it needs
@@ -102,16 +102,29 @@ def trajectory(
         return Trajectory(
             robot.joint_names, np.zeros(1), q, still, still, np.zeros(1), path.walk.cell[:1], asked
         )
-    curve, refusal = blended(robot, cells, task, path.walk), ""
-    for _ in range(FINER + 1):
-        run = within_limits(robot, curve, limits, period)
-        if past_limits(robot, run).max(initial=0.0) <= MENDED:
-            run = held_inside(robot, run)
-        refusal = _refusal(path, run)
+    if task.collision is not None:
+        # Turns that were not asked to stay clear mostly do, and the motion is judged anyway.
+        curve = blended(robot, cells, replace(task, collision=None), path.walk)
+        run, refusal = _judged(path, curve, limits, period)
         if not refusal:
-            return replace(run, collisions=tuple(checked(task.collision)))
+            return run
+    curve = blended(robot, cells, task, path.walk)
+    for _ in range(FINER + 1):
+        run, refusal = _judged(path, curve, limits, period)
+        if not refusal:
+            return run
         period *= 0.5
     raise PathError(f"the independent replay refuses the timed motion: {refusal}")
+
+
+def _judged(
+    path: CoveragePath, curve: Curve, limits: MotionLimits, period: float
+) -> tuple[Trajectory, str]:
+    """Samples of a curve, and why they are refused; empty if they are not."""
+    run = within_limits(path.robot, curve, limits, period)
+    if past_limits(path.robot, run).max(initial=0.0) <= MENDED:
+        run = held_inside(path.robot, run)
+    return replace(run, collisions=tuple(checked(path.task.collision))), _refusal(path, run)
 
 
 def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: float) -> Trajectory:
@@ -120,23 +133,24 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
     Raises:
         PathError: no such timing was found.
     """
-    less, share = 1.0 - RESERVE, np.ones(robot.n)
+    less, share = 1.0 - RESERVE, np.ones((1, robot.n))
+    given = MotionLimits(
+        less * limits.velocity, less * limits.acceleration, less * limits.tool_speed
+    )
+    bounds = speed_bounds(robot, curve, given)
     for _ in range(ROUNDS):
-        given = MotionLimits(
-            less * limits.velocity, less * share * limits.acceleration, less * limits.tool_speed
-        )
-        timed = timed_curve(robot, curve, given)
+        timed = timed_curve(bounds, share)
         if timed.duration > MOST_SAMPLES * period:
             raise PathError(
                 f"the motion takes {timed.duration:,.0f} s, more than {MOST_SAMPLES:,} samples "
                 f"{period:g} s apart; give a higher speed, velocity or acceleration, or a longer "
                 "period"
             )
-        runs = [samples(robot, timed, part * period) for part in PARTS]
-        over = np.max([accelerations_used(run, limits) for run in runs], axis=0)
+        runs = [samples(robot, timed, part * period, with_tool=False) for part in PARTS]
+        over = _over(timed, runs, limits)
         if over.max() <= SLIGHTLY:
             break
-        share /= np.maximum(over, 1.0)
+        share = share / over
     slower = 1.0
     for attempt in range(2 * SLOWINGS):
         run = samples(robot, timed.slowed(slower), period)
@@ -148,6 +162,19 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
     raise PathError(
         "no timing was found that keeps to the limits between samples too; a shorter period helps"
     )
+
+
+def _over(timed: TimedCurve, runs: list[Trajectory], limits: MotionLimits) -> Array:
+    """(m - 1, n) largest share of each joint's acceleration in samples near a piece; 1 at least."""
+    worst = np.ones((len(timed.time) - 1, len(limits.acceleration)))
+    for run in runs:
+        share = accelerations_each(run, limits)
+        for k in np.flatnonzero(share.max(axis=1) > 1.0).tolist():
+            first = int(np.searchsorted(timed.time, run.time[max(k - 1, 0)]))
+            last = int(np.searchsorted(timed.time, run.time[min(k + 2, len(run) - 1)]))
+            near = worst[max(first - 1, 0) : last]
+            np.maximum(near, share[k], out=near)
+    return worst
 
 
 def timed_moves(
@@ -209,6 +236,10 @@ def _refusal(path: CoveragePath, run: Trajectory) -> str:
 
 def _collisions(robot: Robot, bodies: Bodies, run: Trajectory) -> str:
     """Which bodies come too near, as straight lines or interpolated; empty if all stay clear."""
+    # At once, as lines between samples that all of them are near, where that is clear enough.
+    away = np.maximum.reduce([strays_between(run, kind, run.q) for kind in KINDS])
+    if not _collision(robot, bodies, run.q, run.time, away):
+        return ""
     found = _collision(robot, bodies, run.walk.q, run.time)
     for kind in KINDS:
         walk = motion_between(run, kind, PLACES)

@@ -156,6 +156,15 @@ def closely(points: Array) -> Array:
     return points
 
 
+def largest(points: Array) -> Array:
+    """(n,) the largest of `closely`, which looks only at what may exceed the values at all ends."""
+    reached = points[[0, -1]].max(axis=(0, 1))
+    more = (points.max(axis=0) > reached).any(axis=1)
+    if not more.any():
+        return np.asarray(reached)
+    return np.maximum(reached, closely(points[:, more]).max(axis=(0, 1)))
+
+
 def values(points: Array, places: int) -> Array:
     """(m * places, n) values of the m polynomials at 0, 1/places, ... of each, in order."""
     degree = len(points) - 1
@@ -212,7 +221,7 @@ def used(robot: Robot, run: Trajectory, limits: MotionLimits) -> Used:
     for kind in KINDS:
         points = coefficients(run, kind)
         slopes = derivative(run, points)
-        velocity = np.maximum(velocity, np.abs(closely(slopes)).max(axis=(0, 1)))
+        velocity = np.maximum.reduce([velocity, largest(slopes), largest(-slopes)])
         tool = max(
             tool, _fastest(tool_slopes(robot, values(points, PLACES), values(slopes, PLACES)))
         )
@@ -225,8 +234,22 @@ def accelerations_used(run: Trajectory, limits: MotionLimits) -> Array:
     most = np.zeros(run.q.shape[1])
     for kind in KINDS:
         bends = derivative(run, derivative(run, coefficients(run, kind)))
-        most = np.maximum(most, np.abs(closely(bends)).max(axis=(0, 1)))
+        most = np.maximum.reduce([most, largest(bends), largest(-bends)])
     return np.asarray(most / limits.acceleration)
+
+
+def accelerations_each(run: Trajectory, limits: MotionLimits) -> Array:
+    """(k - 1, n) the same between any two samples; where it is at most 1 perhaps too large."""
+    most = np.zeros((len(run) - 1, run.q.shape[1]))
+    for kind in KINDS:
+        bends = derivative(run, derivative(run, coefficients(run, kind))) / limits.acceleration
+        share = np.abs(bends).max(axis=0)
+        over = np.flatnonzero(share.max(axis=1) > 1.0)
+        if len(over):
+            halves = np.abs(closely(bends[:, over])).max(axis=0)
+            share[over] = halves.reshape(-1, len(over), share.shape[1]).max(axis=0)
+        most = np.maximum(most, share)
+    return most
 
 
 def _fastest(speed: Array) -> float:
@@ -248,8 +271,8 @@ def past_limits(robot: Robot, run: Trajectory) -> Array:
     """
     past = np.full(robot.n, -np.inf)
     for kind in KINDS:
-        q = closely(coefficients(run, kind)) if len(run) > 1 else run.q[None]
-        past = np.maximum(past, np.maximum(robot.lower - q, q - robot.upper).max(axis=(0, 1)))
+        q = coefficients(run, kind) if len(run) > 1 else run.q[None]
+        past = np.maximum.reduce([past, largest(q) - robot.upper, largest(-q) + robot.lower])
     return past
 
 

@@ -9,7 +9,7 @@ one control point on either side of it. So
 
 How near the neighbours may be is found by replays: each turn begins as wide as its lines allow, and
 is made sharper until the independent replay accepts the curve from cell to cell. A turn at a cell's
-centre must leave the tool point within the tolerance of its target, which the replay checks.
+centre must leave the tool within tolerance and cone of its target, which is tried beforehand.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from feasibility.paths import PathError
 from feasibility.task import Task
 from feasibility.timing.between_samples import strays
 from feasibility.verdict import Walk
-from robots import Robot
+from robots import Kinematics, Robot
 from surfaces import Cells
 
 Array = NDArray[np.float64]
@@ -151,7 +151,7 @@ def blended(robot: Robot, cells: Cells, task: Task, walk: Walk) -> Curve:
 
 def _turned(robot: Robot, cells: Cells, task: Task, walk: Walk) -> tuple[Curve | None, int, str]:
     """The accepted curve along a motion; or None, the mark from which on it is refused, and why."""
-    shares = np.full(len(walk.q), WIDEST)
+    shares = _near_targets(robot, cells, task, walk)
     marks = np.flatnonzero(walk.cell >= 0)
     last = len(marks) - 1
     curve = control_points(walk, shares)
@@ -169,6 +169,26 @@ def _turned(robot: Robot, cells: Cells, task: Task, walk: Walk) -> tuple[Curve |
             refused = {k: why for found in again for k, why in found.items()}
         refused = _refused(robot, cells, task, curve, 0, last)
     return curve, -1, ""
+
+
+def _near_targets(robot: Robot, cells: Cells, task: Task, walk: Walk) -> Array:
+    """(m,) the widest shares with which the tool is right where the curve passes marked waypoints.
+
+    No replay would accept wider ones. How far off a waypoint the curve is depends on its own share.
+    """
+    shares, aims = np.full(len(walk.q), WIDEST), task.targets(cells)
+    points, approaches = aims.points[walk.cell], aims.approaches[walk.cell]
+    wide = np.flatnonzero(walk.cell >= 0)
+    while len(wide):
+        curve = control_points(walk, shares)
+        at = np.searchsorted(np.flatnonzero(walk.cell >= 0), wide)
+        q = inside(robot, curve.spline()(curve.marks[at].astype(float)))
+        tool, axes = Kinematics(robot).tools(q)
+        off = np.linalg.norm(tool - points[wide], axis=1) > task.effective_tolerance
+        tilted = np.linalg.norm(axes - approaches[wide], axis=1) > task.cone_chord
+        wide = wide[(off | tilted) & (shares[wide] >= SHARPEST)]
+        shares[wide] *= 0.5
+    return shares
 
 
 def _refused(

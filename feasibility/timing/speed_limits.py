@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import BSpline
 
-from feasibility.certification import placements, second_derivatives
+from feasibility.certification import second_derivatives
 from feasibility.paths import PathError
 from feasibility.read_only import ReadOnlyArrays
 from robots import Kinematics, Robot
@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 ACCELERATION_TIME = 0.5  # [s], in which a joint gets to its largest velocity, by default
 LOOSE = 0.02  # [1] share by which the bound on the tool's speed may be too careful
-FEWEST, FINEST = 2, 12  # places of the grid on one piece
+FEWEST, FINEST = 2, 64  # places of the grid on one piece
 # [rad/s], [m/s] or their acceleration: more is no limit, less does not move; both are refused.
 LEAST, MOST = 1e-6, 1e6
 
@@ -147,9 +147,13 @@ def _slopes(robot: Robot, spline: BSpline, grid: Array) -> tuple[Array, Array, A
     middle = slope[:-1] + 0.5 * h * bend[:-1]
     fastest = np.maximum(np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])), np.abs(middle))
     bent = np.maximum(np.abs(bend[:-1]), np.abs(bend[1:]))
-    levers = placements(robot, q).levers
+    points, _, twists = Kinematics(robot).tools_and_twists(q)
+    linear, angular = np.split(twists.transpose(0, 2, 1), 2, axis=2)
+    moved = linear + np.cross(angular, points[:, None])  # of the tool point, by each joint
+    levers = np.linalg.norm(moved, axis=2)
     swing = second_derivatives(fastest * h, robot.prismatic, levers, np.inf, bent * h**2)
-    return tool_slopes(robot, q, slope), fastest, swing / h[:, 0] ** 2
+    tool = np.linalg.norm(np.einsum("kji,kj->ki", moved, slope), axis=1)
+    return tool, fastest, swing / h[:, 0] ** 2
 
 
 def tool_slopes(robot: Robot, q: Array, slope: Array) -> Array:

@@ -63,29 +63,58 @@ class TimedCurve:
         return q, slope * rate, bend * rate**2 + slope * u[:, None]
 
 
-def timed_curve(robot: Robot, curve: Curve, limits: MotionLimits) -> TimedCurve:
-    """Time along a curve.
+@dataclass(frozen=True, eq=False, slots=True)
+class SpeedBounds:
+    """A curve with all that bounds its speeds but the limits of accelerations."""
+
+    curve: Curve
+    grid: Array
+    """(m,) places k of the curve."""
+    most: Array
+    """(m,) 1/s^2, upper bounds on (dk/dt)^2."""
+    first: Array
+    last: Array
+    """(m - 1, 3 n) what (dk/dt)^2 at both ends of a piece adds to accelerations in it."""
+    limits: MotionLimits
+
+
+def speed_bounds(robot: Robot, curve: Curve, limits: MotionLimits) -> SpeedBounds:
+    """All that is known of a curve's speeds before accelerations are limited."""
+    spline = curve.spline()
+    grid = fine_grid(robot, spline, curve.pieces)
+    most = squared_speeds(robot, spline, grid, limits)
+    return SpeedBounds(curve, grid, most, *acceleration_rows(spline, grid), limits)
+
+
+def timed_curve(bounds: SpeedBounds, share: Array | float = 1.0) -> TimedCurve:
+    """Time along a curve, with so much of each joint's acceleration, all of it by default.
+
+    Args:
+        bounds: the curve.
+        share: (m - 1, n) of each piece.
 
     Raises:
         PathError: the motion would have to stop in between.
     """
-    spline = curve.spline()
-    grid = fine_grid(robot, spline, curve.pieces)
-    most = squared_speeds(robot, spline, grid, limits)
-    first, last = acceleration_rows(spline, grid)
-    shares = np.tile(limits.acceleration, 3)
-    x = fastest_speeds(most, first / shares, last / shares)
-    over = acceleration_excess(spline, grid, x, limits.acceleration)
+    acceleration = np.atleast_2d(share * bounds.limits.acceleration)
+    limits, grid, most = bounds.limits, bounds.grid, bounds.most
+    all_three = np.tile(acceleration, (1, 3))
+    first, last = bounds.first / all_three, bounds.last / all_three
+    x = fastest_speeds(most, first, last)
+    over = np.abs(first * x[:-1, None] + last * x[1:, None])
     x = x / max(float(over.max()), float((x / most).max()), 1.0)
     rate = np.sqrt(x)
     time = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(grid) / (rate[:-1] + rate[1:]))])
     if not np.isfinite(time).all():
         raise PathError("no timing was found: the motion would have to stop in between")
-    return TimedCurve(curve, grid, x, time, limits)
+    return TimedCurve(bounds.curve, grid, x, time, limits)
 
 
-def samples(robot: Robot, timed: TimedCurve, period: float) -> Trajectory:
-    """A timed curve every `period` seconds, and where it passes the centres of cells."""
+def samples(robot: Robot, timed: TimedCurve, period: float, with_tool: bool = True) -> Trajectory:
+    """A timed curve every `period` seconds, and where it passes the centres of cells.
+
+    Without the tool its speeds are 0, which takes less time.
+    """
     curve = timed.curve
     # Whole nanoseconds, which is what a ROS message can hold.
     passages = np.round(timed.time[np.searchsorted(timed.grid, curve.marks.astype(float))], 9)
@@ -100,24 +129,8 @@ def samples(robot: Robot, timed: TimedCurve, period: float) -> Trajectory:
     q = inside(robot, q)
     return Trajectory(
         joint_names=robot.joint_names, time=time, q=q, dq=dq + 0.0, ddq=ddq + 0.0,
-        tool_speed=tool_slopes(robot, q, dq), cell=cell,
+        tool_speed=tool_slopes(robot, q, dq) if with_tool else np.zeros(len(q)), cell=cell,
     )  # fmt: skip
-
-
-def acceleration_excess(spline: BSpline, grid: Array, x: Array, most: Array) -> Array:
-    """(m - 1,) largest share of its limit that a joint's acceleration has on each piece."""
-    h = np.diff(grid)
-    u = 0.5 * np.diff(x) / h
-    slope, bend = spline.derivative(1), spline.derivative(2)
-    values = [
-        slope(grid[:-1] + part * h) * u[:, None]
-        + bend(grid[:-1] + part * h) * (x[:-1] + part * np.diff(x))[:, None]
-        for part in (0.0, 0.5, 1.0)
-    ]
-    # The last place of a piece is evaluated on the piece: second derivatives are continuous.
-    inner = 2.0 * values[1] - 0.5 * (values[0] + values[2])
-    shares = [(np.abs(value) / most).max(axis=1) for value in (values[0], inner, values[2])]
-    return np.asarray(np.max(shares, axis=0))
 
 
 def acceleration_rows(spline: BSpline, grid: Array) -> tuple[Array, Array]:

@@ -43,9 +43,8 @@ class Jacobians(NamedTuple):
 
 def jacobians(robot: Robot, q: Array) -> Jacobians:
     """Of configurations q (k, n)."""
-    kinematics = Kinematics(robot)
-    points, axes = kinematics.tools(q)
-    linear, angular = np.split(kinematics.twists(q), 2, axis=1)
+    points, axes, twists = Kinematics(robot).tools_and_twists(q)
+    linear, angular = np.split(twists, 2, axis=1)
     moved = linear + np.cross(angular, points[:, :, None], axis=1)
     return Jacobians(points, moved, np.cross(angular, axes[:, :, None], axis=1))
 
