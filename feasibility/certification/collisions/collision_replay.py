@@ -145,9 +145,9 @@ class _Asked:
         self.needed = pair.clearance + self.deviation
         """m, of what is known of them."""
         self.low = -np.inf
-        """m, certified by balls."""
+        """m, certified by balls and boxes."""
         self.pairing: Pairing | None = None
-        """Made where balls do not tell enough."""
+        """Made where these do not tell enough."""
 
     @property
     def distance(self) -> float:

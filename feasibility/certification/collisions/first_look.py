@@ -1,4 +1,4 @@
-"""How far couples of bodies stay apart by the balls around them, all couples at once.
+"""How far couples of bodies stay apart by the balls and boxes around them, all couples at once.
 
 Most bodies of an arm are far from each other all along a motion, and need no more than this.
 """
@@ -45,8 +45,9 @@ class FirstLook:
         # A half space, whose ball has no end, is at rest.
         finite = np.where(np.isfinite(balls), balls, 0.0)
         self._sways = motion.sways(self._joints, centres, finite)
-        self.low: Array = motion.ball_bounds(
-            self._sways, self._joints, centres, balls, self._couples
+        halves = np.array([body.piece.half for body in bodies])
+        self.low: Array = motion.outer_bounds(
+            self._sways, self._joints, centres, balls, halves, self._couples
         )
         """(k, m - 1) m, lower bounds of each couple's distance along each segment."""
 

@@ -53,6 +53,8 @@ class Piece:
         reach = np.linalg.norm(corners - self.centre, axis=1).max()
         self.ball = float(reach) + radius
         """m, radius of a ball about `centre` around the piece."""
+        self.half: Array = 0.5 * (high - low) + radius
+        """(3,) m, half the sides of a box around it, along the axes of the joint's frame."""
 
     @property
     def parts(self) -> tuple[Piece, ...]:
@@ -113,7 +115,7 @@ class Below(Piece):
     def __init__(self, placement: Array) -> None:
         """See `Piece`."""
         super().__init__(None, placement, placement[None, :3, 3], 0.0)
-        self.ball = np.inf
+        self.ball, self.half = np.inf, np.full(3, np.inf)
 
     @property
     def thin(self) -> Array:

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
-from feasibility.certification.collisions.balls import ball_bounds, chord_bounds
+from feasibility.certification.collisions.outer_kernels import chord_bounds, outer_bounds
 from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
@@ -147,15 +147,19 @@ class Motion:
         )  # fmt: skip
         return found
 
-    def ball_bounds(
-        self, sways: Sways, joints: Indices, centres: Array, balls: Array, couples: Indices
-    ) -> Array:
-        """(c, m - 1) m, how far balls, as in `sways`, of couples (c, 2) stay apart, at least."""
+    def outer_bounds(
+        self, sways: Sways, joints: Indices, centres: Array, balls: Array, halves: Array,
+        couples: Indices,
+    ) -> Array:  # fmt: skip
+        """(c, m - 1) m, how far couples (c, 2) of bodies stay apart, at least.
+
+        By their balls, as in `sways`, and boxes with half the sides `halves` (B, 3), m.
+        """
         frames, low = self._frames, np.empty((len(couples), len(self.q) - 1))
-        rotations, points = frames.rotations, frames.points
-        ball_bounds(
-            rotations, points, joints, centres, balls, couples, sways.delta, sways.stray, low
-        )
+        outer_bounds(
+            frames.rotations, frames.points, joints, centres, balls, halves, couples,
+            sways.delta, sways.stray, low,
+        )  # fmt: skip
         return low
 
     @cached_property

@@ -1,4 +1,6 @@
-"""What the judge asks of all bodies on all segments: how their balls move, and stay apart.
+"""What the judge asks of all bodies on all segments: how they move, and by what they stay apart.
+
+They are seen as balls and boxes here.
 
 A point on joint b, seen from joint a, is moved by the joints a + 1 .. b. With T_j the sum of the
 |d_i| of revolute joints i <= j, the sum in the bound of `relative_motion` is
@@ -14,6 +16,8 @@ from __future__ import annotations
 import numpy as np
 
 from coverable_kernels import njit
+
+FAR = 0.05  # [m] between balls, from which on boxes are not looked at
 
 kernel = njit(cache=True, error_model="numpy", _nrt=False)  # makes no arrays: nothing is counted
 
@@ -104,17 +108,66 @@ def chord_bounds(  # type: ignore[no-untyped-def]
 
 
 @kernel
-def ball_bounds(  # type: ignore[no-untyped-def]
-    rotations, points, joints, centres, balls, couples, delta, stray, low
+def reach(rotations, k, joint, body, halves, x, y, z):  # type: ignore[no-untyped-def]
+    """How far a body's box reaches from its centre along a direction of the root frame."""
+    turn = rotations[k, joint]
+    u = turn[0, 0] * x + turn[1, 0] * y + turn[2, 0] * z
+    v = turn[0, 1] * x + turn[1, 1] * y + turn[2, 1] * z
+    w = turn[0, 2] * x + turn[1, 2] * y + turn[2, 2] * z
+    return abs(u) * halves[body, 0] + abs(v) * halves[body, 1] + abs(w) * halves[body, 2]
+
+
+@kernel
+def box_gap(rotations, k, joints, a, b, halves, n, apart):  # type: ignore[no-untyped-def]
+    """How far a plane across n parts the boxes of two bodies at row k; inputs seen from the first.
+
+    `apart` is from the centre of the first to that of the second.
+    """
+    turn = rotations[k, joints[a]]
+    x = turn[0, 0] * n[0] + turn[0, 1] * n[1] + turn[0, 2] * n[2]
+    y = turn[1, 0] * n[0] + turn[1, 1] * n[1] + turn[1, 2] * n[2]
+    z = turn[2, 0] * n[0] + turn[2, 1] * n[1] + turn[2, 2] * n[2]
+    own = abs(n[0]) * halves[a, 0] + abs(n[1]) * halves[a, 1] + abs(n[2]) * halves[a, 2]
+    away = n[0] * apart[0] + n[1] * apart[1] + n[2] * apart[2]
+    return away - own - reach(rotations, k, joints[b], b, halves, x, y, z)
+
+
+@kernel
+def box_bound(rotations, k, joints, a, b, halves, before, now):  # type: ignore[no-untyped-def]
+    """How far boxes stay apart along chords up to row k, by two planes.
+
+    One is across the line between the centres, the other along that side of the first box from
+    which the second is furthest.
+    """
+    x, y, z = 0.5 * (before[0] + now[0]), 0.5 * (before[1] + now[1]), 0.5 * (before[2] + now[2])
+    best, length = -np.inf, np.sqrt(x * x + y * y + z * z)
+    u, v, w = abs(x) - halves[a, 0], abs(y) - halves[a, 1], abs(z) - halves[a, 2]
+    side = (np.sign(x), 0.0, 0.0)
+    if v > u and v >= w:
+        side = (0.0, np.sign(y), 0.0)
+    elif w > u:
+        side = (0.0, 0.0, np.sign(z))
+    for n in ((x / length, y / length, z / length), side):
+        start = box_gap(rotations, k - 1, joints, a, b, halves, n, before)
+        end = box_gap(rotations, k, joints, a, b, halves, n, now)
+        if min(start, end) > best:  # not so where nothing is known of n
+            best = min(start, end)
+    return best
+
+
+@kernel
+def outer_bounds(  # type: ignore[no-untyped-def]
+    rotations, points, joints, centres, balls, halves, couples, delta, stray, low
 ):  # fmt: skip
-    """How far the balls of couples stay apart, whose centres move along chords but for `delta`.
+    """How far couples stay apart by balls and boxes, whose centres keep to chords but for `delta`.
 
     Args:
         rotations: see `chord_bounds`, as are all but these:
         points: see there.
         joints: see there.
-        centres: see there.
+        centres: see there, of balls and boxes.
         balls: (B,) m, radii; infinite of what has no end.
+        halves: (B, 3) m, half the sides of boxes along the axes of the joint; the same.
         couples: (c, 2) two bodies, the one nearer to the root first.
         delta: see there.
         stray: see there.
@@ -122,18 +175,20 @@ def ball_bounds(  # type: ignore[no-untyped-def]
     """
     for c in range(couples.shape[0]):
         a, b = couples[c]
-        joint, radii = joints[a], balls[a] + balls[b]
-        x, y, z = 0.0, 0.0, 0.0
+        joint, radii, before = joints[a], balls[a] + balls[b], (0.0, 0.0, 0.0)
         for k in range(rotations.shape[0]):
             u, v, w = carried_point(rotations, points, k, joints[b], centres, b)
             u, v, w = seen_from(rotations, points, k, joint, u, v, w)
-            u, v, w = u - centres[a, 0], v - centres[a, 1], w - centres[a, 2]
+            now = (u - centres[a, 0], v - centres[a, 1], w - centres[a, 2])
             if k > 0:
-                r, s, t = u - x, v - y, w - z
+                x, y, z = before
+                r, s, t = now[0] - x, now[1] - y, now[2] - z
                 square = r * r + s * s + t * t
                 share = -(x * r + y * s + z * t) / square if square > 0.0 else 0.0
                 share = min(max(share, 0.0), 1.0)
                 x, y, z = x + share * r, y + share * s, z + share * t
-                away = np.sqrt(x * x + y * y + z * z)
-                low[c, k - 1] = away - radii - delta[joint, k - 1, b] - stray[joint, k - 1, b]
-            x, y, z = u, v, w
+                away = np.sqrt(x * x + y * y + z * z) - radii
+                if away < FAR:
+                    away = max(away, box_bound(rotations, k, joints, a, b, halves, before, now))
+                low[c, k - 1] = away - delta[joint, k - 1, b] - stray[joint, k - 1, b]
+            before = now
