@@ -14,7 +14,8 @@ does to bring the tool there, and whether it can, does not matter.
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -35,6 +36,7 @@ Array = NDArray[np.float64]
 
 MOST_BOXES = 4_000  # of one cell
 ALL_BOXES = 20_000  # of all cells of one search
+KEPT = 8  # problems whose balls are remembered: a search is often run again
 SURE = 1e-6  # [m] deeper than needed
 POSES = 12  # directions of tilt, and rolls, that a distance is measured in
 
@@ -73,6 +75,36 @@ class _Measured(NamedTuple):
     """(k, E) the same by rolling."""
 
 
+@lru_cache(maxsize=KEPT)
+def _held_by(robot: Robot, bodies: Bodies) -> tuple[_Held, ...]:
+    """Balls in what moves with the tool, against all that is at rest."""
+    tool_frame = robot.model.frames[robot.tool_frame_id]
+    carrier, tip = int(tool_frame.parentJoint), tool_frame.placement.translation
+    moved, still = dict[str, list[Array]](), dict[str, list[Distance]]()
+    for solid in bodies.solids:
+        place = solid.placement
+        if solid.joint == carrier:
+            balls = balls_inside(solid.geometry)
+            balls[:, :3] = balls[:, :3] @ place[:3, :3].T + place[:3, 3] - tip
+            moved.setdefault(solid.owner, []).append(balls)
+        elif solid.joint == 0:
+            still.setdefault(solid.owner, []).append(distance_from(solid.geometry, place))
+    for thing in bodies.scene:
+        still[thing.name] = [distance_from(thing.geometry, thing.placement)]
+    for soup in bodies.soups:
+        if soup.owner not in still:
+            sheet = distance_from_triangles(soup.triangles, soup.deviation)
+            still[soup.owner] = [sheet]
+    held: list[_Held] = []
+    for pair in bodies.pairs:
+        names = (pair.first, pair.second)
+        tool, rest = names if pair.first in moved else names[::-1]
+        if tool in moved and rest in still:
+            balls = np.concatenate(moved[tool])
+            held += [_Held(pair, d, balls[:, :3], balls[:, 3]) for d in still[rest]]
+    return tuple(held)
+
+
 class ToolAlone:
     """What the tool may hit by itself, of one problem.
 
@@ -88,39 +120,11 @@ class ToolAlone:
             cone: rad, largest angle between tool axis and approach direction.
             tolerance: m, of the tool point.
         """
-        self._tool, self._bodies = robot.model.frames[robot.tool_frame_id], bodies
-        self._axis: Array = self._tool.placement.rotation @ robot.approach_axis
+        self._robot, self._bodies = robot, bodies
+        tool = robot.model.frames[robot.tool_frame_id]
+        self._axis: Array = tool.placement.rotation @ robot.approach_axis
         self._cone, self._tolerance = min(cone, np.pi), tolerance
         self._left = ALL_BOXES
-
-    @cached_property
-    def _held(self) -> list[_Held]:
-        """Balls in what moves with the tool, against all that is at rest."""
-        bodies = self._bodies
-        carrier, tip = int(self._tool.parentJoint), self._tool.placement.translation
-        moved, still = dict[str, list[Array]](), dict[str, list[Distance]]()
-        for solid in bodies.solids:
-            place = solid.placement
-            if solid.joint == carrier:
-                balls = balls_inside(solid.geometry)
-                balls[:, :3] = balls[:, :3] @ place[:3, :3].T + place[:3, 3] - tip
-                moved.setdefault(solid.owner, []).append(balls)
-            elif solid.joint == 0:
-                still.setdefault(solid.owner, []).append(distance_from(solid.geometry, place))
-        for thing in bodies.scene:
-            still[thing.name] = [distance_from(thing.geometry, thing.placement)]
-        for soup in bodies.soups:
-            if soup.owner not in still:
-                sheet = distance_from_triangles(soup.triangles, soup.deviation)
-                still[soup.owner] = [sheet]
-        held: list[_Held] = []
-        for pair in bodies.pairs:
-            names = (pair.first, pair.second)
-            tool, rest = names if pair.first in moved else names[::-1]
-            if tool in moved and rest in still:
-                balls = np.concatenate(moved[tool])
-                held += [_Held(pair, d, balls[:, :3], balls[:, 3]) for d in still[rest]]
-        return held
 
     def blocking(self, point: Array, approach: Array) -> Blocking | None:
         """What keeps the tool from a target in every pose; None where that is not proved.
@@ -164,18 +168,21 @@ class ToolAlone:
 
     def _near(self, root: Array, point: Array, frame: _Frame) -> list[_Held]:
         """The balls that collide in some pose, as far as can be told from the whole box."""
-        found = self._measured(root, self._held, point, frame) if self._held else None
-        if found is None:
+        held = _held_by(self._robot, self._bodies)
+        if not held:
             return []
+        found = self._measured(root, held, point, frame)
         close = (found.spare - found.by_tilt - found.by_roll)[0] < 0.0
-        parts = np.split(close, np.cumsum([len(one.radii) for one in self._held])[:-1])
+        parts = np.split(close, np.cumsum([len(one.radii) for one in held])[:-1])
         return [
             one._replace(centres=one.centres[some], radii=one.radii[some])
-            for one, some in zip(self._held, parts, strict=True)
+            for one, some in zip(held, parts, strict=True)
             if some.any()
         ]
 
-    def _measured(self, boxes: Array, held: list[_Held], point: Array, frame: _Frame) -> _Measured:
+    def _measured(
+        self, boxes: Array, held: Sequence[_Held], point: Array, frame: _Frame
+    ) -> _Measured:
         """Distances at the middles of boxes (k, 5), and how far balls are moved within them."""
         turns = frame.rotations(boxes)
         spare, reach, aside = [], [], []
