@@ -2,9 +2,11 @@
 
 import pytest
 import test_checking
+import test_clustering
 import test_division
 import test_greedy_cases
 import test_mesh_verdicts
+import test_robot_visuals
 import test_segment_bound
 import test_set_cover
 
@@ -52,3 +54,13 @@ def test_greedy(name, moves):
 @pytest.mark.parametrize("name", test_mesh_verdicts.MORE)
 def test_meshes(name, tmp_path):
     test_mesh_verdicts.test_a_case_as_a_mesh_has_the_same_answer(name, tmp_path)
+
+
+@pytest.mark.parametrize("name", test_clustering.PATCHES)
+def test_many_cells(name):
+    test_clustering.test_cells_are_connected_even_and_complete(name, test_clustering.MANY)
+
+
+@pytest.mark.parametrize("name", test_robot_visuals.LARGE)
+def test_large_visuals(name):
+    test_robot_visuals.test_every_link_with_visuals_is_drawn_whole_and_within_its_own_shape(name)

@@ -141,7 +141,8 @@ def test_the_command_says_what_is_treated(capsys) -> None:
     said = " ".join(capsys.readouterr().out.split())
     assert "not shown to treat enough" in said
     assert "surface.cells=auto" in said
-    assert main(["check", "paper/4a", "--set", "task.footprint=9"]) == 0
+    few = ["--set", "surface.cells=[2, 2]"]
+    assert main(["check", "paper/4a", "--set", "task.footprint=9", *few]) == 0
     assert "larger than the whole surface" in " ".join(capsys.readouterr().out.split())
 
 
