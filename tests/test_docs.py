@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -207,6 +208,14 @@ def test_the_front_door_is_true() -> None:
         assert dir(package) == sorted(package.__all__)
         assert not {"Any", "TYPE_CHECKING"} & set(dir(package))
     assert "check" in dir(feasibility)
+
+
+def test_a_public_name_means_one_thing() -> None:
+    """Where two rooms hand on the same name, it is the same object."""
+    rooms = [import_module(room) for room in coverable._ROOMS]
+    for name in sorted(set(coverable.__all__) - set(coverable._RENAMED) - {"__version__"}):
+        found = [getattr(room, name) for room in rooms if name in room.__all__]
+        assert all(one is found[0] for one in found), name
 
 
 def test_a_wheel_works_outside_the_checkout(tmp_path: Path) -> None:

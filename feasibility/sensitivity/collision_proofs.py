@@ -5,6 +5,7 @@ from __future__ import annotations
 from feasibility.roadmap.joint_boxes import Blockers, blockers_of
 from feasibility.sensitivity.quantities import Quantity, Variant
 
+MOST_BOXES = 10_000  # of joint values, for all cases of one explanation
 Steps = tuple[Quantity, int]
 """A quantity, and how many steps from its value."""
 
@@ -15,6 +16,7 @@ class CollisionProofs:
     def __init__(self, given: Variant) -> None:
         """Prepare the case as given."""
         self._given = given
+        self._left = MOST_BOXES
         self._asked: tuple[tuple[str, int], Blockers | None] | None = None
 
     def at(self, steps: Steps | None) -> Blockers | None:
@@ -25,5 +27,7 @@ class CollisionProofs:
         if self._asked is None or self._asked[0] != key:
             variant = self._given if steps is None else steps[0].applied(self._given, steps[1])
             robot, cells, task = variant
-            self._asked = key, blockers_of(robot, cells.surface, task)
+            if self._asked is not None and self._asked[1] is not None:
+                self._left = self._asked[1].left
+            self._asked = key, blockers_of(robot, cells.surface, task, self._left)
         return self._asked[1]

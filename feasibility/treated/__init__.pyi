@@ -3,7 +3,7 @@ from .area import treated_by_passes as treated_by_passes
 from .area import treated_by_walk as treated_by_walk
 from .decision import Decision as Decision
 from .decision import with_coverage as with_coverage
-from .regions import Region as Region
+from .regions import UntreatedRegion as UntreatedRegion
 from .words import region_words as region_words
 from .words import share_words as share_words
 from .words import treated_json as treated_json

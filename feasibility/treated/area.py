@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.treated.feet import Feet, feet_along, feet_on
-from feasibility.treated.regions import Region, untreated_regions
+from feasibility.treated.regions import UntreatedRegion, untreated_regions
 from feasibility.verdict import Walk
 from robots import Robot
 from surfaces import Cells, Surface
@@ -47,7 +47,7 @@ class TreatedArea(ReadOnlyArrays):
     """[1] and at most this."""
     twice: float
     """[1] share that the tool comes by more than once, about."""
-    untreated: tuple[Region, ...]
+    untreated: tuple[UntreatedRegion, ...]
     """What is left out for certain, the largest region first."""
     mesh: WorkingMesh
     """The surface as it was measured, for pictures."""

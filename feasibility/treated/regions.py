@@ -16,7 +16,7 @@ OPEN = 0.5  # [1] a face of which at least this share is untreated for certain b
 LEAST = 1e-6  # [1] of the whole area: smaller regions are not listed
 
 
-class Region(NamedTuple):
+class UntreatedRegion(NamedTuple):
     """A connected part of the surface that the tool does not treat."""
 
     centre: Floats
@@ -25,7 +25,7 @@ class Region(NamedTuple):
     """m^2."""
 
 
-def untreated_regions(found: Treated) -> tuple[Region, ...]:
+def untreated_regions(found: Treated) -> tuple[UntreatedRegion, ...]:
     """The regions that are untreated for certain, the largest first."""
     mesh = found.mesh
     faces = np.flatnonzero(found.most <= 1.0 - OPEN)
@@ -43,6 +43,6 @@ def untreated_regions(found: Treated) -> tuple[Region, ...]:
         own = part == number
         mean = np.average(middles[own], axis=0, weights=areas[own])
         nearest = np.linalg.norm(middles[own] - mean, axis=1).argmin()
-        regions.append(Region(middles[own][nearest], float(areas[own].sum())))
+        regions.append(UntreatedRegion(middles[own][nearest], float(areas[own].sum())))
     listed = (each for each in regions if each.area >= LEAST * found.area)
     return tuple(sorted(listed, key=lambda each: -each.area))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from feasibility.treated.area import TreatedArea
-from feasibility.treated.regions import Region
+from feasibility.treated.regions import UntreatedRegion
 
 LISTED = 3  # regions that are named
 
@@ -37,7 +37,7 @@ def treated_json(found: TreatedArea | None) -> dict[str, Any] | None:
     }
 
 
-def region_words(region: Region) -> str:
+def region_words(region: UntreatedRegion) -> str:
     """Where a region is, and how large."""
     x, y, z = (1e3 * region.centre).tolist()
     area = 1e6 * region.area

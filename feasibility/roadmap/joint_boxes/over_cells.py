@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from feasibility.collisions import gather
 from feasibility.roadmap.branch_and_bound import root_box
-from feasibility.roadmap.joint_boxes.prover import ArmBlocked, JointBoxes
+from feasibility.roadmap.joint_boxes.prover import ALL_BOXES, ArmBlocked, JointBoxes
 from feasibility.roadmap.motions import PROJECTION_STEPS, SearchArrays, Work, project_near_cell
 from feasibility.roadmap.tool_alone import Blocking, ToolAlone
 from feasibility.task import Task
@@ -31,6 +31,11 @@ class Blockers:
         """What keeps the tool from a cell in every pose; None where that is not proved."""
         self.arm: dict[int, ArmBlocked | None] = {}
         """What keeps the whole arm from it."""
+
+    @property
+    def left(self) -> int:
+        """Boxes of joint values that may still be looked at."""
+        return max(self._arm.left, 0)
 
     def over(
         self,
@@ -73,10 +78,17 @@ class Blockers:
         return self._arm.blocking(target, low, high, tick)
 
 
-def blockers_of(robot: Robot, surface: Surface, task: Task) -> Blockers | None:
-    """What may keep an arm from cells of a surface; None where collisions are not checked."""
+def blockers_of(
+    robot: Robot, surface: Surface, task: Task, boxes: int = ALL_BOXES
+) -> Blockers | None:
+    """What may keep an arm from cells of a surface; None where collisions are not checked.
+
+    Args:
+        robot, surface, task: the problem.
+        boxes: of joint values that may be looked at for all its cells.
+    """
     bodies = gather(robot, surface, task.collision, task.standoff)
     if bodies is None:
         return None
     alone = ToolAlone(robot, bodies, task.cone, task.effective_tolerance)
-    return Blockers(alone, JointBoxes(robot, bodies, task))
+    return Blockers(alone, JointBoxes(robot, bodies, task, boxes))

@@ -46,17 +46,18 @@ class ArmBlocked(NamedTuple):
 class JointBoxes:
     """What keeps the whole arm from targets, of one problem."""
 
-    def __init__(self, robot: Robot, bodies: Bodies, task: Task) -> None:
+    def __init__(self, robot: Robot, bodies: Bodies, task: Task, boxes: int = ALL_BOXES) -> None:
         """Ask nothing yet.
 
         Args:
             robot: the arm.
             bodies: everything that can collide, and the pairs that are asked for.
             task: its tolerance, cone and roll are used.
+            boxes: that may be looked at for all targets.
         """
         self._robot, self._bodies, self._task = robot, bodies, task
         self._way: InTheWay | None = None
-        self.left = ALL_BOXES
+        self.left = boxes
 
     @property
     def way(self) -> InTheWay:

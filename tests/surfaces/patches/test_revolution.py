@@ -107,7 +107,7 @@ def test_closest_recovers_parameters_height_and_normal(shape):
 
 def test_no_point_of_the_whole_turn_is_nearer_than_the_foot(shape):
     rng = np.random.default_rng(3)
-    points = shape.position + rng.normal(scale=0.5, size=(25, 3))
+    points = shape.position + rng.normal(scale=0.5, size=(12, 3))
     closest_point = shape.closest(points)
     placed = shape.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
