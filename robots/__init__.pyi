@@ -4,6 +4,7 @@ from .chain import frames as frames
 from .chain import jacobians as jacobians
 from .chain import joint_alignments as joint_alignments
 from .errors import RobotError as RobotError
+from .inverse_kinematics import configuration_near as configuration_near
 from .kinematics import Kinematics as Kinematics
 from .library import GROUPS as GROUPS
 from .library import RobotInfo as RobotInfo

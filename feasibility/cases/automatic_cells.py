@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, Literal
 
 import numpy as np
 
@@ -61,3 +61,18 @@ def _check(count: int, footprint: Footprint, most: int) -> None:
         )
         wanted = "give their number yourself, or a larger footprint"
         raise CaseError([Fault("surface.cells", what, expected=wanted)])
+
+
+def grid_of(
+    patch: Patch, cells: tuple[int, int] | Literal["auto"], footprint: Footprint | None
+) -> tuple[int, int]:
+    """Cells along u and v of a patch, as given or fine enough for a footprint (m).
+
+    Raises:
+        CaseError: they are to be fine enough for a footprint, and there is none.
+    """
+    if cells != AUTO:
+        return cells
+    if footprint is None:
+        raise CaseError([Fault("surface.cells", f"is {AUTO!r}, without a footprint")])
+    return automatic_grid(patch, footprint)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from robots import Kinematics, Robot
+from robots import Kinematics, Robot, configuration_near
 
 Floats = NDArray[np.float64]
 
@@ -32,26 +32,11 @@ def lift(robot: Robot, q: Floats) -> Floats | None:
     point, axis = kinematics.tool(q)
     rows, here = [], q
     for k in range(1, STEPS + 1):
-        reached = _near(kinematics, here, point - k * LIFT / STEPS * axis, axis)
+        reached = configuration_near(
+            kinematics, here, point - k * LIFT / STEPS * axis, axis, NEWTON, CLOSE
+        )
         if reached is None:
             return None
         rows.append(reached)
         here = reached
     return np.array(rows)
-
-
-def _near(kinematics: Kinematics, q: Floats, point: Floats, axis: Floats) -> Floats | None:
-    """The configuration near q (n,) with the tool point and its axis there; None if none is found.
-
-    Newton's method, the shortest step each time, clipped to the limits.
-    """
-    robot = kinematics.robot
-    for _ in range(NEWTON):
-        at, along = kinematics.tool(q)
-        missed = np.concatenate([point - at, axis - along])
-        if np.abs(missed).max() < CLOSE:
-            return q
-        rows = np.concatenate(kinematics.jacobians(q))
-        step = np.linalg.lstsq(rows, missed, rcond=1e-6)[0]
-        q = np.clip(q + step, robot.lower, robot.upper)
-    return None

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification import placements, second_derivatives
 from feasibility.paths import PathError
-from robots import Kinematics, Robot
+from robots import Kinematics, Robot, configuration_near
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +54,9 @@ def _rows(robot: Robot, q: Floats, way: Floats, count: int) -> tuple[Floats, str
     point, axis = kinematics.tool(q)
     rows = [q]
     for k in range(1, count + 1):
-        reached = _landed(kinematics, rows[-1], point + k / count * way, axis)
+        reached = configuration_near(
+            kinematics, rows[-1], point + k / count * way, axis, NEWTON, CLOSE
+        )
         if reached is None:
             done = f"{1e3 * np.linalg.norm(way) * (k - 1) / count:.3g} mm"
             return np.array(rows), _in_the_way(robot, rows[-1], done)
@@ -69,20 +71,3 @@ def _in_the_way(robot: Robot, q: Floats, done: str) -> str:
     if margin[joint] < 1e-6:
         return f"after {done} {robot.joint_names[joint]} is at its limit"
     return f"after {done} the arm cannot follow, being stretched out or folded up"
-
-
-def _landed(kinematics: Kinematics, q: Floats, point: Floats, axis: Floats) -> Floats | None:
-    """The configuration near q (n,) with tool point and axis there; None where none is found.
-
-    Newton's method with the shortest steps, clipped to the limits.
-    """
-    robot = kinematics.robot
-    for _ in range(NEWTON):
-        at, along = kinematics.tool(q)
-        missed = np.concatenate([point - at, axis - along])
-        if np.abs(missed).max() < CLOSE:
-            return q
-        rows = np.concatenate(kinematics.jacobians(q))
-        step = np.linalg.lstsq(rows, missed, rcond=1e-6)[0]
-        q = np.clip(q + step, robot.lower, robot.upper)
-    return None

@@ -8,17 +8,14 @@ is never shown on another arm or surface than the ones it was found for.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, CoverableError, shown, worded
 from feasibility.cases import CLOSED_FORM_KINDS, Case, CaseError, Setup
-from feasibility.collisions import LeftOut
 from feasibility.results.archive import Archive, ArchiveError, Fields, write_archive
 from feasibility.results.proof_arrays import pack_proof, unpack_proof
 from feasibility.results.result_arrays import (
@@ -32,14 +29,19 @@ from feasibility.results.result_arrays import (
     unpack_graph,
     unpack_ragged,
 )
+from feasibility.results.result_rows import (
+    cause_row,
+    plain,
+    read_causes,
+    read_certificate,
+    read_left_out,
+    read_names,
+)
 from feasibility.safe_files import FileError
 from feasibility.task import Task
 from feasibility.treated import treated_by_walk
 from feasibility.verdict import (
     Answer,
-    Cause,
-    CauseKind,
-    Certificate,
     Evidence,
     Verdict,
     Walk,
@@ -99,7 +101,7 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
         "method": verdict.method,
         "seed": int(verdict.seed),
         "start": None if verdict.start is None else int(verdict.start),
-        "causes": [_cause_row(cause) for cause in verdict.causes],
+        "causes": [cause_row(cause) for cause in verdict.causes],
         "certificate": None if verdict.certificate is None else plain(asdict(verdict.certificate)),
         "unchecked_links": list(verdict.unchecked_links),
         "pairs_left_out": [plain(asdict(pair)) for pair in verdict.pairs_left_out],
@@ -132,18 +134,6 @@ def save_result(verdict: Verdict, case: Case, path: str | os.PathLike[str]) -> P
     return Path(path)
 
 
-def _cause_row(cause: Cause) -> dict[str, Any]:
-    """Why a cell is missed, as JSON holds it."""
-    return {
-        "cell": int(cause.cell),
-        "kind": str(cause.kind),
-        "proved": bool(cause.proved),
-        "detail": cause.detail,
-        "pair": plain(cause.pair),
-        "clearance": plain(cause.clearance),
-    }
-
-
 def load_result(path: str | os.PathLike[str]) -> Result:
     """Read a result file; nothing in it is trusted.
 
@@ -173,23 +163,6 @@ def load_result(path: str | os.PathLike[str]) -> Result:
     except ArchiveError as error:
         raise ResultError(str(error)) from error
     return Result(case, verdict, written)
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON can hold it; what is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    return str(value)
 
 
 def _format(fields: Fields) -> int:
@@ -238,7 +211,7 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         graph=graph,
         n_edges=graph.number_of_edges(),
         covered=covered,
-        causes=_causes(fields, count),
+        causes=read_causes(fields, count),
         components=components,
         postures=_postures(fields, archive, len(components), n),
         tree=unpack_graph(archive, "tree", count, n, tree=True)
@@ -246,10 +219,10 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         else None,
         start=start,
         witness=witness,
-        certificate=_certificate(fields),
+        certificate=read_certificate(fields),
         proof=proof,
-        unchecked_links=_names(fields, "unchecked_links"),
-        pairs_left_out=_left_out(fields),
+        unchecked_links=read_names(fields, "unchecked_links"),
+        pairs_left_out=read_left_out(fields),
         treated=None
         if witness is None
         else deferred(lambda: treated_by_walk(robot, cells, task, witness)),
@@ -273,80 +246,3 @@ def _task(fields: Fields) -> Task:
     except ArgumentError as error:
         text = "; ".join(worded(fault.renamed({}, "task")) for fault in error.faults)
         raise fields.archive.error(f"meta.json: {text}") from error
-
-
-def _causes(fields: Fields, count: int) -> tuple[Cause, ...]:
-    """Why cells are missed."""
-    causes = []
-    for k, entry in enumerate(fields.get("causes", list, "an array")):
-        if not isinstance(entry, dict):
-            raise fields.archive.error(f"meta.json: causes[{k}] is {shown(entry)}, not an object")
-        row = Fields(fields.archive, entry, f"causes[{k}].")
-        cell, kind = row.cell("cell", count), row.member("kind", CauseKind)
-        proved, detail = row.flag("proved"), row.text("detail")
-        causes.append(
-            Cause(cell, kind, proved, detail, _pair(row, "pair"), _maybe(row, "clearance"))
-        )
-    return tuple(causes)
-
-
-def _certificate(fields: Fields) -> Certificate | None:
-    """The certificate; an infinite margin was written as null."""
-    if fields.entries.get("certificate") is None:
-        return None
-    row = fields.table("certificate")
-    margin = row.entries.get("min_limit_margin")
-    return Certificate(
-        waypoints=row.get("waypoints", int, "a whole number"),
-        max_position_error=row.number("max_position_error"),
-        max_angle=row.number("max_angle"),
-        min_limit_margin=np.inf if margin is None else row.number("min_limit_margin"),
-        min_clearance=_maybe(row, "min_clearance"),
-        nearest_pair=_pair(row, "nearest_pair"),
-        max_roll=_maybe(row, "max_roll"),
-        max_speed=_maybe(row, "max_speed"),
-        min_singular_value=_maybe(row, "min_singular_value"),
-        stops_in_place=_count(row, "stops_in_place"),
-        corners=_count(row, "corners"),
-    )
-
-
-def _maybe(row: Fields, key: str) -> float | None:
-    """A number that may be missing or null; files of earlier versions say nothing of collisions."""
-    return None if row.entries.get(key) is None else row.number(key)
-
-
-def _count(row: Fields, key: str) -> int | None:
-    """A whole number that may be missing or null."""
-    return None if row.entries.get(key) is None else row.get(key, int, "a whole number")
-
-
-def _names(row: Fields, key: str) -> tuple[str, ...]:
-    """Names of bodies that may be missing or null."""
-    if row.entries.get(key) is None:
-        return ()
-    names = row.get(key, list, "an array of names")
-    if not all(isinstance(name, str) for name in names):
-        raise row.archive.error(f"meta.json: {row.path}{key} is {shown(names)}, not names")
-    return tuple(names)
-
-
-def _pair(row: Fields, key: str) -> tuple[str, str] | None:
-    """Two names of bodies, or None."""
-    names = _names(row, key)
-    if len(names) not in (0, 2):
-        raise row.archive.error(f"meta.json: {row.path}{key} is {shown(names)}, not two names")
-    return (names[0], names[1]) if names else None
-
-
-def _left_out(fields: Fields) -> tuple[LeftOut, ...]:
-    """The pairs that were not asked for."""
-    found = []
-    given = fields.entries.get("pairs_left_out")
-    for k, entry in enumerate(() if given is None else fields.get("pairs_left_out", list, "rows")):
-        if not isinstance(entry, dict):
-            raise fields.archive.error(f"meta.json: pairs_left_out[{k}] is not an object")
-        row = Fields(fields.archive, entry, f"pairs_left_out[{k}].")
-        first, second, why = (row.text(key) for key in ("first", "second", "why"))
-        found.append(LeftOut(first, second, why, _maybe(row, "rate")))
-    return tuple(found)

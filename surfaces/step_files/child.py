@@ -247,15 +247,6 @@ def answer(job: dict[str, Any], data: bytes) -> bytes:
     return json.dumps(said).encode() + b"\n" + vertices.tobytes() + corners.tobytes()
 
 
-def _limit(kind: int, most: int) -> None:
-    hard = resource.getrlimit(kind)[1]
-    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-    try:
-        resource.setrlimit(kind, (most, hard))
-    except (ValueError, OSError):  # macOS does not limit memory
-        return
-
-
 def _load_all() -> None:
     """Import what reading takes, as long as files can be opened."""
     import numpy  # noqa: F401
@@ -282,15 +273,11 @@ def main() -> None:
     """Do the job on the standard input."""
     job = json.loads(sys.stdin.buffer.readline())
     data = sys.stdin.buffer.read()
-    _limit(resource.RLIMIT_CORE, 0)
-    _limit(resource.RLIMIT_AS, job["memory"])
-    _limit(resource.RLIMIT_CPU, job["seconds"])
-    _limit(resource.RLIMIT_FSIZE, job["bytes"])
     sys.path[:0] = job["library"]
     _load_all()
     written = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # Open CASCADE writes to the standard output what it thinks of a file
-    _limit(resource.RLIMIT_NOFILE, 0)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
     try:
         said = answer(job, data)
     except Refused as error:

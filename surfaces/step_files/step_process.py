@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_files import FileFault, read_regular
-from coverable_processes import run_apart
+from coverable_processes import Limits, folder_of, run_apart
 from surfaces.surface import SurfaceError
 
 EXTRA = "needs the extra: pip install 'coverable[step]'"
@@ -68,11 +67,12 @@ def read_step(path: str | os.PathLike[str], job: Mapping[str, Any], caps: Caps =
         SurfaceError: the extra is missing; the file is none, or cannot be read within the caps.
     """
     data = _checked(path, caps)
-    library = [_folder_of("OCP"), _folder_of("numpy")]
-    most = MOST_FACES * LINE + 36 * caps.triangles
-    limits = {"memory": caps.memory, "seconds": caps.seconds, "bytes": most}
-    line = json.dumps({"library": library, **job, **limits}).encode() + b"\n"
-    ended = run_apart(CHILD, line + data, caps.waiting, most)
+    library = [folder_of("OCP"), folder_of("numpy")]
+    if None in library:
+        raise SurfaceError(EXTRA)
+    limits = Limits(caps.memory, caps.seconds, MOST_FACES * LINE + 36 * caps.triangles)
+    line = json.dumps({"library": library, **job}).encode() + b"\n"
+    ended = run_apart(CHILD, line + data, caps.waiting, limits)
     less = "export fewer faces, or ask for a larger deviation"
     if ended.too_late:
         raise SurfaceError(f"is not read after {caps.waiting:g} s; {less}")
@@ -142,15 +142,3 @@ def _taken(written: bytes, caps: Caps) -> Read:
         np.frombuffer(arrays[24 * vertices :], "<i4").reshape(-1, 3).astype(np.int64),
         float(said.get("deviation", 0.0)),
     )
-
-
-def _folder_of(package: str) -> str:
-    """The folder that a package is imported from.
-
-    Raises:
-        SurfaceError: it is not installed.
-    """
-    spec = find_spec(package)
-    if spec is None or spec.origin is None:  # a folder of that name has no origin
-        raise SurfaceError(EXTRA)
-    return str(Path(spec.origin).parent.parent)

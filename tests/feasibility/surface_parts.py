@@ -7,7 +7,8 @@ import os
 from hypothesis import strategies as st
 
 from feasibility.cases.surface_keys import OWN_KEYS
-from feasibility.cases.surface_table import PiecePart, SurfacePart
+from feasibility.cases.surface_pieces import PiecePart
+from feasibility.cases.surface_table import SurfacePart
 
 lengths = st.floats(0.01, 100)
 triples = st.tuples(*[st.floats(-1e6, 1e6)] * 3)

@@ -15,7 +15,6 @@ import ast
 import json
 import os
 import re
-import resource
 import stat
 import sys
 from collections.abc import Mapping
@@ -223,22 +222,9 @@ def place() -> str:
     return ", ".join(words)
 
 
-def _limit(kind: int, most: int) -> None:
-    hard = resource.getrlimit(kind)[1]
-    most = most if hard == resource.RLIM_INFINITY else min(most, hard)
-    try:
-        resource.setrlimit(kind, (most, hard))
-    except (ValueError, OSError):  # macOS does not limit memory
-        return
-
-
 def main() -> None:
     """Do the job on the standard input."""
     job = json.load(sys.stdin)
-    _limit(resource.RLIMIT_CORE, 0)
-    _limit(resource.RLIMIT_AS, job["memory"])
-    _limit(resource.RLIMIT_CPU, job["seconds"])
-    _limit(resource.RLIMIT_FSIZE, job["bytes"] + 2**16)
     sys.path[:0] = job["library"]
     try:
         text = expand(job)

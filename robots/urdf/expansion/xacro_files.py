@@ -10,12 +10,11 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from coverable_errors import Fault
-from coverable_processes import run_apart
+from coverable_processes import Limits, folder_of, run_apart
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import MAX_BYTES, UrdfError, read_bytes
 
@@ -65,7 +64,9 @@ def expanded(
         UrdfError: the extra is missing; the file cannot be read, or expanded within the caps.
     """
     read_bytes(path)
-    library = [_folder_of(package, path) for package in ("xacro", "yaml")]
+    library = [folder_of(package) for package in ("xacro", "yaml")]
+    if None in library:
+        raise UrdfError(EXTRA, path)
     path = os.path.abspath(path)
     base = os.path.dirname(path)
     mesh_folders = MeshFolders(base, [os.path.abspath(folder) for folder in package_dirs])
@@ -77,7 +78,7 @@ def expanded(
         "packages": [str(folder) for folder in (*mesh_folders.packages, base)],
         "roots": [str(folder) for folder in roots],
         "args": {name: _text(value) for name, value in args.items()},
-        **caps._asdict(),
+        "bytes": caps.bytes,
     }
     kind, _, answer = _run(job, path, caps).partition(b"\n")
     if kind == b"urdf":
@@ -96,7 +97,8 @@ def _run(job: Mapping[str, Any], path: str, caps: Caps) -> bytes:
     Raises:
         UrdfError: it took too long.
     """
-    ended = run_apart(CHILD, json.dumps(job).encode(), caps.waiting, 2 * caps.bytes)
+    limits = Limits(caps.memory, caps.seconds, caps.bytes + 2**16)
+    ended = run_apart(CHILD, json.dumps(job).encode(), caps.waiting, limits)
     if ended.too_late:
         raise UrdfError(f"is not expanded after {caps.waiting:g} s", path)
     if ended.too_slow:
@@ -106,18 +108,6 @@ def _run(job: Mapping[str, Any], path: str, caps: Caps) -> bytes:
             path,
         )
     return ended.written
-
-
-def _folder_of(package: str, path: str) -> str:
-    """The folder that a package is imported from.
-
-    Raises:
-        UrdfError: it is not installed.
-    """
-    spec = find_spec(package)
-    if spec is None or spec.origin is None:  # a folder of that name has no origin
-        raise UrdfError(EXTRA, path)
-    return str(Path(spec.origin).parent.parent)
 
 
 def _text(value: Any) -> str:

@@ -27,7 +27,7 @@ from feasibility.cases import (
 from feasibility.cases.case import CaseError
 from feasibility.cases.mesh_keys import MOST_MESH_CELLS
 from feasibility.cases.surface_keys import PATCHES
-from feasibility.cases.surface_table import MOST_PIECES
+from feasibility.cases.surface_pieces import MOST_PIECES
 from feasibility.results import load_result, save_result
 from feasibility.results.result_file import ResultError
 from surfaces import (

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from coverable_processes import Ended, run_apart
+from coverable_processes import Ended, Limits, folder_of, run_apart
 from feasibility.cases import Case, CaseError
 from surfaces import SurfaceError, step, step_faces
 from surfaces.step_files import step_process, step_surface
@@ -190,10 +190,7 @@ def test_caps_hold(folder, caps, words):
 
 def test_processor_time_has_a_cap(folder, monkeypatch, tmp_path):
     endless = tmp_path / "endless.py"
-    endless.write_text(
-        "import json, resource, sys\njob = json.loads(sys.stdin.buffer.readline())\n"
-        "resource.setrlimit(resource.RLIMIT_CPU, (job['seconds'],) * 2)\nwhile True: pass\n"
-    )
+    endless.write_text("while True: pass\n")
     monkeypatch.setattr(step_process, "CHILD", endless)
     with pytest.raises(SurfaceError, match="takes more than 1 s of processor time"):
         step_surface.step_triangles(folder / "part.step", [1], caps=Caps(seconds=1))
@@ -241,7 +238,7 @@ def test_triangles_of_no_vertices_are_refused(folder, monkeypatch, corners, word
 
 
 def test_the_message_names_the_extra(folder, monkeypatch):
-    monkeypatch.setattr(step_process, "find_spec", lambda name: None)
+    monkeypatch.setattr(step_process, "folder_of", lambda name: None)
     with pytest.raises(SurfaceError, match=r"pip install 'coverable\[step\]'"):
         step_faces(folder / "part.step")
 
@@ -257,9 +254,9 @@ def test_the_process_opens_nothing_once_it_sees_the_file(tmp_path):
     assert tries != text
     script = tmp_path / "tries.py"
     script.write_text(tries)
-    library = [step_process._folder_of("OCP"), step_process._folder_of("numpy")]
-    job = {"library": library, "memory": CAPS.memory, "seconds": 60, "bytes": 1000}
-    ended = run_apart(script, json.dumps(job).encode() + b"\n", 300.0, 1000)
+    job = {"library": [folder_of("OCP"), folder_of("numpy")]}
+    limits = Limits(CAPS.memory, 60, 1000)
+    ended = run_apart(script, json.dumps(job).encode() + b"\n", 300.0, limits)
     assert ended.written == b"24"  # too many open files
 
 

@@ -143,7 +143,7 @@ def test_what_is_wrong_after_expansion_has_the_line_of_the_expanded_text(tmp_pat
 
 
 def test_without_the_extra_it_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(xacro_files, "find_spec", lambda package: None)
+    monkeypatch.setattr(xacro_files, "folder_of", lambda package: None)
     with pytest.raises(UrdfError, match=r"arm\.urdf\.xacro: needs the extra: pip install 'cov"):
         check_urdf(Path(one_file(tmp_path, "")).rename(tmp_path / "arm.urdf.xacro"))
     with pytest.raises(UrdfError, match="there is no such file"):
