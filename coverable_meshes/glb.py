@@ -18,7 +18,6 @@ from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from coverable_meshes.errors import MeshError
 from coverable_meshes.raw_mesh import Floats, RawMesh, joined, no_triangles, refuse_large
@@ -263,6 +262,8 @@ def _matrix(node: Json, where: str) -> Floats:
         raise MeshError(f"{where} has a 'rotation' that is no unit quaternion")
     matrix = np.eye(4)
     if "rotation" in node:
+        from scipy.spatial.transform import Rotation
+
         matrix[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
     matrix[:3, :3] *= np.array(node.get("scale", [1.0] * 3), float)
     matrix[:3, 3] = node.get("translation", [0.0] * 3)

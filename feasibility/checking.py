@@ -83,8 +83,6 @@ def check(
         >>> verdict.feasible, verdict.n_covered
         (True, 9)
     """
-    from feasibility.paper import greedy_search
-    from feasibility.roadmap import complete_search
     from feasibility.speed import check_asked
 
     search = Search() if search is None else search
@@ -96,8 +94,12 @@ def check(
     if search.method == "greedy":
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
+        from feasibility.paper import greedy_search
+
         from_start = partial(greedy_search, start=robot.start)
         return _measured(_decided(problem, search, progress, from_start, clock), clock)
+    from feasibility.roadmap import complete_search
+
     clock = Clock(search.time_limit, progress) if clock is None else clock
     found = _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
     return _measured(_at_rates(found, clock), clock)
@@ -105,6 +107,8 @@ def check(
 
 def _at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The verdict at the speed, and as far from singularities, as the task asks."""
+    if verdict.task.speed is None and verdict.task.min_manipulability is None:
+        return verdict
     from feasibility.speed import at_rates
 
     began = time.monotonic()

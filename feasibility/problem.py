@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from feasibility.collisions import Bodies, Pair, gather
+from feasibility.collisions import gather
 from feasibility.targets import check_references
 from feasibility.task import Task, check_footprint
 from robots import Robot
 from surfaces import Cells, Surface
+
+if TYPE_CHECKING:
+    from feasibility.collisions import Bodies, Pair
 
 NARROWER = 0.9  # [1] of tolerance, cone and roll, when the replay refuses what just kept to them
 

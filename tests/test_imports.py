@@ -326,6 +326,7 @@ def test_the_certificate_shares_nothing_with_the_search() -> None:
     feasibility = {name for name in ours if name.startswith("feasibility.")}
     words = {f"feasibility.{word}" for word in ("cone", "cut_tree", "roll", "task", "verdict")}
     values = (
+        "asked_bodies",
         "bodies",
         "gathering",
         "outer_bodies",

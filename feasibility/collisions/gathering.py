@@ -33,32 +33,9 @@ KEPT = 16  # problems whose bodies are remembered: `explain` and `place` come ba
 FURTHEST = 1e4  # [m] that an arm on a rail without end is taken to get
 
 
-def gather(
-    robot: Robot, surface: Surface, collision: Collision | None, standoff: float
-) -> Bodies | None:
-    """All bodies and pairs of one problem; None where collisions are not checked.
-
-    Args:
-        robot: the arm.
-        surface: what it works on.
-        collision: what is asked for.
-        standoff: m; where it is 0 the tool touches the surface, and that pair is left out.
-
-    Raises:
-        RobotError: no link has a shape, or the SRDF is not of this arm.
-        ArgumentError: a pair names something that is not there; all such names are given.
-        SurfaceError: no bounds on the surface are known.
-    """
-    if collision is not None and collision.surface and surface.wall is None:
-        collision = collision.without_surface
-    if collision is None or not collision.checked:
-        return None
-    return _gathered(robot, surface, collision, float(standoff))
-
-
 @lru_cache(maxsize=KEPT)
-def _gathered(robot: Robot, surface: Surface, collision: Collision, standoff: float) -> Bodies:
-    """`gather`, remembered: its arguments are values that nobody changes."""
+def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: float) -> Bodies:
+    """What `gather` says, remembered: its arguments are values that nobody changes."""
     faults = collision.unknown_names(robot.link_names)
     if faults:
         raise ArgumentError([fault.renamed({}, "collision") for fault in faults])

@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,7 +40,6 @@ from feasibility.results.result_rows import (
 )
 from feasibility.safe_files import FileError
 from feasibility.task import Task
-from feasibility.treated import treated_by_walk
 from feasibility.verdict import (
     Answer,
     Evidence,
@@ -48,6 +48,11 @@ from feasibility.verdict import (
     deferred,
 )
 from feasibility.version import version
+
+if TYPE_CHECKING:
+    from feasibility.treated import TreatedArea
+    from robots import Robot
+    from surfaces import Cells
 
 FORMAT = "coverable-result"
 TASK = ("standoff", "cone_deg", "tolerance")  # what is stored of it; the rest is the case's
@@ -225,7 +230,7 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
         pairs_left_out=read_left_out(fields),
         treated=None
         if witness is None
-        else deferred(lambda: treated_by_walk(robot, cells, task, witness)),
+        else deferred(lambda: _treated(robot, cells, task, witness)),
         timing={key: timing.number(key) for key in timing.entries},
         statistics=dict(fields.table("statistics").entries),
     )
@@ -246,3 +251,10 @@ def _task(fields: Fields) -> Task:
     except ArgumentError as error:
         text = "; ".join(worded(fault.renamed({}, "task")) for fault in error.faults)
         raise fields.archive.error(f"meta.json: {text}") from error
+
+
+def _treated(robot: Robot, cells: Cells, task: Task, witness: Walk) -> TreatedArea | None:
+    """What the motion treats; what measures it is imported only then."""
+    from feasibility.treated import treated_by_walk
+
+    return treated_by_walk(robot, cells, task, witness)

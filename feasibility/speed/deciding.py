@@ -13,15 +13,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import ArgumentError, Fault
 from feasibility.certification import replay
-from feasibility.certification.rates import RateReplay, check_rates, replay_rates
+from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
-from feasibility.search import Search
 from feasibility.speed.largest import begin_of, largest_speed
 from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
 from feasibility.speed.routes import covered, route
-from feasibility.task import Task
 from feasibility.verdict import (
     Answer,
     Cause,
@@ -32,52 +29,10 @@ from feasibility.verdict import (
     Walk,
     deferred,
 )
-from robots import Robot
 
 FEW = 5  # cells that are named
 TOO_SLOW = "covered, but not as fast or as far from singularities as asked"
 """A key of the statistics of such a verdict."""
-
-
-def check_asked(robot: Robot, task: Task, search: Search) -> None:
-    """Refuse what cannot be asked of speed and singularities.
-
-    Raises:
-        ArgumentError: joints without velocity limits, a speed beyond all of them, or the greedy
-            search.
-    """
-    _check_home(robot, task)
-    if task.speed is None and task.min_manipulability is None:
-        return
-    if search.method != "complete":
-        what = "needs the complete search: the greedy one has no motion over the cells' centres"
-        raise ArgumentError(Fault("speed" if task.speed else "min_manipulability", what), "task")
-    check_rates(robot, task)
-
-
-def _check_home(robot: Robot, task: Task) -> None:
-    """Refuse a home that is no configuration of the arm.
-
-    Raises:
-        ArgumentError: it has another number of joints, one that slides, or one past its limits.
-    """
-    if task.home_deg is None:
-        return
-    what, names = "", ", ".join(robot.joint_names)
-    home = np.radians(task.home_deg)
-    if len(home) != robot.n:
-        what = f"has {len(home)} values; expected one for each of {names}"
-    elif robot.prismatic.any():
-        what = f"gives degrees, but {robot.joint_names[int(np.argmax(robot.prismatic))]} slides"
-    elif not ((home >= robot.lower) & (home <= robot.upper)).all():
-        past = int(np.argmax(np.maximum(robot.lower - home, home - robot.upper)))
-        limits = np.degrees([robot.lower[past], robot.upper[past]])
-        what = (
-            f"puts {robot.joint_names[past]} at {task.home_deg[past]:g} deg, outside its limits "
-            f"{limits[0]:.4g} to {limits[1]:.4g} deg"
-        )
-    if what:
-        raise ArgumentError(Fault("home_deg", what), "task")
 
 
 def at_rates(verdict: Verdict, clock: Clock) -> Verdict:

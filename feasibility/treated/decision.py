@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from feasibility.task import Task
-from feasibility.treated.area import TreatedArea
 from feasibility.treated.words import share_words
 from feasibility.verdict import Answer, Evidence
+
+if TYPE_CHECKING:
+    from feasibility.treated.area import TreatedArea
 
 NOT_MEASURED = "No motion along which the treated area could be measured is known."
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from feasibility.treated.area import TreatedArea
-from feasibility.treated.regions import UntreatedRegion
+if TYPE_CHECKING:
+    from feasibility.treated.area import TreatedArea
+    from feasibility.treated.regions import UntreatedRegion
+
 
 LISTED = 3  # regions that are named
 

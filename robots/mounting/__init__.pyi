@@ -1,6 +1,7 @@
 from .between_links import seen_from as seen_from
 from .directions import made_orthogonal as made_orthogonal
 from .directions import unit_axis as unit_axis
+from .fixed_axes import about_fixed_axes as about_fixed_axes
 from .poses import FURTHEST_BASE as FURTHEST_BASE
 from .poses import FURTHEST_TCP as FURTHEST_TCP
 from .poses import checked_pose as checked_pose

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import Checks, Fault, shown
+from robots.mounting.fixed_axes import about_fixed_axes
 
 FURTHEST_TCP = 10.0  # [m] from tool_frame: no tool is longer, but many are given in millimetres
 FURTHEST_BASE = 1e4  # [m] from the origin of the world
@@ -52,7 +53,7 @@ def matrix_of(
     expected = "must be three finite numbers (degrees)"
     angles = checks.numbers(f"{before}rpy_deg", rpy_deg, 3, expected)
     matrix = np.eye(4)
-    matrix[:3, :3] = _rotation(*map(math.radians, angles or (0.0, 0.0, 0.0)))
+    matrix[:3, :3] = about_fixed_axes(*map(math.radians, angles or (0.0, 0.0, 0.0)))
     matrix[:3, 3] = place or (0.0, 0.0, 0.0)
     return matrix
 
@@ -85,10 +86,3 @@ def rigid_matrix(checks: Checks, key: str, value: Any, furthest: float, other: s
             return matrix
     checks.keep(Fault(key, f"got {shown(matrix.tolist())}", expected=expected))
     return np.eye(4)
-
-
-def _rotation(roll: float, pitch: float, yaw: float) -> Matrix:
-    """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from radians: URDF's fixed-axis roll, pitch, yaw."""
-    from scipy.spatial.transform import Rotation
-
-    return Rotation.from_euler("xyz", (roll, pitch, yaw)).as_matrix()

@@ -8,11 +8,11 @@ links and joints and nothing else of the file.
 
 from __future__ import annotations
 
+import html
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -202,17 +202,25 @@ def _check(
     )
 
 
+def _quoted(name: str) -> str:
+    """A name as the value of an attribute; xml.sax.saxutils would import a web client for it."""
+    escaped = html.escape(name, quote=False).replace('"', "&quot;")
+    for character in "\n\r\t":
+        escaped = escaped.replace(character, f"&#{ord(character)};")
+    return f'"{escaped}"'
+
+
 def _written(title: str, links: tuple[str, ...], joints: tuple[JointInfo, ...]) -> str:
     """Write the tree as URDF; repr keeps every digit of a number."""
-    lines = [f"<robot name={quoteattr(title)}>"]
-    lines += [f"  <link name={quoteattr(link)}/>" for link in links]
+    lines = [f"<robot name={_quoted(title)}>"]
+    lines += [f"  <link name={_quoted(link)}/>" for link in links]
     for joint in joints:
         poses = (joint.xyz, joint.rpy, joint.axis)
         xyz, rpy, axis = (" ".join(map(repr, values)) for values in poses)
         lines += [
-            f'  <joint name={quoteattr(joint.name)} type="{joint.kind}">',
-            f"    <parent link={quoteattr(joint.parent)}/>",
-            f"    <child link={quoteattr(joint.child)}/>",
+            f'  <joint name={_quoted(joint.name)} type="{joint.kind}">',
+            f"    <parent link={_quoted(joint.parent)}/>",
+            f"    <child link={_quoted(joint.child)}/>",
             f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
         ]
         if joint.moves:

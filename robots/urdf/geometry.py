@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from robots.mounting import about_fixed_axes
 from robots.urdf.mesh_folders import MeshFolders
 from robots.urdf.xml import BadValue, Node, Triple, numbers, shown, triple
 
@@ -76,8 +77,6 @@ def read_shape(node: Node, folders: MeshFolders) -> tuple[NDArray[np.float64], G
     Raises:
         BadValue: "what :: why", where there is no shape that can be used.
     """
-    from scipy.spatial.transform import Rotation
-
     shapes = [shape for holder in node.all("geometry") for shape in holder.children]
     if len(shapes) != 1:
         raise BadValue(f"a <{node.tag}> :: must hold one <geometry> with one shape")
@@ -89,7 +88,7 @@ def read_shape(node: Node, folders: MeshFolders) -> tuple[NDArray[np.float64], G
     except KeyError as missing:
         raise BadValue(f"a <{shapes[0].tag}> :: has no {missing.args[0]}") from None
     origin = np.eye(4)
-    origin[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()  # about fixed axes
+    origin[:3, :3] = about_fixed_axes(*rpy)
     origin[:3, 3] = xyz
     origin.flags.writeable = False
     return origin, geometry

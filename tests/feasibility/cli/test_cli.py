@@ -423,6 +423,27 @@ def test_help_loads_no_heavy_library(args):
         assert f"'{library}'" not in loaded
 
 
+def test_a_plain_check_loads_only_what_it_needs():
+    program = "import sys; from feasibility.cli.main import main; status = main(sys.argv[1:])\n"
+    program += "print(*sys.modules, file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", program, "check", "paper/4a"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    loaded = set(done.stderr.split())
+    assert {"numba", "pinocchio", "feasibility.roadmap.complete"} <= loaded
+    late = {
+        "networkx",
+        "scipy.spatial",
+        "scipy.optimize",
+        "trimesh",
+        "matplotlib",
+        "urllib.request",
+    }
+    late |= {"feasibility.collisions.gathering", "feasibility.paper.greedy", "surfaces.passes"}
+    assert not late & loaded
+
+
 def test_help_and_version_answer_on_stdout(ask):
     status, out, err = ask("--help")
     assert (status, err) == (0, "")
