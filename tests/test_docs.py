@@ -89,14 +89,14 @@ def test_commands_of_the_readme_run(
             arguments += ["--html", "shown.html"]
         if arguments[0] == "live":
             arguments += ["--no-browser"]
-        # Fewer cells and placements, and no processes but for the study, to save time.
+        # Fewer cells and placements, and no processes, to save time.
         if arguments[0] in ("path", "compare", "explain"):
             arguments += ["--set", "surface.cells=[3, 4]"]
         if arguments[:2] == ["place", "case.toml"]:
             arguments += ["--set", "surface.cells=[2, 2]"]
         if arguments[0] == "place":
             arguments += ["--count", "4"]
-        if arguments[0] in ("place", "compare"):
+        if arguments[0] in ("place", "compare", "study"):
             arguments += ["--workers", "0"]
         expected = 1 if arguments[1:2] == ["paper/4d"] else 0
         assert main(arguments) == expected, arguments
