@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Hashable
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +25,7 @@ DEVIATION = 2e-4  # [m]
 MOST_TRIANGLES = 32_768
 MOST_LAYERS = 64
 COARSER = 1.2  # by which the deviation grows where there would be too many triangles
+KEPT = 8  # surfaces whose triangles are remembered: one that is moved has the same
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -33,10 +37,20 @@ class Sheet(Protected):
     further than `deviation` from all of them does not touch the surface.
     """
 
-    triangles: NDArray[np.float64]
-    """(k, 3, 3) m, the corners of each triangle."""
+    own: NDArray[np.float64]
+    """(k, 3, 3) m, the corners of each triangle in the surface's own frame, the same wherever it
+    stands."""
+    rotation: NDArray[np.float64]
+    """(3, 3) of that frame in the root frame."""
+    position: NDArray[np.float64]
+    """(3,) m"""
     deviation: float
     """m, no point of the surface is further than this from a triangle."""
+
+    @property
+    def triangles(self) -> NDArray[np.float64]:
+        """(k, 3, 3) m, the corners of each triangle."""
+        return np.asarray(self.own @ self.rotation.T + self.position)
 
 
 def sheet_of(
@@ -86,27 +100,54 @@ def sheet_of(
         steps = min(steps, max(1, most // len(surface.mesh.faces) - 1)) if depth else 0
         triangles, normals, off = _of_mesh(surface)
     else:
-        triangles, normals, off = _of_tiles(surface, wanted, depth, most // (steps + 1))
+        triangles, normals, off = _of_tiles(_Shape(surface), wanted, depth, most // (steps + 1))
     away = -surface.side_sign * normals
     layers = [triangles + t * away for t in np.linspace(0.0, depth, steps + 1)]
     between = depth / (2.0 * steps) if steps else 0.0
-    return Sheet(np.concatenate(layers), off + between)
+    return Sheet(np.concatenate(layers), surface.rotation, surface.position, off + between)
+
+
+class _Shape:
+    """A surface at home, where its own frame is the root frame; equal to others of its shape."""
+
+    def __init__(self, surface: Surface) -> None:
+        """Take it home."""
+        self.surface = replace(surface, rotation=np.eye(3), position=np.zeros(3))
+        named = (field.name for field in fields(surface) if field.init)
+        kept = [name for name in named if name not in ("rotation", "position")]
+        self.known = (type(surface), *(_plain(getattr(surface, name)) for name in kept))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all is the same but for the place."""
+        return isinstance(other, _Shape) and self.known == other.known
+
+    def __hash__(self) -> int:
+        """Of all that is compared."""
+        return hash(self.known)
+
+
+def _plain(value: Any) -> Hashable:
+    """A value that can be compared: arrays by their bytes, objects of ours by who they are."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return (value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value
 
 
 def _of_mesh(surface: MeshSurface) -> tuple[Array, Array, float]:
     """The triangles of a mesh, their outward normals at each corner, and no deviation."""
     mesh = surface.mesh
-    corners = mesh.vertices[mesh.faces] @ surface.rotation.T + surface.position
-    normals = mesh.face_normals @ surface.rotation.T
-    return corners, np.repeat(normals[:, None], 3, axis=1), 0.0
+    normals = np.repeat(mesh.face_normals[:, None], 3, axis=1)
+    return mesh.vertices[mesh.faces], normals, 0.0
 
 
+@lru_cache(maxsize=KEPT)
 def _of_tiles(
-    surface: Surface, deviation: float, depth: float, most: int
+    shape: _Shape, deviation: float, depth: float, most: int
 ) -> tuple[Array, Array, float]:
     """The triangles of a smooth surface, the normals at their corners by the models, and
     r_f + T r_n.
     """
+    surface = shape.surface
     found = tiles_of(surface, deviation, depth, most // 2)
     if found is None:
         raise SurfaceError(

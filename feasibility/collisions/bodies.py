@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.collisions.scene import Obstacle
 from robots.shapes import Polytope, Solid
+
+if TYPE_CHECKING:
+    from surfaces import Sheet
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -24,6 +27,8 @@ class Soup:
     """m, how far the body may stand out from its triangles; every clearance is larger by it."""
     closed: bool
     """True where they bound a solid, which has an inside."""
+    sheet: Sheet | None = None
+    """Where they are a surface's: the same triangles in its own frame, wherever it stands."""
 
 
 class Seat(NamedTuple):

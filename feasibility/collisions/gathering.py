@@ -46,7 +46,7 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
     if collision.surface and surface.wall is not None:
         sheet = sheet_of(surface.wall, thickness=collision.thickness)
-        soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False))
+        soups.append(Soup(SURFACE, sheet.triangles, sheet.deviation, False, sheet))
     seats = seats_of(robot, collision.scene)
     reach = _reach(robot, polytopes, seats, soups)
     for obstacle in (seat.obstacle for seat in seats if not seat.joint):

@@ -108,6 +108,29 @@ def test_a_rigid_motion_moves_the_sheet_along(kind):
     assert moved.deviation == pytest.approx(still.deviation, abs=1e-9)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_wherever_a_surface_stands_its_own_triangles_are_the_same(kind):
+    surface = random_surface(kind, np.random.default_rng([8, *map(ord, kind)]))
+    turn, shift = Rotation.from_euler("xyz", [0.3, -1.0, 2.0]).as_matrix(), [0.4, -1.0, 2.0]
+    here, there = (
+        sheet_of(each, 1e-2, 600, 1e-3) for each in (surface, surface.moved(turn, shift))
+    )
+    assert np.array_equal(here.own, there.own)
+    assert here.deviation == there.deviation
+    carried = here.triangles @ turn.T + shift
+    assert np.allclose(carried, there.triangles, atol=1e-12)
+
+
+def test_surfaces_of_other_shapes_have_triangles_of_their_own():
+    shapes = [
+        plane((0, 1), (0, 1)), plane((0, 1), (0, 2)), plane((0, 1), (0, 1), side="outside"),
+        sphere(1.0, (10, 90), (0, 90)), sphere(1.1, (10, 90), (0, 90)),
+    ]  # fmt: skip
+    sheets = [sheet_of(shape, 1e-2, 600, 1e-3).triangles for shape in shapes]
+    for k, one in enumerate(sheets):
+        assert not any(np.array_equal(one, other) for other in sheets[:k])
+
+
 def test_a_mesh_gives_its_own_triangles():
     surface = random_surface("mesh", np.random.default_rng(5))
     sheet = sheet_of(surface)

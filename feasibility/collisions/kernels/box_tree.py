@@ -70,6 +70,27 @@ def box_tree(triangles: Array) -> BoxTree:
     return BoxTree(nodes, cloud[np.arange(8) < counts[:, None]])
 
 
+def moved(tree: BoxTree, rotation: Array, position: Array) -> BoxTree:
+    """The tree of the same triangles after x -> rotation x + position, which costs no sorting.
+
+    Args:
+        tree: of the triangles where they were.
+        rotation: (3, 3)
+        position: (3,) m
+    """
+    if np.array_equal(rotation, np.eye(3)) and not position.any():
+        return tree
+    nodes, corners = tree.nodes.copy(), tree.corners @ rotation.T + position
+    boxes = nodes[:, MIDDLE:]
+    boxes[:, :3] = boxes[:, :3] @ rotation.T + position
+    boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3, 3) @ rotation.T).reshape(-1, 9)
+    boxes[:, 12:] += OUTWARD * np.abs(corners).max()
+    inner = nodes[:, LEFT] >= 0
+    rows = nodes[inner, FIRST].astype(np.int64)[:, None] + np.arange(8)
+    corners[rows] = _corners(boxes[inner])
+    return BoxTree(nodes, corners)
+
+
 def _runs(starts: Whole, sizes: Whole) -> Whole:
     """All places of consecutive runs, one after the other."""
     ends = np.cumsum(sizes)

@@ -6,8 +6,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from feasibility.collisions import Bodies
-from feasibility.collisions.kernels.box_tree import BoxTree, box_tree
+from feasibility.collisions import Bodies, Soup
+from feasibility.collisions.kernels.box_tree import BoxTree, box_tree, moved
 from feasibility.collisions.kernels.tables import (
     DIRECTION,
     FIRST,
@@ -174,11 +174,19 @@ def _tree(triangles: bytes) -> BoxTree:
     return box_tree(np.frombuffer(triangles).reshape(-1, 3, 3))
 
 
+def _tree_of(soup: Soup) -> BoxTree:
+    """The tree of triangles; where a surface is moved, that of its own frame moves with it."""
+    if soup.sheet is None:
+        return _tree(soup.triangles.tobytes())
+    tree = _tree(soup.sheet.own.tobytes())
+    return moved(tree, soup.sheet.rotation, soup.sheet.position)
+
+
 def _trees(bodies: Bodies, above: int) -> tuple[list[int], Array, Array]:
     """The root of each soup's tree, all nodes, and all corners (their rows begin at `above`)."""
     roots, nodes, corners = [], [np.empty((0, NODE_COLUMNS))], [np.empty((0, 3))]
     for soup in bodies.soups:
-        tree = _tree(soup.triangles.tobytes())
+        tree = _tree_of(soup)
         root = sum(map(len, nodes))
         shifted = tree.nodes.copy()
         shifted[:, [1, 2]] += above + sum(map(len, corners))
