@@ -15,9 +15,11 @@ The numbers that come out are the same.
 from __future__ import annotations
 
 import functools
+import hashlib
 import inspect
 from typing import Any
 
+from llvmlite import binding as llvm
 from llvmlite import ir
 from numba import njit
 from numba.core import cgutils, datamodel, event, types, typing
@@ -36,7 +38,8 @@ class Shared(types.Type):
     def __init__(self, whole: Any) -> None:
         """The type of that named tuple."""
         self.whole = whole
-        super().__init__(f"shared({whole})")
+        fields = hashlib.sha256(repr((whole, whole.fields)).encode()).hexdigest()[:12]
+        super().__init__(f"{whole.instance_class.__name__}-{fields}")  # in the names of all kernels
 
     @property
     def key(self) -> Any:
@@ -195,6 +198,16 @@ def compiled_for_python(function: Any, options: dict[str, Any]) -> Any:
     functools.update_wrapper(compiled, function)
     compiled.py_func, compiled.targetoptions = function, whole.targetoptions
     return compiled
+
+
+def without_bitcode(library: Any) -> None:
+    """Let a finished library be kept as machine code alone: no kernel is linked with it.
+
+    With it, numba would keep LLVM's code, and parse that each time for the names of functions.
+    """
+    names = (f.name for f in library._final_module.functions if not f.is_declaration)
+    text = "".join(f'define void @"{name}"() {{ ret void }}\n' for name in names)
+    library._shared_module = llvm.parse_assembly(text)
 
 
 def _only_calling(function: Any, called: Any) -> Any:

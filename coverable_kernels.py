@@ -4,8 +4,8 @@ numba keeps what it has compiled until the file of that function changes. What a
 the constants that it reads, are compiled into it, whichever files they stand in: with another
 version of those, a kernel that was kept would run on with the old ones, and give wrong results
 without a word. So a kept kernel holds only where its stamp does: the code of its function, every
-value that this code names, and the same again of every function among those. Types of arguments
-are in numba's own key of each kernel, but for the names of their fields, which are added.
+value that this code names, and the same again of every function among those. The stamp is in the
+name of its file (`coverable_kernel_files.py`), with the types of its arguments.
 
 Take `njit` and `cfunc` from here, not from numba.
 """
@@ -13,6 +13,7 @@ Take `njit` and `cfunc` from here, not from numba.
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Callable, Iterator
 from enum import Enum
 from functools import cache
@@ -21,11 +22,13 @@ from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
-from numba.core import caching, types
+from numba.core import compiler, types
 from numba.core.ccallback import CFunc
+from numba.core.serialize import dumps
 
 import coverable_inner_kernels
-from coverable_inner_kernels import compiled_for_python
+from coverable_inner_kernels import compiled_for_python, without_bitcode
+from coverable_kernel_files import Kernel, Processor, keep, load
 
 __all__ = ["cfunc", "njit"]
 
@@ -67,44 +70,53 @@ def cfunc(signature: Any, **options: Any) -> Callable[[Function], Any]:
     return decorate
 
 
-class KeptKernels(caching.FunctionCache):
-    """What was compiled of one function, on disk."""
+class KeptKernels:
+    """What was compiled of one function, on disk, in the form in which numba asks for it."""
 
     def __init__(self, function: Function, options: dict[str, Any]) -> None:
         """Nothing is read yet."""
-        super().__init__(function)
-        self._options = options
-        self._cache_file = _Files(self._cache_path, self._impl.filename_base, "")
+        self._function, self._options = function, options
+        self._source = Path(inspect.getfile(function))
+        self.cache_path = str(self._source.parent)
 
-    def _index_key(self, signature: Any, codegen: Any) -> tuple[Any, ...]:
-        """numba's key, with the names of fields.
+    def kernel(self, signature: Any, codegen: Any) -> Kernel:
+        """Of the function as it is, for some types of arguments.
 
-        numba asks for it before it looks for a kernel, and before it keeps one: by then all that
-        the function calls is there, which it need not be where the function is made.
+        numba asks before it looks for a kernel, and before it keeps one: by then all that the
+        function calls is there, which it need not be where the function is made.
         """
-        self._cache_file._source_stamp = stamp(self._py_func, self._options)
         arguments = getattr(signature, "args", signature)
-        key: tuple[Any, ...] = super()._index_key(signature, codegen)
-        return (*key, tuple(map(_layout, arguments)))
+        return Kernel(
+            f"{self._function.__module__}.{self._function.__qualname__}",
+            stamp(self._function, self._options),
+            repr([str(signature), *map(_layout, arguments)]),
+            Processor(*codegen.magic_tuple()),
+        )
 
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """The compiled function; None where it has to be compiled."""
+        target.refresh()  # by which numba itself prepares to load one
+        parts = load(self.kernel(signature, target.codegen()), self._source)
+        return None if parts is None else compiler.CompileResult._rebuild(target, *parts)
 
-class _Files(caching.IndexDataCacheFile):
-    """The files of what was compiled of one function."""
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep it, where that is possible."""
+        if not compiled.library.has_dynamic_globals:  # such as addresses
+            without_bitcode(compiled.library)
+            content = dumps(compiled._reduce())
+            keep(self.kernel(signature, compiled.codegen), self._source, content)
 
-    def _load_index(self) -> dict[Any, str]:
-        """What is kept; nothing where its list names a class that has moved."""
-        try:
-            found: dict[Any, str] = super()._load_index()
-        except (ImportError, AttributeError):
-            return {}
-        return found
+    def flush(self) -> None:
+        """numba would compile anew what has been compiled; names of files see to that here."""
 
 
 def _layout(kind: Any) -> tuple[Any, ...]:
-    """Names of the fields of all named tuples in a type of numba's, in their order."""
+    """Class and names of the fields of all named tuples in a type of numba's, in their order."""
     has_parts, has_fields = (isinstance(kind, t) for t in (types.BaseTuple, types.BaseNamedTuple))
     inside = tuple(map(_layout, kind.types)) if has_parts else ()
-    return (kind.fields, *inside) if has_fields else inside
+    if not has_fields:
+        return inside
+    return kind.instance_class.__module__, kind.instance_class.__qualname__, kind.fields, *inside
 
 
 def stamp(function: Function, options: dict[str, Any]) -> str:

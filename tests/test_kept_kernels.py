@@ -11,9 +11,9 @@ import sys
 import types
 from collections import namedtuple
 from pathlib import Path
-from typing import Any
 
 import numba
+import numpy as np
 import pytest
 from numba.core.registry import cpu_target
 
@@ -147,14 +147,14 @@ def test_every_kernel_of_ours_has_a_stamp() -> None:
     assert seen > 100
 
 
-def key_of(value: object) -> tuple[Any, ...]:
-    """The key under which a kernel of such an argument is kept, but for the argument's type."""
+def key_of(*values: object) -> str:
+    """What the name of a kept kernel says of its arguments."""
 
-    def function(pair: object) -> object:
-        return pair
+    def function(*pairs: object) -> object:
+        return pairs
 
     codegen = cpu_target.target_context.codegen()
-    return KeptKernels(function, {})._index_key((numba.typeof(value),), codegen)[1:]
+    return KeptKernels(function, {}).kernel(tuple(map(numba.typeof, values)), codegen).types
 
 
 def test_names_of_fields_are_part_of_the_key() -> None:
@@ -162,20 +162,34 @@ def test_names_of_fields_are_part_of_the_key() -> None:
     one, same, other = (namedtuple("Pair", names)(1.0, 2.0) for names in ("a b", "a b", "b a"))
     assert key_of(one) == key_of(same) != key_of(other)
     assert key_of((1, (one, 2.0))) == key_of((1, (same, 2.0))) != key_of((1, (other, 2.0)))
+    elsewhere = type(one)._make((1.0, 2.0))
+    type(one).__module__ = "elsewhere"
+    assert key_of(elsewhere) != key_of(same)
+
+
+def test_kinds_of_arrays_are_part_of_the_key() -> None:
+    given = np.zeros((2, 2)), np.zeros(2), np.zeros((2, 2), order="F"), np.zeros((2, 2), np.int64)
+    fixed = np.zeros((2, 2))
+    fixed.flags.writeable = False
+    keys = {key_of(array) for array in (*given, fixed)} | {
+        key_of(given[0], 1),
+        key_of(given[0], 1.0),
+    }
+    assert len(keys) == 7
 
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     """A checkout of kernels that call each other."""
-    for name in ("coverable_kernels.py", "coverable_inner_kernels.py"):
-        shutil.copy(ROOT / name, tmp_path)
+    for path in ROOT.glob("coverable_*kernel*.py"):
+        shutil.copy(path, tmp_path)
     for name, text in (("robots/inner.py", INNER), ("robots/outer.py", OUTER)):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     return tmp_path
 
 
-def result(checkout: Path) -> tuple[float, bool]:
+def result(checkout: Path, **more: str) -> tuple[float, bool]:
     """What a new process gets from kernel and C function, and whether both came from disk."""
     code = (
         "from robots.outer import called, outer;"
@@ -185,8 +199,8 @@ def result(checkout: Path) -> tuple[float, bool]:
     environment = {**os.environ, "PYTHONPATH": str(checkout), "PYTHONDONTWRITEBYTECODE": "1"}
     environment.pop("NUMBA_CACHE_DIR", None)
     done = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True,
-        cwd=checkout,
+        [sys.executable, "-c", code], env={**environment, **more}, capture_output=True, text=True,
+        check=True, cwd=checkout,
     )  # fmt: skip
     kernel, by_address, *hits = map(float, done.stdout.split())
     assert kernel == by_address
@@ -205,6 +219,21 @@ def test_a_kernel_is_compiled_anew_when_another_that_it_calls_has_changed(
     (copy / "robots" / "inner.py").write_text(INNER.replace("x + 1.0", "x + 2.0"))
     assert result(copy) == (9.5, False)  # numba alone would have said 7.5
     assert result(checkout) == (7.5, True)
+
+
+def test_kernels_that_were_shipped(checkout: Path, tmp_path: Path) -> None:
+    """They serve any processor, if they fit, and are whole; nothing has to be written."""
+    kept, shipped = tmp_path / "kept", tmp_path / "coverable_shipped_kernels"
+    any_cpu = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    assert result(checkout, NUMBA_CACHE_DIR=str(kept), **any_cpu) == (7.5, False)
+    shipped.mkdir()
+    for path in kept.glob("*/*.kernel"):
+        path.rename(shipped / path.name)
+    nowhere = {"NUMBA_CACHE_DIR": "/dev/null"}
+    assert result(checkout, **nowhere) == (7.5, True)
+    for path in shipped.iterdir():
+        path.write_bytes(path.read_bytes()[:-1])
+    assert result(checkout, **nowhere) == (7.5, False)
 
 
 def test_no_kernel_of_ours_is_kept_by_its_own_file_alone() -> None:

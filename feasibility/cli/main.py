@@ -20,7 +20,6 @@ from feasibility.cli.console import prepare, print_err, print_out
 from feasibility.interrupts import INTERRUPTED, MESSAGE, interruptible, leave_at_once
 
 TRACEBACK = "COVERABLE_TRACEBACK"
-NO_CACHE = "cannot cache function"  # numba's words
 
 
 class _Parser(argparse.ArgumentParser):
@@ -120,11 +119,6 @@ def _message(error: Exception) -> str:
         return (
             f"a library is missing or broken ({error}); install coverable into a fresh virtual "
             "environment"
-        )
-    if isinstance(error, RuntimeError) and NO_CACHE in str(error):
-        return (
-            "the compiled search kernels cannot be cached: neither the folder of the installation "
-            "nor the cache in the home folder is writable; set NUMBA_CACHE_DIR to a folder that is"
         )
     text = " ".join(str(error).split())
     return (

@@ -42,30 +42,6 @@ def test_a_device_in_a_folder_that_takes_no_files(monkeypatch: pytest.MonkeyPatc
         check_writable("/dev/coverable.csv")
 
 
-def test_kernels_that_can_be_kept_nowhere(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """A read-only installation without a home folder: numba's own error, in words of ours."""
-    import numba.core.caching
-    from numba import njit
-
-    import feasibility.checking
-
-    for name in ("_CacheImpl", "CompileResultCacheImpl", "CodeLibraryCacheImpl"):
-        if hasattr(numba.core.caching, name):
-            monkeypatch.setattr(getattr(numba.core.caching, name), "_locator_classes", [])
-
-    def check(*_: object, **__: object) -> None:
-        njit(cache=True)(check_writable)
-
-    monkeypatch.setattr(feasibility.checking, "check", check)
-    assert main(["check", "paper/4d"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert "set NUMBA_CACHE_DIR" in err
-
-
 def test_the_witness_on_a_pipe(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case = tmp_path / "plate.toml"
     case.write_text(
