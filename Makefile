@@ -3,6 +3,7 @@
 # make campaign NAME=oracle   what takes too long for make test (tests/campaigns)
 # make bench BENCH=old.json   the same, with figures in that file and not in out/bench.json
 # make bench-compare OLD=old.json NEW=new.json   what became slower, and counts that changed
+# make wheel  a wheel in dist/ that brings compiled kernels, for this platform, Python and numba
 # PYTHON=/path/to/python chooses the interpreter (CPython 3.11 or later).
 
 BIN := .venv/bin
@@ -13,10 +14,10 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-browser lint kernels greedy bench bench-compare campaign clean distclean
+.PHONY: help demo test test-browser lint kernels greedy wheel bench bench-compare campaign clean distclean
 
 help:
-	@sed -n '1,6s/^# //p' Makefile
+	@sed -n '1,7s/^# //p' Makefile
 
 # The stamp is younger than pyproject.toml once everything it names is installed. Python compiles what it
 # imports, which is a third of what pip would compile.
@@ -59,6 +60,9 @@ greedy: .venv/installed
 test: .venv/installed
 	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --nbmake --nbmake-timeout=900
+
+wheel: .venv/installed
+	$(BIN)/python tools/make_wheel.py
 
 # Installs nothing: it needs the extra `browser`, and a Chromium on the path or named by CHROMIUM.
 test-browser:

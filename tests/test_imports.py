@@ -22,6 +22,7 @@ ORDER = """
 coverable_errors
 coverable_files
 coverable_inner_kernels
+coverable_kernel_files
 coverable_kernels
 coverable_processes
 coverable_meshes
