@@ -8,16 +8,17 @@ from feasibility import check
 from feasibility.cases import Case, load_case
 
 TEXTS = {
-    # ur5 above a small plate: feasible
+    # ur5 above a small plate: feasible; keys can follow
     "plate": """
-        robot = { name = "ur5" }
+        robot.name = "ur5"
         surface.kind = "plane"
         surface.u = [0.4, 0.6]
         surface.v = [-0.1, 0.1]
         surface.cells = [3, 4]
         surface.position = [0, 0, 0.3]
         surface.side = "outside"
-        task = { standoff = 0.02, cone_deg = 30 }
+        task.standoff = 0.02
+        task.cone_deg = 30
     """,
     # a plate that begins within reach and ends outside: proved infeasible
     "long plate": """
@@ -42,6 +43,19 @@ TEXTS = {
         search = { method = "greedy", step_deg = 0.05 }
     """,
 }
+
+# A plate whose parameters begin at a corner, for passes; keys can follow.
+PANEL = """
+    robot.name = "ur5"
+    surface.kind = "plane"
+    surface.u = [0.0, 0.2]
+    surface.v = [0.0, 0.2]
+    surface.cells = [2, 2]
+    surface.position = [0.4, -0.1, 0.2]
+    surface.side = "outside"
+    task.standoff = 0.02
+    task.cone_deg = 20
+"""
 
 
 @cache

@@ -7,7 +7,6 @@ import io
 import json
 import os
 import pty
-import re
 import signal
 import subprocess
 import sys
@@ -48,20 +47,6 @@ def run(*args, **options):
 def kernels():
     """Have the kernels compiled before a test waits for a process that needs them."""
     assert small_verdict("plate").feasible
-
-
-@pytest.fixture
-def ask(capsys):
-    """Run the command in this process: ask(arguments) -> status, stdout, stderr."""
-
-    def asked(*args):
-        status = cli.main([str(arg) for arg in args])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        # A busy machine may take a while to load kernels; that it says so has its own test.
-        return status, out, re.sub(r"compiling .*first run only.*\n", "", err)
-
-    return asked
 
 
 @pytest.fixture

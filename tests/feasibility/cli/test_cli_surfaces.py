@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import re
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from schema import CHECK, conforms
 from small_cases import small_verdict
 from surface_files import cube, mesh_case, net_case, sheet, write_stl
 
-from feasibility.cli import main as cli
 from feasibility.results import load_result
 from surfaces import plane
 
@@ -21,19 +19,6 @@ from surfaces import plane
 def kernels():
     """Have the kernels compiled before anything is said on stderr."""
     assert small_verdict("plate").feasible
-
-
-@pytest.fixture
-def ask(capsys):
-    """Run the command in this process: ask(arguments) -> status, stdout, stderr."""
-
-    def asked(*args):
-        status = cli.main([str(arg) for arg in args])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return status, out, re.sub(r"compiling .*first run only.*\n", "", err)
-
-    return asked
 
 
 def test_a_mesh_end_to_end(ask, tmp_path):

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from small_cases import PANEL
 
 from coverable_errors import CoverableError
 from feasibility import Task, check, verify
@@ -15,20 +16,6 @@ from robots import Kinematics, load_robot
 from surfaces import cylinder, plane
 from surfaces.passes import parallel_passes, pass_toolpath
 
-CASE = """
-[robot]
-name = "ur5"
-[surface]
-kind = "plane"
-u = [0.0, 0.2]
-v = [0.0, 0.2]
-position = [0.4, -0.1, 0.2]
-side = "outside"
-cells = [2, 2]
-[task]
-standoff = 0.02
-cone_deg = 20
-"""
 UR5 = load_robot("ur5")
 TASK = Task(standoff=0.02, cone_deg=20)
 PLATE = plane((0.0, 0.2), (0.0, 0.2), "outside", (0.4, -0.1, 0.2))
@@ -38,7 +25,7 @@ ARCH = cylinder(0.3, (60, 120), (0.0, 0.2), "outside", (0.45, -0.1, 0.0), (-90, 
 @pytest.fixture
 def case(tmp_path):
     path = tmp_path / "panel.toml"
-    path.write_text(CASE)
+    path.write_text(PANEL)
     return str(path)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from small_cases import PANEL
 
 from feasibility.cli.main import main
 
@@ -27,21 +28,10 @@ standoff = 0.12
 cone_deg = 20
 footprint = 0.1
 """
-PLATE = """
-[robot]
-name = "ur5"
-[surface]
-kind = "plane"
-u = [0.0, 0.3]
-v = [0.0, 0.2]
-position = [0.4, -0.1, 0.2]
-side = "outside"
-cells = [2, 2]
-[task]
-standoff = 0.02
-cone_deg = 20
-footprint = 0.05
-coverage = 0.9
+PLATE = f"""
+{PANEL.replace("u = [0.0, 0.2]", "u = [0.0, 0.3]")}
+task.footprint = 0.05
+task.coverage = 0.9
 """
 
 

@@ -10,21 +10,6 @@ import pytest
 from bad_cases import write
 from small_cases import TEXTS
 
-from feasibility.cli import main as cli
-
-
-@pytest.fixture
-def ask(capsys):
-    """Run the command in this process: ask(arguments) -> status, stdout, stderr."""
-
-    def asked(*args):
-        status = cli.main([str(arg) for arg in args])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return status, out, err
-
-    return asked
-
 
 @pytest.fixture
 def plate(tmp_path: Path) -> Path:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from path_cases import assert_keeps_to_limits
+from small_cases import TEXTS
 
 from coverable_errors import ArgumentError
 from feasibility import Task, check
@@ -107,21 +108,10 @@ def test_what_cannot_be_had_is_said(path):
         replace(TASK, home_deg=(0.0, np.nan))
 
 
-CASE = """
-[robot]
-name = "ur5"
-[surface]
-kind = "plane"
-u = [0.4, 0.6]
-v = [-0.1, 0.1]
-position = [0, 0, 0.3]
-side = "outside"
-cells = [2, 2]
-[task]
-standoff = 0.02
-cone_deg = 15
-speed = 0.15
-home_deg = [0, -90, 90, -90, -90, 0]
+CASE = f"""
+{TEXTS["plate"]}
+task.speed = 0.15
+task.home_deg = [0, -90, 90, -90, -90, 0]
 """
 
 

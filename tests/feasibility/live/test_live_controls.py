@@ -4,31 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from small_cases import small_case
+from small_cases import TEXTS, small_case
 
 from feasibility.cases import Case, CaseError, load_case
 from feasibility.live.controls import Controls
 from feasibility.live.workbench import Workbench
 
-RAIL = """
-    [robot]
-    name = "ur5"
+RAIL = f"""
+    {TEXTS["plate"]}
     [[robot.axis]]
     carries = "base"
     name = "rail"
     type = "prismatic"
     axis = [0, 1, 0]
     limits_m = [-0.5, 1.25]
-    [surface]
-    kind = "plane"
-    u = [0.4, 0.6]
-    v = [-0.1, 0.1]
-    position = [0, 0, 0.3]
-    side = "outside"
-    cells = [2, 3]
-    [task]
-    standoff = 0.02
-    cone_deg = 30
 """
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from small_cases import TEXTS
 
 from feasibility.cli.main import main
 from feasibility.programs import ProgramError, check_program, language_of, save_program
@@ -146,25 +147,9 @@ def test_signs_and_endings_are_checked(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-CASE = """
-[robot]
-name = "ur5"
-[surface]
-kind = "plane"
-u = [0.4, 0.6]
-v = [-0.1, 0.1]
-position = [0, 0, 0.3]
-side = "outside"
-cells = [2, 3]
-[task]
-standoff = 0.02
-cone_deg = 30
-"""
-
-
 def test_the_command_writes_them(tmp_path, capsys):
     case, out = tmp_path / "panel.toml", tmp_path / "run.script"
-    case.write_text(CASE)
+    case.write_text(TEXTS["plate"])
     assert main(["path", str(case), "--program", str(out), "--json"]) == 0
     assert f"program: {out}" in capsys.readouterr().err
     time, q = read_script(out.read_text())

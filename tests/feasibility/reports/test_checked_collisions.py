@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from small_cases import TEXTS
 
 from feasibility.cases import Case
 from feasibility.collisions import CHECKABLE, UNCHECKED
@@ -14,18 +15,6 @@ SCENE = """
 name = "floor"
 kind = "halfspace"
 """
-CASE = """
-[robot]
-name = "ur5"
-[surface]
-kind = "plane"
-u = [0.4, 0.6]
-v = [-0.1, 0.1]
-cells = [2, 2]
-[task]
-standoff = 0.02
-cone_deg = 30
-"""
 ARM = Arm("ur5", 6, 1.0, "feasible", "witness", "", share=1.0, covered=4, cells=4)
 
 
@@ -35,7 +24,7 @@ def study_of(*lines: str) -> study.Study:
 
 @pytest.mark.parametrize("asked", ["", "[collision]", "[collision]\nself = false", SCENE])
 def test_a_comparison_and_a_late_answer_say_what_the_case_asks_for(asked: str) -> None:
-    case = Case.from_toml(CASE + asked)
+    case = Case.from_toml(TEXTS["plate"] + asked)
     names = [] if case.collision is None else list(case.collision.checked)
     found = Comparison("x", (ARM,), divided=False, critical=False, collision=case.collision)
     assert comparison.as_json(found)["collisions"] == names
