@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
-from feasibility.certification.collisions.first_look import Body, FirstLook
+from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
 from feasibility.certification.collisions.pieces import Below, piece_of, sheet_piece
 from feasibility.certification.collisions.plane_search import NEAR
@@ -54,6 +54,17 @@ class CollisionReplay(Judged):
     """How often coal was asked."""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Couple:
+    """Two bodies of a pair, the one nearer to the root first."""
+
+    pair: Pair
+    a: Body
+    b: Body
+    deviation: float
+    """m, how far they may stand out from what is known of them."""
+
+
 class BodiesOfOwners:
     """The bodies of one problem, ready for coal; not to be pickled."""
 
@@ -81,6 +92,14 @@ class BodiesOfOwners:
         empty = sorted(name for name, parts in self._of.items() if not parts)
         if empty:
             raise ArgumentError(f"pairs name what has no body: {', '.join(empty)}")
+        asked = [
+            Couple(pair, a, b, a.deviation + b.deviation)
+            for pair in bodies.pairs
+            for a, b in self.couples(pair)
+        ]
+        self.ordered = tuple(sorted(asked, key=_outermost))
+        """All couples of all pairs, what is furthest from the base first."""
+        self.known = CoupledBodies([(one.a, one.b) for one in self.ordered])
 
     def couples(self, pair: Pair) -> list[tuple[Body, Body]]:
         """Each body of one owner with each of the other, the one nearer to the root first."""
@@ -131,18 +150,17 @@ def collision_replay(
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
         rows, strays = np.repeat(rows, 2, axis=0), None
     motion = Motion(robot, rows, None if strays is None else np.abs(strays))
-    return _judged(bodies, ready, motion)
+    return _judged(ready, motion)
 
 
 class _Asked:
     """Two bodies of a pair."""
 
-    def __init__(self, pair: Pair, a: Body, b: Body) -> None:
+    def __init__(self, couple: Couple) -> None:
         """Nothing is known of them yet."""
-        self.pair, self.a, self.b = pair, a, b
-        self.deviation = a.deviation + b.deviation
-        """m, how far they may stand out from what is known of them."""
-        self.needed = pair.clearance + self.deviation
+        self.pair, self.a, self.b = couple.pair, couple.a, couple.b
+        self.deviation = couple.deviation
+        self.needed = self.pair.clearance + self.deviation
         """m, of what is known of them."""
         self.low = -np.inf
         """m, certified by balls and boxes."""
@@ -158,11 +176,10 @@ class _Asked:
         return (bound - ROUNDING if place is None else place.distance) - self.deviation
 
 
-def _judged(bodies: Bodies, ready: BodiesOfOwners, motion: Motion) -> CollisionReplay:
+def _judged(ready: BodiesOfOwners, motion: Motion) -> CollisionReplay:
     """All pairs, the nearest first: how near they come sets what is aimed at."""
-    asked = [_Asked(pair, a, b) for pair in bodies.pairs for a, b in ready.couples(pair)]
-    asked.sort(key=_outermost)
-    look = FirstLook(motion, [(one.a, one.b) for one in asked])
+    asked = [_Asked(couple) for couple in ready.ordered]
+    look = FirstLook(motion, ready.known)
     for one, low in zip(asked, look.low.min(axis=1).tolist(), strict=True):
         one.low = low
 
@@ -209,7 +226,7 @@ def _outcome(asked: list[_Asked]) -> CollisionReplay:
     )
 
 
-def _outermost(one: _Asked) -> tuple[object, ...]:
+def _outermost(one: Couple) -> tuple[object, ...]:
     """Brings what is furthest from the base, and often the nearest, to the front.
 
     So the answer does not depend on the order in which bodies and pairs are given.

@@ -27,32 +27,44 @@ class Body:
     """m, how far it may stand out from the piece."""
 
 
-class FirstLook:
-    """Couples of bodies along one motion."""
+class CoupledBodies:
+    """Couples of bodies in plain numbers, whatever the motion."""
 
-    def __init__(self, motion: Motion, couples: Sequence[tuple[Body, Body]]) -> None:
+    def __init__(self, couples: Sequence[tuple[Body, Body]]) -> None:
         """The first body of each couple is the one nearer to the root."""
-        self._motion = motion
         numbers: dict[int, int] = {}
         bodies: list[Body] = []
         for body in (body for couple in couples for body in couple):
             if numbers.setdefault(id(body), len(bodies)) == len(bodies):
                 bodies.append(body)
-        self._couples = np.array([(numbers[id(a)], numbers[id(b)]) for a, b in couples])
-        self._joints = np.array([body.joint for body in bodies], dtype=np.intp)
-        centres = np.array([body.piece.centre for body in bodies])
-        balls = np.array([body.piece.ball for body in bodies])
+        self.couples = np.array([(numbers[id(a)], numbers[id(b)]) for a, b in couples])
+        """(c, 2) two bodies each."""
+        self.joints = np.array([body.joint for body in bodies], dtype=np.intp)
+        """(B,) which joint carries each body."""
+        self.centres = np.array([body.piece.centre for body in bodies])
+        """(B, 3) m, of a ball and a box around each."""
+        self.balls = np.array([body.piece.ball for body in bodies])
+        """(B,) m, radii."""
+        self.halves = np.array([body.piece.half for body in bodies])
+        """(B, 3) m, half the sides of boxes."""
+
+
+class FirstLook:
+    """Couples of bodies along one motion."""
+
+    def __init__(self, motion: Motion, known: CoupledBodies) -> None:
+        """Bound the distances of all of them."""
+        self._motion, self._known = motion, known
         # A half space, whose ball has no end, is at rest.
-        finite = np.where(np.isfinite(balls), balls, 0.0)
-        self._sways = motion.sways(self._joints, centres, finite)
-        halves = np.array([body.piece.half for body in bodies])
+        finite = np.where(np.isfinite(known.balls), known.balls, 0.0)
+        self._sways = motion.sways(known.joints, known.centres, finite)
         self.low: Array = motion.outer_bounds(
-            self._sways, self._joints, centres, balls, halves, self._couples
+            self._sways, known.joints, known.centres, known.balls, known.halves, known.couples
         )
-        """(k, m - 1) m, lower bounds of each couple's distance along each segment."""
+        """(c, m - 1) m, lower bounds of each couple's distance along each segment."""
 
     def stretches(self, couple: int) -> Stretches:
         """The segments, as the second body of a couple moves as seen from the first."""
-        a, b = self._couples[couple].tolist()
-        joints = int(self._joints[a]), int(self._joints[b])
+        a, b = self._known.couples[couple].tolist()
+        joints = int(self._known.joints[a]), int(self._known.joints[b])
         return self._motion.stretches_of(self._sways, *joints, b, self.low[couple])

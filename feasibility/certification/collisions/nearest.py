@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.collisions.coal_distances import coal_distance
 from feasibility.certification.collisions.collision_replay import ready_bodies
-from feasibility.certification.collisions.first_look import Body, FirstLook
+from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
 from feasibility.certification.collisions.pieces import Below
 from feasibility.certification.collisions.relative_motion import Motion, Stretches
 from feasibility.collisions import Bodies
@@ -70,7 +70,7 @@ def nearest_along(robot: Robot, bodies: Bodies, q: Array) -> NearestAlong | None
         for pair in bodies.pairs
         for couple in ready.couples(pair)
     ]
-    look = FirstLook(motion, [couple for _, couple in named])
+    look = FirstLook(motion, CoupledBodies([couple for _, couple in named]))
     couples = [
         _Couple(names, *couple, motion, look.stretches(k))
         for k, (names, couple) in enumerate(named)

@@ -13,7 +13,7 @@ neither gets there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -89,7 +89,7 @@ class Pairing:
         if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
             self._hints = glimpse(self.a.tree, self.b, s)
             if not self.a.closed:
-                self.stretches = replace(s, bound=np.maximum(s.bound, self._hints))
+                self.stretches = s.bounded(np.maximum(s.bound, self._hints), s.across)
         else:
             for n in guesses(self.a, self.b, s):
                 s = _raised(self.a, self.b, s, n)
@@ -156,7 +156,7 @@ class Pairing:
 
     def _cheaply(self, a: Piece, b: Piece, s: Stretches, aim: float) -> Stretches:
         """Certify by balls, the planes of longer stretches, and guessed directions."""
-        s = self._accepted(replace(s, bound=np.maximum(s.bound, by_balls(a, b, s))), aim)
+        s = self._accepted(s.bounded(np.maximum(s.bound, by_balls(a, b, s)), s.across), aim)
         for n in (s.across, *guesses(a, b, s)) if len(s.row) else ():
             s = _raised(a, b, s, n)
         return self._accepted(s, aim)
@@ -317,7 +317,7 @@ def _raised(a: Piece, b: Piece, s: Stretches, n: Array) -> Stretches:
     """Stretches with the bounds that planes across n, (3,) or (k, 3), give."""
     found = parted(a, b, s, n)
     better = (found > s.bound)[:, None]
-    return replace(s, bound=np.maximum(s.bound, found), across=np.where(better, n, s.across))
+    return s.bounded(np.maximum(s.bound, found), np.where(better, n, s.across))
 
 
 def _all_of(parts: list[Stretches]) -> Stretches:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.collisions.pieces import Below, Piece
+from feasibility.certification.collisions.plane_kernels import part
 from feasibility.certification.collisions.relative_motion import Poses, Stretches
 
 Array = NDArray[np.float64]
@@ -34,6 +35,15 @@ def parted(a: Piece, b: Piece, s: Stretches, n: Array) -> Array:
     """(k,) m, how far planes across n, (k, 3) or (3,), part a and b along stretches, see above."""
     if isinstance(a, Below):
         n = a.thin
+    own, other = a.outline, b.outline
+    if own is not None and other is not None:
+        found = np.empty(len(s.row))
+        less = s.delta + s.stray + (own.radius + other.radius)
+        part(
+            own.corners, own.rim, other.corners, other.rim, s.first.rotations, s.first.points,
+            s.last.rotations, s.last.points, np.ascontiguousarray(np.atleast_2d(n)), less, found,
+        )  # fmt: skip
+        return found
     low = np.minimum(lows(b, s.first, n), lows(b, s.last, n))
     return np.asarray(low - a.support(np.atleast_2d(n)) - s.delta - s.stray)
 

@@ -8,6 +8,7 @@ its convex hull, which is larger than the mesh; its pieces are ever smaller part
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -27,7 +28,20 @@ FLAT = (
 )
 MERGED = 1e-12  # [1] of its size, how far what qhull leaves out may stand out of its hull
 TINY = 1e-300  # what keeps quotients of zeros finite
+NO_RIM = np.zeros(4)
 MANY = 64  # corners of a part of a mesh, above which only those on its hull are kept
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Outline:
+    """What the support of a piece is, in plain numbers: max n . corner + r |n x axis| + radius."""
+
+    corners: Array
+    """(k, 3) m."""
+    rim: Array
+    """(4,) an axis, and r (m); 0 where there is none."""
+    radius: float
+    """m."""
 
 
 class Piece:
@@ -66,6 +80,11 @@ class Piece:
         """(3,) unit vector across a part of a mesh, along which it is thinnest; or None."""
         return None
 
+    @cached_property
+    def outline(self) -> Outline | None:
+        """Its support in plain numbers; None where it is something else."""
+        return Outline(np.array(self.corners, order="C"), NO_RIM, self.radius)
+
     def support(self, n: Array) -> Array:
         """(k,) m, h(n) for unit vectors n (k, 3) in the joint's frame."""
         return np.asarray((n @ self.corners.T).max(axis=1)) + self.radius
@@ -90,6 +109,13 @@ class Round(Piece):
         super().__init__(geometry, placement, _moved(placement, box), 0.0)
         self.ball = float(np.hypot(r, h))
         self.shape = shape
+
+    @cached_property
+    def outline(self) -> Outline:
+        """Its axis, and a rim about it."""
+        half = 0.5 * self.shape.length * self.placement[:3, 2]
+        ends = self.placement[:3, 3] + np.stack([-half, half])
+        return Outline(ends, np.append(self.placement[:3, 2], self.shape.radius), 0.0)
 
     def support(self, n: Array) -> Array:
         """(k,) m: n . c + |n_z| l / 2 + r sqrt(1 - n_z^2), z along the axis."""
@@ -155,6 +181,13 @@ class MeshPart(Piece):
     def tree(self) -> Tree:
         """Its triangles in boxes."""
         return Tree(self.vertices[self.faces])
+
+    @cached_property
+    def outline(self) -> Outline | None:
+        """Of few triangles their corners."""
+        if self.triangles > MANY:
+            return None
+        return Outline(np.array(self.outermost, order="C"), NO_RIM, 0.0)
 
     def support(self, n: Array) -> Array:
         """(k,) m, see `Piece`; of many triangles that of boxes around them, which is larger."""

@@ -19,7 +19,7 @@ point by another sum_j r_j e_j at most, with r_j enlarged by what the joints beh
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,8 @@ from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+KEPT = 16  # arms whose twists are remembered
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,6 +95,13 @@ class Stretches:
             self.across[chosen],
         )
 
+    def bounded(self, bound: Array, across: Array) -> Stretches:
+        """The same with other bounds, (k,) m, and the normals (k, 3) of the planes behind them."""
+        return Stretches(
+            self.row, self.share, self.length, self.first, self.last, self.delta, self.moved,
+            self.stray, bound, across,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Sways:
@@ -126,7 +135,7 @@ class Motion:
         """
         if list(robot.model.parents)[1:] != list(range(robot.n)):
             raise ArgumentError(f"robot {robot.name!r}: its joints form no serial chain")
-        self.q, self.prismatic = q, robot.prismatic
+        self._robot, self.q, self.prismatic = robot, q, robot.prismatic
         self.strays = (
             np.zeros((len(q) - 1, robot.n)) if strays is None else np.ascontiguousarray(strays)
         )
@@ -142,8 +151,9 @@ class Motion:
         found = Sways(*(np.zeros((n + 1, len(steps), len(joints))) for _ in range(3)))
         frames, levers = self._frames, np.empty((len(joints), n))
         chord_bounds(
-            frames.rotations, frames.points, self._twists, self.prismatic, steps, turned,
-            self.strays, joints, centres, balls, levers, found.delta, found.moved, found.stray,
+            frames.rotations, frames.points, _own_twists(self._robot), self.prismatic, steps,
+            turned, self.strays, joints, centres, balls, levers, found.delta, found.moved,
+            found.stray,
         )  # fmt: skip
         return found
 
@@ -161,17 +171,6 @@ class Motion:
             sways.delta, sways.stray, low,
         )  # fmt: skip
         return low
-
-    @cached_property
-    def _twists(self) -> Array:
-        """(n, 6) unit twists of the joints in their own frames, linear part first.
-
-        There they are always the same; Pinocchio says which at the first row.
-        """
-        rotations, points = self._frames.rotations[0, 1:], self._frames.points[0, 1:]
-        linear, angular = np.split(self._kinematics.twists(self.q[:1])[0].T, 2, axis=1)
-        there = np.stack([linear + np.cross(angular, points), angular], axis=1)
-        return np.ascontiguousarray((there @ rotations).reshape(-1, 6))
 
     def stretches(self, a: int, b: int, centre: Array, ball: float) -> Stretches:
         """Every segment, as a body on joint b within a ball moves as seen from joint a <= b."""
@@ -220,6 +219,19 @@ class Motion:
             frames = self._frames
             self._relative[a, b] = _seen_from(frames.rotations, frames.points, a, b)
         return self._relative[a, b]
+
+
+@lru_cache(maxsize=KEPT)
+def _own_twists(robot: Robot) -> Array:
+    """(n, 6) unit twists of the joints in their own frames, linear part first.
+
+    There they are always the same; Pinocchio says which.
+    """
+    kinematics, q = Kinematics(robot), np.zeros((1, robot.n))
+    frames = kinematics.joints(q)
+    linear, angular = np.split(kinematics.twists(q)[0].T, 2, axis=1)
+    there = np.stack([linear + np.cross(angular, frames.points[0, 1:]), angular], axis=1)
+    return np.ascontiguousarray((there @ frames.rotations[0, 1:]).reshape(-1, 6))
 
 
 def joined(one: Stretches, other: Stretches) -> Stretches:

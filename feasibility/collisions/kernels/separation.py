@@ -34,17 +34,18 @@ UPPER, POINTS = SIMPLEX + 6 * WIDTH, SIMPLEX + 6 * WIDTH + 1
 def support(m, body, x, y, z):  # type: ignore[no-untyped-def]
     """The vertex of a body that is furthest along a direction, and how far it is.
 
-    Every other vertex is compared with a most of its own, which the processor does side by side.
+    Every other vertex is compared with a most of its own, which the processor does side by side;
+    and without branches, since nobody can guess which is the next most.
     """
     first, last = int(m[body + FIRST]), int(m[body + LAST])
     best, most, other, more = first, -np.inf, first, -np.inf
     for k in range(first, last - 3, 6):
         along, beside = m[k] * x + m[k + 1] * y, m[k + 3] * x + m[k + 4] * y
         along, beside = along + m[k + 2] * z, beside + m[k + 5] * z
-        if along > most:
-            best, most = k, along
-        if beside > more:
-            other, more = k + 3, beside
+        best = k if along > most else best
+        most = along if along > most else most
+        other = k + 3 if beside > more else other
+        more = beside if beside > more else more
     if (last - first) % 2 == 1:
         along = m[last - 3] * x + m[last - 2] * y + m[last - 1] * z
         if along > most:

@@ -47,6 +47,31 @@ def distance_from(geometry: object, placement: Array) -> Distance:
     return distance
 
 
+def ball_around(geometry: object, placement: Array) -> tuple[Array, float]:
+    """Centre (3,), in the root frame, and radius, m, of a ball around a shape at rest.
+
+    Args:
+        geometry: see `distance_from`; the ball around a `HalfSpace` has no end.
+        placement: (4, 4) its frame in the root frame, m.
+    """
+    match geometry:
+        case Sphere(radius):
+            half = np.array([radius, 0.0, 0.0])
+        case Capsule(radius, length):
+            half = np.array([0.5 * length + radius, 0.0, 0.0])
+        case Cylinder(radius, length):
+            half = np.array([radius, 0.5 * length, 0.0])
+        case Box(size):
+            half = 0.5 * np.asarray(size)
+        case Triangles(vertices):
+            low, high = vertices.min(axis=0), vertices.max(axis=0)
+            centre = placement[:3, :3] @ (0.5 * (low + high)) + placement[:3, 3]
+            return centre, 0.5 * float(np.linalg.norm(high - low))
+        case _:
+            half = np.array([np.inf])
+    return placement[:3, 3], float(np.linalg.norm(half))
+
+
 def _of_primitive(shape: object, x: Array) -> Array:
     """Signed distances of points x (..., 3) in the shape's own frame."""
     match shape:

@@ -25,6 +25,7 @@ from feasibility.collisions import Bodies, Pair, gather
 from feasibility.roadmap.tool_alone.balls_inside import balls_inside
 from feasibility.roadmap.tool_alone.distances import (
     Distance,
+    ball_around,
     distance_from,
     distance_from_triangles,
 )
@@ -62,6 +63,15 @@ class _Held(NamedTuple):
     """(k, 3) m, from the tool point, in the frame of the last joint."""
     radii: Array
     """(k,) m."""
+    ball: tuple[Array, float]
+    """Around the body at rest: centre (3,) and radius, m."""
+
+    def in_reach(self, point: Array, tolerance: float) -> bool:
+        """May any ball come too near with the tool point within `tolerance` (m) of a point?"""
+        centre, radius = self.ball
+        reach = (np.linalg.norm(self.centres, axis=1) + self.radii).max(initial=-np.inf)
+        needed = radius + float(reach) + self.pair.clearance + tolerance + SURE
+        return bool(np.linalg.norm(centre - point) <= needed)
 
 
 class _Measured(NamedTuple):
@@ -75,12 +85,20 @@ class _Measured(NamedTuple):
     """(k, E) the same by rolling."""
 
 
+_Still = tuple[Distance, tuple[Array, float]]
+
+
+def _at_rest(geometry: object, placement: Array) -> _Still:
+    """How far points are from a body at rest, and a ball around it."""
+    return distance_from(geometry, placement), ball_around(geometry, placement)
+
+
 @lru_cache(maxsize=KEPT)
 def _held_by(robot: Robot, bodies: Bodies) -> tuple[_Held, ...]:
     """Balls in what moves with the tool, against all that is at rest."""
     tool_frame = robot.model.frames[robot.tool_frame_id]
     carrier, tip = int(tool_frame.parentJoint), tool_frame.placement.translation
-    moved, still = dict[str, list[Array]](), dict[str, list[Distance]]()
+    moved, still = dict[str, list[Array]](), dict[str, list[_Still]]()
     for solid in bodies.solids:
         place = solid.placement
         if solid.joint == carrier:
@@ -88,20 +106,23 @@ def _held_by(robot: Robot, bodies: Bodies) -> tuple[_Held, ...]:
             balls[:, :3] = balls[:, :3] @ place[:3, :3].T + place[:3, 3] - tip
             moved.setdefault(solid.owner, []).append(balls)
         elif solid.joint == 0:
-            still.setdefault(solid.owner, []).append(distance_from(solid.geometry, place))
+            still.setdefault(solid.owner, []).append(_at_rest(solid.geometry, place))
     for thing in bodies.scene:
-        still[thing.name] = [distance_from(thing.geometry, thing.placement)]
+        still[thing.name] = [_at_rest(thing.geometry, thing.placement)]
     for soup in bodies.soups:
         if soup.owner not in still:
             sheet = distance_from_triangles(soup.triangles, soup.deviation)
-            still[soup.owner] = [sheet]
+            corners = soup.triangles.reshape(-1, 3)
+            centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+            radius = float(np.linalg.norm(corners - centre, axis=1).max()) + soup.deviation
+            still[soup.owner] = [(sheet, (centre, radius))]
     held: list[_Held] = []
     for pair in bodies.pairs:
         names = (pair.first, pair.second)
         tool, rest = names if pair.first in moved else names[::-1]
         if tool in moved and rest in still:
             balls = np.concatenate(moved[tool])
-            held += [_Held(pair, d, balls[:, :3], balls[:, 3]) for d in still[rest]]
+            held += [_Held(pair, d, balls[:, :3], balls[:, 3], ball) for d, ball in still[rest]]
     return tuple(held)
 
 
@@ -167,11 +188,20 @@ class ToolAlone:
         return Blocking(tuple(named), float(some[best].min()) + pairs[0].clearance, looked)
 
     def _near(self, root: Array, point: Array, frame: _Frame) -> list[_Held]:
-        """The balls that collide in some pose, as far as can be told from the whole box."""
-        held = _held_by(self._robot, self._bodies)
+        """The balls that collide in some pose, as far as can be told from the whole box.
+
+        None of them where nothing speaks against the pose at its middle.
+        """
+        held = [
+            one
+            for one in _held_by(self._robot, self._bodies)
+            if one.in_reach(point, self._tolerance)
+        ]
         if not held:
             return []
         found = self._measured(root, held, point, frame)
+        if found.spare.min() + self._tolerance >= 0.0:
+            return []
         close = (found.spare - found.by_tilt - found.by_roll)[0] < 0.0
         parts = np.split(close, np.cumsum([len(one.radii) for one in held])[:-1])
         return [
