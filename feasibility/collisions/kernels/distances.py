@@ -16,12 +16,13 @@ import numpy as np
 
 from feasibility.collisions.kernels.inside import inside_tree
 from feasibility.collisions.kernels.link_frames import pose_of, transformed
-from feasibility.collisions.kernels.separation import BEST, MOST_TURNS, separation
+from feasibility.collisions.kernels.separation import BEST, MOST_TURNS, remember, separation
 from feasibility.collisions.kernels.tables import (
     BALL,
     CENTRE,
     CLOSED,
     DIRECTION,
+    DIRECTION_COLUMNS,
     FIRST,
     INNER,
     ITEM_A,
@@ -71,7 +72,7 @@ def swept_ball(m, b, ends):  # type: ignore[no-untyped-def]
 def of_polytopes(m, a, b, direction, ends, need, want, least):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of two polytopes in the relative poses; see `separation`.
 
-    `direction` is the place of the one that separated them the last time.
+    `direction` is the row of the one that separated them the last time.
     """
     x, y, z, radius = swept_ball(m, b, ends)
     x, y, z = x - m[a + CENTRE], y - m[a + CENTRE + 1], z - m[a + CENTRE + 2]
@@ -83,7 +84,8 @@ def of_polytopes(m, a, b, direction, ends, need, want, least):  # type: ignore[n
         m[d], m[d + 1], m[d + 2] = x, y, z
     m[BEST], m[BEST + 1], m[BEST + 2] = m[d], m[d + 1], m[d + 2]
     radii = m[a + RADIUS] + m[b + RADIUS]
-    bound = separation(m, a, b, ends, need + radii, want + radii, least + radii, MOST_TURNS)
+    bound = separation(m, a, b, ends, need + radii, want + radii, least + radii, MOST_TURNS, d)
+    remember(m, d, bound)
     m[d], m[d + 1], m[d + 2] = m[BEST], m[BEST + 1], m[BEST + 2]
     return max(lower, bound - radii)
 
@@ -100,7 +102,7 @@ def of_groups(m, item, ends, need, want, least):  # type: ignore[no-untyped-def]
             if least == -np.inf and bound < goal:
                 record(m, m[i + RADIUS], k, bound)
             result = min(result, bound)
-            direction += 3
+            direction += DIRECTION_COLUMNS
             if result < least:
                 return result
     return result
@@ -128,7 +130,7 @@ def of_item(m, item, here, there, need, want, least):  # type: ignore[no-untyped
         if k == nearest:
             continue
         b = k if k >= first else nearest
-        place = known + 3 * ((b - first) // POLYTOPE_COLUMNS)
+        place = known + DIRECTION_COLUMNS * ((b - first) // POLYTOPE_COLUMNS)
         bound = of_tree(m, root, b, place, result, ends, need, want, least)
         if bound < result:
             m[known + NEAREST], result = b - first, bound

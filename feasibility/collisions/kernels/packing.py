@@ -10,6 +10,7 @@ from feasibility.collisions import Bodies, Soup
 from feasibility.collisions.kernels.box_tree import BoxTree, box_tree, moved
 from feasibility.collisions.kernels.tables import (
     DIRECTION,
+    DIRECTION_COLUMNS,
     FIRST,
     GROUP_COLUMNS,
     ITEM_A,
@@ -76,7 +77,7 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
     tables = Tables(
         state=np.zeros((1, STATE_COLUMNS)),
         relative=np.zeros((2, 12)),
-        simplex=np.zeros((7, 8)),
+        simplex=np.zeros((7, 10)),
         found=np.zeros((1, 10)),
         placed=np.zeros((2, 12)),
         stack=np.zeros((1, 128)),
@@ -86,7 +87,7 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
         vertices=np.vstack([*vertices, corners]),
         nodes=nodes,
         items=_table(items, ITEM_COLUMNS),
-        directions=np.zeros((directions, 3)),
+        directions=np.zeros((directions, DIRECTION_COLUMNS)),
         asked=np.zeros((3, n)),
         configurations=np.zeros((SLOTS, n)),
         poses=np.zeros((SLOTS * (n + 1), 12)),

@@ -8,6 +8,9 @@ and the largest s(n) is their distance (the least depth, negative, where they ov
 algorithm of Gilbert, Johnson and Keerthi (1988) only proposes the directions, from A towards B; the
 bound is what the vertices themselves say of the best one. So neither rounding nor a loop that ends
 too soon can make it too large; they only weaken it.
+
+Bodies that were nearest at some vertices are mostly nearest there again after a small step: the
+loop begins with these, and one direction is enough then.
 """
 
 from __future__ import annotations
@@ -15,7 +18,16 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.collisions.kernels.simplex import WEIGHT, WIDTH, reduce
-from feasibility.collisions.kernels.tables import FIRST, LAST, RELATIVE, SIMPLEX, STATE, TRIED
+from feasibility.collisions.kernels.tables import (
+    CORNERS,
+    FIRST,
+    KNOWN,
+    LAST,
+    RELATIVE,
+    SIMPLEX,
+    STATE,
+    TRIED,
+)
 from feasibility.compiled import kernel
 
 MOST_TURNS = np.int64(40)
@@ -28,6 +40,9 @@ TOUCHING = 1e-10  # m, nearer than this there is no direction to be had
 # the shortest difference, its length, and how many points the simplex has.
 BEST, SHORTEST = SIMPLEX + 4 * WIDTH, SIMPLEX + 5 * WIDTH
 UPPER, POINTS = SIMPLEX + 6 * WIDTH, SIMPLEX + 6 * WIDTH + 1
+# Columns of a point of the simplex, behind its weight: places of both vertices, and the pose.
+ON_A, ON_B, IN_POSE = WEIGHT + 1, WEIGHT + 2, WEIGHT + 3
+NOT_KNOWN = np.int64(0)  # instead of a row of `directions`
 
 
 @kernel
@@ -66,6 +81,7 @@ def add_point(m, a, b, pose, size):  # type: ignore[no-untyped-def]
         place = m[turn] * x + m[turn + 1] * y + m[turn + 2] * z + m[pose + 9 + k]
         m[new + k] = place - m[a + k]
         m[new + 3 + k] = m[a + k]
+    m[new + ON_A], m[new + ON_B], m[new + IN_POSE] = a, b, 0.0 if pose == RELATIVE else 1.0
     for old in range(SIMPLEX, new, WIDTH):
         if m[old] == m[new] and m[old + 1] == m[new + 1] and m[old + 2] == m[new + 2]:
             return False
@@ -86,7 +102,34 @@ def shortest(m, size):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def separation(m, a, b, ends, need, want, least, turns):  # type: ignore[no-untyped-def]
+def recall(m, known, ends):  # type: ignore[no-untyped-def]
+    """Set the simplex to the vertices at which two bodies were nearest; how many points it has.
+
+    0 where none are known, or the bodies overlap in them.
+    """
+    size = 0
+    for point in range(np.int64(m[known + KNOWN])):
+        at = known + CORNERS + 3 * point
+        pose = RELATIVE + 12 if ends == 2 and m[at + 2] > 0.0 else RELATIVE
+        if add_point(m, np.int64(m[at]), np.int64(m[at + 1]), pose, size):
+            size += 1
+    return reduce(m, size) if size > 0 else 0
+
+
+@kernel
+def remember(m, known, bound):  # type: ignore[no-untyped-def]
+    """Keep at which vertices two bodies are nearest, where the last `separation` found that."""
+    points = np.int64(m[POINTS])
+    found = points < 4 and m[UPPER] - bound <= COARSE * m[UPPER]
+    m[known + KNOWN] = points if found else 0.0
+    for point in range(points if found else 0):
+        for column in range(3):
+            row = SIMPLEX + WIDTH * point
+            m[known + CORNERS + 3 * point + column] = m[row + ON_A + column]
+
+
+@kernel
+def separation(m, a, b, ends, need, want, least, turns, known):  # type: ignore[no-untyped-def]
     """Lower bound of the distance of two hulls of vertices, m, by at most `turns` directions.
 
     Args:
@@ -98,6 +141,7 @@ def separation(m, a, b, ends, need, want, least, turns):  # type: ignore[no-unty
         want: m, nor are these tried once the bound has reached this.
         least: m, the bound is given up where the distance is less than this.
         turns: directions that are tried at most.
+        known: the row of `directions` with the vertices to begin with; or NOT_KNOWN.
     """
     nx, ny, nz = m[BEST], m[BEST + 1], m[BEST + 2]
     length = np.sqrt(nx * nx + ny * ny + nz * nz)
@@ -105,6 +149,13 @@ def separation(m, a, b, ends, need, want, least, turns):  # type: ignore[no-unty
         nx, length = 1.0, 1.0
     nx, ny, nz = nx / length, ny / length, nz / length
     lower, upper, size = -np.inf, FARTHEST, 0
+    if known > 0:
+        size = recall(m, known, ends)
+        upper = shortest(m, size)
+        if size > 0 and upper > TOUCHING:
+            nx, ny, nz = m[SHORTEST] / upper, m[SHORTEST + 1] / upper, m[SHORTEST + 2] / upper
+        else:
+            upper, size = FARTHEST, 0
     for turn in range(turns):
         m[STATE + TRIED] += 1.0
         i, top = support(m, a, nx, ny, nz)

@@ -2,7 +2,7 @@
 
 C. Ericson, Real-Time Collision Detection (2005), section 5.1. The simplex is the first rows of the
 table `simplex`; a point is the place of its row, whose first three columns are its coordinates;
-column WEIGHT gets its share in the closest point. Rounding may pick one that is not quite the
+column WEIGHT gets its share in the closest point; what is in the others goes with it. Rounding may pick one that is not quite the
 closest: `separation.py` trusts no more than that it gives a direction.
 """
 
@@ -14,7 +14,7 @@ from feasibility.collisions.kernels.tables import SIMPLEX
 from feasibility.compiled import kernel
 
 WEIGHT = 6
-WIDTH = 8  # of a row
+WIDTH = 10  # of a row
 
 
 @kernel
@@ -132,7 +132,7 @@ def reduce(m, size):  # type: ignore[no-untyped-def]
     for point in range(size):
         old, new = SIMPLEX + WIDTH * point, SIMPLEX + WIDTH * kept
         if m[old + WEIGHT] > 0.0:
-            for column in range(WEIGHT + 1):
+            for column in range(WIDTH):
                 m[new + column] = m[old + column]
             kept += 1
     return kept

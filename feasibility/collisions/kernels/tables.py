@@ -43,7 +43,11 @@ NODE_COLUMNS = 20
 # the column after it are lower bounds of its distance in slots 0 and 1.
 ITEM_A, ITEM_B, TREE, INNER, OUTER, CLEARANCE, PAIR, DIRECTION, CLOSED, WISH, BOUND = range(11)
 ITEM_COLUMNS = 12
-NEAREST = 1  # column of `directions`: how far behind its group's first the nearest polytope was
+# Columns of `directions`: how far behind its group's first the nearest polytope was; how many points
+# the simplex had from which the shortest difference was found, and of each the places of the first
+# and the second body's vertex, and the pose, 0 or 1.
+NEAREST, KNOWN, CORNERS = 1, 3, 4
+DIRECTION_COLUMNS = 13
 # Columns of `state`: counters, what was found, and what is asked for.
 CALLS, BOUNDS, SWEPT, DECIDED, BY_BUDGET, FRAMES, TRIED = range(7)
 BLAMED, FIRST_ASKED, SIZE, NODES, VALID = 7, 8, 9, 10, 11  # VALID: of slot 0, then of slot 1
@@ -60,7 +64,7 @@ class Tables(NamedTuple):
     relative: Array
     """(2, 12) poses of the second body in the frame of the first, at both ends."""
     simplex: Array
-    """(7, 8) working memory of `separation.py`."""
+    """(7, 10) working memory of `separation.py`."""
     found: Array
     """(1, 10) of the nearest bodies: bound, direction, a point of the first, one of the second."""
     placed: Array
@@ -77,8 +81,9 @@ class Tables(NamedTuple):
     nodes: Array
     items: Array
     directions: Array
-    """(D, 3) the direction that last separated two bodies, in the frame of the first. For a tree:
-    the place of the leaf that was nearest to a polytope; in the first row also NEAREST."""
+    """(D, DIRECTION_COLUMNS) the direction that last separated two bodies, in the frame of the
+    first, and where they were nearest. For a tree: the place of the leaf that was nearest to a
+    polytope, and where; in the first row also NEAREST."""
     asked: Array
     """(3, n) the ends of the segment that is asked for; last the push that is made."""
     configurations: Array
@@ -95,7 +100,7 @@ class Tables(NamedTuple):
 
 NAMES = Tables._fields
 STATE, RELATIVE = np.int64(HEADER), np.int64(HEADER + STATE_COLUMNS)
-SIMPLEX, FOUND = RELATIVE + 24, RELATIVE + 80
+SIMPLEX, FOUND = RELATIVE + 24, RELATIVE + 94
 PLACED = FOUND + 10
 STACK = PLACED + 24
 JOINTS, GROUPS, ITEMS, ASKED, CONFIGURATIONS, POSES, LEVERS, LARGEST, REACH = (

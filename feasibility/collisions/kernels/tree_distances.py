@@ -11,7 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from feasibility.collisions.kernels.link_frames import transformed
-from feasibility.collisions.kernels.separation import BEST, FEW_TURNS, MOST_TURNS, separation
+from feasibility.collisions.kernels.separation import (
+    BEST,
+    FEW_TURNS,
+    MOST_TURNS,
+    NOT_KNOWN,
+    remember,
+    separation,
+)
 from feasibility.collisions.kernels.tables import (
     AXES,
     BALL,
@@ -69,10 +76,10 @@ def between_boxes(m, node, ends):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def of_node(m, node, b, ends, bound, need, goal, least):  # type: ignore[no-untyped-def]
+def of_node(m, node, b, ends, bound, need, goal, least, known):  # type: ignore[no-untyped-def]
     """Make the bound of a node larger: a leaf's up to `goal`, another one's as far as it is cheap.
 
-    The first direction is across its thinnest side.
+    The first direction is across its thinnest side, unless more is `known`, see `separation`.
     """
     axis, side, around = node + AXES + 6, 0.0, m[b + RADIUS]
     for k in range(3):
@@ -85,7 +92,8 @@ def of_node(m, node, b, ends, bound, need, goal, least):  # type: ignore[no-unty
         turns, given_up = FEW_TURNS if small and bound < need else ONE_TURN, goal
     m[STATE + NODES] += 1.0
     enough = min(need, goal) + around
-    found = separation(m, node, b, ends, enough, goal + around, given_up + around, turns) - around
+    goal, given_up = goal + around, given_up + around
+    found = separation(m, node, b, ends, enough, goal, given_up, turns, known) - around
     return bound if bound > found else found  # so that NaN is none
 
 
@@ -94,7 +102,7 @@ def of_tree(m, root, b, known, best, ends, need, want, least):  # type: ignore[n
     """Lower bound of the distance of the triangles of a tree from polytope b, where below `best`.
 
     `OPENED` boxes may be opened for a bound up to `want`, the others only up to `need`; where all
-    is asked for (`need` is infinite), the bound is sharp. `known` is the place of the triangle that
+    is asked for (`need` is infinite), the bound is sharp. `known` is the row with the triangle that
     was nearest the last time.
     """
     place_box(m, b, ends)
@@ -117,12 +125,14 @@ def of_tree(m, root, b, known, best, ends, need, want, least):  # type: ignore[n
         goal = want if opened < (SEARCHED if searching else OPENED) else min(need, want)
         goal = min(goal, max(floor, share * nearest if nearest > 0.0 else nearest))
         if not bound >= goal:
-            bound = of_node(m, node, b, ends, bound, need, goal, least)
+            points = known if node == before else NOT_KNOWN
+            bound = of_node(m, node, b, ends, bound, need, goal, least, points)
         left, right = np.int64(m[node + LEFT]), np.int64(m[node + RIGHT])
         if left < 0 or bound >= goal:
             result = min(result, bound)
             if left < 0 and bound < goal:
                 m[known], nearest = node, min(nearest, bound)
+                remember(m, known, bound + around)
                 if least == -np.inf:
                     record(m, 0.0, b, bound)
             if result < least:
