@@ -31,7 +31,7 @@ from feasibility.collisions.kernels.tables import (
 from feasibility.compiled import kernel
 
 MOST_TURNS = np.int64(40)
-FEW_TURNS = np.int64(3)  # for a box, which can be opened instead
+FEW_TURNS = np.int64(6)  # for a box, which can be opened instead
 COARSE = 0.1  # relative gap at which a bound that is large enough already is good enough
 FINE = 1e-6  # the same for others
 FARTHEST = 1e300  # m, above any distance

@@ -2,8 +2,9 @@
 
 C. Ericson, Real-Time Collision Detection (2005), section 5.1. The simplex is the first rows of the
 table `simplex`; a point is the place of its row, whose first three columns are its coordinates;
-column WEIGHT gets its share in the closest point; what is in the others goes with it. Rounding may pick one that is not quite the
-closest: `separation.py` trusts no more than that it gives a direction.
+column WEIGHT gets its share in the closest point, and what is in the others goes with it. Rounding
+may pick one that is not quite the closest: `separation.py` trusts no more than that it gives a
+direction.
 """
 
 from __future__ import annotations

@@ -43,9 +43,9 @@ NODE_COLUMNS = 20
 # the column after it are lower bounds of its distance in slots 0 and 1.
 ITEM_A, ITEM_B, TREE, INNER, OUTER, CLEARANCE, PAIR, DIRECTION, CLOSED, WISH, BOUND = range(11)
 ITEM_COLUMNS = 12
-# Columns of `directions`: how far behind its group's first the nearest polytope was; how many points
-# the simplex had from which the shortest difference was found, and of each the places of the first
-# and the second body's vertex, and the pose, 0 or 1.
+# Columns of `directions`: how far behind its group's first the nearest polytope was; how many
+# points the simplex had from which the shortest difference was found, and of each the places of the
+# first and the second body's vertex, and the pose, 0 or 1.
 NEAREST, KNOWN, CORNERS = 1, 3, 4
 DIRECTION_COLUMNS = 13
 # Columns of `state`: counters, what was found, and what is asked for.

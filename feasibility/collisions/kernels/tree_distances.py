@@ -81,15 +81,20 @@ def of_node(m, node, b, ends, bound, need, goal, least, known):  # type: ignore[
 
     The first direction is across its thinnest side, unless more is `known`, see `separation`.
     """
-    axis, side, around = node + AXES + 6, 0.0, m[b + RADIUS]
+    axis, side, beyond, around = node + AXES + 6, 0.0, 0.0, m[b + RADIUS]
+    last = PLACED + 12 * (ends - 1)
     for k in range(3):
         side += m[axis + k] * (m[PLACED + k] - m[node + MIDDLE + k])
+        beyond += m[axis + k] * (m[last + k] - m[node + MIDDLE + k])
     for k in range(3):
         m[BEST + k] = m[axis + k] if side >= 0.0 else -m[axis + k]
     turns, given_up = MOST_TURNS, least
     if m[node + LEFT] >= 0.0:
         small = m[node + HALF] < 0.5 * m[b + BALL]
         turns, given_up = FEW_TURNS if small and bound < need else ONE_TURN, goal
+        beyond = min(abs(side), beyond if side >= 0.0 else -beyond)
+        if turns == ONE_TURN and beyond - m[node + HALF + 2] - around < goal:
+            return bound  # even its middle is too near for that
     m[STATE + NODES] += 1.0
     enough = min(need, goal) + around
     goal, given_up = goal + around, given_up + around
