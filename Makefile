@@ -14,7 +14,7 @@ IS_RECENT := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-browser lint kernels greedy wheel bench bench-compare campaign clean distclean
+.PHONY: help demo test test-browser lint kernels greedy collected wheel bench bench-compare campaign clean distclean
 
 help:
 	@sed -n '1,7s/^# //p' Makefile
@@ -47,18 +47,23 @@ lint: .venv/installed
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 
-# Compiles kernels into the cache; one processor is enough for that: the complete search and collisions,
+# Compiles kernels into the cache; one processor is enough for that: the complete search, areas and collisions,
 # and by itself the paper's search.
 kernels: .venv/installed
-	@$(BIN)/coverable check paper/4a >/dev/null
+	@$(BIN)/coverable check paper/4a --area >/dev/null
 	@$(BIN)/coverable check paper/5e --set collision.clearance=0.005 >/dev/null
 
 greedy: .venv/installed
 	@$(BIN)/coverable check paper/4f --set search.method=greedy >/dev/null || test $$? -eq 1
 	@$(BIN)/coverable check tests/feasibility/paper/greedy_on_a_torus.toml >/dev/null
 
+# What the tests import is compiled once, and not by each of the two processes that run them; they
+# say it where that fails.
+collected: .venv/installed
+	@$(BIN)/python -m pytest --collect-only --quiet tests >/dev/null || true
+
 test: .venv/installed
-	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy
+	@$(MAKE) --no-print-directory --jobs=2 kernels lint greedy collected
 	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --nbmake --nbmake-timeout=900
 
 wheel: .venv/installed

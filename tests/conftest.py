@@ -26,7 +26,7 @@ LONGEST = (
     "test_docs", "test_study", "test_placement", "test_explain", "test_mesh_witness",
     "test_checking", "test_new_kinds", "test_timing", "test_greedy_cases", "test_division",
     "test_mesh_verdicts", "test_creases", "test_study_dask", "test_other_kinds", "test_oracles",
-    "test_planted", "test_segment_bound", "test_cli", "test_coverage", "test_proof_verification",
+    "test_segment_bound", "test_cli", "test_coverage", "test_proof_verification",
     "test_known_feasible", "test_refinement", "test_metamorphic", "test_trajectory_files",
     "test_set_cover", "test_complete", "test_placement_view", "test_kept_kernels",
 )  # fmt: skip
