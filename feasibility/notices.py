@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 COMPILING = "compiling {} (first run only, up to a minute) ..."
@@ -56,39 +58,38 @@ def compiling_notice(
     """
     from numba.core import event
 
+    began = time.monotonic()
+    wait = PATIENCE if patience is None else patience
+    speak = partial(notify, notice) if say is None else say
+
     class Watch(event.Listener):
-        """Knows when both have come: a compilation, and the end of patience."""
+        """Waits from the first compilation on, in a thread: most blocks need neither."""
 
         def __init__(self) -> None:
-            """Neither has come."""
-            self.lock, self.compiling, self.late, self.said = threading.Lock(), False, False, False
+            """Nothing is compiled yet."""
+            self.lock, self.waiting = threading.Lock(), list[threading.Timer]()
 
         def on_start(self, about: Any) -> None:
             """A kernel that is in no cache begins to be compiled."""
-            self.look(compiling=True)
+            with self.lock:
+                if self.waiting:
+                    return
+                left = max(0.0, began + wait - time.monotonic())
+                timer = threading.Timer(left, speak)
+                timer.daemon = True
+                self.waiting.append(timer)
+            if left > 0.0:
+                timer.start()
+            else:
+                speak()
 
         def on_end(self, about: Any) -> None:
             """It has been."""
 
-        def look(self, compiling: bool = False, late: bool = False) -> None:
-            """Say it when it is time to."""
-            with self.lock:
-                self.compiling, self.late = self.compiling or compiling, self.late or late
-                due = self.compiling and self.late and not self.said
-                self.said |= due
-            if due and say is not None:
-                say()
-            elif due:
-                notify(notice)
-
     watch = Watch()
-    timer = threading.Timer(
-        PATIENCE if patience is None else patience, watch.look, kwargs={"late": True}
-    )
-    timer.daemon = True
-    timer.start()
     try:
         with event.install_listener("numba:compile", watch):
             yield
     finally:
-        timer.cancel()
+        for timer in watch.waiting:
+            timer.cancel()

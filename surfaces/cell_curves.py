@@ -51,7 +51,7 @@ class CellCurves(Protected):
     def slopes(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Derivatives by t of point (k, 3) m and normal (k, 3)."""
         powers, cubics = self._local(curves, t)
-        count = np.diff(self.first)[curves]
+        count = self.first[curves + 1] - self.first[curves]
         by_s = np.column_stack([powers[:, 0], 2.0 * powers[:, 1], 3.0 * powers[:, 2]])
         values = np.einsum("kp,kpd->kd", by_s, cubics[:, 1:]) * count[:, None]
         return values[:, :3], values[:, 3:]
@@ -104,10 +104,14 @@ class CellCurves(Protected):
 
     def _local(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Powers 1, s, s^2, s^3 (k, 4), and the cubics (k, 4, 6) that hold at t."""
-        count = np.diff(self.first)[curves]
-        piece = np.clip(np.floor(t * count), 0, count - 1).astype(np.int64)
-        s = t * count - piece
-        return np.vander(s, 4, increasing=True), self.cubics[self.first[curves] + piece]
+        first = self.first[curves]
+        count = self.first[curves + 1] - first
+        along = t * count
+        piece = np.minimum(np.maximum(np.floor(along), 0), count - 1).astype(np.int64)
+        s = along - piece
+        square = s * s
+        powers = np.stack([np.ones(len(s)), s, square, square * s], axis=1)
+        return powers, self.cubics.take(first + piece, axis=0)
 
 
 def slopes_of(cubics: Array, s: float) -> Array:

@@ -173,9 +173,11 @@ def _pieces(
     curves: TargetCurves, curve: NDArray[np.int64], t: Array
 ) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
     """Piece (k,) that t falls into, s (k,) on it, and number of pieces (k,) of the curve."""
-    count = np.diff(curves.first)[curve]
-    piece = np.clip((t * count).astype(np.int64), 0, count - 1)
-    return curves.first[curve] + piece, t * count - piece, count
+    first = curves.first[curve]
+    count = curves.first[curve + 1] - first
+    along = t * count
+    piece = np.minimum(np.maximum(along.astype(np.int64), 0), count - 1)
+    return first + piece, along - piece, count
 
 
 def _at(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
@@ -186,7 +188,11 @@ def _at(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> tuple[Array
 
 def _powers(s: Array) -> Array:
     """(k, 4) 1, s, s^2, s^3."""
-    return np.column_stack([np.ones(len(s)), s, s * s, s * s * s])
+    powers = np.empty((len(s), 4))
+    powers[:, 0], powers[:, 1] = 1.0, s
+    powers[:, 2] = square = s * s
+    powers[:, 3] = square * s
+    return powers
 
 
 def _matched_parameters(
@@ -200,9 +206,10 @@ def _matched_parameters(
     t = _nearest(curves, curve, points)
     arrived = np.zeros(len(curve), dtype=bool)
     pays = curves.deviations[curve, 1] > curves.centre_curvature * near
-    for end in (0.0, 1.0):
-        centre, _ = _at(curves, curve, np.full(len(curve), end))
-        there = pays & (np.linalg.norm(points - centre, axis=1) <= near)
+    where = np.flatnonzero(pays)
+    for end in (0.0, 1.0) if len(where) else ():
+        centre, _ = _at(curves, curve[where], np.full(len(where), end))
+        there = where[np.linalg.norm(points[where] - centre, axis=1) <= near]
         t[there], arrived[there] = end, True
     return t, arrived
 
@@ -220,55 +227,73 @@ def _matched_between_poses(
     return t, np.zeros(len(t), dtype=bool)
 
 
-def _slopes(curves: TargetCurves, curve: NDArray[np.int64], t: Array, axes: int) -> Array:
-    """(k, axes) derivatives by t of target points (m), and perhaps of directions."""
-    piece, s, count = _pieces(curves, curve, t)
-    by_s = _powers(s)[:, :3] * [1.0, 2.0, 3.0]
-    slopes = np.einsum("kp,kpd->kd", by_s, curves.cubics[piece, 1:, :axes])
-    return np.asarray(slopes * count[:, None])
-
-
 def _values(curves: TargetCurves, curve: NDArray[np.int64], t: Array, axes: int) -> Array:
     """(k, axes) target points (m) at t, and perhaps directions."""
     piece, s, _ = _pieces(curves, curve, t)
     return np.asarray(np.einsum("kp,kpd->kd", _powers(s), curves.cubics[piece, :, :axes]))
 
 
+def _places(
+    curves: TargetCurves, curve: NDArray[np.int64], t: Array, axes: int
+) -> tuple[Array, Array]:
+    """`_values` at t, by coordinate (axes, k), and their derivatives by t."""
+    piece, s, count = _pieces(curves, curve, t)
+    a, b, c, d = curves.cubics.take(piece, axis=0)[:, :, :axes].transpose(1, 2, 0)
+    bent, turned = s * d, s * c
+    slope = b + turned + turned + 3.0 * s * bent
+    return a + s * (b + turned + s * bent), slope * count
+
+
 def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> Array:
     """(k,) t of the place on each curve that is closest to a tool point (k, 3), or more numbers."""
     axes = points.shape[1]
     t = np.empty(len(curve))
-    counts = np.diff(curves.first)[curve]
+    counts = curves.first[curve + 1] - curves.first[curve]
     for count in np.unique(counts):
         alike = np.flatnonzero(counts == count)
         # Not where two pieces join: a curve may have zero speed there, where Newton's method fails.
         inner = (np.arange(GUESSES * count) + 0.5) / (GUESSES * count)
         grid = np.concatenate([[0.0], inner, [1.0]])
+        used, which = np.unique(curve[alike], return_inverse=True)
+        along = _values(curves, np.repeat(used, len(grid)), np.tile(grid, len(used)), axes)
+        tried = along.reshape(len(used), len(grid), axes)
         for first in range(0, len(alike), BLOCK):
-            some = alike[first : first + BLOCK]
-            places = np.repeat(curve[some], len(grid)), np.tile(grid, len(some))
-            tried = _values(curves, *places, axes)
-            away = tried.reshape(len(some), len(grid), axes) - points[some, None]
-            t[some] = grid[np.argmin((away**2).sum(axis=2), axis=1)]
+            some = slice(first, first + BLOCK)
+            away = tried[which[some]].transpose(2, 0, 1) - points[alike[some]].T[:, :, None]
+            t[alike[some]] = grid[np.argmin(_square(away), axis=1)]
     # Newton steps, shortened where one leads further away: they overshoot next to a point where a
     # curve has zero speed.
     left, width = np.arange(len(t)), 1.0 / (GUESSES * counts)
-    off = _values(curves, curve, t, axes) - points
+    wanted, here_t, here_curve = points.T, t.copy(), curve
+    off, slope = _places(curves, curve, t, axes)
+    off -= wanted
     for _ in range(NEWTON_STEPS):
-        slope = _slopes(curves, curve[left], t[left], axes)
-        square = (slope**2).sum(axis=1)
-        step = (off[left] * slope).sum(axis=1)
+        square = _square(slope)
+        step = sum(off * slope)
         step = np.divide(step, square, out=np.zeros(len(left)), where=square > 0.0)
-        step = np.clip(step, -width[left], width[left])
-        tried = np.clip(t[left] - step, 0.0, 1.0)
-        there = _values(curves, curve[left], tried, axes) - points[left]
-        nearer = (there**2).sum(axis=1) < (off[left] ** 2).sum(axis=1)
-        t[left[nearer]], off[left[nearer]] = tried[nearer], there[nearer]
-        width[left[~nearer]] = 0.25 * np.abs(step[~nearer])
-        left = left[np.abs(step) > CONVERGED]
-        if len(left) == 0:
+        step = np.minimum(np.maximum(step, -width), width)
+        tried_t = np.minimum(np.maximum(here_t - step, 0.0), 1.0)
+        there, there_slope = _places(curves, here_curve, tried_t, axes)
+        there -= wanted
+        nearer = _square(there) < _square(off)
+        here_t = np.where(nearer, tried_t, here_t)
+        off, slope = np.where(nearer, there, off), np.where(nearer, there_slope, slope)
+        t[left] = here_t
+        width = np.where(nearer, width, 0.25 * np.abs(step))
+        open_ = np.flatnonzero(np.abs(step) > CONVERGED)
+        if len(open_) == 0:
             break
+        left, here_t, width, here_curve = (a[open_] for a in (left, here_t, width, here_curve))
+        off, slope, wanted = (a[:, open_] for a in (off, slope, wanted))
     return t
+
+
+def _square(a: Array) -> Array:
+    """(...,) sums of squares of (axes, ...); numpy's own sums are slow over three numbers."""
+    total = a[0] * a[0]
+    for one in a[1:]:
+        total += one * one
+    return total
 
 
 def _derivative_bounds(
@@ -306,9 +331,12 @@ def _deviations(
     owner, t = _samples(cells, used, 0.5 * tolerance)
     point, normal = curves.at(used[owner], t)
     closest = surface.closest(point)
-    deviations = curves.deviations[used].copy()
-    np.maximum.at(deviations[:, 0], owner, np.abs(closest.height))
-    np.maximum.at(deviations[:, 1], owner, np.linalg.norm(normal - closest.normal, axis=1))
+    first = np.flatnonzero(np.diff(owner, prepend=-1))
+    found = np.abs(closest.height), np.linalg.norm(normal - closest.normal, axis=1)
+    measured = (
+        np.maximum.reduceat(np.column_stack(found), first) if len(first) else np.empty((0, 2))
+    )
+    deviations = np.maximum(curves.deviations[used], measured)
     if not np.isfinite(deviations).all():
         return deviations, "the curve between two cells is not known"
     if not closest.inside.all():
@@ -316,11 +344,11 @@ def _deviations(
     deviations += surface.deviations
     deviations[:, 0] += standoff * deviations[:, 1]
     if surface.mean_edge_length > 0.0:
-        found = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)
-        np.maximum.at(deviations[:, 0], owner, found.off)
-        np.maximum.at(deviations[:, 1], owner, found.leans)
-        if not found.off.max(initial=0.0) <= tolerance:
-            away = found.away.min()
+        beside = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)
+        np.maximum.at(deviations[:, 0], owner, beside.off)
+        np.maximum.at(deviations[:, 1], owner, beside.leans)
+        if not beside.off.max(initial=0.0) <= tolerance:
+            away = beside.away.min()
             return deviations, (
                 f"between centres the tool point would come within {1e3 * away:.3g} mm of the "
                 f"surface, nearer than the standoff of {1e3 * standoff:g} mm: something protrudes "
@@ -336,7 +364,7 @@ def _samples(
 ) -> tuple[NDArray[np.int64], Array]:
     """Samples (k,) to compare: which of the used curves, and t on it."""
     curves = cells.curves
-    count = np.diff(curves.first)[used]
+    count = curves.first[used + 1] - curves.first[used]
     if cells.surface.mean_edge_length > 0.0:
         ends = cells.centres[cells.pairs[used]]
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

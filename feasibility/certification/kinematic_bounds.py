@@ -32,10 +32,21 @@ class Placements:
 def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
     """Tool points, axes and lever arms at q (m, n) by Pinocchio."""
     points, axes, twists = Kinematics(robot).tools_and_twists(q)
-    linear, angular = np.split(twists.transpose(0, 2, 1), 2, axis=2)
-    levers = np.linalg.norm(linear + np.cross(angular, points[:, None]), axis=2)
-    sines = np.linalg.norm(np.cross(angular, axes[:, None]), axis=2)
-    return Placements(points, axes, levers, sines)
+    moving = np.ascontiguousarray(twists.transpose(1, 0, 2))  # by coordinate, (6, m, n)
+    linear, angular = moving[:3], moving[3:]
+    levers = _length(linear + _cross(angular, points))
+    return Placements(points, axes, levers, _length(_cross(angular, axes)))
+
+
+def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(3, m, n) the cross products of vectors (3, m, n) with one (m, 3) for each row."""
+    x, y, z = b.T[:, :, None]
+    return np.stack([a[1] * z - a[2] * y, a[2] * x - a[0] * z, a[0] * y - a[1] * x])
+
+
+def _length(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(m, n) lengths of vectors (3, m, n); numpy's own sums are slow over three numbers."""
+    return np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 def second_derivatives(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,8 +68,6 @@ class Exploration:
     """How often a bridge between two nodes was tried."""
     pairs: NDArray[np.int64] = field(init=False)
     """(M + 1,) state of each neighbouring pair, see `close_pairs`."""
-    parts: NDArray[np.int64] = field(init=False)
-    """(N,) which part of the surface each cell is in, as the curves join them."""
 
     begun: tuple[int, int] | None = None
     """Node and component of the arm's start, where it has one: the motion has to begin there."""
@@ -97,9 +95,13 @@ class Exploration:
         self.indptr, self.indices = self.cells.neighbours
         self.links = self.cells.neighbours.links
         self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
-        self.parts = components(self.cells.pairs[passable(self.arrays)], len(self.cells))
 
     # -- reading the roadmap -------------------------------------------------------------------
+
+    @cached_property
+    def parts(self) -> NDArray[np.int64]:
+        """(N,) which part of the surface each cell is in, as the curves join them."""
+        return components(self.cells.pairs[passable(self.arrays)], len(self.cells))
 
     @property
     def best(self) -> int:
