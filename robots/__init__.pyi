@@ -3,6 +3,7 @@ from .chain import Chain as Chain
 from .chain import frames as frames
 from .chain import jacobians as jacobians
 from .chain import joint_alignments as joint_alignments
+from .chain_rows import moved_by_joints as moved_by_joints
 from .errors import RobotError as RobotError
 from .inverse_kinematics import configuration_near as configuration_near
 from .kinematics import Kinematics as Kinematics

@@ -16,6 +16,8 @@ analysis, IEEE Transactions on Robotics 34 (2018).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -28,26 +30,47 @@ ROUNDING = 1e-12  # [1]
 LEAST_SHARE = 1e-13  # [1] of c, below which d is nothing
 
 
-def fastest_speeds(most: Array, c: Array, d: Array) -> Array:
+class Rows(NamedTuple):
+    """Limits |c x + d y| <= l of each piece, made ready for any l > 0."""
+
+    c: Array
+    d: Array
+    lean: Array
+    """(m - 1, r) c / d; 0 where d is nothing."""
+    room: Array
+    """(m - 1, r) 1 / |d|; inf there."""
+    alone: Array | None
+    """(m - 1, r) 1 / |c| there and inf elsewhere; None where d is something everywhere."""
+
+    @staticmethod
+    def of(c: Array, d: Array) -> Rows:
+        """From c and d (m - 1, r)."""
+        alone = np.abs(d) <= LEAST_SHARE * np.abs(c)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            room = np.where(alone, np.inf, 1.0 / np.abs(d))
+            lean = np.where(alone, 0.0, c / d)
+            by_itself = np.where(alone, 1.0 / np.abs(c), np.inf) if alone.any() else None
+        return Rows(c, d, lean, room, by_itself)
+
+
+def fastest_speeds(most: Array, rows: Rows, limits: Array | float = 1.0) -> Array:
     """(m,) the largest x from rest to rest; see the module.
 
     Args:
         most: (m,) upper bounds of x.
-        c, d: (m - 1, r) rows of each piece: |c x + d y| <= 1.
+        rows: |c x + d y| <= l of each piece.
+        limits: (m - 1, r) l, or what makes that by repetition.
 
     Example:
-        >>> x = fastest_speeds(np.full(5, 9.0), np.full((4, 1), -0.5), np.full((4, 1), 0.5))
-        >>> x.round(9).tolist()
+        >>> rows = Rows.of(np.full((4, 1), -0.5), np.full((4, 1), 0.5))
+        >>> fastest_speeds(np.full(5, 9.0), rows).round(9).tolist()
         [0.0, 2.0, 4.0, 2.0, 0.0]
     """
-    alone = np.abs(d) <= LEAST_SHARE * np.abs(c)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # y is between -room - lean x and room - lean x.
-        room = np.where(alone, np.inf, 1.0 / np.abs(d))
-        lean = np.where(alone, 0.0, c / d)
-        by_itself = np.where(alone, 1.0 / np.abs(c), np.inf).min(axis=1)
-    x = np.append(np.minimum(most[:-1], by_itself), 0.0)
-    _run_through(x, room, lean)
+    # y is between -room - lean x and room - lean x.
+    x = np.append(most[:-1], 0.0)
+    if rows.alone is not None:
+        x[:-1] = np.minimum(x[:-1], (rows.alone * limits).min(axis=1))
+    _run_through(x, rows.room * limits, rows.lean)
     return x
 
 

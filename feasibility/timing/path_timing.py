@@ -22,7 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 from feasibility.certification import collision_replay, replay
 from feasibility.collisions import Bodies, checked, gather
 from feasibility.paths import CoveragePath, PathError
-from feasibility.timing.between_samples import strays_between
+from feasibility.task import Task
+from feasibility.timing.between_samples import NearMotion, motion_near, strays_between
 from feasibility.timing.sampled_trajectory import (
     KINDS,
     PLACES,
@@ -31,11 +32,12 @@ from feasibility.timing.sampled_trajectory import (
     held_inside,
     motion_between,
     past_limits,
-    used,
+    used_by_joints,
 )
 from feasibility.timing.smoothing import Curve, blended, control_points
-from feasibility.timing.speed_limits import MotionLimits, motion_limits, number
+from feasibility.timing.speed_limits import MotionLimits, motion_limits, number, tool_slopes
 from feasibility.timing.timed_curve import TimedCurve, samples, speed_bounds, timed_curve
+from feasibility.timing.tool_between_samples import fastest_tool
 from feasibility.verdict import Walk
 from robots import Robot
 
@@ -153,10 +155,12 @@ def within_limits(robot: Robot, curve: Curve, limits: MotionLimits, period: floa
         share = share / over
     slower = 1.0
     for attempt in range(2 * SLOWINGS):
-        run = samples(robot, timed.slowed(slower), period)
-        too_fast = used(robot, run, limits).too_fast
+        run = samples(robot, timed.slowed(slower), period, with_tool=False)
+        too_fast = used_by_joints(run, limits).too_fast
         if too_fast <= 1.0:
-            return run
+            too_fast = fastest_tool(robot, run, limits.tool_speed) / limits.tool_speed
+        if too_fast <= 1.0:
+            return replace(run, tool_speed=tool_slopes(robot, run.q, run.dq))
         # Other samples are over by another little: at first small steps, which may do.
         slower *= min(too_fast, SMALL if attempt < SLOWINGS else too_fast) + RESERVE
     raise PathError(
@@ -223,15 +227,33 @@ def _refusal(path: CoveragePath, run: Trajectory) -> str:
     if past > 0.0:
         return f"between samples a joint may go {past:.2g} (rad or m) past its limits"
     tool_alone = replace(path.task, collision=None)
-    motions = {kind: motion_between(run, kind, PLACES) for kind in KINDS}
-    for walk in (run.walk, *motions.values()):
+    replayed = replay(robot, cells, tool_alone, run.walk, path.needed)
+    for kind in KINDS if replayed.accepted else ():
+        if _near_enough(path, tool_alone, motion_near(robot, run, kind)):
+            continue
+        walk = motion_between(run, kind, PLACES)
         replayed = replay(robot, cells, tool_alone, walk, path.needed)
         if not replayed.accepted:
-            return replayed.refusal
+            break
+    if not replayed.accepted:
+        return replayed.refusal
     bodies = gather(robot, cells.surface, path.task.collision, path.task.standoff)
     if bodies is None:
         return ""
     return _collisions(robot, bodies, run)
+
+
+def _near_enough(path: CoveragePath, task: Task, near: NearMotion) -> bool:
+    """Is all that is near a motion of straight lines shown to be right?
+
+    How far the roll may be off is not known.
+    """
+    if task.roll is not None:
+        return False
+    replayed = replay(path.robot, path.cells, task, near.walk, path.needed)
+    off = replayed.certificate.max_position_error + near.point
+    tilt = replayed.certificate.max_angle + near.turn
+    return replayed.accepted and off <= task.effective_tolerance and tilt <= task.cone
 
 
 def _collisions(robot: Robot, bodies: Bodies, run: Trajectory) -> str:

@@ -18,7 +18,7 @@ from scipy.interpolate import BSpline
 from feasibility.certification import second_derivatives
 from feasibility.paths import PathError
 from feasibility.read_only import ReadOnlyArrays
-from robots import Kinematics, Robot
+from robots import Kinematics, Robot, moved_by_joints
 
 Array = NDArray[np.float64]
 
@@ -147,15 +147,23 @@ def _slopes(robot: Robot, spline: BSpline, grid: Array) -> tuple[Array, Array, A
     middle = slope[:-1] + 0.5 * h * bend[:-1]
     fastest = np.maximum(np.maximum(np.abs(slope[:-1]), np.abs(slope[1:])), np.abs(middle))
     bent = np.maximum(np.abs(bend[:-1]), np.abs(bend[1:]))
-    points, _, twists = Kinematics(robot).tools_and_twists(q)
-    linear, angular = np.split(twists.transpose(0, 2, 1), 2, axis=2)
-    moved = linear + np.cross(angular, points[:, None])  # of the tool point, by each joint
-    levers = np.linalg.norm(moved, axis=2)
+    moved = moved_by_joints(robot.chain, q)
+    levers = np.sqrt((moved**2).sum(axis=1)).T
     swing = second_derivatives(fastest * h, robot.prismatic, levers, np.inf, bent * h**2)
-    tool = np.linalg.norm(np.einsum("kji,kj->ki", moved, slope), axis=1)
-    return tool, fastest, swing / h[:, 0] ** 2
+    return speeds(moved, slope), fastest, swing / h[:, 0] ** 2
+
+
+def speeds(moved: Array, slope: Array) -> Array:
+    """(m,) how fast what each joint moves as `moved` (n, 3, m) says moves at `slope` (m, n)."""
+    velocity = np.zeros(moved.shape[1:])
+    for by_joint, rate in zip(moved, slope.T, strict=True):
+        velocity += by_joint * rate
+    return np.asarray(np.sqrt((velocity**2).sum(axis=0)))
 
 
 def tool_slopes(robot: Robot, q: Array, slope: Array) -> Array:
-    """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n)."""
+    """(m,) m, how fast the tool point moves when the joints q (m, n) move at `slope` (m, n).
+
+    By Pinocchio: what users are told.
+    """
     return np.linalg.norm(Kinematics(robot).tool_velocities(q, slope), axis=1)

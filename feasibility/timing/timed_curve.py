@@ -13,10 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline
-from scipy.spatial import cKDTree
 
 from feasibility.paths import PathError
-from feasibility.timing.fastest_speeds import fastest_speeds
+from feasibility.timing.fastest_speeds import Rows, fastest_speeds
 from feasibility.timing.sampled_trajectory import Trajectory
 from feasibility.timing.smoothing import Curve, inside
 from feasibility.timing.speed_limits import MotionLimits, fine_grid, squared_speeds, tool_slopes
@@ -72,8 +71,7 @@ class SpeedBounds:
     """(m,) places k of the curve."""
     most: Array
     """(m,) 1/s^2, upper bounds on (dk/dt)^2."""
-    first: Array
-    last: Array
+    rows: Rows
     """(m - 1, 3 n) what (dk/dt)^2 at both ends of a piece adds to accelerations in it."""
     limits: MotionLimits
 
@@ -83,7 +81,7 @@ def speed_bounds(robot: Robot, curve: Curve, limits: MotionLimits) -> SpeedBound
     spline = curve.spline()
     grid = fine_grid(robot, spline, curve.pieces)
     most = squared_speeds(robot, spline, grid, limits)
-    return SpeedBounds(curve, grid, most, *acceleration_rows(spline, grid), limits)
+    return SpeedBounds(curve, grid, most, Rows.of(*acceleration_rows(spline, grid)), limits)
 
 
 def timed_curve(bounds: SpeedBounds, share: Array | float = 1.0) -> TimedCurve:
@@ -97,11 +95,10 @@ def timed_curve(bounds: SpeedBounds, share: Array | float = 1.0) -> TimedCurve:
         PathError: the motion would have to stop in between.
     """
     acceleration = np.atleast_2d(share * bounds.limits.acceleration)
-    limits, grid, most = bounds.limits, bounds.grid, bounds.most
+    limits, grid, most, rows = bounds.limits, bounds.grid, bounds.most, bounds.rows
     all_three = np.tile(acceleration, (1, 3))
-    first, last = bounds.first / all_three, bounds.last / all_three
-    x = fastest_speeds(most, first, last)
-    over = np.abs(first * x[:-1, None] + last * x[1:, None])
+    x = fastest_speeds(most, rows, all_three)
+    over = np.abs(rows.c * x[:-1, None] + rows.d * x[1:, None]) / all_three
     x = x / max(float(over.max()), float((x / most).max()), 1.0)
     rate = np.sqrt(x)
     time = np.concatenate([[0.0], np.cumsum(2.0 * np.diff(grid) / (rate[:-1] + rate[1:]))])
@@ -119,7 +116,9 @@ def samples(robot: Robot, timed: TimedCurve, period: float, with_tool: bool = Tr
     # Whole nanoseconds, which is what a ROS message can hold.
     passages = np.round(timed.time[np.searchsorted(timed.grid, curve.marks.astype(float))], 9)
     regular = np.round(np.arange(0.0, timed.duration, period), 9)
-    apart, _ = cKDTree(passages[:, None]).query(regular[:, None], p=1)
+    after = np.searchsorted(passages, regular)
+    known = np.concatenate([[-np.inf], passages, [np.inf]])
+    apart = np.minimum(regular - known[after], known[after + 1] - regular)
     regular = regular[apart > CROWDED * period]
     time = np.concatenate([passages, regular])
     order = np.argsort(time, kind="stable")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from arm_urdfs import UNLIKE, arm, joint, load_text, placement, random_arm, random_q, unlike
 
-from robots import Kinematics, list_robots, load_robot
+from robots import Kinematics, list_robots, load_robot, moved_by_joints
 from robots.urdf import check_urdf
 
 
@@ -49,6 +49,16 @@ def test_the_tool_moves_as_its_jacobian_says(seed, tmp_path):
     dq = rng.normal(size=q.shape)
     expected = [kinematics.jacobians(place)[0] @ rate for place, rate in zip(q, dq, strict=True)]
     np.testing.assert_allclose(kinematics.tool_velocities(q, dq), expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_the_chain_moves_the_tool_as_pinocchio_does(seed, tmp_path):
+    rng = np.random.default_rng(700 + seed)
+    robot = load_text(tmp_path, random_arm(rng))
+    q = np.array([random_q(robot, rng) for _ in range(5)])
+    expected = [Kinematics(robot).jacobians(row)[0].T for row in q]
+    moved = moved_by_joints(robot.chain, q).transpose(2, 0, 1)
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", UNLIKE)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from feasibility.timing.fastest_speeds import fastest_speeds
+from feasibility.timing.fastest_speeds import Rows, fastest_speeds
 from feasibility.timing.smoothing import control_points
 from feasibility.timing.speed_limits import fine_grid, motion_limits, squared_speeds
 from feasibility.timing.timed_curve import speed_bounds, timed_curve
@@ -26,7 +26,7 @@ def test_speeds_are_those_of_one_linear_program(seed):
     d = rng.normal(size=(m - 1, r))
     c = -d * rng.uniform(0.2, 3.0, (m - 1, r))
     d[rng.random((m - 1, r)) < 0.2] = 0.0
-    x = fastest_speeds(most, c, d)
+    x = fastest_speeds(most, Rows.of(c, d))
     rows = np.zeros((m - 1, r, m))
     at = np.arange(m - 1)
     rows[at, :, at], rows[at, :, at + 1] = c, d
