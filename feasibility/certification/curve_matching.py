@@ -269,7 +269,7 @@ def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> A
     off -= wanted
     for _ in range(NEWTON_STEPS):
         square = _square(slope)
-        step = sum(off * slope)
+        step = (off * slope).sum(axis=0)
         step = np.divide(step, square, out=np.zeros(len(left)), where=square > 0.0)
         step = np.minimum(np.maximum(step, -width), width)
         tried_t = np.minimum(np.maximum(here_t - step, 0.0), 1.0)
@@ -283,7 +283,8 @@ def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> A
         open_ = np.flatnonzero(np.abs(step) > CONVERGED)
         if len(open_) == 0:
             break
-        left, here_t, width, here_curve = (a[open_] for a in (left, here_t, width, here_curve))
+        left, here_curve = left[open_], here_curve[open_]
+        here_t, width = here_t[open_], width[open_]
         off, slope, wanted = (a[:, open_] for a in (off, slope, wanted))
     return t
 
