@@ -50,7 +50,7 @@ def region_words(region: UntreatedRegion) -> str:
 def treated_words(found: TreatedArea) -> str:
     """The share, how much of it twice, what is left out, in one text."""
     along, across = (1e3 * axis for axis in found.footprint)
-    size = f"{along:.4g} mm" if along == across else f"{along:.4g} x {across:.4g} mm"
+    size = f"{along:,.6g} mm" if along == across else f"{along:,.6g} x {across:,.6g} mm"
     words = (
         f"{share_words(found)} of {found.area:.4g} m2 by a footprint of {size}, "
         f"{100.0 * found.twice:.1f} % more than once"

@@ -108,7 +108,8 @@ def view_division(
     parts += _left_out(division)
     for k, area in enumerate(() if areas is None else areas.patches):
         if area is not None:
-            parts.append(certified_layer(area, f"certified of patch {k + 1}"))
+            share = min(area.area / plan.patches[k].area, 1.0)
+            parts.append(certified_layer(area, f"certified of patch {k + 1}", share))
     walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
     motion = None
     if walks:

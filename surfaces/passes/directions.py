@@ -36,7 +36,7 @@ def ranked_directions(surface: Surface, pitch: float) -> list[float]:
     ranks = []
     for angle in np.radians(np.arange(0.0, 180.0, STEP_DEG)).tolist():
         laid = lay_lines(surface, lidded, angle, "planes", pitch)
-        pieces = sum(each.line.length >= SHORTEST * pitch for each in laid.lines)
+        pieces = sum(each.line.length >= SHORTEST * laid.spacing for each in laid.lines)
         ranks.append((pieces, laid.levels, angle))
     return [angle for _, _, angle in sorted(ranks)]
 

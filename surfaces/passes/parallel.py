@@ -27,7 +27,8 @@ By = Literal["distance", "planes", "parameters"]
 BYS: tuple[By, ...] = ("distance", "planes", "parameters")
 EDGES_PER_PITCH = 4.0  # how fine distances are measured
 POINTS_PER_PITCH = 4.0  # how close the points of a pass are, unless it is said
-SHORTEST = 0.5  # [1] of the pitch: shorter pieces are dropped, unless it is said
+SHORTEST = 0.5  # [1] of the spacing: shorter pieces are dropped, unless it is said
+TURNED = math.radians(1.0)  # from here on it is said that passes are not in the direction asked for
 KINK = 0.9  # [1] a distance that grows more slowly than this across a face has a ridge there
 
 
@@ -89,7 +90,7 @@ def parallel_passes(
         by: how distance is measured.
         overrun: m >= 0, by how much passes go on straight beyond the border.
         step: m > 0 between points of a pass; a quarter of the pitch by default.
-        shortest: m >= 0, stretches shorter than this are dropped; half of the pitch by default.
+        shortest: m >= 0, stretches shorter than this are dropped; half of the spacing by default.
         one_way: run all passes in the same direction, and not to and fro.
 
     Raises:
@@ -110,7 +111,7 @@ def parallel_passes(
     lidded = with_lids(copy.mesh, edge)
     laid = lay_lines(surface, lidded, direction, by, pitch)
     field, spacing = laid.field, laid.spacing
-    kept = SHORTEST * pitch if shortest is None else shortest
+    kept = SHORTEST * spacing if shortest is None else shortest
     lines, dropped = list[LevelLine](), 0.0
     for each in laid.lines:
         if each.line.length >= kept:
@@ -129,7 +130,7 @@ def parallel_passes(
         by=by,
         widest=spacing if by == "distance" else spacing / max(slopes.min(initial=1.0), 1e-9),
         dropped=dropped,
-        notes=(*_notes(lidded.holes, lines, field, by), *_copied(copy)),
+        notes=(*_notes(lidded.holes, lines, field, by), *_turned(laid), *_copied(copy)),
     )
 
 
@@ -142,16 +143,29 @@ class Laid(NamedTuple):
     """How many there are."""
     spacing: float
     """m, between levels."""
+    turned: float
+    """rad, from the direction that was asked for at the middle to that of the lines."""
 
 
 def lay_lines(
     surface: Surface, lidded: Lidded, direction: float | ArrayLike, by: By, pitch: float
 ) -> Laid:
     """The lines of all levels, cut at holes; for the arguments see `parallel_passes`."""
-    field = _field(surface, lidded, direction, by)
-    own = field.parent < lidded.faces
-    levels, spacing = _levels(field, own, pitch)
-    return Laid(field, list(_lines(field, own, levels)), len(levels), spacing)
+    mesh = lidded.mesh
+    own = WorkingMesh(mesh.vertices, mesh.faces[: lidded.faces])
+    centres = mesh.vertices[own.faces].mean(axis=1)
+    mean = np.average(centres, axis=0, weights=own.areas)
+    middle = centres[np.linalg.norm(centres - mean, axis=1).argmin()]
+    normal = surface.closest(middle).normal
+    along, turned = _along(surface, middle, normal, direction), 0.0
+    if by == "parameters":
+        field, turned = _parameter_field(surface, mesh, along, middle)
+    else:
+        across = np.cross(normal, along)
+        field = (distance_field if by == "distance" else plane_field)(mesh, middle, across)
+    covers = field.parent < lidded.faces
+    levels, spacing = _levels(field, covers, pitch)
+    return Laid(field, list(_lines(field, covers, levels)), len(levels), spacing, turned)
 
 
 def _check(
@@ -167,21 +181,6 @@ def _check(
         checks.number("shortest", shortest, "must be a finite number >= 0 (metres)", low=0.0)
     checks.choice("by", by, BYS)
     checks.done()
-
-
-def _field(surface: Surface, lidded: Lidded, direction: float | ArrayLike, by: By) -> Field:
-    """What the passes are the level lines of."""
-    mesh = lidded.mesh
-    own = WorkingMesh(mesh.vertices, mesh.faces[: lidded.faces])
-    centres = mesh.vertices[own.faces].mean(axis=1)
-    mean = np.average(centres, axis=0, weights=own.areas)
-    middle = centres[np.linalg.norm(centres - mean, axis=1).argmin()]
-    normal = surface.closest(middle).normal
-    along = _along(surface, middle, normal, direction)
-    if by == "parameters":
-        return _parameter_field(surface, mesh, along, middle)
-    across = np.cross(normal, along)
-    return (distance_field if by == "distance" else plane_field)(mesh, middle, across)
 
 
 def _along(
@@ -222,21 +221,28 @@ def _u_direction(surface: Surface, middle: Floats, normal: Floats) -> Floats:
     return np.asarray(flat / np.linalg.norm(flat))
 
 
-def _parameter_field(surface: Surface, mesh: WorkingMesh, along: Floats, middle: Floats) -> Field:
-    """The parameter that is constant along the passes, as metres across them at the widest."""
+def _parameter_field(
+    surface: Surface, mesh: WorkingMesh, along: Floats, middle: Floats
+) -> tuple[Field, float]:
+    """The parameter that is constant along the passes, as metres across them at the widest.
+
+    And the angle (rad) from `along` to the passes at the middle.
+    """
     if not isinstance(surface, Patch):
         raise ArgumentError(
             f"by: a surface of kind {surface.kind!r} has no lines of constant parameters; take "
             "'distance' or 'planes'"
         )
     at, here = surface.closest(mesh.vertices), surface.closest(middle)
-    runs_along_u = abs(float(along @ surface.tangent(here.u, here.v))) > math.sqrt(0.5)
+    cosine = min(1.0, abs(float(along @ surface.tangent(here.u, here.v))))
+    runs_along_u = cosine > math.sqrt(0.5)
     low, high = surface.v_range if runs_along_u else surface.u_range
     values = ((at.v if runs_along_u else at.u) - low) / (high - low)
     field = Field(mesh, values, np.arange(len(mesh.faces)))
     slopes = field.slopes[~field.torn]
     width = 1.0 / float(slopes[slopes > 0.0].min())
-    return field._replace(values=width * values, extent=(0.0, width))
+    turned = math.acos(cosine) if runs_along_u else math.asin(cosine)
+    return field._replace(values=width * values, extent=(0.0, width)), turned
 
 
 def _levels(field: Field, own: NDArray[np.bool_], pitch: float) -> tuple[Floats, float]:
@@ -271,6 +277,16 @@ def _parts(line: Line, own: NDArray[np.bool_]) -> Iterator[Line]:
     ends = np.flatnonzero(np.diff(np.concatenate([[0], own.astype(np.int8), [0]])))
     for start, end in ends.reshape(-1, 2):
         yield Line(points[start : end + 1], faces[start:end], closed=False)
+
+
+def _turned(laid: Laid) -> tuple[str, ...]:
+    """That passes run in another direction than was asked for."""
+    if laid.turned < TURNED:
+        return ()
+    return (
+        "lines of constant parameters run along u or v, "
+        f"{math.degrees(laid.turned):.3g} deg from the direction that was asked for",
+    )
 
 
 def _copied(copy: WorkingCopy) -> tuple[str, ...]:

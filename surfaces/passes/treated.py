@@ -56,6 +56,18 @@ class ToolLines(NamedTuple):
         start, end = self.segments
         return float(np.linalg.norm(end - start, axis=1).max(initial=0.0))
 
+    def about(self, step: float) -> ToolLines:
+        """The same with points about `step` (m) apart along each stretch, ends kept."""
+        start, end = self.segments
+        along = np.append(0.0, np.cumsum(np.linalg.norm(end - start, axis=1)))[: len(start)]
+        kept = np.diff(np.floor(along / step), prepend=-1.0) > 0.0
+        turns = np.diff(self.stretch) != 0
+        kept[1:] |= turns
+        kept[:-1] |= turns
+        kept[-1:] = True
+        thin = ToolLines(self.points[kept], self.normals[kept], self.stretch[kept])
+        return thin.no_longer_than(step)
+
     def no_longer_than(self, step: float) -> ToolLines:
         """The same with points so close that no piece is longer than `step` (m)."""
         start, end = self.segments

@@ -68,8 +68,8 @@ def _grid(patch: Patch, edge: float, sign: float) -> WorkingMesh:
     nu, nv = (max(2, count) for count in grid_shape(patch, edge))
     if 2 * nu * nv > MOST_FACES:
         raise SurfaceError(
-            f"edges of {1e3 * edge:.3g} mm make {2 * nu * nv} triangles of it, more than "
-            f"{MOST_FACES}; take a larger pitch",
+            f"edges of {1e3 * edge:.3g} mm make {2 * nu * nv:,} triangles of it, more than "
+            f"{MOST_FACES:,}; take a larger pitch",
             patch.kind,
         )
     u, v = np.meshgrid(np.linspace(u0, u1, nu + 1), np.linspace(v0, v1, nv + 1), indexing="ij")

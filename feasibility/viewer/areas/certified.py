@@ -27,12 +27,21 @@ ABOVE = 0.012  # [1] of a cell's width, so that tiles lie over the surface
 PIECES = 3  # of a tile's side: a large one is bent
 
 
-def certified_layer(area: CertifiedArea, name: str = "certified area") -> Layer:
-    """The certified tiles, tinted on the side where the tool works."""
+def certified_layer(
+    area: CertifiedArea, name: str = "certified area", share: float | None = None
+) -> Layer:
+    """The certified tiles, tinted on the side where the tool works.
+
+    Args:
+        area: the tiles.
+        name: in the legend.
+        share: 0 to 1, told beside it; that of all cells' area by default.
+    """
+    share = area.share if share is None else share
     cells, path = area.cells, f"/cells/{name}"
     height = cells.surface.side_sign * ABOVE * cell_size(cells)
     cut = cell_tiles(cells, height)
-    count, label = len(area.areas), f"{name} ({percent_down(area.share)})"
+    count, label = len(area.areas), f"{name} ({percent_down(share)})"
     if cut is None or not count:
         return Layer((), Entry(label, CERTIFIED, path), 0)
     weights, faces = _triangle() if area.tiles.corners.shape[1] == 3 else _square()

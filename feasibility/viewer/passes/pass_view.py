@@ -17,7 +17,7 @@ from feasibility.runs import PlannedPasses
 from feasibility.timing import MotionLimits, Trajectory
 from feasibility.treated import TreatedArea, share_words
 from feasibility.viewer import robot as robot_visuals
-from feasibility.viewer.passes.digits import digit_lines
+from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import LONGEST, Motion, paced
 from feasibility.viewer.scene import OUTLINES, PATCHES, Layer, drawn_lines
@@ -31,6 +31,8 @@ Floats = NDArray[np.float64]
 FRAMES = 3_000  # samples of a trajectory that are drawn, at most
 THIN = 0.03  # [1] of the distance between passes: radius of their lines
 TALL = 0.5  # [1] of it: height of their numbers
+BEFORE = 0.15  # [1] of it: from a number to its pass
+UPRIGHT = np.array([-1.0, 1.0, 3.0])  # upwards, or away from where the page looks from
 
 
 def view_passes(
@@ -114,15 +116,13 @@ def _pass_layers(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[La
 
 
 def _number(each: Pass, along: PlannedPasses) -> list[Floats]:
-    """The number of a pass, beside the beginning of one of its stretches."""
-    spacing, normal = along.passes.spacing, each.normals[0]
+    """The number of a pass before the beginning of a stretch, upright on the tool's side."""
+    spacing, side = along.passes.spacing, along.passes.surface.side_sign
     heading = each.points[1] - each.points[0]
     heading = heading / max(float(np.linalg.norm(heading)), 1e-300)
-    first = along.passes.stretches[0]
-    reading = first.points[1] - first.points[0]
-    reading = heading if reading @ heading >= 0.0 else -heading
-    up = np.cross(normal, reading) * TALL * spacing
-    name = each.level + 1
-    wide = 0.75 * TALL * spacing * len(str(name))
-    start = each.points[0] - heading * (0.3 * spacing + (wide if reading @ heading > 0.0 else 0.0))
-    return digit_lines(name, start - 0.5 * up, reading, up)
+    up = heading if heading @ UPRIGHT >= 0.0 else -heading
+    reading = np.cross(up, side * each.normals[0])
+    name, height = each.level + 1, TALL * spacing
+    middle = each.points[0] - (BEFORE * spacing + 0.5 * height) * heading
+    wide = (len(str(name)) * (WIDTH + GAP) - GAP) * height
+    return digit_lines(name, middle - 0.5 * (wide * reading + height * up), reading, height * up)

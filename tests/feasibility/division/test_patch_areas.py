@@ -62,7 +62,8 @@ def test_they_are_tinted(divided, areas):
     one = replace(divided, fewest=replace(divided.fewest, patches=divided.patches[1:]))
     drawn = view_division(one, areas=replace(areas, patches=areas.patches[1:]))
     entries = [entry.label for entry in drawn.legend.entries]
-    assert [entry for entry in entries if "certified" in entry] == ["certified of patch 1 (50.0 %)"]
+    certified = [entry for entry in entries if "certified" in entry]
+    assert certified == ["certified of patch 1 (100.0 %)"]
 
 
 def test_refused_walks_and_collisions_have_none(divided):

@@ -224,3 +224,17 @@ def test_over_many_triangles_distances_are_taken_on_a_copy() -> None:
         for each in row:
             lines = [away("arch", each.points, other.points) for other in levels[inner]]
             assert np.abs(np.min(lines, axis=0) / found.spacing - 1.0).max() <= 0.02
+
+
+def test_one_pass_is_enough_for_a_narrow_plate() -> None:
+    found = parallel_passes(plane((0.0, 0.3), (0.0, 0.4)), 1.0, HALF)
+    assert (found.count, found.dropped) == (1, 0.0)
+    assert found.length == pytest.approx(0.4)
+    assert np.allclose(found.stretches[0].points[:, 0], 0.15)
+
+
+def test_parameters_say_that_they_run_along_u_or_v_alone() -> None:
+    plate = plane((0.0, 0.3), (0.0, 0.4))
+    (note,) = parallel_passes(plate, 0.05, HALF / 2, by="parameters").notes
+    assert "45 deg from the direction that was asked for" in note
+    assert not parallel_passes(plate, 0.05, HALF, by="parameters").notes

@@ -10,7 +10,14 @@ from pass_metrics import panel_with_hole
 from scipy.integrate import quad
 
 from surfaces import cone, cylinder, plane, sphere
-from surfaces.passes import ToolLines, WorkingMesh, parallel_passes, treated_share, working_mesh
+from surfaces.passes import (
+    ToolLines,
+    WorkingMesh,
+    parallel_passes,
+    treated_share,
+    visits,
+    working_mesh,
+)
 from surfaces.passes.treated import share_below
 
 
@@ -205,3 +212,23 @@ def test_shares_of_triangles_below_a_level() -> None:
     for row, share in zip(values, share_below(values, 0.2), strict=True):
         assert share == pytest.approx((weights @ row <= 0.2).mean(), abs=5e-3)
     assert share_below(np.array([[0.1, 0.1, 0.1], [0.3, 0.3, 0.3]]), 0.2).tolist() == [1.0, 0.0]
+
+
+def test_a_footprint_far_larger_than_the_surface_is_counted_too() -> None:
+    """Within reach of everything a path comes by once; at a few pitches, by each of its passes."""
+    x = np.linspace(0.0, 0.6, 600)
+    rows = [
+        np.column_stack([x[:: 1 if k % 2 else -1], np.full(600, 0.02 * k + 0.01), 0.0 * x])
+        for k in range(20)
+    ]
+    points = np.concatenate(rows)
+    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    line = ToolLines(points, up, np.zeros(len(points), dtype=np.int64))
+    places = np.random.default_rng(1).uniform(0.0, [0.6, 0.4, 0.0], (4000, 3))
+    for radius in (1.0, 100.0):
+        assert (visits(places, up[:4000], line, radius) == 1).all()
+    inner = np.abs(places - [0.3, 0.2, 0.0]).max(axis=1) < 0.1
+    for radius, passes in ((0.03, 3.0), (0.05, 5.0)):
+        assert visits(places[inner], up[:4000][inner], line, radius).mean() == pytest.approx(
+            passes, rel=0.06
+        )
