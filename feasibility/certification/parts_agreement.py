@@ -13,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces import Cells, Surface, SurfaceParts
+from surfaces.toolpaths import PoseSurface, arc_at
 
 SAMPLES = 300
+AT_ONCE = 60  # courses between poses that are looked at
 ROUNDING = 1e-9  # [m], [1] that a radius is taken larger by
 ON_SURFACE = 1e-8  # [m], [1] by which a place and its own closest place may differ
 WITHIN = 2.0  # of (|df| / r_f)^2 + (|dn| / r_n)^2; a common x makes each at most 1
@@ -36,8 +38,15 @@ def disagreement(cells: Cells, parts: SurfaceParts) -> str:
 
 
 def places(cells: Cells, samples: int) -> tuple[Array, Array]:
-    """Points (m, 3) m of the surface and outward normals (m, 3), cell centres among them."""
+    """Points (m, 3) m of the surface and outward normals (m, 3), cell centres among them.
+
+    Of poses, those of the courses between them.
+    """
     rng = np.random.default_rng(0)
+    if cells.surface.bare:
+        pairs = cells.pairs[rng.integers(len(cells.pairs), size=AT_ONCE)]
+        points, normals = cells.trace(pairs, rng.uniform(0.0, 1.0, -(-samples // AT_ONCE)))
+        return points.reshape(-1, 3), normals.reshape(-1, 3)
     chosen = rng.integers(len(cells), size=samples)
     size = np.sqrt(cells.areas[chosen])[:, None]
     near = cells.centres[chosen] + size * rng.uniform(-1.0, 1.0, (samples, 3))
@@ -62,14 +71,33 @@ def feet_of(surface: Surface, points: Array) -> Feet:
     """The places whose normals lead to points (m, 3).
 
     Beyond the border of a mesh or a seam the normal that `closest` gives leads elsewhere; so each
-    place is asked for its own closest place.
+    place is asked for its own closest place. Of poses it is the place of a course that is nearest.
     """
+    if isinstance(surface, PoseSurface):
+        return _on_courses(surface, points)
     found = surface.closest(points)
     feet = points - found.height[:, None] * found.normal
     again = surface.closest(feet)
     alike = np.linalg.norm(again.normal - found.normal, axis=1) <= ON_SURFACE
     alike &= np.abs(again.height) <= ON_SURFACE
     return Feet(feet, found.normal, np.asarray(found.inside & alike))
+
+
+def _on_courses(surface: PoseSurface, points: Array) -> Feet:
+    """The places of the straight courses between poses that are nearest to points (m, 3)."""
+    start, end = (surface.placed_points[of] for of in surface.pairs.T)
+    way = end - start
+    off = points[:, None] - start
+    share = (off * way).sum(axis=2) / np.maximum((way**2).sum(axis=1), 1e-300)
+    share = np.clip(share, 0.0, 1.0)
+    away = np.linalg.norm(off - share[..., None] * way, axis=2)
+    nearest = np.argmin(np.nan_to_num(away, nan=np.inf), axis=1)
+    t = share[np.arange(len(points)), nearest]
+    feet = start[nearest] + t[:, None] * way[nearest]
+    i, j = surface.pairs[nearest].T
+    outward = surface.turned(surface.outward)
+    normals, _ = arc_at(outward[i], outward[j], t)
+    return Feet(feet, normals, np.asarray(np.isfinite(points).all(axis=1)))
 
 
 def on_a_finest_part(places: Array, parts: SurfaceParts) -> NDArray[np.bool_]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import CoverableError, Fault
-from feasibility.cli.command import STATUS, json_text, note_no_rates, positive, write_text
+from feasibility.cli.command import STATUS, json_text, positive, write_text
 from feasibility.cli.console import print_err, print_out
 from feasibility.safe_files import shown_path
 
@@ -141,11 +141,11 @@ def in_runs(args: argparse.Namespace, opened: OpenCase, along: PlannedPasses) ->
     from feasibility.timing import trajectory
 
     verdict = along.verdict
-    note_no_rates(verdict.task, "passes that are cut are")
     opened.progress(0, None, "cutting passes into runs")
     found = pass_runs(
-        verdict.robot, along.cells, verdict.task, along.places, verdict.seed, opened.clock
-    )
+        verdict.robot, along.cells, verdict.task, along.places, verdict.seed, opened.clock,
+        verdict.proof,
+    )  # fmt: skip
     timed = [
         trajectory(
             run, args.speed, velocity=args.velocity, acceleration=args.acceleration,

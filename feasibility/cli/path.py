@@ -105,7 +105,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         from feasibility.paths import coverage_path
         from feasibility.reports import path as report
         from feasibility.results import check_ending
-        from feasibility.speed import TOO_SLOW, path_rates
+        from feasibility.speed import path_rates
         from feasibility.timing import motion_limits, trajectory
         from feasibility.verdict import Answer
 
@@ -117,8 +117,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         limits = motion_limits(robot, speed, args.velocity, args.acceleration)
         along = None if args.passes is None else passes_asked(args, opened)
         verdict = check(*opened.setup, clock=opened.clock) if along is None else along.verdict
-        whole = "time limit" in verdict.message or TOO_SLOW in verdict.statistics
-        if not verdict.feasible and along is not None and not whole:
+        if not verdict.feasible and along is not None and "time limit" not in verdict.message:
             return in_runs(args, opened, along)
         if not verdict.feasible:
             return _no_path(args, opened.case.name, verdict, loaded)

@@ -10,6 +10,8 @@ from .patch_areas import PatchAreas as PatchAreas
 from .patch_areas import patch_areas as patch_areas
 from .plans import collect_components as collect_components
 from .plans import connect_pairs as connect_pairs
+from .proved_bound import ProvedBound as ProvedBound
+from .proved_bound import prove_apart as prove_apart
 from .reconfiguration import Reconfiguration as Reconfiguration
 from .set_covering import set_cover as set_cover
 from .set_covering import undominated as undominated

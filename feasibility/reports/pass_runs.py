@@ -7,14 +7,16 @@ from collections.abc import Sequence
 from typing import Any
 
 from feasibility.collisions import checked
-from feasibility.reports.parts import aligned, certificate_json, clearance_json, summary
+from feasibility.reports.parts import aligned, certificate_json, clearance_json, counted, summary
 from feasibility.reports.path import passes_json, passes_text
+from feasibility.reports.proof import proof_json
 from feasibility.runs import Cut, PassRuns, PlannedPasses
 from feasibility.timing import Trajectory
 from feasibility.treated import TreatedArea, treated_json, treated_words
 from feasibility.version import version
 
 FEWEST = "no fewer with the configurations found"
+LISTED = 3  # gaps that are named
 
 
 def as_json(
@@ -47,12 +49,36 @@ def as_json(
             for run, trajectory in zip(found.runs, timed, strict=True)
         ],
         "cuts": [_cut_json(cut, found) for cut in found.cuts],
+        "at_least": _bound_json(along, found),
         "left_out_m": found.left_out,
+        "left_out": [
+            {
+                "stretches": [1 + stretch for stretch in gap.stretches],
+                "length_m": gap.length,
+                "cause": gap.cause,
+                "proved": gap.proved,
+            }
+            for gap in found.gaps
+        ],
         "refused": list(found.refusals),
         "treated": treated_json(treated),
         "collisions": checked(along.task.collision),
         "robot": found.robot.name,
         "version": version(),
+    }
+
+
+def _bound_json(along: PlannedPasses, found: PassRuns) -> dict[str, Any]:
+    """How many interruptions there are at least, and the proofs, each with the poses it is about.
+
+    A proof numbers its poses from the first one of its piece on.
+    """
+    return {
+        "interruptions": len(found.parted),
+        "proofs": [
+            {"poses": [one.first, one.last], **proof_json(one.proof, found.robot, along.cells)}
+            for one in found.parted
+        ],
     }
 
 
@@ -87,12 +113,11 @@ def as_text(
         if count
         else "no part of them can be run."
     )
-    left = f"{found.left_out:.4g} m of {along.passes.length:.4g} m of passes"
     rows = [
         ("passes", passes_text(along.passes)),
         ("one motion", along.verdict.message),
-        ("runs", f"{count}, {FEWEST}" if count else ""),
-        ("left out", left if found.left_out > 0.0 else ""),
+        ("runs", _fewest_words(found)),
+        ("left out", _left_words(along, found)),
         ("refused", "; ".join(found.refusals)),
         ("treated", "" if treated is None else treated_words(treated)),
     ]
@@ -104,6 +129,35 @@ def as_text(
         lines += [f"    move {cut.move.described()}"]
         lines += [f"    {cut.move.refusal}"] * bool(cut.move.refusal)
     return "\n".join(lines)
+
+
+def _fewest_words(found: PassRuns) -> str:
+    """How many runs there are, and what is known of fewer."""
+    count, least = len(found.runs), len(found.parted)
+    if count < 2:
+        return str(count) if count else ""
+    if least >= count - 1:
+        return f"{count}, proved: no fewer work on as much in this order"
+    proved = f"; at least {1 + least}, proved" if least else "; nothing is proved"
+    return f"{count}, {FEWEST}{proved}"
+
+
+def _left_words(along: PlannedPasses, found: PassRuns) -> str:
+    """How much is left out, where, and why."""
+    if not found.gaps:
+        return ""
+    words = f"{found.left_out:.4g} m of {along.passes.length:.4g} m of passes"
+    for gap in found.gaps[:LISTED]:
+        why = f" ({gap.cause}{', proved' if gap.proved else ''})" if gap.cause else ""
+        words += f"; of {_stretch_words(gap.stretches)}{why}"
+    more = len(found.gaps) - LISTED
+    return words + (f"; and {counted(more, 'more gap')}" if more > 0 else "")
+
+
+def _stretch_words(stretches: Sequence[int]) -> str:
+    """'stretch 3' or 'stretches 3 to 7'."""
+    first, last = 1 + stretches[0], 1 + stretches[-1]
+    return f"stretch {first}" if first == last else f"stretches {first} to {last}"
 
 
 def _table(found: PassRuns, timed: Sequence[Trajectory]) -> list[list[str]]:

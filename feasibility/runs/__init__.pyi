@@ -1,6 +1,9 @@
+from .at_least import Parted as Parted
+from .at_least import piece_of as piece_of
 from .fewest import Stations as Stations
 from .fewest import Way as Way
 from .fewest import fewest_ways as fewest_ways
+from .gaps import Gap as Gap
 from .pass_runs import Cut as Cut
 from .pass_runs import PassRuns as PassRuns
 from .pass_runs import pass_runs as pass_runs

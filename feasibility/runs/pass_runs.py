@@ -8,9 +8,13 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.certification import replay
+from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock, OutOfTime
+from feasibility.collisions import Pair
+from feasibility.cut_tree import CutTree
 from feasibility.division import (
     Reconfiguration,
     clear_moves,
@@ -24,13 +28,17 @@ from feasibility.roadmap import (
     NODES,
     Exploration,
     arrays_of,
+    edge_motion,
     explore,
     route_walk,
     warm_up,
 )
 from feasibility.roadmap.joint_boxes import blockers_of
+from feasibility.runs.at_least import Parted, parted_pieces
 from feasibility.runs.fewest import Stations, Way, fewest_ways
+from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
 from feasibility.runs.stopping import Stop, where_it_stops
+from feasibility.speed import asks_rates, motion_rates
 from feasibility.task import Task
 from robots import Robot
 from surfaces.passes import PassPlaces
@@ -66,10 +74,19 @@ class PassRuns:
     """One certified motion each, in order."""
     cuts: tuple[Cut, ...]
     """Between one run and the next."""
-    left_out: float
-    """m, of passes that no run covers."""
+    gaps: tuple[Gap, ...]
+    """What no run works on, and why."""
+    parted: tuple[Parted, ...]
+    """Pieces of the toolpath, one behind the other, none of which a single motion runs: proved, by
+    cut trees that the independent verifier accepts. Whatever the search found, as many
+    interruptions are needed at least, see `feasibility.runs.at_least`."""
     refusals: tuple[str, ...]
     """What the independent replay says against runs that were left out for it."""
+
+    @property
+    def left_out(self) -> float:
+        """m, of passes that no run covers."""
+        return sum(gap.length for gap in self.gaps)
 
     def stretches_of(self, run: CoveragePath) -> list[int]:
         """The stretches that a run works on, in order."""
@@ -84,11 +101,13 @@ def pass_runs(
     places: PassPlaces,
     seed: int = 0,
     clock: Clock | None = None,
+    proof: CutTree | None = None,
 ) -> PassRuns:
     """Run passes in the fewest motions that the configurations found allow.
 
     As little as can be is left out; then the motions are as few as can be, over the configurations
-    that the search finds, and cut between passes rather than inside one.
+    that the search finds, and cut between passes rather than inside one. At a speed, or a distance
+    from singularities, only motions count that hold it.
 
     Args:
         robot: the arm.
@@ -97,6 +116,7 @@ def pass_runs(
         places: the same poses, with their stretches.
         seed: of the search.
         clock: its time limit counts.
+        proof: that no single motion runs all of them, where a verdict has one.
 
     Raises:
         OutOfTime: the time ran out before the search began.
@@ -116,20 +136,24 @@ def pass_runs(
             connect_pairs(exploration, root, everywhere & exploration.covers(root))
     except OutOfTime:
         pass  # what was found until then counts
-    exploration.clock = Clock()
-    stations = _stations(exploration, places)
+    stations = _stations(exploration, task, places)
     found = _replayed(exploration, task, fewest_ways(stations))
-    worked = np.zeros(len(stations.pieces), dtype=bool)
+    worked, passed = np.zeros(len(stations.pieces), dtype=bool), np.zeros(len(cells), dtype=bool)
     for path in found.runs:
         own = np.flatnonzero(path.needed)
         worked[own[0] : own[-1]] = True
+        passed[own[0] : own[-1] + 1] = True
+    parted = parted_pieces(exploration, cells, task, stations, passed, proof)
+    exploration.clock = Clock()
+    pairs = Problem.of(robot, cells, task).pairs
     return PassRuns(
         robot=robot,
         task=task,
         places=places,
         runs=tuple(found.runs),
-        cuts=_cuts(exploration, task, places, found.runs),
-        left_out=float(stations.pieces[~worked].sum()),
+        cuts=_cuts(exploration, task, places, found.runs, pairs),
+        gaps=gaps_of(exploration, task, places, stations.pieces, worked, pairs),
+        parted=parted,
         refusals=found.refusals,
     )
 
@@ -141,13 +165,12 @@ class _Replayed(NamedTuple):
     refusals: tuple[str, ...]
 
 
-def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
+def _stations(exploration: Exploration, task: Task, places: PassPlaces) -> Stations:
     """What a search found, as stations along the toolpath."""
     roadmap = exploration.roadmap
     over = np.array(roadmap.cell[: roadmap.counters[NODES]])
-    count = int(roadmap.counters[EDGES])
-    ends, rows = roadmap.ends[:count], roadmap.edge_rows[:count, 1]
-    number = np.arange(1, count + 1)
+    which = _fine(exploration, task)
+    ends, rows, number = roadmap.ends[which], roadmap.edge_rows[which, 1], which + 1
     there = np.column_stack([ends, number, rows])
     back = np.column_stack([ends[:, ::-1], -number, rows])
     steps = np.concatenate([there, back]).astype(np.int64)
@@ -156,6 +179,16 @@ def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
     inside = same & (places.stretch[1:] >= 0)
     lengths = np.linalg.norm(np.diff(places.points, axis=0), axis=1)
     return Stations(over, steps[(ahead == 0) | (ahead == 1)], lengths * inside, inside)
+
+
+def _fine(exploration: Exploration, task: Task) -> NDArray[np.int64]:
+    """The motions of a search that do what is asked of speed and singular values."""
+    roadmap = exploration.roadmap
+    every = np.arange(int(roadmap.counters[EDGES]))
+    if not asks_rates(task):
+        return every
+    motions = [edge_motion(roadmap, k) for k in every.tolist()]
+    return every[motion_rates(exploration.robot, exploration.cells, task, motions).fine(task)]
 
 
 def _replayed(exploration: Exploration, task: Task, ways: Sequence[Way]) -> _Replayed:
@@ -167,8 +200,11 @@ def _replayed(exploration: Exploration, task: Task, ways: Sequence[Way]) -> _Rep
         needed = np.zeros(len(cells), dtype=bool)
         needed[walk.cell[walk.cell >= 0]] = True
         judged = replay(robot, cells, task, walk, needed)
-        if not judged.accepted:
-            refusals.append(judged.refusal)
+        refused = judged.refusal
+        if not refused and asks_rates(task):
+            refused = "; ".join(replay_rates(robot, cells, task, walk).refusals)
+        if refused:
+            refusals.append(refused)
             continue
         certificate = judged.certificate
         figures = figures_of(robot, cells, task, walk, certificate, needed)
@@ -177,11 +213,14 @@ def _replayed(exploration: Exploration, task: Task, ways: Sequence[Way]) -> _Rep
 
 
 def _cuts(
-    exploration: Exploration, task: Task, places: PassPlaces, runs: Sequence[CoveragePath]
+    exploration: Exploration,
+    task: Task,
+    places: PassPlaces,
+    runs: Sequence[CoveragePath],
+    pairs: tuple[Pair, ...],
 ) -> tuple[Cut, ...]:
     """What lies between the runs."""
     robot, cells = exploration.robot, exploration.cells
-    pairs = Problem.of(robot, cells, task).pairs
     moves = [
         Reconfiguration(robot.joint_names, robot.prismatic, a.walk.q[-1], b.walk.q[0])
         for a, b in pairwise(runs)
@@ -190,13 +229,13 @@ def _cuts(
     found = []
     for before, after, move in zip(runs, runs[1:], clear, strict=False):
         pose, following = int(before.visits[-1]), int(after.visits[0])
-        stop = where_it_stops(exploration, pose, move.start, pairs)
+        stop = where_it_stops(exploration, task, pose, move.start, pairs)
         found.append(
             Cut(
                 pose=pose,
                 next_pose=following,
                 stretch=int(places.stretch[pose]),
-                along=_along(places, pose),
+                along=along_stretch(places, pose),
                 cause=_cause_words(places, stop),
                 move=move,
             )
@@ -204,20 +243,8 @@ def _cuts(
     return tuple(found)
 
 
-def _along(places: PassPlaces, pose: int) -> float:
-    """m, from the beginning of the stretch that a pose belongs to."""
-    first = int(np.flatnonzero(places.stretch == places.stretch[pose])[0])
-    return float(np.linalg.norm(np.diff(places.points[first : pose + 1], axis=0), axis=1).sum())
-
-
 def _cause_words(places: PassPlaces, stop: Stop) -> str:
     """What stops an arm that goes on, and where."""
     if not stop.cause:
         return "another configuration gets further"
-    stretch = int(places.stretch[stop.pose])
-    where = (
-        "on the way to the next pass"
-        if stretch < 0
-        else (f"{1e3 * _along(places, stop.pose):.0f} mm along stretch {stretch + 1}")
-    )
-    return f"{stop.cause} {where}"
+    return f"{stop.cause}, {place_words(places, stop.pose)}"

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from feasibility.collisions import Pair
 from feasibility.roadmap import MOST_STEPS, Exploration, track
 from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
+from feasibility.speed import asks_rates, motion_rates
+from feasibility.task import Task
 
 WORDS = {
     CONE: "the tool axis would leave the cone",
@@ -30,25 +32,39 @@ class Stop(NamedTuple):
 
 
 def where_it_stops(
-    exploration: Exploration, pose: int, q: NDArray[np.float64], pairs: tuple[Pair, ...]
+    exploration: Exploration,
+    task: Task,
+    pose: int,
+    q: NDArray[np.float64],
+    pairs: tuple[Pair, ...],
 ) -> Stop:
     """Follow the poses from a configuration over one of them, as far as it goes.
 
     Args:
         exploration: a finished search.
+        task: what is asked of speed and singular values.
         pose: where the arm is.
         q: (n,) its configuration.
         pairs: that had to stay clear of each other.
     """
-    q, rows = np.array(q), np.empty((MOST_STEPS + 1, len(q)))
+    first, q, rows = pose, np.array(q), np.empty((MOST_STEPS + 1, len(q)))
+    cause, motions = "", list[NDArray[np.float64]]()
     while pose < len(exploration.cells) - 1:
-        curve = exploration.curve(pose, pose + 1)
+        curve, begin = exploration.curve(pose, pose + 1), q.copy()
         count = track(exploration.arrays, exploration.work, curve, 0.0, 1.0, q, q, False, rows, 0)
         if count < 0:
             code, joint = (int(value) for value in exploration.work.stop_reason)
-            return Stop(pose, _words(exploration, code, joint, pairs))
+            cause = _words(exploration, code, joint, pairs)
+            break
+        motions.append(np.vstack([begin, rows[:count]]))
         pose += 1
-    return Stop(pose, "")
+    if asks_rates(task):
+        rates = motion_rates(exploration.robot, exploration.cells, task, motions)
+        slow = np.flatnonzero(~rates.fine(task))
+        if len(slow):
+            which = int(slow[0])
+            return Stop(first + which, rates.words(exploration.robot, task, which))
+    return Stop(pose, cause)
 
 
 def _words(exploration: Exploration, code: int, joint: int, pairs: tuple[Pair, ...]) -> str:

@@ -3,4 +3,7 @@ from .deciding import TOO_SLOW as TOO_SLOW
 from .deciding import at_rates as at_rates
 from .largest import RateFigures as RateFigures
 from .largest import rate_figures as rate_figures
+from .motion_rates import MotionRates as MotionRates
+from .motion_rates import asks_rates as asks_rates
+from .motion_rates import motion_rates as motion_rates
 from .of_paths import path_rates as path_rates

@@ -17,6 +17,7 @@ from feasibility.certification import replay
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.largest import begin_of, largest_speed
+from feasibility.speed.motion_rates import asks_rates, too_slow_words
 from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
 from feasibility.speed.routes import covered, route
 from feasibility.verdict import (
@@ -38,8 +39,7 @@ TOO_SLOW = "covered, but not as fast or as far from singularities as asked"
 def at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The same verdict where it is not feasible, or nothing is asked; else the one at the speed."""
     task, walk = verdict.task, verdict.witness
-    asked = task.speed is not None or task.min_manipulability is not None
-    if not asked or not verdict.feasible or walk is None or not len(verdict.cells):
+    if not asks_rates(task) or not verdict.feasible or walk is None or not len(verdict.cells):
         return verdict
     judged = replay_rates(verdict.robot, verdict.cells, task, walk)
     if judged.accepted:
@@ -167,12 +167,8 @@ def _detail(rated: RatedGraph, cell: int, edge: tuple[int, int] | None) -> str:
         return "the motions to it do what is asked, but are not joined with the best one"
     one = rated.rated[edge]
     if task.speed is not None and one.speed < task.speed:
-        unit = "m/s" if robot.prismatic[one.joint] else "rad/s"
-        needed = f"{task.speed / one.share:.3g} {unit}" if one.share > 0.0 else "endless speed"
-        return (
-            f"{robot.joint_names[one.joint]} would need {needed} at cell "
-            f"{list(rated.cells.unravel(cell))}; it allows {robot.max_velocity[one.joint]:.3g}"
-        )
+        where = f" at cell {list(rated.cells.unravel(cell))}"
+        return too_slow_words(robot, one.joint, one.share, task.speed, where)
     return (
         f"singular values fall to {one.sigma:.3g} on the way to it; "
         f"{task.min_manipulability:g} is asked"

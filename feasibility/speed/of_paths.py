@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.paths import CoveragePath, PathError
+from feasibility.speed.motion_rates import asks_rates
 from feasibility.verdict import Walk
 
 
@@ -21,7 +22,7 @@ def path_rates(path: CoveragePath, walk: Walk | None = None) -> RateReplay | Non
         PathError: singular values fall below what the task asks.
     """
     task = path.task
-    if task.speed is None and task.min_manipulability is None:
+    if not asks_rates(task):
         return None
     judged = replay_rates(path.robot, path.cells, task, path.walk if walk is None else walk)
     least = task.min_manipulability

@@ -9,17 +9,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feasibility.certification.rates import SegmentRates, in_place, segment_rates
 from feasibility.clock import Clock
 from feasibility.paths import MotionGraph, join_self_motions, motion_graph_of, step_to
+from feasibility.speed.motion_rates import motion_rates
 from feasibility.task import Task
 from feasibility.verdict import Verdict, Walk
 from robots import Robot
 from surfaces import Cells
 
-Array = NDArray[np.float64]
 Edge = tuple[int, int]
 """Two nodes, the lower index first."""
 
@@ -56,31 +54,13 @@ class RatedGraph:
         new = [edge for edge in new if edge not in self.rated]
         if not new:
             return
-        rows = [np.asarray(self.graph.motion(*edge)) for edge in new]
-        q = np.vstack(rows)
-        owner = np.repeat(np.arange(len(new)), [len(motion) for motion in rows])
-        inside = owner[:-1] == owner[1:]
-        resting = in_place(self.robot, self.cells, self.task, q)[inside]
-        found = segment_rates(
-            self.robot, q[:-1][inside], q[1:][inside],
-            sigma=self.task.min_manipulability, group=owner[:-1][inside], resting=resting,
-        )  # fmt: skip
-        self._keep(new, owner[:-1][inside], found)
-
-    def _keep(self, new: list[Edge], owner: NDArray[np.int64], found: SegmentRates) -> None:
-        """Take the least of each motion's segments."""
-        order = np.lexsort((found.speed, owner))
-        first = np.searchsorted(owner[order], np.arange(len(new)))
-        sigma = np.full(len(new), np.inf)
-        np.minimum.at(sigma, owner, found.sigma)
+        motions = [np.asarray(self.graph.motion(*edge)) for edge in new]
+        found = motion_rates(self.robot, self.cells, self.task, motions)
         for k, edge in enumerate(new):
-            if first[k] >= len(order) or owner[order[first[k]]] != k:
-                self.rated[edge] = Rated(np.inf, np.inf, 0, np.inf)
-                continue
-            row = order[first[k]]
-            joint = int(found.joint[row])
-            exact = float(found.sampled_speed[row]) / float(self.robot.max_velocity[joint])
-            self.rated[edge] = Rated(float(found.speed[row]), float(sigma[k]), joint, exact)
+            self.rated[edge] = Rated(
+                float(found.speed[k]), float(found.sigma[k]), int(found.joint[k]),
+                float(found.share[k]),
+            )  # fmt: skip
 
     def fine(self, speed: float, sigma: float) -> list[Edge]:
         """The motions that allow both."""

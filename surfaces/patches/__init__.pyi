@@ -1,4 +1,5 @@
 from .affine_models import SpaceModel as SpaceModel
+from .affine_models import arc as arc
 from .closed_form_kernels import PatchKernel as PatchKernel
 from .closed_form_kernels import cell_at as cell_at
 from .closed_form_kernels import closest_on_patch as closest_on_patch

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.parts import MOST_PARTS, SurfaceParts
 from surfaces.surface import ClosestPoint, Surface, SurfaceError, points_of
+from surfaces.toolpaths.course_parts import course_parts
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -23,8 +24,8 @@ Ints = NDArray[np.int64]
 class PoseSurface(Surface):
     """N poses: points with outward normals, perhaps with tool axes and tangents of their own.
 
-    There is no surface between them: no closest points but the poses' own planes, no bounds, and no
-    sheet that an arm could collide with.
+    There is no surface between them: no closest points but the poses' own planes, bounds on their
+    courses alone, and no sheet that an arm could collide with.
     """
 
     kind: ClassVar[str] = "poses"
@@ -101,13 +102,19 @@ class PoseSurface(Surface):
         return ClosestPoint.of_rows(points.shape[:-1], values, known)
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
-        """See `Surface.parts`; poses have none.
+        """See `Surface.parts`: those of the courses between poses.
 
         Raises:
-            SurfaceError: always.
+            SurfaceError: there are no courses or more than `most`, or the tool axes are given apart
+                from the normals.
         """
-        raise SurfaceError("there is no surface between poses, so nothing can be proved of it",
-                           self.kind)  # fmt: skip
+        if self.axes is not None:
+            raise SurfaceError("poses with tool axes of their own have no bounds", self.kind)
+        if not 0 < len(self.pairs) <= most:
+            what = f"there are {len(self.pairs):,} courses; bounds are made for 1 to {most:,}"
+            raise SurfaceError(what, self.kind)
+        normals = self.turned(self.outward)
+        return course_parts(self.placed_points, normals, self.pairs, flat, straight, most)
 
     def __repr__(self) -> str:
         """One line."""

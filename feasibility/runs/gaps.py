@@ -1,0 +1,95 @@
+"""What of passes is left out by all runs, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from feasibility.collisions import Pair
+from feasibility.roadmap import Exploration
+from feasibility.roadmap.causes import cause_of
+from feasibility.runs.stopping import where_it_stops
+from feasibility.task import Task
+from surfaces.passes import PassPlaces
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Places of passes in a row on which no run works."""
+
+    stretches: tuple[int, ...]
+    """Which stretches they are on, in order."""
+    length: float
+    """m, of passes."""
+    cause: str
+    """Why, at the first of these places where something is in the way."""
+    proved: bool
+    """Is that proved?"""
+
+
+def gaps_of(
+    exploration: Exploration,
+    task: Task,
+    places: PassPlaces,
+    pieces: NDArray[np.float64],
+    worked: NDArray[np.bool_],
+    pairs: tuple[Pair, ...],
+) -> tuple[Gap, ...]:
+    """What is left out, in order.
+
+    Args:
+        exploration: a finished search.
+        task: what is asked.
+        places: the poses of the passes.
+        pieces: (N - 1,) m, of passes between poses.
+        worked: (N - 1,) on which of them a run works.
+        pairs: of bodies that had to stay clear of each other.
+    """
+    left = (pieces > 0.0) & ~worked
+    # What lies between two passes belongs to the gap if it is not worked on either.
+    open_ = ~worked
+    ends = np.flatnonzero(np.diff(np.concatenate([[0], open_.astype(np.int8), [0]])))
+    found = []
+    for first, last in ends.reshape(-1, 2).tolist():
+        length = float(pieces[first:last][left[first:last]].sum())
+        if length > 0.0:
+            own = places.stretch[first : last + 1][np.append(left[first:last], False)]
+            stretches = tuple(dict.fromkeys(own.tolist()))
+            cause, proved = _why(exploration, task, places, range(first, last + 1), pairs)
+            found.append(Gap(stretches, length, cause, proved))
+    return tuple(found)
+
+
+def _why(
+    exploration: Exploration,
+    task: Task,
+    places: PassPlaces,
+    poses: range,
+    pairs: tuple[Pair, ...],
+) -> tuple[str, bool]:
+    """What is in the way at the first of some poses, and whether that is proved."""
+    for pose in poses:
+        if not exploration.reached[pose]:
+            cause = cause_of(exploration, pose, pairs)
+            return f"{cause.detail}, {place_words(places, pose)}", cause.proved
+    node = int(exploration.roadmap.first_node[poses[0]])
+    stop = where_it_stops(exploration, task, poses[0], exploration.roadmap.q[node], pairs)
+    if not stop.cause:
+        return "", False
+    return f"{stop.cause}, {place_words(places, stop.pose)}", False
+
+
+def along_stretch(places: PassPlaces, pose: int) -> float:
+    """m, from the beginning of the stretch that a pose belongs to."""
+    first = int(np.flatnonzero(places.stretch == places.stretch[pose])[0])
+    return float(np.linalg.norm(np.diff(places.points[first : pose + 1], axis=0), axis=1).sum())
+
+
+def place_words(places: PassPlaces, pose: int) -> str:
+    """Where a pose is on the passes."""
+    stretch = int(places.stretch[pose])
+    if stretch < 0:
+        return "on the way to the next pass"
+    return f"{1e3 * along_stretch(places, pose):.0f} mm along stretch {stretch + 1}"
