@@ -13,7 +13,6 @@ from feasibility.cli.command import (
     add_command,
     add_html,
     json_text,
-    note_no_rates,
     open_case,
     write_text,
 )
@@ -189,7 +188,6 @@ def divide(args: argparse.Namespace, began: float) -> int:
         from feasibility.reports import division as report
 
         loaded = opened.so_far()
-        note_no_rates(opened.setup.task, "the motions over patches are")
         division = run(*opened.setup, clock=opened.clock)
         areas = patch_areas(division, opened.clock) if args.area else None
     if args.json:

@@ -24,7 +24,6 @@ from feasibility.safe_files import FileError, check_writable, shown_path, write_
 if TYPE_CHECKING:
     from feasibility.cases import Case, Setup
     from feasibility.clock import Clock
-    from feasibility.task import Task
 
 Command = Callable[[argparse.Namespace, float], int]
 
@@ -210,14 +209,6 @@ def check_outputs(outputs: Mapping[str, str | None], given: str = "") -> None:
             faults.append(f"{flag} {shown_path(path)}: is the input file; give another name")
     if faults:
         raise FileError(faults)
-
-
-def note_no_rates(task: Task, what: str) -> None:
-    """Say on stderr that what is asked of speed and singular values is not looked at."""
-    asked = {"task.speed": task.speed, "task.min_manipulability": task.min_manipulability}
-    keys = [key for key, value in asked.items() if value is not None]
-    if keys:
-        print_err(f"note: {what} not judged by {' and '.join(keys)}")
 
 
 def write_text(path: str, text: str, what: str) -> None:

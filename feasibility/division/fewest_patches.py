@@ -28,6 +28,7 @@ from feasibility.roadmap import (
 from feasibility.roadmap.causes import cause_of, causes_of, diagnose, disconnected
 from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.search import Progress, Search
+from feasibility.speed import asks_rates, check_asked, keep_fast_motions
 from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause
@@ -58,7 +59,8 @@ def divide(
 
     Every cell that some motion covers is in exactly one patch; the others are left out, each with
     its cause. "Fewest" is proved for the components that the search found; that there are no
-    larger ones is as certain as the search is exhaustive.
+    larger ones is as certain as the search is exhaustive. At a speed, or a distance from
+    singularities, only motions of the search count that hold it.
 
     Args:
         robot: the arm, with its limits.
@@ -73,7 +75,7 @@ def divide(
     Raises:
         OutOfTime: a command's time ran out before the search began.
         ArgumentError: the search is the greedy one, which keeps a single tree of motions; or the
-            cells are a toolpath.
+            cells are a toolpath; or the task has a speed that this arm cannot have or be judged by.
         RobotError: the arm is no serial chain of one-dof joints.
 
     Example:
@@ -85,17 +87,17 @@ def divide(
         (1, True, True)
     """
     search = Search() if search is None else search
-    _refuse_others(search, cells)
+    _refuse_others(robot, cells, task, search)
     called = time.monotonic()
     with compiling_notice():
         warm_up()
     clock = (Clock(search.time_limit, progress) if clock is None else clock).start()
     began = time.monotonic()
-    exploration, apart, ended = _searched(robot, cells, task, search.seed, clock)
+    exploration, apart, ended, slow = _searched(robot, cells, task, search.seed, clock)
     searched = time.monotonic()
     folded = bool(np.isinf(exploration.arrays.derivative_bounds).any())
     blocked = blocked_curves(cells, task) if len(cells) and _no_motion(exploration.arrays) else ""
-    shared = _shared(exploration, task, clock, blocked, ended)
+    shared = _shared(exploration, task, clock, blocked, ended, slow)
     fewest, ended = shared.fewest, ended and not shared.late
     found = _message(shared, apart.number, len(cells), ended, folded)
     return Division(
@@ -129,8 +131,8 @@ class _Shared(NamedTuple):
     """Did a command's time run out meanwhile?"""
 
 
-def _refuse_others(search: Search, cells: Cells) -> None:
-    """Refuse the greedy search, and toolpaths.
+def _refuse_others(robot: Robot, cells: Cells, task: Task, search: Search) -> None:
+    """Refuse the greedy search, toolpaths, and what cannot be asked of speed.
 
     Raises:
         ArgumentError: it is one of them.
@@ -139,10 +141,16 @@ def _refuse_others(search: Search, cells: Cells) -> None:
         raise ArgumentError(NOT_GREEDY.format(search.method))
     if cells.in_order:
         raise ArgumentError(NOT_IN_ORDER)
+    check_asked(robot, task, search)
 
 
 def _shared(
-    exploration: Exploration, task: Task, clock: Clock, blocked: str, ended: bool
+    exploration: Exploration,
+    task: Task,
+    clock: Clock,
+    blocked: str,
+    ended: bool,
+    slow: dict[int, Cause],
 ) -> _Shared:
     """Plans for what the search found, and why cells are in none, as far as there is time."""
     total, nothing = len(exploration.cells), Plan((), (), 0)
@@ -153,7 +161,8 @@ def _shared(
                 fewest, connected = plans(exploration, task, clock.left)
                 missing = np.flatnonzero(fewest.patch_of(total) < 0)
                 shared = shared._replace(fewest=fewest, connected=connected, missing=missing)
-            return shared._replace(causes=_causes(exploration, task, shared.missing, ended))
+            causes = _causes(exploration, task, shared.missing, ended, slow)
+            return shared._replace(causes=causes)
     except OutOfTime:
         return shared._replace(late=True)
 
@@ -180,10 +189,19 @@ def _statistics(exploration: Exploration) -> dict[str, int]:
     }
 
 
-def _searched(
-    robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock
-) -> tuple[Exploration, ProvedBound, bool]:
-    """The search with all components that it found, a bound, and whether it ran to its end."""
+class _Searched(NamedTuple):
+    """What a search found."""
+
+    exploration: Exploration
+    apart: ProvedBound
+    ended: bool
+    """Did it run to its end?"""
+    slow: dict[int, Cause]
+    """Cells that no motion leads to at the speed, or the distance from singularities, asked for."""
+
+
+def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -> _Searched:
+    """The search with all components that it found, and a bound."""
     with clock.enforced():
         arrays = arrays_of(robot, cells, task)
     blockers = blockers_of(robot, cells.surface, task)
@@ -196,20 +214,28 @@ def _searched(
             apart = prove_apart(exploration, task)
     except OutOfTime:
         ended = False
+    slow = keep_fast_motions(exploration, task) if asks_rates(task) else {}
     exploration.clock = Clock()
-    return exploration, apart, ended
+    return _Searched(exploration, apart, ended, slow)
 
 
 def _causes(
-    exploration: Exploration, task: Task, missing: NDArray[np.int64], ended: bool
+    exploration: Exploration,
+    task: Task,
+    missing: NDArray[np.int64],
+    ended: bool,
+    slow: dict[int, Cause],
 ) -> tuple[Cause, ...]:
-    """Why cells are in no patch; of a search that did not end, only what is proved."""
+    """Why cells are in no patch; of a search that did not end, only what is proved or too slow."""
     if not ended:
         proved = [c for c in missing.tolist() if exploration.rulings.get(c) is Ruling.PROVED]
-        return tuple(diagnose(exploration, cell) for cell in proved[:MOST_EXPLAINED])
+        found = [diagnose(exploration, cell) for cell in proved[:MOST_EXPLAINED]]
+        return tuple(sorted([*found, *slow.values()], key=lambda cause: cause.cell))
     pairs = Problem.of(exploration.robot, exploration.cells, task).pairs
     known = {cause.cell: cause for cause in causes_of(exploration, None, pairs)}
-    return tuple(known.get(c) or _cause(exploration, c, pairs) for c in missing.tolist())
+    return tuple(
+        slow.get(c) or known.get(c) or _cause(exploration, c, pairs) for c in missing.tolist()
+    )
 
 
 def _cause(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> Cause:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification import replay
+from feasibility.certification.rates import replay_rates
 from feasibility.division.between_patches import clear_moves
 from feasibility.division.connected_labels import count_of
 from feasibility.division.division import Plan, SubPatch
@@ -26,6 +27,7 @@ from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
 from feasibility.roadmap import Exploration, Links, improve, links_of, patch_walk
+from feasibility.speed import asks_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
 
@@ -92,11 +94,14 @@ def plan_of(
     if len(partition) == 0:
         return Plan((), (), partition.bound)
     wanted = [partition.patch == p for p in range(len(partition))]
-    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers))
+    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers, asks_rates(task)))
     patches = []
     for p, walk in zip(chosen.order, chosen.walks, strict=True):
         mine = wanted[p]
         replayed = replay(robot, cells, task, walk, mine)
+        refusal = replayed.refusal
+        if not refusal and asks_rates(task):
+            refusal = "; ".join(replay_rates(robot, cells, task, walk).refusals)
         patches.append(
             SubPatch(
                 cells=np.flatnonzero(mine),
@@ -104,7 +109,7 @@ def plan_of(
                 pieces=count_of(np.where(mine, 0, -1), cells.pairs),
                 walk=walk,
                 certificate=replayed.certificate,
-                refusal=replayed.refusal,
+                refusal=refusal,
             )
         )
     moves = clear_moves(robot, cells, task, exploration.arrays.collisions, chosen.moves)
@@ -116,6 +121,7 @@ def _choices(
     wanted: Sequence[NDArray[np.bool_]],
     roots: list[int],
     covers: NDArray[np.bool_],
+    asked: bool,
 ) -> list[list[Walk]]:
     """For each patch walks of the components that cover it, from several starts."""
     fitting = []
@@ -123,7 +129,7 @@ def _choices(
         rows = np.flatnonzero(covers[:, mine].all(axis=1))
         most = MOST_COMPONENTS if len(wanted) > 1 else 1
         fitting.append([roots[row] for row in rows[:most].tolist()])
-        for component in fitting[-1]:
+        for component in () if asked else fitting[-1]:  # of those at a speed all is known
             connect_pairs(exploration, component, mine)
     roadmap = exploration.roadmap
     links = {root: links_of(roadmap, root) for root in {r for own in fitting for r in own}}

@@ -7,6 +7,7 @@ from .exploration import Exploration as Exploration
 from .exploration import wound as wound
 from .graph import EDGES as EDGES
 from .graph import NODES as NODES
+from .graph import Roadmap as Roadmap
 from .graph import root_of as root_of
 from .motions import CONE_SLACK as CONE_SLACK
 from .motions import HERE as HERE

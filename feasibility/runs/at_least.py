@@ -41,6 +41,7 @@ from surfaces.toolpaths import PoseCells
 
 MOST_TRIED = 24  # pieces of a toolpath that a proof is looked for of
 FURTHER = (0.0, 0.25, 0.75)  # [1] of the way to where the next run would end
+MOST_SEEDS = 12  # configurations over one of them
 SEEDED = 5  # poses of a piece over which its own search begins
 
 
@@ -107,7 +108,8 @@ class _Pieces:
         exploration = Exploration(known.robot, own, arrays, known.seed, known.clock)
         over = known.roadmap.cell[: known.roadmap.counters[NODES]]
         for pose in np.unique(np.linspace(first, last, SEEDED).astype(int)).tolist():
-            exploration.add_seeds(pose - first, known.roadmap.q[: len(over)][over == pose])
+            some = np.flatnonzero(over == pose)[:MOST_SEEDS]
+            exploration.add_seeds(pose - first, known.roadmap.q[some])
         if not exploration.reached.all():
             return None
         return prove_apart(exploration, task).proof

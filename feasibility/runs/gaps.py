@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +13,7 @@ from feasibility.roadmap import Exploration
 from feasibility.roadmap.causes import cause_of
 from feasibility.runs.stopping import where_it_stops
 from feasibility.task import Task
+from feasibility.verdict import Cause
 from surfaces.passes import PassPlaces
 
 
@@ -36,6 +38,7 @@ def gaps_of(
     pieces: NDArray[np.float64],
     worked: NDArray[np.bool_],
     pairs: tuple[Pair, ...],
+    slow: Mapping[int, Cause],
 ) -> tuple[Gap, ...]:
     """What is left out, in order.
 
@@ -46,6 +49,7 @@ def gaps_of(
         pieces: (N - 1,) m, of passes between poses.
         worked: (N - 1,) on which of them a run works.
         pairs: of bodies that had to stay clear of each other.
+        slow: poses to which no motion leads that does what is asked of speed and singular values.
     """
     left = (pieces > 0.0) & ~worked
     # What lies between two passes belongs to the gap if it is not worked on either.
@@ -57,7 +61,8 @@ def gaps_of(
         if length > 0.0:
             own = places.stretch[first : last + 1][np.append(left[first:last], False)]
             stretches = tuple(dict.fromkeys(own.tolist()))
-            cause, proved = _why(exploration, task, places, range(first, last + 1), pairs)
+            poses = range(first, last + 1)
+            cause, proved = _why(exploration, task, places, poses, pairs, slow)
             found.append(Gap(stretches, length, cause, proved))
     return tuple(found)
 
@@ -68,17 +73,18 @@ def _why(
     places: PassPlaces,
     poses: range,
     pairs: tuple[Pair, ...],
+    slow: Mapping[int, Cause],
 ) -> tuple[str, bool]:
     """What is in the way at the first of some poses, and whether that is proved."""
     for pose in poses:
         if not exploration.reached[pose]:
-            cause = cause_of(exploration, pose, pairs)
-            return f"{cause.detail}, {place_words(places, pose)}", cause.proved
+            cause = slow.get(pose) or cause_of(exploration, pose, pairs)
+            return f"{place_words(places, pose)}: {cause.detail}", cause.proved
     node = int(exploration.roadmap.first_node[poses[0]])
     stop = where_it_stops(exploration, task, poses[0], exploration.roadmap.q[node], pairs)
     if not stop.cause:
         return "", False
-    return f"{stop.cause}, {place_words(places, stop.pose)}", False
+    return f"{place_words(places, stop.pose)}: {stop.cause}", False
 
 
 def along_stretch(places: PassPlaces, pose: int) -> float:

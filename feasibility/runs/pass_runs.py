@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from feasibility.certification import replay
 from feasibility.certification.rates import replay_rates
@@ -28,7 +27,6 @@ from feasibility.roadmap import (
     NODES,
     Exploration,
     arrays_of,
-    edge_motion,
     explore,
     route_walk,
     warm_up,
@@ -38,7 +36,7 @@ from feasibility.runs.at_least import Parted, parted_pieces
 from feasibility.runs.fewest import Stations, Way, fewest_ways
 from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
 from feasibility.runs.stopping import Stop, where_it_stops
-from feasibility.speed import asks_rates, motion_rates
+from feasibility.speed import asks_rates, keep_fast_motions
 from feasibility.task import Task
 from robots import Robot
 from surfaces.passes import PassPlaces
@@ -136,7 +134,8 @@ def pass_runs(
             connect_pairs(exploration, root, everywhere & exploration.covers(root))
     except OutOfTime:
         pass  # what was found until then counts
-    stations = _stations(exploration, task, places)
+    slow = keep_fast_motions(exploration, task) if asks_rates(task) else {}
+    stations = _stations(exploration, places)
     found = _replayed(exploration, task, fewest_ways(stations))
     worked, passed = np.zeros(len(stations.pieces), dtype=bool), np.zeros(len(cells), dtype=bool)
     for path in found.runs:
@@ -152,7 +151,7 @@ def pass_runs(
         places=places,
         runs=tuple(found.runs),
         cuts=_cuts(exploration, task, places, found.runs, pairs),
-        gaps=gaps_of(exploration, task, places, stations.pieces, worked, pairs),
+        gaps=gaps_of(exploration, task, places, stations.pieces, worked, pairs, slow),
         parted=parted,
         refusals=found.refusals,
     )
@@ -165,12 +164,13 @@ class _Replayed(NamedTuple):
     refusals: tuple[str, ...]
 
 
-def _stations(exploration: Exploration, task: Task, places: PassPlaces) -> Stations:
+def _stations(exploration: Exploration, places: PassPlaces) -> Stations:
     """What a search found, as stations along the toolpath."""
     roadmap = exploration.roadmap
     over = np.array(roadmap.cell[: roadmap.counters[NODES]])
-    which = _fine(exploration, task)
-    ends, rows, number = roadmap.ends[which], roadmap.edge_rows[which, 1], which + 1
+    count = int(roadmap.counters[EDGES])
+    ends, rows = roadmap.ends[:count], roadmap.edge_rows[:count, 1]
+    number = np.arange(1, count + 1)
     there = np.column_stack([ends, number, rows])
     back = np.column_stack([ends[:, ::-1], -number, rows])
     steps = np.concatenate([there, back]).astype(np.int64)
@@ -179,16 +179,6 @@ def _stations(exploration: Exploration, task: Task, places: PassPlaces) -> Stati
     inside = same & (places.stretch[1:] >= 0)
     lengths = np.linalg.norm(np.diff(places.points, axis=0), axis=1)
     return Stations(over, steps[(ahead == 0) | (ahead == 1)], lengths * inside, inside)
-
-
-def _fine(exploration: Exploration, task: Task) -> NDArray[np.int64]:
-    """The motions of a search that do what is asked of speed and singular values."""
-    roadmap = exploration.roadmap
-    every = np.arange(int(roadmap.counters[EDGES]))
-    if not asks_rates(task):
-        return every
-    motions = [edge_motion(roadmap, k) for k in every.tolist()]
-    return every[motion_rates(exploration.robot, exploration.cells, task, motions).fine(task)]
 
 
 def _replayed(exploration: Exploration, task: Task, ways: Sequence[Way]) -> _Replayed:

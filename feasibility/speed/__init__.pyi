@@ -1,6 +1,7 @@
 from .asking import check_asked as check_asked
 from .deciding import TOO_SLOW as TOO_SLOW
 from .deciding import at_rates as at_rates
+from .fast_motions import keep_fast_motions as keep_fast_motions
 from .largest import RateFigures as RateFigures
 from .largest import rate_figures as rate_figures
 from .motion_rates import MotionRates as MotionRates

@@ -107,9 +107,11 @@ def test_bad_arguments_are_named(case, arguments, said, capsys):
     assert "Traceback" not in err
 
 
-def test_passes_too_fast_for_the_joints_are_not_cut_but_refused(case, capsys):
+def test_passes_too_fast_for_the_joints_are_left_out_with_the_joint(case, capsys):
     asked = ["--passes", "0", "--pitch", "0.1", "--set", "task.speed=6"]
     assert main(["path", case, *asked]) == 3
-    err = " ".join(capsys.readouterr().err.split())
-    assert "none was found that does so at 6 m/s" in err
-    assert "rad/s at cell" in err
+    out = " ".join(capsys.readouterr().out.split())
+    assert "none was found that does so at 6 m/s" in out
+    assert "no part of them can be run" in out
+    assert "along stretch 1: " in out
+    assert "rad/s; it allows 3.15" in out
