@@ -83,7 +83,7 @@ def moved(tree: BoxTree, rotation: Array, position: Array) -> BoxTree:
     nodes, corners = tree.nodes.copy(), tree.corners @ rotation.T + position
     boxes = nodes[:, MIDDLE:]
     boxes[:, :3] = boxes[:, :3] @ rotation.T + position
-    boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3, 3) @ rotation.T).reshape(-1, 9)
+    boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3) @ rotation.T).reshape(-1, 9)
     boxes[:, 12:] += OUTWARD * np.abs(corners).max()
     inner = nodes[:, LEFT] >= 0
     rows = nodes[inner, FIRST].astype(np.int64)[:, None] + np.arange(8)
@@ -117,7 +117,7 @@ def _corners(boxes: Array) -> Array:
     """(m, 8, 3) corners of boxes."""
     middle, axes = boxes[:, None, :3], boxes[:, 3:12].reshape(-1, 3, 3)
     sides = CORNERS[None] * boxes[:, None, 12:]
-    return np.asarray(middle + np.einsum("mca,mak->mck", sides, axes))
+    return np.asarray(middle + sides @ axes)
 
 
 def _sorted_along(triangles: Array, held: Whole, sizes: Whole, boxes: Array) -> Whole:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,19 +59,14 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
     polytopes: list[list[float]] = []
     groups: list[list[float]] = []
     for (_, joint), parts in owners.items():
-        clouds = [part.vertices @ turned[joint] for part in parts]
+        rounded = _rounded(tuple(parts), turned[joint].tobytes())
         start = len(polytopes)
-        for part, cloud in zip(parts, clouds, strict=True):
+        for part, cloud, around in zip(parts, rounded.clouds, rounded.around, strict=True):
             first = sum(map(len, vertices))
-            around = _around(cloud, part.radius)
             polytopes.append([0, first, first + len(cloud), part.radius, *around])
             vertices.append(cloud)
-        levers = [
-            np.hypot(c[:, 0], c[:, 1]).max() + p.radius for c, p in zip(clouds, parts, strict=True)
-        ]
-        radius = max(part.radius for part in parts)
-        capsule = _capsule(np.vstack(clouds), radius)
-        groups.append([joint, start, len(polytopes), *capsule, max(levers), len(groups)])
+        shape = *rounded.capsule, rounded.lever
+        groups.append([joint, start, len(polytopes), *shape, len(groups)])
     roots, nodes, corners = _trees(bodies, sum(map(len, vertices)))
     items, directions = _items(bodies, list(owners), groups, roots, n)
     count = len(groups)
@@ -98,6 +94,38 @@ def packed(bodies: Bodies, robot: Robot) -> Array:
     memory = flat(tables)
     _rows_into_places(memory)
     return memory
+
+
+class _Rounded(NamedTuple):
+    """The bodies of one owner on one joint, and round ones around them."""
+
+    clouds: tuple[Array, ...]
+    """(v, 3) vertices of each, in the joint's frame."""
+    around: tuple[list[float], ...]
+    """Of each: see `_around`."""
+    capsule: list[float]
+    """Around all: see `_capsule`."""
+    lever: float
+    """m, how far they get from the joint's axis."""
+
+
+@lru_cache(maxsize=16 * KEPT)
+def _rounded(parts: tuple[Polytope, ...], turned: bytes) -> _Rounded:
+    """What does not change while a surface or a clearance does; remembered by the bodies.
+
+    Args:
+        parts: bodies of one owner.
+        turned: (3, 3) floats, the joint's frame in which its axis is z.
+    """
+    turn = np.frombuffer(turned).reshape(3, 3)
+    clouds = [part.vertices @ turn for part in parts]
+    pairs = list(zip(clouds, parts, strict=True))
+    return _Rounded(
+        tuple(clouds),
+        tuple(_around(cloud, part.radius) for cloud, part in pairs),
+        _capsule(np.vstack(clouds), max(part.radius for part in parts)),
+        max(np.hypot(c[:, 0], c[:, 1]).max() + part.radius for c, part in pairs),
+    )
 
 
 def _rows_into_places(memory: Array) -> None:
