@@ -155,6 +155,10 @@ def test_a_slider_is_dragged_and_the_cells_change_colour(tab):
     assert painted(tab, "red") > red + 500
     assert f"{48 - len(missed)} of 48 cells" in tab.inner_text("#progress")
     assert "out of reach" in tab.inner_text("#causes")
+    expect(tab.locator("#painted")).to_be_in_viewport(
+        ratio=1
+    )  # beside the cells, without scrolling
+    assert "not covered: out of reach" in tab.inner_text("#painted")
     assert "proof: a bound shows" in tab.inner_text("#rows")
 
     tab.keyboard.press("Control+z")

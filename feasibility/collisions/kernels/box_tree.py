@@ -80,14 +80,15 @@ def moved(tree: BoxTree, rotation: Array, position: Array) -> BoxTree:
     """
     if np.array_equal(rotation, np.eye(3)) and not position.any():
         return tree
-    nodes, corners = tree.nodes.copy(), tree.corners @ rotation.T + position
+    nodes, corners = tree.nodes.copy(), np.empty_like(tree.corners)
     boxes = nodes[:, MIDDLE:]
-    boxes[:, :3] = boxes[:, :3] @ rotation.T + position
-    boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3) @ rotation.T).reshape(-1, 9)
-    boxes[:, 12:] += OUTWARD * np.abs(corners).max()
-    inner = nodes[:, LEFT] >= 0
-    rows = nodes[inner, FIRST].astype(np.int64)[:, None] + np.arange(8)
-    corners[rows] = _corners(boxes[inner])
+    boxes[:, :3] = np.einsum("mk,ik->mi", boxes[:, :3], rotation) + position
+    boxes[:, 3:12] = (boxes[:, 3:12].reshape(-1, 3, 3) @ rotation.T).reshape(-1, 9)
+    boxes[:, 12:] += OUTWARD * (np.abs(boxes[0, :3]).max() + np.linalg.norm(boxes[0, 12:]))
+    first, inner = nodes[:, FIRST].astype(np.int64)[:, None], nodes[:, LEFT] >= 0
+    own = first[~inner] + np.arange(3)  # of triangles
+    corners[own] = tree.corners[own] @ rotation.T + position
+    corners[first[inner] + np.arange(8)] = _corners(boxes[inner])
     return BoxTree(nodes, corners)
 
 

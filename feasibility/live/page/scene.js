@@ -58,6 +58,17 @@ export class Scene {
       this.viewer.handle_command_bytearray(data.subarray(at + 4, at + 4 + length));
       at += 4 + length;
     }
+    this.lighten();
+  }
+
+  // Light falls on corners, not on every pixel: half the work where no graphics card does it.
+  lighten() {
+    this.viewer.scene.traverse((drawn) => {
+      if (!drawn.isMesh || drawn.material.type !== "MeshPhongMaterial") return;
+      const heavy = drawn.material;
+      drawn.material = new THREE.MeshLambertMaterial().copy(heavy);
+      heavy.dispose();
+    });
   }
 
   // All cells as one mesh with a colour at each corner.
