@@ -148,6 +148,11 @@ def greedy_check(
     return _measured(_decided(Problem.of(robot, cells, task), search, progress, from_start))
 
 
+IN_PIECES = (
+    " (With one convex hull for each shape of a link, {} of {} cells were covered; so the links "
+    "were cut into convex pieces.)"
+)
+NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
 Method = Callable[[Problem, Search, Clock], Found]
 
@@ -159,6 +164,21 @@ class _Attempt(NamedTuple):
     replayed: Replay | None
     search_s: float
     certify_s: float
+
+    @property
+    def accepted(self) -> bool:
+        """Was a motion over all cells accepted?"""
+        return self.replayed is not None and self.replayed.accepted
+
+    @property
+    def decided(self) -> bool:
+        """Is there a motion that was accepted, or a proof?"""
+        return self.accepted or self.found.proof is not None
+
+    @property
+    def blocked(self) -> bool:
+        """Is nothing decided, and were convex bodies of the arm in the way?"""
+        return not self.decided and self.found.hindered
 
 
 def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> _Attempt:
@@ -178,6 +198,25 @@ def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> 
         found = replace(found, unfinished=NOT_REPLAYED.format(clock.limit))
     search_s = searched - float(np.fmax(called, clock.loaded))
     return _Attempt(found, replayed, search_s, time.monotonic() - searched)
+
+
+def _in_pieces(problem: Problem, clock: Clock) -> Problem | None:
+    """The problem with links cut into pieces, where that differs and there is time for it."""
+    try:
+        with clock.enforced():
+            return None if clock.out_of_time else problem.in_pieces
+    except OutOfTime:
+        return None
+
+
+def _attempts(problem: Problem, search: Search, clock: Clock, method: Method) -> list[_Attempt]:
+    """The attempt that counts, and then others that were made."""
+    first = _attempt(problem, search, clock, method)
+    if first.replayed is None or not first.replayed.narrowly_refused:
+        return [first]
+    # The replay measures the deviation between its samples, and may find a little more.
+    narrower = _attempt(problem.narrowed, search, clock, method)
+    return [narrower, first] if narrower.accepted else [first, narrower]
 
 
 def _nothing(problem: Problem, clock: Clock) -> Found:
@@ -211,21 +250,24 @@ def _decided(
     """Search, certify, and make the verdict."""
     called = time.monotonic()
     clock = Clock(search.time_limit, progress) if clock is None else clock
-    bodies = problem.bodies
-    tried = [_attempt(problem, search, clock, method)]
-    first = tried[0].replayed
-    if tried[0].found.motion is not None and first is not None and first.narrowly_refused:
-        # The replay measures the deviation between its samples, and may find a little more.
-        tried.append(_attempt(problem.narrowed, search, clock, method))
-    last = tried[-1].replayed
-    chosen = tried[-1] if last is not None and last.accepted else tried[0]
-    found, replayed = chosen.found, chosen.replayed
+    tried = _attempts(problem, search, clock, method)
+    chosen, said = tried[0], ""
+    finer = _in_pieces(problem, clock) if chosen.blocked else None
+    if finer is not None:
+        tried = [*_attempts(finer, search, clock, method), *tried]
+        count, before = tried[0].found.covered.sum(), chosen.found.covered.sum()
+        if tried[0].decided or count > before:
+            said = IN_PIECES.format(before, len(problem.cells))
+            problem, chosen = finer, tried[0]
+        elif not clock.out_of_time:
+            said = NOT_IN_PIECES.format(count, len(problem.cells))
+    bodies, found, replayed = problem.bodies, chosen.found, chosen.replayed
     answer, evidence, message = _answer(problem, found, replayed)
     feasible = answer is Answer.FEASIBLE
     return Verdict(
         answer=answer,
         evidence=evidence,
-        message=message,
+        message=message + said,
         robot=problem.robot,
         cells=problem.cells,
         task=problem.task,

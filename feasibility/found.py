@@ -36,6 +36,8 @@ class Found:
     """Work done: FK evaluations (`fk`), nodes, calls, boxes."""
     motion: Walk | None = None
     """One motion over the centres of all cells, where there is one."""
+    hindered: bool = False
+    """Did convex bodies of the arm keep the search from going anywhere?"""
     replay: Callable[[], Replay] | None = None
     """Replays the motion over all cells by Pinocchio; None where none was found."""
     accepted: str = ""

@@ -84,6 +84,21 @@ class Problem:
         return replace(self, searched=searched)
 
     @property
+    def in_pieces(self) -> Problem | None:
+        """The same problem with the links cut into convex pieces; None where that is no different.
+
+        Nor is it tried where the task says what is to stand for a link other than hulls.
+        """
+        asked, bodies = self.task.collision, self.bodies
+        if asked is None or bodies is None or asked.shapes != "hulls":
+            return None
+        finer = replace(asked, shapes="pieces")
+        task, searched = (replace(one, collision=finer) for one in (self.task, self.searched))
+        problem = replace(self, task=task, searched=searched)
+        cut = problem.bodies
+        return problem if cut and len(cut.polytopes) > len(bodies.polytopes) else None
+
+    @property
     def within(self) -> str:
         """Tolerance, cone and range of the roll in words."""
         words = f"within {1e3 * self.task.effective_tolerance:g} mm and {self.task.cone_deg:g} deg"

@@ -285,9 +285,6 @@ def _hints(verdict: Verdict) -> list[str]:
         if verdict.task.roll is not None and verdict.task.roll_deg is not None:
             now = "{:g} to {:g} now".format(*verdict.task.roll_deg)
             hints.append(f"--set 'task.roll_deg=[..., ...]' widens the range of the roll ({now})")
-    asked = verdict.task.collision
-    if asked is not None and CauseKind.COLLISION in kinds and asked.shapes == "hulls":
-        hints.append("--set collision.shapes=pieces takes bodies that are nearer to the real ones")
     if CauseKind.DISCONNECTED in kinds:
         hints.append(f"{_narrower(verdict)} leaves out cells that need a second motion")
     shows = "it" if verdict.covered.all() else "which cells are missed"

@@ -10,7 +10,7 @@ import numpy as np
 from coverable_errors import ArgumentError, Checks, Fault
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import segment_clear
+from feasibility.collisions import blamed, segment_clear
 from feasibility.found import Found
 from feasibility.notices import compiling_notice
 from feasibility.problem import Problem
@@ -177,6 +177,7 @@ def _found(
             "rounds": exploration.rounds,
         },
         motion=walk,
+        hindered=_hindered(exploration),
         replay=None if walk is None else partial(_replayed, problem, walk),
         accepted="One continuous motion of {waypoints} waypoints visits every cell centre; "
         f"Pinocchio's replay holds it {problem.within}, between waypoints too.",
@@ -189,6 +190,12 @@ def _found(
         make_graph=lambda: graph_of(exploration),
         make_causes=lambda: causes_of(exploration, proof, problem.pairs),
     )
+
+
+def _hindered(exploration: Exploration) -> bool:
+    """Was any motion refused because of collisions?"""
+    buffer = exploration.arrays.collisions
+    return len(buffer) > 0 and blamed(buffer) >= 0
 
 
 def _in_order(found: Found, run: Run, problem: Problem, exploration: Exploration) -> Found:

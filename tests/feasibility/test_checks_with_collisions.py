@@ -12,7 +12,7 @@ from feasibility import Search, Task, Verdict, check, greedy_check, verify
 from feasibility.certification import collision_replay, replay
 from feasibility.collisions import Collision, Obstacle, gather
 from feasibility.reports.verdict import as_json
-from feasibility.verdict import Answer, CauseKind, Walk
+from feasibility.verdict import Answer, CauseKind, Evidence, Walk
 from robots import load_robot
 from surfaces import plane
 
@@ -76,6 +76,27 @@ def test_what_is_in_the_way_is_named() -> None:
 def test_an_object_that_may_be_touched_is_not_in_the_way() -> None:
     links = {solid.owner for solid in gather(UR5, PLATE, Collision(), 0.02).solids}  # type: ignore[union-attr]
     assert checked(ROOF, allow=tuple((link, "roof") for link in sorted(links))).feasible
+
+
+def test_links_are_cut_into_pieces_only_where_hulls_are_in_the_way(clear: Verdict) -> None:
+    """Base and upper arm fold beside each other, and their hulls overlap."""
+    q = np.array([2.27, 2.74, 0.66, -1.62, 1.48, -0.77])
+    folded = UR5.with_limits(np.column_stack([q - 0.06, q + 0.06]))
+    small = plane((-0.01, 0.01), (-0.01, 0.01), "outside", (0.477, -0.75, -0.053)).cells(2, 2)
+    asked = Collision(surface=False, clearance=0.005)
+    verdict = check(folded, small, TASK, collision=asked)
+    assert verdict.feasible
+    assert verdict.task.collision is not None
+    assert verdict.task.collision.shapes == "pieces"
+    assert "0 of 4 cells were covered; so the links were cut into convex pieces" in verdict.message
+    assert clear.task.collision is not None
+    assert clear.task.collision.shapes == "hulls"
+    # Nor where it is proved that something collides everywhere.
+    crowded = Collision(surface=False, clearance=0.05)
+    verdict = check(folded, small, TASK, collision=crowded)
+    assert verdict.evidence is Evidence.PROOF
+    assert verdict.task.collision is not None
+    assert verdict.task.collision.shapes == "hulls"
 
 
 def test_a_motion_through_an_object_is_refused(clear: Verdict) -> None:
