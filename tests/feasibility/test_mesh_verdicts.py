@@ -15,8 +15,8 @@ from robots import load_robot
 from surfaces import mesh
 from surfaces.meshes.cells import MeshCells
 
-CASES = ["4a", "4c", "4d", "4f", "5a", "5e"]
-MORE = ["4b", "4e", "5b", "5c", "5d", "5f"]  # make campaign NAME=larger_samples
+CASES = ["4a", "4d", "5e"]
+MORE = ["4b", "4c", "4e", "4f", "5a", "5b", "5c", "5d", "5f"]  # make campaign NAME=larger_samples
 FINE = (90, 100)  # rows and columns of facets
 
 

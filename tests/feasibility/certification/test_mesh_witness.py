@@ -190,14 +190,21 @@ TASKS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("robot", "name", "task"),
-    [
-        *(("ur5", name, "near") for name in PARTS if name != "fine hood"),
-        ("puma560", "noisy cap", "near"),
-        *(("ur5", name, "touching, wide") for name in ("irregular", "noisy plate")),
-    ],
-)
+SOME = [
+    ("ur5", "coarse hood", "near"),
+    ("ur5", "slivers", "near"),
+    ("puma560", "noisy cap", "near"),
+    ("ur5", "irregular", "touching, wide"),
+]
+MORE = [  # make campaign NAME=larger_samples
+    ("ur5", "irregular", "near"),
+    ("ur5", "noisy plate", "near"),
+    ("ur5", "noisy cap", "near"),
+    ("ur5", "noisy plate", "touching, wide"),
+]
+
+
+@pytest.mark.parametrize(("robot", "name", "task"), SOME)
 def test_a_witness_holds_over_the_triangles_as_given(robot, name, task):
     (vertices, faces), position = PARTS[name]
     surface = mesh(TriangleMesh(vertices, faces), side="outside", position=position)

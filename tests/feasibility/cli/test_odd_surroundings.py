@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tomllib
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -153,11 +153,17 @@ def test_no_number_of_a_case_is_beyond_words(kind: str, table: str, name: str) -
     example = tomllib.loads(f"x = {dict(keys_of(table, kind))[name].example}")["x"]
     for number in (1e300, -1e300, 1.5e155, 1e-300, 10**400):
         tables[table][name] = replaced(example, number)
-        with suppress(CaseError):
-            Case.from_toml(text_of(tables)).build()
-            continue
-        with pytest.raises(CaseError, match=rf"\b{name}\b"):
-            Case.from_toml(text_of(tables)).build()
+        refused = refusal(text_of(tables))
+        assert refused is None or re.search(rf"\b{name}\b", refused), refused
+
+
+def refusal(text: str) -> str | None:
+    """What is said of a case that is not taken."""
+    try:
+        Case.from_toml(text).build()
+    except CaseError as fault:
+        return str(fault)
+    return None
 
 
 def text_of(tables: dict[str, dict[str, Any]]) -> str:

@@ -95,7 +95,7 @@ def tube(name):
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("name", TUBES)
+@pytest.mark.parametrize("name", ["ur5 around", "stops at 180"])
 def test_a_closed_surface_is_not_gone_over_twice(name, order):
     """Some joint cannot turn on where the surface does: the path begins there."""
     verdict = tube(name)

@@ -191,8 +191,8 @@ def beside_the_curve(robot, cells, task, q0, q1, samples):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_segment_that_is_accepted_holds_everywhere(kind):
-    """240 segments of each kind; `make campaign NAME=larger_samples` has more."""
-    assert_accepted_segments_hold(kind, 12)
+    """120 segments of each kind; `make campaign NAME=larger_samples` has more."""
+    assert_accepted_segments_hold(kind, 6)
 
 
 def assert_accepted_segments_hold(kind, surfaces):
@@ -247,13 +247,18 @@ def off_middle(arrays, cells, task, x, axes, normals):
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_roll_holds_on_a_segment_that_is_accepted(kind):
-    """160 segments as above, ranges of 0.5 to 300 deg about a random reference.
+    """128 segments of each kind; `make campaign NAME=larger_samples` has more."""
+    assert_roll_holds(kind, 8)
+
+
+def assert_roll_holds(kind, arms):
+    """16 segments for each arm, as above, with ranges of 0.5 to 300 deg about a random reference.
 
     Roll stays in its range at every sample, over the curve and over the tool point's own foot.
     """
     rng = np.random.default_rng(20 + KINDS.index(kind))
     passed = 0
-    for _ in range(10):
+    for _ in range(arms):
         robot = random_arm(rng)
         turned = replace(
             robot, approach_axis=robot.reference_axis, reference_axis=robot.approach_axis
@@ -284,13 +289,13 @@ def test_roll_holds_on_a_segment_that_is_accepted(kind):
             if max(work.error[0, 0], work.error[1, 0]) <= arrays.near:
                 own = cells.surface.closest(points).normal
                 assert off_middle(arrays, cells, task, x, axes, own).max() <= arrays.roll[1]
-    assert passed > 25
+    assert passed > 2.5 * arms
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_cone_holds_on_long_segments(kind):
-    """150 segments of each kind; `make campaign NAME=larger_samples` has more."""
-    assert_the_cone_holds(kind, 10)
+    """90 segments of each kind; `make campaign NAME=larger_samples` has more."""
+    assert_the_cone_holds(kind, 6)
 
 
 def assert_the_cone_holds(kind, arms):
