@@ -87,7 +87,7 @@ def cell_under(kernel, x, y, z):  # type: ignore[no-untyped-def]
     for k in range(3):
         p[k] = r[0, k] * x + r[1, k] * y + r[2, k] * z
     weights, normal, off = kernel.weights, np.zeros(3), np.empty(3)
-    f = nearest_face(kernel.tree, p, kernel.last[0], weights)
+    f = nearest_face(kernel.tree, p[0], p[1], p[2], kernel.last[0], weights, off)
     kernel.last[0] = f
     cell, along = kernel.cell[f], 0.0
     for c in range(3):

@@ -345,7 +345,8 @@ def _deviations(
     deviations += surface.deviations
     deviations[:, 0] += standoff * deviations[:, 1]
     if surface.mean_edge_length > 0.0:
-        beside = beside_facets(cells, standoff, tolerance, used[owner], t, everywhere=True)
+        places = used[owner], point, normal
+        beside = beside_facets(cells, standoff, tolerance, *places, everywhere=True)
         np.maximum.at(deviations[:, 0], owner, beside.off)
         np.maximum.at(deviations[:, 1], owner, beside.leans)
         if not beside.off.max(initial=0.0) <= tolerance:

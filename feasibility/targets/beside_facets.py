@@ -27,7 +27,8 @@ def beside_facets(
     standoff: float,
     tolerance: float,
     curves: NDArray[np.int64],
-    t: NDArray[np.float64],
+    point: NDArray[np.float64],
+    normal: NDArray[np.float64],
     everywhere: bool,
 ) -> BesideFacets:
     """Compare targets with the triangles of a mesh, without any interpolation.
@@ -41,15 +42,15 @@ def beside_facets(
         standoff: m.
         tolerance: m, of the tool point.
         curves: (k,) which curves.
-        t: (k,) places on them.
+        point: (k, 3) m, a place on each of them.
+        normal: (k, 3) their normals there.
         everywhere: compare with all of the mesh, which takes long at large standoffs; otherwise
             with the cells of the curve and those that touch both.
     """
     pairs = cells.pairs[curves]
-    point, normal = cells.curves.at(curves, t)
     target = point + cells.surface.side_sign * standoff * normal
     away, direction = cells.distances(pairs, target, everywhere)
-    leans = np.zeros(len(t))
+    leans = np.zeros(len(point))
     off = np.abs(standoff - away) if standoff > 0.0 else leans
     strip = cells.crease_distances(pairs, point, everywhere)
     some = np.isfinite(strip) & (strip >= tolerance - standoff)

@@ -65,7 +65,8 @@ def _see_facets(
     some = np.arange(len(deviations))
     for count in (FEW, MANY):
         t = (np.arange(count) + 0.5) / count
-        places = np.repeat(some, count), np.tile(t, len(some))
+        curves = np.repeat(some, count)
+        places = curves, *cells.curves.at(curves, np.tile(t, len(some)))
         found = beside_facets(cells, standoff, tolerance, *places, everywhere=False)
         off = found.off.reshape(-1, count).max(axis=1)
         leans = found.leans.reshape(-1, count).max(axis=1)

@@ -1,4 +1,10 @@
-"""Closest points on triangles, and on the faces of two cells, compiled."""
+"""The point of a triangle closest to a given one, compiled.
+
+By the regions of Ericson, Real-Time Collision Detection (2005), section 5.1.5: products of
+distances tell whether it lies at a corner, on a side, or inside. With a thin triangle these say
+little more than how they were rounded. There the three sides and the inside are tried, each by
+itself, and the nearest counts.
+"""
 
 from __future__ import annotations
 
@@ -6,129 +12,118 @@ import numpy as np
 
 from coverable_kernels import njit
 
-
-@njit(cache=True, error_model="numpy")
-def nearest_on_triangle(a, b, c, p):  # type: ignore[no-untyped-def]
-    """Weights (w0, w1, w2) of the point of a triangle nearest to p.
-
-    By the regions of Ericson, Real-Time Collision Detection (2005), section 5.1.5.
-
-    Args:
-        a: (3,) corner, as b and c.
-        b: (3,)
-        c: (3,)
-        p: (3,)
-    """
-    d1, d2, d3, d4, d5, d6 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(3):
-        ab, ac = b[k] - a[k], c[k] - a[k]
-        d1 += ab * (p[k] - a[k])
-        d2 += ac * (p[k] - a[k])
-        d3 += ab * (p[k] - b[k])
-        d4 += ac * (p[k] - b[k])
-        d5 += ab * (p[k] - c[k])
-        d6 += ac * (p[k] - c[k])
-    if d1 <= 0.0 and d2 <= 0.0:
-        return 1.0, 0.0, 0.0
-    if d3 >= 0.0 and d4 <= d3:
-        return 0.0, 1.0, 0.0
-    if d6 >= 0.0 and d5 <= d6:
-        return 0.0, 0.0, 1.0
-    vc = d1 * d4 - d3 * d2
-    if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
-        v = d1 / (d1 - d3)
-        return 1.0 - v, v, 0.0
-    vb = d5 * d2 - d1 * d6
-    if vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
-        w = d2 / (d2 - d6)
-        return 1.0 - w, 0.0, w
-    va = d3 * d6 - d5 * d4
-    if va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
-        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-        return 0.0, 1.0 - w, w
-    total = 1.0 / (va + vb + vc)
-    return va * total, vb * total, vc * total
+THIN = 1e-4  # [1], square of the sine of the first corner's angle
 
 
-@njit(cache=True, error_model="numpy")
-def nearest_of(corners, middles, radii, some, p, weights):  # type: ignore[no-untyped-def]
-    """The face nearest to p among `some`, and its distance; -1 and inf where there are none.
+@njit(cache=True, error_model="numpy", _nrt=False)
+def on_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
+    """m^2, the square of the distance of a point from a triangle; NaN where either is not finite.
 
     Args:
         corners: (F, 3, 3) m.
-        middles: (F, 3) m, a point of each face.
-        radii: (F,) m, no point of the face is further from its middle.
-        some: (k,) faces.
-        p: (3,) m.
-        weights: (3,) receives the weights of the nearest point.
+        f: which of them.
+        x: m, as y and z.
+        y: m.
+        z: m.
+        weights: (3,) receives the weights of the corners at the closest point.
     """
-    best, least = -1, np.inf
-    for f in some:
-        away = 0.0
-        for k in range(3):
-            away += (p[k] - middles[f, k]) ** 2
-        if best >= 0 and away > (least + radii[f]) ** 2:
-            continue
-        w0, w1, w2 = nearest_on_triangle(corners[f, 0], corners[f, 1], corners[f, 2], p)
-        distance = 0.0
-        for k in range(3):
-            x = w0 * corners[f, 0, k] + w1 * corners[f, 1, k] + w2 * corners[f, 2, k]
-            distance += (p[k] - x) ** 2
-        distance = np.sqrt(distance)
-        if distance < least:
-            best, least = f, distance
-            weights[0], weights[1], weights[2] = w0, w1, w2
-    return best, least
+    ax, ay, az = corners[f, 0, 0], corners[f, 0, 1], corners[f, 0, 2]
+    bx, by, bz = corners[f, 1, 0], corners[f, 1, 1], corners[f, 1, 2]
+    cx, cy, cz = corners[f, 2, 0], corners[f, 2, 1], corners[f, 2, 2]
+    ux, uy, uz, vx, vy, vz = bx - ax, by - ay, bz - az, cx - ax, cy - ay, cz - az
+    d1 = ux * (x - ax) + uy * (y - ay) + uz * (z - az)
+    d2 = vx * (x - ax) + vy * (y - ay) + vz * (z - az)
+    d3 = ux * (x - bx) + uy * (y - by) + uz * (z - bz)
+    d4 = vx * (x - bx) + vy * (y - by) + vz * (z - bz)
+    d5 = ux * (x - cx) + uy * (y - cy) + uz * (z - cz)
+    d6 = vx * (x - cx) + vy * (y - cy) + vz * (z - cz)
+    w0, w1, w2 = 1.0, 0.0, 0.0
+    if d1 <= 0.0 and d2 <= 0.0:
+        pass
+    elif d3 >= 0.0 and d4 <= d3:
+        w0, w1 = 0.0, 1.0
+    elif d6 >= 0.0 and d5 <= d6:
+        w0, w2 = 0.0, 1.0
+    else:
+        vc, vb, va = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
+        if not va + vb + vc > THIN * (d1 - d3) * (d2 - d6):
+            return _on_thin_triangle(corners, f, x, y, z, weights)
+        if vc <= 0.0 and d1 >= 0.0 and d3 <= 0.0:
+            w1 = d1 / (d1 - d3)
+            w0 = 1.0 - w1
+        elif vb <= 0.0 and d2 >= 0.0 and d6 <= 0.0:
+            w2 = d2 / (d2 - d6)
+            w0 = 1.0 - w2
+        elif va <= 0.0 and d4 - d3 >= 0.0 and d5 - d6 >= 0.0:
+            w2 = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+            w0, w1 = 0.0, 1.0 - w2
+        else:
+            total = 1.0 / (va + vb + vc)
+            w0, w1, w2 = va * total, vb * total, vc * total
+    weights[0], weights[1], weights[2] = w0, w1, w2
+    return (
+        (x - (w0 * ax + w1 * bx + w2 * cx)) ** 2
+        + (y - (w0 * ay + w1 * by + w2 * cy)) ** 2
+        + (z - (w0 * az + w1 * bz + w2 * cz)) ** 2
+    )
 
 
-@njit(cache=True, error_model="numpy")
-def _around(pair, members, indptr, near, near_indptr):  # type: ignore[no-untyped-def]
-    """Faces of two cells, and of those that touch both: the straight line may cut their corners."""
-    cells = np.empty(2 + near_indptr[pair[0] + 1] - near_indptr[pair[0]], dtype=np.int64)
-    cells[0], cells[1] = pair[0], pair[1]
-    count = 2
-    for i in range(near_indptr[pair[0]], near_indptr[pair[0] + 1]):
-        for j in range(near_indptr[pair[1]], near_indptr[pair[1] + 1]):
-            if near[i] == near[j]:
-                cells[count] = near[i]
-                count += 1
-    total = 0
-    for cell in cells[:count]:
-        total += indptr[cell + 1] - indptr[cell]
-    some = np.empty(total, dtype=np.int64)
-    total = 0
-    for cell in cells[:count]:
-        for i in range(indptr[cell], indptr[cell + 1]):
-            some[total] = members[i]
-            total += 1
-    return some
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _square(corners, f, x, y, z, i, wi, j, wj, k, wk):  # type: ignore[no-untyped-def]
+    """m^2, the square of the distance from the place with weights wi, wj, wk of corners i, j, k."""
+    c = corners
+    return (
+        (x - (wi * c[f, i, 0] + wj * c[f, j, 0] + wk * c[f, k, 0])) ** 2
+        + (y - (wi * c[f, i, 1] + wj * c[f, j, 1] + wk * c[f, k, 1])) ** 2
+        + (z - (wi * c[f, i, 2] + wj * c[f, j, 2] + wk * c[f, k, 2])) ** 2
+    )
 
 
-@njit(cache=True, error_model="numpy")
-def put_on_cells(  # type: ignore[no-untyped-def]
-    corners, middles, radii, members, indptr, near, near_indptr, pairs, points, faces, weights
-):
-    """Closest points on the faces of two cells each, and of those that touch both.
-
-    Args:
-        corners: see `nearest_of`, as for middles and radii.
-        members: (F,) faces, cell by cell.
-        indptr: (N + 1,) where each cell's faces begin.
-        near: neighbours, cell by cell.
-        near_indptr: (N + 1,) where each cell's neighbours begin.
-        pairs: (m, 2) cells.
-        points: (m, k, 3) m.
-        faces: (m, k) receives the nearest face.
-        weights: (m, k, 3) receives the weights of its nearest point.
-    """
-    for m in range(pairs.shape[0]):
-        some = _around(pairs[m], members, indptr, near, near_indptr)
-        for k in range(points.shape[1]):
-            found, _ = nearest_of(corners, middles, radii, some, points[m, k], weights[m, k])
-            faces[m, k] = found
-            # A face close to one point of the line is close to the next: try it first there.
-            for i in range(some.shape[0]):
-                if some[i] == found:
-                    some[i] = some[0]
-                    some[0] = found
-                    break
+@njit(cache=True, error_model="numpy", _nrt=False)
+def _on_thin_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
+    """`on_triangle` where the sine of an angle is small, or 0: sides and corners may coincide."""
+    least, longest, first = np.inf, -1.0, 0
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        square, along = 0.0, 0.0
+        for axis in range(3):
+            side = corners[f, j, axis] - corners[f, i, axis]
+            square += side * side
+            given = x if axis == 0 else y if axis == 1 else z
+            along += side * (given - corners[f, i, axis])
+        if square > longest:
+            longest, first = square, i
+        t = min(max(along / square, 0.0), 1.0) if square > 0.0 else 0.0
+        away = _square(corners, f, x, y, z, i, 1.0 - t, j, t, k, 0.0)
+        if away < least:
+            least = away
+            weights[i], weights[j], weights[k] = 1.0 - t, t, 0.0
+    # Inside: along the longest side, and across it to the third corner.
+    i, j, k = first, (first + 1) % 3, (first + 2) % 3
+    along, to, height, up = 0.0, 0.0, 0.0, 0.0
+    for axis in range(3):
+        side, third = (
+            corners[f, j, axis] - corners[f, i, axis],
+            corners[f, k, axis] - corners[f, i, axis],
+        )
+        given = x if axis == 0 else y if axis == 1 else z
+        along += side * third
+        to += side * (given - corners[f, i, axis])
+    for axis in range(3):
+        side, third = (
+            corners[f, j, axis] - corners[f, i, axis],
+            corners[f, k, axis] - corners[f, i, axis],
+        )
+        given = x if axis == 0 else y if axis == 1 else z
+        across = third - along / longest * side
+        height += across * across
+        up += across * (given - corners[f, i, axis])
+    wk = up / height
+    wj = (to - wk * along) / longest
+    wi = 1.0 - wj - wk
+    if wi >= 0.0 and wj >= 0.0 and wk >= 0.0:
+        away = _square(corners, f, x, y, z, i, wi, j, wj, k, wk)
+        if away < least:
+            least = away
+            weights[i], weights[j], weights[k] = wi, wj, wk
+    return least if least < np.inf else np.nan

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coverable_kernels import njit
-from surfaces.meshes.closest_point import nearest_on_triangle
+from surfaces.meshes.closest_point import on_triangle
+from surfaces.meshes.tree_building import boxes_around, sort_by_halves
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-LEAF = 4  # triangles in a leaf, at most
+LEAF = 2  # triangles in a leaf, at most
 SAME = 2e-14  # [1] of the largest coordinate: distances that differ by less are rounding
 
 
@@ -36,6 +37,10 @@ class FaceTree(NamedTuple):
     same: float
     """m, distances that differ by less are one: then the triangle given first counts, so that what
     is nearest to an edge does not depend on rounding."""
+    waiting: Ints
+    """(d + 1,) scratch: nodes still to be looked into."""
+    bounds: Array
+    """(d + 1,) scratch: m^2, squares of their distances."""
 
     @staticmethod
     def of(corners: Array) -> FaceTree:
@@ -44,22 +49,14 @@ class FaceTree(NamedTuple):
         depth = 0
         while count > LEAF << depth:
             depth += 1
-        order, middles, levels = np.arange(count), corners.mean(axis=1), []
-        lowest, highest = corners.min(axis=1), corners.max(axis=1)
-        for level in range(depth + 1):
-            starts = (np.arange(2**level) * count) >> level
-            low = np.minimum.reduceat(lowest[order], starts)
-            high = np.maximum.reduceat(highest[order], starts)
-            levels.append(np.hstack([low, high]))
-            if level < depth:
-                node = np.repeat(np.arange(2**level), np.diff(np.append(starts, count)))
-                spots = middles[order]
-                spread = np.maximum.reduceat(spots, starts) - np.minimum.reduceat(spots, starts)
-                axis = spread.argmax(axis=1)[node]
-                order = order[np.lexsort((spots[np.arange(count), axis], node))]
+        corners, order = np.ascontiguousarray(corners), np.arange(count)
+        sort_by_halves(corners.mean(axis=1), depth, order)
+        corners = corners[order]
+        boxes = np.empty(((2 << depth) - 1, 6))
+        boxes_around(corners, depth, boxes)
         same = SAME * max(float(np.abs(corners).max()), 1e-300)
-        boxes = np.ascontiguousarray(np.concatenate(levels))
-        return FaceTree(np.ascontiguousarray(corners[order]), order, boxes, depth, same)
+        scratch = np.empty(depth + 1, dtype=np.int64), np.empty(depth + 1)
+        return FaceTree(corners, order, boxes, depth, same, *scratch)
 
     def nearest(self, points: Array) -> tuple[Ints, Array]:
         """Triangles (k,), and weights (k, 3) on them, of the places nearest to points (k, 3) m.
@@ -72,7 +69,7 @@ class FaceTree(NamedTuple):
         return faces, weights
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", _nrt=False, inline="always")
 def _beside_box(boxes, node, x, y, z):  # type: ignore[no-untyped-def]
     """m^2, the square of the distance of a point from a box; 0 inside."""
     dx = max(boxes[node, 0] - x, x - boxes[node, 3], 0.0)
@@ -81,64 +78,66 @@ def _beside_box(boxes, node, x, y, z):  # type: ignore[no-untyped-def]
     return dx * dx + dy * dy + dz * dz
 
 
-@njit(cache=True, error_model="numpy")
-def nearest_face(tree, p, guess, weights):  # type: ignore[no-untyped-def]
-    """The row of `tree.corners` nearest to p, or as near as rounding can tell; -1 where p is NaN.
+@njit(cache=True, error_model="numpy", _nrt=False)
+def nearest_face(tree, x, y, z, guess, weights, found):  # type: ignore[no-untyped-def]
+    """The row of `tree.corners` nearest to a point, or as near as rounding can tell.
 
     Args:
         tree: a `FaceTree`.
-        p: (3,) m, finite.
+        x: m, as y and z; finite.
+        y: m.
+        z: m.
         guess: a row that may be near.
         weights: (3,) receives the weights of the nearest point.
+        found: (3,) scratch.
     """
     corners, order, boxes = tree.corners, tree.order, tree.boxes
+    waiting, bounds = tree.waiting, tree.bounds
     count, depth, same = corners.shape[0], tree.depth, tree.same
     first_leaf = (1 << depth) - 1
-    waiting, bound = np.empty(depth + 2, np.int64), np.empty(depth + 2)
-    best, least = -1, np.inf
-    waiting[0], waiting[1], top = 0, -1, 2  # -1: the guess alone
-    bound[:2] = 0.0
-    while top > 0:
-        top -= 1
-        node = waiting[top]
-        if bound[top] > (least + same) ** 2:
-            continue
-        if 0 <= node < first_leaf:
+    best, least = guess, np.sqrt(on_triangle(corners, guess, x, y, z, weights))
+    within, node, top = (least + same) ** 2, 0, 0
+    while node >= 0:
+        if node < first_leaf:
             near, far = 2 * node + 1, 2 * node + 2
-            to = _beside_box(boxes, near, p[0], p[1], p[2])
-            further = _beside_box(boxes, far, p[0], p[1], p[2])
+            to, further = _beside_box(boxes, near, x, y, z), _beside_box(boxes, far, x, y, z)
             if further < to:
                 near, far, to, further = far, near, further, to
-            waiting[top], bound[top] = far, further
-            waiting[top + 1], bound[top + 1] = near, to
-            top += 2
-            continue
-        begin, end = guess, guess + 1
-        if node >= 0:
+            if further <= within:
+                waiting[top], bounds[top] = far, further
+                top += 1
+            if to <= within:
+                node = near
+                continue
+        else:
             leaf = node - first_leaf
-            begin, end = (leaf * count) >> depth, ((leaf + 1) * count) >> depth
-        for f in range(begin, end):
-            w0, w1, w2 = nearest_on_triangle(corners[f, 0], corners[f, 1], corners[f, 2], p)
-            square = 0.0
-            for k in range(3):
-                x = w0 * corners[f, 0, k] + w1 * corners[f, 1, k] + w2 * corners[f, 2, k]
-                square += (p[k] - x) ** 2
-            away = np.sqrt(square)
-            if away < least - same or (away <= least + same and order[f] < order[best]):
-                best = f
-                weights[0], weights[1], weights[2] = w0, w1, w2
-            if away < least:
-                least = away
+            for f in range((leaf * count) >> depth, ((leaf + 1) * count) >> depth):
+                square = on_triangle(corners, f, x, y, z, found)
+                if square > within:
+                    continue
+                away = np.sqrt(square)
+                if away < least - same or (away <= least + same and order[f] < order[best]):
+                    best = f
+                    for k in range(3):
+                        weights[k] = found[k]
+                if away < least:
+                    least, within = away, (away + same) ** 2
+        node = -1
+        while top > 0 and node < 0:
+            top -= 1
+            if bounds[top] <= within:
+                node = waiting[top]
     return best
 
 
 @njit(cache=True, error_model="numpy")
 def nearest_faces(tree, points, faces, weights):  # type: ignore[no-untyped-def]
     """`nearest_face` for points (k, 3) m; fills faces (k,), as they were given, and weights."""
-    near = 0
+    near, found = 0, np.empty(3)
     for i in range(points.shape[0]):
-        if np.isfinite(points[i]).all():
-            near = nearest_face(tree, points[i], near, weights[i])
+        x, y, z = points[i, 0], points[i, 1], points[i, 2]
+        if np.isfinite(x + y + z):
+            near = nearest_face(tree, x, y, z, near, weights[i], found)
             faces[i] = tree.order[near]
         else:
             faces[i], weights[i] = -1, np.nan

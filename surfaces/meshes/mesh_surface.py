@@ -20,7 +20,6 @@ from surfaces.meshes.normals import (
     corner_normals,
     crease_share,
     sectors,
-    unit,
 )
 from surfaces.meshes.sources import triangles_of
 from surfaces.meshes.triangle_mesh import TriangleMesh
@@ -75,14 +74,16 @@ class MeshSurface(Surface):
         points = points_of(points)
         flat = (points.reshape(-1, 3) - self.position) @ self.rotation
         face, weights = self.face_tree.nearest(flat)
-        corners = self.mesh.vertices[self.mesh.faces[face]]
-        off = flat - np.einsum("kc,kci->ki", weights, corners)
-        normals = self.normals_at(face, weights)
-        outer = np.einsum("ki,ki->k", off, normals @ self.rotation) >= 0.0
-        distance = np.linalg.norm(off, axis=1)
-        nowhere = np.full((len(flat), 2), np.nan)
-        values = np.column_stack([nowhere, np.where(outer, distance, -distance), normals])
-        return ClosestPoint.of_rows(points.shape[:-1], values, np.ones(len(flat), dtype=bool))
+        normals, _, heights = self._over(flat, face, weights)
+        shape = points.shape[:-1]
+        nowhere = np.full(shape, np.nan)
+        return ClosestPoint(
+            u=nowhere,
+            v=nowhere,
+            height=heights.reshape(shape),
+            normal=(normals @ self.rotation.T).reshape(points.shape),
+            inside=np.ones(shape, dtype=bool),
+        )
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
         """See `Surface.parts`; clusters of triangles."""
@@ -107,15 +108,14 @@ class MeshSurface(Surface):
         interpolation: over an edge the direction to the edge; on a face the face's own normal.
         """
         local = (points - self.position) @ self.rotation
-        off = local - np.einsum("kc,kci->ki", weights, self.face_balls[0][face])
-        distance = np.linalg.norm(off, axis=1)
-        # Not by the face's own normal: beyond a sharp edge a point may lie under its plane.
-        mean = self.normals_at(face, weights) @ self.rotation
-        outer = np.where(np.einsum("ki,ki->k", off, mean) >= 0.0, 1.0, -1.0)
+        # Outside or inside not by the face's own normal: beyond a sharp edge a point may lie under
+        # its plane.
+        _, off, heights = self._over(local, face, weights)
+        distance = np.abs(heights)
         on = distance <= ON * self.mean_edge_length
-        direction = off * (outer / np.where(on, 1.0, distance))[:, None]
-        flat = self.mesh.face_normals[face]
-        return distance, np.where(on[:, None], flat, direction) @ self.rotation.T
+        direction = off / np.where(on, 1.0, heights)[:, None]
+        direction[on] = self.mesh.face_normals[face[on]]
+        return distance, direction @ self.rotation.T
 
     def from_crease(self, face: Ints, weights: Array) -> Array:
         """(k,) m, how far off a crease places of faces are, at most.
@@ -139,11 +139,33 @@ class MeshSurface(Surface):
 
     def normals_at(self, face: Ints, weights: Array) -> Array:
         """(..., 3) unit normals in the root frame at places of faces, by their weights."""
-        own = self.corner_normals[face]
-        turned = own + self.crease_share(face, weights)[..., None, None] * (
-            self.crease_normals[face] - own
+        weights = np.asarray(weights)
+        rows = np.ascontiguousarray(face).reshape(-1), weights.reshape(-1, 3)
+        return (self._local_normals(*rows) @ self.rotation.T).reshape(weights.shape)
+
+    def _local_normals(self, face: Ints, weights: Array) -> Array:
+        """(k, 3) unit normals in the own frame at places of faces (k,), by their weights (k, 3)."""
+        from surfaces.meshes.places_on_faces import normals_on_faces
+
+        normals = np.empty((len(face), 3))
+        places = np.ascontiguousarray(face), np.ascontiguousarray(weights)
+        normals_on_faces(self.corner_normals, self.crease_normals, self.on_crease, *places, normals)
+        return normals
+
+    def _over(self, points: Array, face: Ints, weights: Array) -> tuple[Array, Array, Array]:
+        """Normals (k, 3) at places of faces (k,); what leads from there to points (k, 3) m.
+
+        All in the own frame: vectors (k, 3) m, and their lengths (k,), negative inwards.
+        """
+        from surfaces.meshes.places_on_faces import heights_over_faces
+
+        normals = self._local_normals(face, weights)
+        off, heights = np.empty_like(normals), np.empty(len(normals))
+        places = np.ascontiguousarray(points), np.ascontiguousarray(face)
+        heights_over_faces(
+            self.face_balls[0], *places, np.ascontiguousarray(weights), normals, off, heights
         )
-        return unit(np.einsum("...c,...ci->...i", weights, turned)) @ self.rotation.T
+        return normals, off, heights
 
     def crease_share(self, face: Ints, weights: Array) -> Array:
         """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from coverable_kernels import njit
 from surfaces.adjacency import Neighbours
-from surfaces.meshes.closest_point import nearest_on_triangle
+from surfaces.meshes.closest_point import on_triangle
 from surfaces.meshes.triangle_mesh import sum_by
 from surfaces.protected import Protected
 
@@ -102,12 +102,8 @@ def _choose(corners, middles, border, order, indptr, centroids, total, chosen, w
         resolution = 1e-12 * total[n]  # of squared distances: the first of equal ones is taken
         nearest = math.inf
         for face in members:
-            a, b, c = corners[face, 0], corners[face, 1], corners[face, 2]
-            here[0], here[1], here[2] = nearest_on_triangle(a, b, c, centroids[n])
-            square = 0.0
-            for k in range(3):
-                at = here[0] * a[k] + here[1] * b[k] + here[2] * c[k]
-                square += (at - centroids[n, k]) ** 2
+            x, y, z = centroids[n, 0], centroids[n, 1], centroids[n, 2]
+            square = on_triangle(corners, face, x, y, z, here)
             if square < nearest - resolution:
                 nearest, chosen[n] = square, face
                 weights[n] = here

@@ -172,7 +172,7 @@ class MeshCells(Cells):
 
         Of the two cells of each pair and of those that touch both.
         """
-        from surfaces.meshes.closest_point import put_on_cells
+        from surfaces.meshes.cells.closest_in_cells import put_on_cells
 
         surface = self.surface
         local = np.ascontiguousarray((points - surface.position) @ surface.rotation)
@@ -182,8 +182,9 @@ class MeshCells(Cells):
         pairs = np.ascontiguousarray(pairs)
         near_indptr, near = self.neighbours
         put_on_cells(
-            *surface.face_balls, members, indptr, near, near_indptr, pairs, local, faces, weights
-        )
+            surface.face_tree, *surface.face_balls, self.labels, members, indptr,
+            near, near_indptr, pairs, local, faces, weights,
+        )  # fmt: skip
         return faces, weights
 
     @property

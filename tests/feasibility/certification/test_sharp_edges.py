@@ -60,7 +60,8 @@ def test_the_cells_of_a_curve_agree_with_the_full_mesh(angle: int) -> None:
     """Where nothing else is near: the search uses the former, the replay the latter."""
     cells = mesh(roof(angle)).cells(20)
     t = (np.arange(32) + 0.5) / 32
-    places = np.repeat(np.arange(len(cells.pairs)), len(t)), np.tile(t, len(cells.pairs))
+    curves = np.repeat(np.arange(len(cells.pairs)), len(t))
+    places = curves, *cells.curves.at(curves, np.tile(t, len(cells.pairs)))
     near, all_over = (
         beside_facets(cells, 0.02, 3e-4, *places, everywhere=everywhere)
         for everywhere in (False, True)
