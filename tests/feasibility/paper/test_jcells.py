@@ -379,7 +379,7 @@ REACHABLE = {
 @pytest.mark.parametrize("name", REACHABLE)
 def test_library_arms_cover_a_table(name: str) -> None:
     cells = REACHABLE[name].cells(4, 4)
-    search = greedy(moves="all", step_deg=0.5, time_limit=60.0)
+    search = greedy(moves="all", step_deg=0.5, time_limit=3600.0)
     verdict = greedy_check(load_robot(name), cells, Task(0.02, 20), search)
     assert verdict.answer is Answer.FEASIBLE, verdict.message
     assert verdict.certificate is not None
