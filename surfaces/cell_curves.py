@@ -10,7 +10,7 @@ are straight lines. `surfaces.curve_fitting` fits them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,12 @@ class CellCurves(Protected):
     def __len__(self) -> int:
         """Number of curves."""
         return len(self.first) - 1
+
+    def moved(self, rotation: Array, translation: Array) -> CellCurves:
+        """The same curves after the rigid motion x -> rotation x + translation, up to rounding."""
+        halves = self.cubics.reshape(-1, 4, 2, 3) @ rotation.T
+        halves[:, 0, 0] += translation
+        return replace(self, cubics=halves.reshape(-1, 4, 6))
 
     def at(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
         """Point (k, 3) m and normal (k, 3) at t (k,) of some curves (k,)."""

@@ -43,9 +43,15 @@ class Workbench:
         self._lock = threading.Lock()
         self._robots: OrderedDict[str, Robot] = OrderedDict({_key(case.robot): self.setup.robot})
         self._cells: OrderedDict[str, Cells] = OrderedDict({_pose_key(case): self.setup.cells})
+        self._rough: OrderedDict[str, Cells] = OrderedDict({_pose_key(case): self.setup.cells})
 
-    def build(self, case: Case) -> Setup:
+    def build(self, case: Case, roughly: bool = False) -> Setup:
         """What the case builds, which differs from the first in pose, task and limits alone.
+
+        Args:
+            case: the changed one.
+            roughly: for a quick look; the curves between cells, whose fitting takes most of the
+                time, are those of the first case, moved: right up to rounding.
 
         Raises:
             CaseError: the arm or the task do not go together with these values.
@@ -53,7 +59,8 @@ class Workbench:
         if case == self.case:
             return self.setup
         robot = self._kept(self._robots, _key(case.robot), lambda: _robot(case))
-        cells = self._kept(self._cells, _pose_key(case), lambda: self._moved(case))
+        known = self._rough if roughly else self._cells
+        cells = self._kept(known, _pose_key(case), lambda: self._moved(case, roughly))
         task: Task = replace(case.task, collision=self.setup.task.collision)
         try:
             check_references(cells, task)
@@ -62,10 +69,15 @@ class Workbench:
             raise CaseError(named, case.name) from error
         return Setup(robot, cells, task, case.search)
 
-    def _moved(self, case: Case) -> Cells:
+    def _moved(self, case: Case, roughly: bool) -> Cells:
         """The cells at the pose that the case has."""
-        surface = case.surface
-        return moved_cells(self.setup.cells, Pose(surface.position, surface.rpy_deg))
+        first = self.setup.cells
+        cells = moved_cells(first, Pose(case.surface.position, case.surface.rpy_deg))
+        if roughly:
+            old, new = first.surface, cells.surface
+            turn = new.rotation @ old.rotation.T
+            vars(cells)["curves"] = first.curves.moved(turn, new.position - turn @ old.position)
+        return cells
 
     def _kept(self, known: OrderedDict[str, Made], key: str, make: Callable[[], Made]) -> Made:
         """What was made before for that key, or is made now; the oldest ones are forgotten."""

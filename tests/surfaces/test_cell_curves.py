@@ -118,6 +118,8 @@ def test_a_rigid_motion_moves_the_curves_along(cells):
     np.testing.assert_allclose(
         cells.curves.derivative_bounds, moved.curves.derivative_bounds, atol=1e-6
     )
+    carried = cells.curves.moved(turn, np.array([0.3, -0.2, 0.1]))
+    np.testing.assert_allclose(carried.cubics, moved.curves.cubics, atol=1e-9)
 
 
 def test_no_pairs_no_curves():
