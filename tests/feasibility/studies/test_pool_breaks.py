@@ -101,6 +101,8 @@ def there(request, monkeypatch):
     pools[:] = [own]
     if request.param == "dask":
         monkeypatch.setattr(pytest.importorskip("distributed"), "Client", StandInClient)
+        # Stand-ins start no threads, beside which the garbage of others would have to be gone.
+        monkeypatch.setattr("feasibility.studies.dask_workers.gc.collect", int)
         return {"address": "tcp://127.0.0.1:8786", "warm": False}, own
     monkeypatch.setattr("concurrent.futures.ProcessPoolExecutor", own)
     return {"count": 2, "warm": False}, own
