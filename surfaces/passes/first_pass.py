@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surfaces.adjacency import components
-from surfaces.passes.cut_in import CutMesh, cut_in, line_edges
+from surfaces.passes.beyond_ends import FirstPass, carried_on, slopes
+from surfaces.passes.cut_in import CutMesh, cut_in, line_edges, with_denser_line
 from surfaces.passes.net import WorkingMesh
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+HALVINGS = 2  # of the edges along the first pass: distances are taken from their vertices
 
 
 class Field(NamedTuple):
@@ -36,11 +40,7 @@ class Field(NamedTuple):
     @property
     def slopes(self) -> Floats:
         """(F,) length of the gradient in each face: 1 for the distance from something."""
-        a, b, c = np.moveaxis(self.mesh.vertices[self.mesh.faces], 1, 0)
-        fa, fb, fc = self.values[self.mesh.faces].T
-        squared = np.maximum((np.cross(b - a, c - a) ** 2).sum(axis=1), 1e-300)
-        turned = (fb - fa)[:, None] * (c - a) - (fc - fa)[:, None] * (b - a)
-        return np.asarray(np.sqrt((turned**2).sum(axis=1) / squared))
+        return slopes(self.mesh, self.values)
 
 
 def plane_field(mesh: WorkingMesh, middle: Floats, across: Floats) -> Field:
@@ -54,14 +54,17 @@ def distance_field(mesh: WorkingMesh, middle: Floats, across: Floats) -> Field:
     The first pass is the section of the surface with the plane through `middle` (3,) m square to
     `across` (3,) unit; the part of it that runs through the middle. On either side of it every
     point of the level k P is exactly P from the level (k - 1) P, because its shortest way to the
-    first pass crosses that level.
+    first pass crosses that level. Beyond its ends the first pass goes on straight, off the surface
+    (`beyond_ends`).
 
     Where the first pass does not part the surface in two (along a closed tube), the plane does, and
     values jump where the two sides meet.
     """
     cut = cut_in(mesh, (mesh.vertices - middle) @ across)
+    for _ in range(HALVINGS):
+        cut = with_denser_line(cut)
     first, edges = _through(cut, middle)
-    values = _exact_distance(cut.mesh, first) * _sides(cut, edges)
+    values = _from_carried_on(cut.mesh, first, edges) * _sides(cut, edges)
     field = Field(cut.mesh, values, cut.parent)
     if not field.torn.any():
         return field
@@ -80,13 +83,18 @@ def _through(cut: CutMesh, middle: Floats) -> tuple[Ints, Ints]:
     return used[own], edges[own[of.reshape(-1, 2)[:, 0]]]
 
 
-def _exact_distance(mesh: WorkingMesh, sources: Ints) -> Floats:
-    """(V,) m, length of the shortest way on the triangles to the nearest of some vertices."""
+def _from_carried_on(mesh: WorkingMesh, first: Ints, edges: Ints) -> Floats:
+    """(V,) m, length of the shortest way on the triangles to the first pass, carried on."""
     from pygeodesic.geodesic import PyGeodesicAlgorithmExact
 
     algorithm = PyGeodesicAlgorithmExact(mesh.vertices, mesh.faces.astype(np.int32))
-    distances, _ = algorithm.geodesicDistances(sources.astype(np.int32), None)
-    return np.asarray(distances, dtype=float)
+    distances, nearest = algorithm.geodesicDistances(first.astype(np.int32), None)
+    known = FirstPass(mesh, edges, np.asarray(distances, dtype=float), first[nearest])
+
+    def from_vertex(vertex: int) -> Floats:
+        return np.asarray(algorithm.geodesicDistances(np.array([vertex], np.int32), None)[0], float)
+
+    return carried_on(known, from_vertex)
 
 
 def _sides(cut: CutMesh, edges: Ints) -> Floats:

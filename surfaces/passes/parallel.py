@@ -306,8 +306,9 @@ def _notes(holes: int, lines: list[LevelLine], field: Field, by: By) -> tuple[st
         notes.append(f"{holes} hole{'s' * (holes > 1)} parted passes; the tool must lift there")
     if by != "distance" or not lines:
         return tuple(notes)
-    slopes = field.slopes
-    length = sum(float(line.pieces[slopes[line.faces] < KINK].sum()) for _, line in lines)
+    # Beside the first pass the distance from its vertices is coarse.
+    kinked = (field.slopes < KINK) & (field.values[field.mesh.faces] != 0.0).all(axis=1)
+    length = sum(float(line.pieces[kinked[line.faces]].sum()) for _, line in lines)
     total = sum(line.length for _, line in lines)
     if length > 0.005 * total:
         notes.append(

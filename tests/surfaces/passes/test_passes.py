@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 import pytest
-from pass_metrics import ARCH, CAP, PLATE, away, by_level, panel_with_hole
+from pass_metrics import ARCH, CAP, PLATE, away, by_level, panel_with_hole, unrolled
 
 from coverable_errors import CoverableError
 from surfaces import bspline, cylinder, mesh, piecewise, plane, sphere, torus
@@ -21,7 +21,10 @@ HALF = math.pi / 2
 @pytest.mark.parametrize("direction", [0.0, HALF, 0.4])
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_pitch_holds_on_the_surface(name: str, direction: float) -> None:
-    """From each outer pass to its inner neighbour, towards the first pass, within 2 %."""
+    """From each outer pass to its inner neighbour, towards the first pass, within 2 %.
+
+    What lies beyond the inner pass's ends is for the test of oblique passes.
+    """
     found = parallel_passes(SURFACES[name], 0.03, direction, step=0.002)
     levels = by_level(found)
     assert found.spacing <= 0.03
@@ -32,17 +35,13 @@ def test_the_pitch_holds_on_the_surface(name: str, direction: float) -> None:
         inner = level + (1 if level < middle - 0.5 else -1 if level > middle + 0.5 else 0)
         if inner == level:
             continue
-        off = np.array(
-            [
-                away(name, each.points, np.concatenate([other.points]))
-                for each in row
-                for other in levels[inner][:1]
-            ],
-            dtype=object,
-        )
-        for distances in off:
-            assert np.abs(np.asarray(distances, float) / found.spacing - 1.0).max() <= 0.02
-            checked += len(distances)
+        for each, other in product(row, levels[inner][:1]):
+            distances = away(name, each.points, other.points)
+            # Beside the end of the inner pass there is none of it to be away from.
+            ends = [away(name, each.points, other.points[some]) for some in ([0, 1], [-2, -1])]
+            beside = distances < 0.9999 * np.minimum(*ends)
+            assert np.abs(distances[beside] / found.spacing - 1.0).max() <= 0.02
+            checked += int(beside.sum())
     assert checked > 500
 
 
@@ -238,3 +237,28 @@ def test_parameters_say_that_they_run_along_u_or_v_alone() -> None:
     (note,) = parallel_passes(plate, 0.05, HALF / 2, by="parameters").notes
     assert "45 deg from the direction that was asked for" in note
     assert not parallel_passes(plate, 0.05, HALF, by="parameters").notes
+
+
+@pytest.mark.parametrize("degrees", [20, 45, 70, 110, 150])
+@pytest.mark.parametrize("name", ["plate", "cap"])
+def test_oblique_passes_stay_parallel_beyond_the_ends_of_the_first(name: str, degrees: int) -> None:
+    """Straight on the plate, and on the sphere circles about one great circle, to their ends.
+
+    (On the arch the first pass is the section with a plane, no straight line when laid flat.)
+    """
+    found = parallel_passes(SURFACES[name], 0.03, math.radians(degrees), step=0.004)
+    assert not any("kinks" in note for note in found.notes)
+    rows = [
+        np.concatenate([unrolled(name, each.points) for each in row])
+        for _, row in sorted(by_level(found).items())
+    ]
+    line = rows[len(rows) // 2]
+    along, _, least = np.linalg.svd(line - line.mean(axis=0))[2][[0, 1, -1]]
+    if name == "cap":
+        heights = [0.4 * np.arcsin(row @ least / 0.4) for row in rows]
+    else:
+        heights = [row @ np.cross([0.0, 0.0, 1.0], along) for row in rows]
+    for height in heights:
+        assert np.ptp(height) <= 0.02 * found.spacing
+    gaps = np.abs(np.diff([height.mean() for height in heights]))
+    assert np.abs(gaps / found.spacing - 1.0).max() <= 0.02
