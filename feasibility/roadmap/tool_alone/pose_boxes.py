@@ -242,18 +242,18 @@ class _Frame:
 
     def __init__(self, axis: Array, approach: Array) -> None:
         """From the tool axis in the joint's frame to the approach direction."""
-        from scipy.spatial.transform import Rotation
-
-        self._rotation, self._approach = Rotation, approach
         start, end = (np.column_stack([one, *_across(one)]) for one in (axis, approach))
-        self._plane = end[:, 1:].T
-        self._onto = Rotation.from_matrix(end @ start.T)
+        self._approach, self._plane, self._onto = approach, end[:, 1:].T, end @ start.T
 
     def rotations(self, boxes: Array) -> Array:
         """(k, 3, 3) at the middles of boxes."""
-        tilts = self._rotation.from_rotvec(boxes[:, :2] @ self._plane)
-        rolls = self._rotation.from_rotvec(boxes[:, 3:4] * self._approach)
-        return np.asarray((tilts * rolls * self._onto).as_matrix())
+        if not boxes[:, [0, 1, 3]].any():
+            return np.repeat(self._onto[None], len(boxes), axis=0)
+        from scipy.spatial.transform import Rotation
+
+        tilts = Rotation.from_rotvec(boxes[:, :2] @ self._plane)
+        rolls = Rotation.from_rotvec(boxes[:, 3:4] * self._approach)
+        return np.asarray((tilts * rolls).as_matrix() @ self._onto)
 
 
 def _across(direction: Array) -> tuple[Array, Array]:
