@@ -8,6 +8,7 @@ import test_creases
 import test_division
 import test_explain
 import test_greedy_cases
+import test_mesh_file
 import test_mesh_verdicts
 import test_mesh_witness
 import test_proof_verification
@@ -94,9 +95,15 @@ def test_tubes(name, order):
     test_coverage.test_a_closed_surface_is_not_gone_over_twice(name, order)
 
 
+@pytest.mark.parametrize("count", test_clustering.MANY)
 @pytest.mark.parametrize("name", test_clustering.PATCHES)
-def test_many_cells(name):
-    test_clustering.test_cells_are_connected_even_and_complete(name, test_clustering.MANY)
+def test_many_cells(name, count):
+    test_clustering.test_cells_are_connected_even_and_complete(name, count)
+
+
+@pytest.mark.parametrize("name", test_mesh_file.GOOD)
+def test_damaged_meshes(name, tmp_path):
+    test_mesh_file.assert_damaged_are_refused_or_clean(name, tmp_path, 1500)
 
 
 @pytest.mark.parametrize("name", test_robot_visuals.LARGE)

@@ -127,15 +127,15 @@ def test_flatness_crease_and_sagitta(cut):
     vectors = vectors_of(cut.vertices, cut.faces)
     unit = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
     found = cut.figures
-    crease = np.zeros(60)
-    first = {}
+    crease, first, inner = np.zeros(60), {}, []
     for face, corners in enumerate(cut.faces.tolist()):
         for k in range(3):
             edge = frozenset((corners[k], corners[(k + 1) % 3]))
             other = first.setdefault(edge, face)
             if other != face and cut.labels[other] == cut.labels[face]:
-                cell = cut.labels[face]
-                crease[cell] = max(crease[cell], angle(unit[face], unit[other]))
+                inner.append((face, other))
+    one, other = np.array(inner).reshape(-1, 2).T
+    np.maximum.at(crease, cut.labels[one], angle(unit[one], unit[other]))
     np.testing.assert_allclose(found.crease, crease, atol=1e-9)
     for cell in range(60):
         member = cut.labels == cell

@@ -137,13 +137,19 @@ def mutated(data, rng):
 
 @pytest.mark.parametrize("name", GOOD)
 def test_damaged_files_are_refused_or_give_a_clean_mesh(name, tmp_path):
+    """`make campaign NAME=larger_samples` has more."""
+    assert_damaged_are_refused_or_clean(name, tmp_path, 150)
+
+
+def assert_damaged_are_refused_or_clean(name, tmp_path, count):
+    """Copies of a good file with some bytes changed, left out or there twice."""
     rng = np.random.default_rng(sum(name.encode()))
     path = tmp_path / name
     path.write_bytes(GOOD[name])
     w.assert_clean(read_mesh(path))
     outcomes = {True: 0, False: 0}
     tracemalloc.start()
-    for _ in range(300):
+    for _ in range(count):
         path.write_bytes(mutated(GOOD[name], rng))
         try:
             mesh = read_mesh(path, scale=float(rng.choice([1.0, 1e-3])))
@@ -155,8 +161,8 @@ def test_damaged_files_are_refused_or_give_a_clean_mesh(name, tmp_path):
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert peak < 32 << 20
-    assert sum(outcomes.values()) == 300
-    assert min(outcomes.values()) > 10
+    assert sum(outcomes.values()) == count
+    assert min(outcomes.values()) > count // 50
 
 
 @pytest.mark.parametrize("kind", ["stl", "stl_ascii", "obj", "ply", "off", "glb"])
