@@ -57,6 +57,7 @@ class PageServer(ThreadingTCPServer):  # not HTTPServer, which looks up this mac
         """
         self.files, self.sessions, self.controls = files, sessions, controls
         self.path = f"/{secrets.token_urlsafe(16)}/"
+        self.closed = False
         try:
             super().__init__((ADDRESS, 0), _Handler)
         except OSError as error:
@@ -70,7 +71,11 @@ class PageServer(ThreadingTCPServer):  # not HTTPServer, which looks up this mac
         self.thread.start()
 
     def close(self) -> None:
-        """Stop serving, give up all questions, and free the port."""
+        """Stop serving, give up all questions, and free the port.
+
+        Connections that browsers keep open end with their next request.
+        """
+        self.closed = True
         self.sessions.close_all()
         self.shutdown()
         self.server_close()
@@ -183,12 +188,12 @@ class _Handler(BaseHTTPRequestHandler):
         self._send("application/json", text.encode())
 
     def _name(self) -> str | None:
-        """What is asked for; None where a stranger asks, or the secret is another."""
+        """What is asked for; None where a stranger asks, the secret is another, or all is over."""
         host, origin = self.headers.get("Host"), self.headers.get("Origin")
         stranger = host != self.server.host or origin not in (None, f"http://{host}")
         given, _, name = self.path.rpartition("/")
         known = secrets.compare_digest(f"{given}/".encode(), self.server.path.encode())
-        return None if stranger or not known else name
+        return None if stranger or not known or self.server.closed else name
 
     def _refuse(self) -> None:
         """Nothing is here."""

@@ -341,6 +341,9 @@ def test_a_notebook_shows_the_page_over_a_picture_that_outlives_it(browser):
                 re.compile("^(feasible|infeasible|undecided) *$"), timeout=PATIENCE_MS
             )
             live.close()
+            inner.locator("#cone-number").fill("6")
+            inner.locator("#cone-number").press("Enter")
+            expect(inner.locator("#trouble")).to_contain_text("has ended", timeout=PATIENCE_MS)
             page.reload()
             page.wait_for_timeout(1000)
             assert page.locator("iframe").count() == 0

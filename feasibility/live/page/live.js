@@ -35,7 +35,11 @@ class Page {
     this.questions = new Questions({
       heard: (answer) => this.hear(answer),
       waits: (said) => this.wait(said),
-      broken: (trouble) => { $("trouble").hidden = !trouble; $("trouble").textContent = trouble; },
+      broken: (trouble) => {
+        $("trouble").hidden = !trouble;
+        $("trouble").textContent = trouble;
+        if (trouble) $("progress").textContent = "not answered";
+      },
     });
     this.scene.handle.moved = (what, how) => this.drag(what, how);
     this.buttons();

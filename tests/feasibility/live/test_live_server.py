@@ -289,6 +289,18 @@ def test_a_connection_serves_many_questions_and_may_break(page, capfd):
     assert capfd.readouterr().err == ""
 
 
+def test_a_browser_that_keeps_its_connection_hears_that_all_is_over():
+    kind, live = {"Content-Type": "application/json"}, Live(small_case("plate"))
+    host, _, path = live.url.removeprefix("http://").partition("/")
+    connection = http.client.HTTPConnection(host, timeout=GUARD_S)
+    connection.request("POST", f"/{path}open", b"{}", kind)
+    assert json.loads(connection.getresponse().read())["session"]
+    live.close()
+    connection.request("POST", f"/{path}open", b"{}", kind)
+    assert connection.getresponse().status == 404
+    connection.close()
+
+
 def test_bodies_are_kept_clear_of():
     case = small_case("plate").with_overrides(["collision.self=true", "collision.clearance=0.005"])
     bench = Workbench(case)
