@@ -123,6 +123,11 @@ class Cells(Protected, ABC):
         pairs.flags.writeable = False
         return pairs
 
+    @cached_property
+    def links(self) -> NDArray[np.int64]:
+        """The row of `pairs` that each entry of the neighbours' `indices` belongs to."""
+        return self.neighbours.links  # not write-protected: to kernels that is another type
+
     @property
     @abstractmethod
     def curves(self) -> CellCurves:

@@ -63,16 +63,21 @@ class CurveFit:
             if edge:
                 fine = 2 * np.ceil(length[missing] / edge).astype(np.int64)
                 samples = np.maximum(samples, fine)
-            for some, parts in _blocks(missing, samples):
+            cubics, deviations = np.empty((len(missing), count, 4, 6)), np.empty((len(missing), 2))
+            final = np.full(len(missing), count == PIECES[-1])
+            for rows, parts in _blocks(samples):
+                some = missing[rows]
                 traced = cells.trace(pairs[some], np.linspace(0.0, 1.0, 2 * parts + 1))
-                cubics, deviations = fit_between_centres(cells, pairs[some], *traced, count)
-                final = (deviations <= close[some]).all(axis=1) | (count == PIECES[-1])
+                fitted = fit_between_centres(cells, pairs[some], *traced, count)
+                cubics[rows], deviations[rows] = fitted
+                final[rows] |= (deviations[rows] <= close[some]).all(axis=1)
                 if edge:
-                    final |= 4 * count > parts
-                fit.put(some[final], cubics[final], deviations[final])
-            missing = np.flatnonzero(np.isinf(fit.deviations).any(axis=1))
-            if len(missing) == 0:
+                    final[rows] |= 4 * count > parts
+            if final.all():  # most grids, at once: no copies of what may be large
+                fit.put(missing, cubics, deviations)
                 break
+            fit.put(missing[final], cubics[final], deviations[final])
+            missing = missing[~final]
         return fit
 
     @property
@@ -91,29 +96,39 @@ class CurveFit:
         for turn, (some, cubics) in enumerate(self.cubics):
             counts[some], last[some] = cubics.shape[1], turn
         first = np.concatenate([[0], np.cumsum(counts)])
-        joined = np.empty((first[-1], 4, 6))
-        for turn, (some, cubics) in enumerate(self.cubics):
-            kept = last[some] == turn
-            joined[first[some[kept]][:, None] + np.arange(cubics.shape[1])] = cubics[kept]
+        if len(self.cubics) == 1:
+            joined = self.cubics[0][1].reshape(-1, 4, 6)
+        else:
+            joined = np.empty((first[-1], 4, 6))
+            for turn, (some, cubics) in enumerate(self.cubics):
+                kept = last[some] == turn
+                joined[first[some[kept]][:, None] + np.arange(cubics.shape[1])] = cubics[kept]
         rests = np.zeros(len(joined), dtype=bool)
         for curve in np.flatnonzero(self.creased):
             legs = np.arange(first[curve], first[curve + 1]).reshape(LEGS, -1)
             rests[legs[1:, 0]] = rests[legs[:-1, -1]] = True
         square = np.repeat(counts, counts)[:, None] ** 2  # from s to t
-        ends = [2.0 * joined[:, 2], 2.0 * joined[:, 2] + 6.0 * joined[:, 3]]
-        sizes = [[np.linalg.norm(end[:, half], axis=1) for half in HALVES] for end in ends]
+        begin = 2.0 * joined[:, 2]
+        ends = begin, begin + 6.0 * joined[:, 3]
+        sizes = [[np.sqrt(_squares(end[:, half])) for half in HALVES] for end in ends]
         bounds = np.max(sizes, axis=0).T
         return CellCurves(first, joined, ROUNDING * square * bounds, self.deviations, rests)
 
 
-def _blocks(curves: Ints, samples: Ints) -> Iterator[tuple[Ints, int]]:
-    """Curves that are sampled alike, some at a time: the curves, and into how many parts."""
+def _blocks(samples: Ints) -> Iterator[tuple[Ints, int]]:
+    """Rows of curves that are sampled alike, some at a time: the rows, and into how many parts."""
     # Few different numbers of samples: powers of two of a mesh's, all alike of a patch's.
     rounded = np.where(samples > 8, 2 ** np.ceil(np.log2(np.maximum(samples, 1))), samples)
     for parts in np.unique(rounded).astype(np.int64):
-        alike = curves[rounded == parts]
+        alike = np.flatnonzero(rounded == parts)
         for start in range(0, len(alike), BLOCK):
             yield alike[start : start + BLOCK], int(parts)
+
+
+def _squares(vectors: Array) -> Array:
+    """(...,) squares of the lengths of (..., 3); numpy's own sums are slow over three numbers."""
+    x, y, z = (vectors[..., k] for k in range(3))
+    return x * x + y * y + z * z
 
 
 def fit_between_centres(
@@ -121,7 +136,8 @@ def fit_between_centres(
 ) -> tuple[Array, Array]:
     """See `fit_cubics`: from samples (m, 2 parts + 1, 3) whose ends are at the two centres."""
     # Places first, so that both maps are products of two matrices: (2 parts + 1, m, 6).
-    values = np.concatenate([points, normals], axis=2).swapaxes(0, 1).copy()
+    values = np.empty((points.shape[1], len(points), 6))
+    values[..., :3], values[..., 3:] = points.swapaxes(0, 1), normals.swapaxes(0, 1)
     values[0] = np.hstack([cells.centres[pairs[:, 0]], cells.normals[pairs[:, 0]]])
     values[-1] = np.hstack([cells.centres[pairs[:, 1]], cells.normals[pairs[:, 1]]])
     return fit_cubics(cells, pairs, values, count)
@@ -149,11 +165,11 @@ def fit_cubics(
         # Least squares also cut corners along the facets, which takes nothing off the surface.
         points, normals = cells.closest_along(pairs[smoothed], off[:, smoothed, :3].swapaxes(0, 1))
         values[:, smoothed] = np.concatenate([points, normals], axis=2).swapaxes(0, 1)
-    off = off - values
-    deviations = [np.sqrt((off[..., half] ** 2).sum(axis=2)).max(axis=0) for half in HALVES]
+    off -= values
+    deviations = [np.sqrt(_squares(off[..., half]).max(axis=0)) for half in HALVES]
     # The surface's own normal is the one at the closest point, which is not the sample, and may lie
     # to the side, where the surface bends more than along the curve.
-    moves = [np.sqrt((np.diff(values[..., half], axis=0) ** 2).sum(axis=2)) for half in HALVES]
+    moves = [np.sqrt(_squares(np.diff(values[..., half], axis=0))) for half in HALVES]
     curvature = np.divide(moves[1], moves[0], out=np.zeros_like(moves[0]), where=moves[0] > 0.0)
     sharpest = SHARPER * cells.max_curvature[pairs].max(axis=1)
     sharpest[smoothed] = 0.0  # measured, to the side too

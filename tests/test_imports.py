@@ -61,7 +61,7 @@ feasibility.certification.collisions
 feasibility.certification.tool_alone
 feasibility.certification.joint_boxes
 feasibility.certification.rolls
-feasibility.certification: box_cutting box_exclusion cells_reached curve_matching empty_region lever_bounds linear_models motion_replay order parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
+feasibility.certification: box_cutting box_exclusion cells_reached curve_deviations curve_matching empty_region lever_bounds linear_models motion_replay order parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
 feasibility.certification.areas
 feasibility.paper
 feasibility.cases

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from robots import Kinematics, Robot
 
+BLOCK = 4096  # configurations at once, to bound the memory
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Placements:
@@ -31,11 +33,19 @@ class Placements:
 
 def placements(robot: Robot, q: NDArray[np.float64]) -> Placements:
     """Tool points, axes and lever arms at q (m, n) by Pinocchio."""
-    points, axes, twists = Kinematics(robot).tools_and_twists(q)
-    moving = np.ascontiguousarray(twists.transpose(1, 0, 2))  # by coordinate, (6, m, n)
-    linear, angular = moving[:3], moving[3:]
-    levers = _length(linear + _cross(angular, points))
-    return Placements(points, axes, levers, _length(_cross(angular, axes)))
+    m, kinematics = len(q), Kinematics(robot)
+    found = Placements(
+        np.empty((m, 3)), np.empty((m, 3)), np.empty((m, robot.n)), np.empty((m, robot.n))
+    )
+    for first in range(0, m, BLOCK):
+        some = slice(first, first + BLOCK)
+        points, axes, twists = kinematics.tools_and_twists(q[some])
+        moving = np.ascontiguousarray(twists.transpose(1, 0, 2))  # by coordinate, (6, k, n)
+        linear, angular = moving[:3], moving[3:]
+        found.points[some], found.axes[some] = points, axes
+        found.levers[some] = _length(linear + _cross(angular, points))
+        found.sines[some] = _length(_cross(angular, axes))
+    return found
 
 
 def _cross(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:

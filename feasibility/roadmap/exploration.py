@@ -93,7 +93,7 @@ class Exploration:
         self.low = np.where(self.robot.prismatic, np.clip(-far, lower, upper), self.low)
         self.high = np.where(self.robot.prismatic, np.clip(far, lower, upper), self.high)
         self.indptr, self.indices = self.cells.neighbours
-        self.links = self.cells.neighbours.links
+        self.links = self.cells.links
         self.pairs = np.zeros(len(self.cells.pairs) + 1, dtype=np.int64)
 
     # -- reading the roadmap -------------------------------------------------------------------

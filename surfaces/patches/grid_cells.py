@@ -112,7 +112,7 @@ class GridCells(Cells):
         begin, stop = self.centres[i[over], None], self.centres[j[over], None]
         found = surface.closest(begin + t[:, None] * (stop - begin))
         us[over], vs[over] = found.u, found.v
-        return surface.point(us, vs), surface.normal(us, vs)
+        return surface.point_and_normal(us, vs)
 
     def parallel_curvature(self, height: float) -> Array:
         """See `Cells.parallel_curvature`: at the centres, by central differences."""
@@ -122,8 +122,10 @@ class GridCells(Cells):
             shift = np.zeros((2, 1))
             shift[axis] = min(DIFFERENCE, 0.25 / max(self.shape[axis], 1)) * (high - low)
             ahead, behind = np.add((self.u, self.v), shift), np.subtract((self.u, self.v), shift)
-            turns.append(surface.normal(*ahead) - surface.normal(*behind))
-            steps.append(surface.point(*ahead) - surface.point(*behind) + height * turns[-1])
+            points, normals = surface.point_and_normal(*ahead)
+            before, leaning = surface.point_and_normal(*behind)
+            turns.append(normals - leaning)
+            steps.append(points - before + height * turns[-1])
         return max_principal_curvature(np.stack(steps, axis=1), np.stack(turns, axis=1))
 
     @property

@@ -162,6 +162,21 @@ class Patch(Surface):
         u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
         return self.local_normal(u, v) @ self.rotation.T
 
+    def point_and_normal(
+        self, u: NDArray[np.float64], v: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`point` and `normal` at places of the same shape, at once."""
+        points, normals = self.local_point_and_normal(u, v)
+        if not np.array_equal(self.rotation, np.eye(3)):
+            points, normals = points @ self.rotation.T, normals @ self.rotation.T
+        return points + self.position, normals
+
+    def local_point_and_normal(
+        self, u: NDArray[np.float64], v: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """`local_point` and `local_normal`; a kind that has both at once says so."""
+        return self.local_point(u, v), self.local_normal(u, v)
+
     def tangent(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
         """Unit directions (..., 3), square to the normals, in which u grows, in the root frame.
 

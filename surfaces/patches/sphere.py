@@ -38,6 +38,11 @@ class Sphere(ClosedFormPatch):
         """Away from the centre."""
         return unit_sphere(u, v)
 
+    def local_point_and_normal(self, u: Array, v: Array) -> tuple[Array, Array]:
+        """The sines and cosines once."""
+        normal = unit_sphere(u, v)
+        return self.radius * normal, normal
+
     def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
         """R^2 (cos u0 - cos u1) (v1 - v0), the difference written without cancellation."""
         u0, u1, v0, v1 = (np.asarray(value, float) for value in (u0, u1, v0, v1))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import time
 from collections.abc import Callable
 
@@ -95,6 +96,14 @@ CASES: dict[str, Callable[[], Variant]] = {
 }
 
 
+def _median(table: list[dict[str, object]]) -> dict[str, object]:
+    """What an explanation of the paper's cases costs in the middle, in verdicts; goal 15."""
+    columns = ("ratio of FK (target 40)", "ratio of times (target 40)")
+    paper = [row for row in table if row["case"] in PAPER_CASES]
+    middle = {name: statistics.median(float(str(row[name])) for row in paper) for name in columns}
+    return {**dict.fromkeys(table[0], ""), "case": "paper's, median (target 15)", **middle}
+
+
 def rows(repeats: int = 3) -> tuple[str, list[dict[str, object]]]:
     """One row for each case: work and time of both, and how its thresholds ended."""
     table = []
@@ -131,6 +140,7 @@ def rows(repeats: int = 3) -> tuple[str, list[dict[str, object]]]:
                 "steps apart, worst": max(apart, default=0),
             }
         )
+    table.append(_median(table))
     return (
         f"Explanations: what would make a case feasible; processor time, least of {repeats}.",
         table,
