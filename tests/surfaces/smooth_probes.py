@@ -51,7 +51,9 @@ def extrapolated_area(surface, breaks_u, breaks_v, pieces=48):
 def least_distance(surface, point, u_range, v_range, count=121):
     """Distance of a point from the patch over the ranges: a grid, then descents by differences."""
     u, v = np.linspace(*u_range, count), np.linspace(*v_range, count)
-    distance = np.linalg.norm(surface.point(u[:, None], v[None, :]) - point, axis=-1)
+    grid = surface.point(u[:, None], v[None, :])
+    distance = np.linalg.norm(grid - point, axis=-1)
+    mesh = max(np.linalg.norm(np.diff(grid, axis=k), axis=-1).max() for k in (0, 1))
     edged = np.pad(distance, 1, constant_values=np.inf)
     around = [np.roll(edged, shift, axis=(0, 1)) for shift in ((0, 1), (0, -1), (1, 0), (-1, 0))]
     valleys = np.argwhere(distance <= np.min(around, axis=0)[1:-1, 1:-1])
@@ -64,6 +66,8 @@ def least_distance(surface, point, u_range, v_range, count=121):
 
     best = np.inf
     for i, j in valleys[order[:3]]:
+        if distance[i, j] - 2.0 * mesh > best:  # too far for its surroundings to be nearer
+            break
         start = np.clip(np.array([u[i], v[j]]) / step, bounds[:, 0] + 1e-3, bounds[:, 1] - 1e-3)
         found = least_squares(
             residual, start, "3-point", bounds.T, ftol=None, xtol=1e-12, gtol=1e-15, max_nfev=300
