@@ -119,6 +119,24 @@ class _Unfinished(JITCodeLibrary):
         self._finalized = True
 
 
+class _Finished(JITCodeLibrary):
+    """Code for Python: a call, and what takes arguments out of Python's objects."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Leave that to the passes over all of it, which begin with the same."""
+        module.data_layout = self._codegen._data_layout
+
+
+class _Finishing(Compiler):
+    """numba's own steps."""
+
+    def __init__(self, typing_context: Any, target_context: Any, library: Any, *rest: Any) -> None:
+        """The code is finished here."""
+        library = _Finished(target_context.codegen(), "kernel")
+        library.enable_object_caching()  # as numba does, so that it can be kept
+        super().__init__(typing_context, target_context, library, *rest)
+
+
 class _Translation(Compiler):
     """numba's own steps, without the last."""
 
@@ -192,7 +210,7 @@ def compiled_for_python(function: Any, options: dict[str, Any]) -> Any:
         return function
     inner = _InnerKernel(whole)
     for_python: dict[str, Any] = {**options, "no_cfunc_wrapper": True}
-    compiled: Any = njit(**for_python)(_only_calling(function, whole))
+    compiled: Any = njit(pipeline_class=_Finishing, **for_python)(_only_calling(function, whole))
     for one in (whole, compiled):
         one.get_call_template, one.get_overload = inner.get_call_template, inner.get_overload
     functools.update_wrapper(compiled, function)

@@ -14,12 +14,15 @@ COMPILING = "compiling {} (first run only, up to a minute) ..."
 NOTICE = COMPILING.format("the search kernels")
 CUTTING = COMPILING.format("the kernels that cut a surface into cells")
 COLLISIONS = COMPILING.format("the kernels that keep clear of collisions")
+REASONS = COMPILING.format("the kernels that say why cells are missed")
 GREEDY = COMPILING.format("the kernels of the greedy search")
 WAITING = (
     "waiting for the workers to load the search kernels (compiled on their first run, up to a "
     "minute) ..."
 )
 PATIENCE = 3.0  # [s]: loading them from the cache takes less, unless the machine is busy
+
+_open: list[Any] = []  # what watches for compilations now, the innermost last
 
 
 def notify(notice: str = NOTICE) -> None:
@@ -46,6 +49,8 @@ def compiling_notice(
     patience: float | None = None, say: Callable[[], None] | None = None, notice: str = NOTICE
 ) -> Iterator[None]:
     """Say that kernels are being compiled, if they are, and the block takes longer than `patience`.
+
+    What is compiled in a block inside, which says so itself, is not said here again.
 
     Args:
         patience: seconds; default `PATIENCE`.

@@ -12,7 +12,7 @@ from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import blamed, segment_clear
 from feasibility.found import Found
-from feasibility.notices import compiling_notice
+from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
 from feasibility.roadmap.between_rounds import between_rounds
 from feasibility.roadmap.causes import causes_of
@@ -33,7 +33,7 @@ from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
 from feasibility.targets import start_cell
-from feasibility.verdict import Replay, Walk
+from feasibility.verdict import Cause, Replay, Walk
 from robots import Kinematics
 
 IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
@@ -59,7 +59,15 @@ def complete_search(
     if seeds is not None:
         _check_seeds(problem, seeds)
     begin = start_cell(problem.robot, problem.cells, problem.task)
-    with compiling_notice(), clock.enforced():  # loading kernels takes a second or two
+    with compiling_notice():
+        return _search(problem, search, clock, seeds, begin)
+
+
+def _search(
+    problem: Problem, search: Search, clock: Clock, seeds: Walk | None, begin: int | None
+) -> Found:
+    """`complete_search`, from a cell that the arm's start is over."""
+    with clock.enforced():  # loading kernels takes a second or two
         warm_up()
     with clock.enforced():
         problem.cells.curves  # noqa: B018 - part of the cells, made once
@@ -188,7 +196,7 @@ def _found(
         unfinished="" if walk is not None else unfinished_words(problem, proving, in_time),
         exhausted=exhausted_words(problem, exploration, proving),
         make_graph=lambda: graph_of(exploration),
-        make_causes=lambda: causes_of(exploration, proof, problem.pairs),
+        make_causes=lambda: _causes(problem, exploration),
     )
 
 
@@ -196,6 +204,12 @@ def _hindered(exploration: Exploration) -> bool:
     """Was any motion refused because of collisions?"""
     buffer = exploration.arrays.collisions
     return len(buffer) > 0 and blamed(buffer) >= 0
+
+
+def _causes(problem: Problem, exploration: Exploration) -> tuple[Cause, ...]:
+    """Why cells are missed."""
+    with compiling_notice(notice=REASONS):
+        return causes_of(exploration, proof_of(exploration), problem.pairs)
 
 
 def _in_order(found: Found, run: Run, problem: Problem, exploration: Exploration) -> Found:

@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.collisions import clearance_gradient, segment_clear
-from feasibility.compiled import put
+from feasibility.compiled import allocating, kernel, put
 from feasibility.roadmap.expansion import join
-from feasibility.roadmap.graph import COMPONENTS, EDGES, NODES, TAIL, Roadmap, add_node
+from feasibility.roadmap.graph import COMPONENTS, EDGES, NODES, TAIL, add_node
 from feasibility.roadmap.motions import (
     CONE_SLACK,
+    HERE,
     NEWTON_STEPS,
     PROJECTION_STEPS,
     SETTLE_STEPS,
@@ -24,6 +25,7 @@ from feasibility.roadmap.motions import (
     settle,
 )
 
+NONE = np.int64(-1)
 PUSHES = 8  # steps that a colliding configuration gets
 PUSH = 0.2  # [rad] or [m] of one step
 
@@ -34,13 +36,20 @@ def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float
     Each step goes down the gradient of the penetration, and is projected back onto the target. The
     way is no motion of the arm: q becomes another start.
     """
-    if len(arrays.collisions) == 0 or segment_clear(arrays.collisions, q, q) > 0.0:
+    return len(arrays.collisions) == 0 or bool(_pushed_clear(arrays, work, cell, q))
+
+
+@kernel
+def _pushed_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
+    """`moved_clear`, where collisions are asked for."""
+    if segment_clear(arrays.collisions, q, q) > 0.0:
         return True
     look_at(arrays, work, cell)
     for _ in range(PUSHES):
-        place(arrays, work, 0, q)
+        place(arrays, work, HERE, q)
         copy_slot(arrays, work)
-        work.secondary_step[:] = 0.0
+        for j in range(q.shape[0]):
+            work.secondary_step[j] = 0.0
         clearance_gradient(arrays.collisions, q, work.secondary_step, PUSH)
         put(work.trial, q)
         if not project(arrays, work, work.trial, CONE_SLACK, np.inf, NEWTON_STEPS):
@@ -51,9 +60,8 @@ def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float
     return False
 
 
-def seed_cell(
-    arrays: SearchArrays, work: Work, roadmap: Roadmap, cell: int, guesses: NDArray[np.float64]
-) -> tuple[int, int]:
+@allocating
+def seed_cell(arrays, work, roadmap, cell, guesses):  # type: ignore[no-untyped-def]
     """Project guesses onto the constraints over one cell; new configurations become components.
 
     Args:
@@ -67,22 +75,22 @@ def seed_cell(
     """
     count = roadmap.counters
     found, made = 0, 0
-    for guess in guesses:
+    for k in range(guesses.shape[0]):
         if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
             break
         if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
             break
-        q = guess.copy()
+        q = guesses[k].copy()
         if not project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
         found += 1
-        if not moved_clear(arrays, work, cell, q):
+        if len(arrays.collisions) > 0 and not _pushed_clear(arrays, work, cell, q):
             continue
         settle(arrays, work, cell, q, SETTLE_STEPS)
-        node, _ = join(arrays, work, roadmap, cell, q, -1, 0, 0)
+        node, _ = join(arrays, work, roadmap, cell, q, NONE, np.int64(0), np.int64(0))
         if node >= 0:
             continue
-        component = int(count[COMPONENTS])
+        component = count[COMPONENTS]
         count[COMPONENTS] += 1
         add_node(arrays, work, roadmap, cell, q, component)
         made += 1

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from typing import Protocol
 
 from feasibility.notices import compiling_notice
+from feasibility.task import Task
+from robots import Robot
+from surfaces import Cells
 
 
 class SharedLock(Protocol):
@@ -31,52 +34,73 @@ def warm_up_in_turn(lock: SharedLock, say: Callable[[], None]) -> None:
         lock.release()
     try:
         with compiling_notice(say=say):
-            warm_up()
+            warm_up(rarely_used=True)
     finally:
         if first:
             lock.release()
 
 
-def warm_up() -> None:
+def warm_up(rarely_used: bool = False) -> None:
     """Load (or compile) the kernels of the complete search, by a search over two small cells.
 
     Its result is discarded; timings afterwards are those of the search, without the compiler.
+
+    Args:
+        rarely_used: those too that a search needs where it does not reach every cell. They are
+            compiled when first used; processes that begin together would all do that.
     """
-    global _warm
-    if _warm:
-        return
+    global _warm, _rare
+    if not _warm:
+        _explore_two_cells()
+        _warm = True
+    if rarely_used and not _rare:
+        _look_for_reasons()
+        _rare = True
+
+
+def _two_cells(width: tuple[float, float]) -> tuple[Robot, Cells, Task]:
+    """An arm over two small cells, this far to the side."""
+    from robots import load_robot
+    from surfaces.patches import plane
+
+    cells = plane(width=width, length=(0.1, 0.12), side="outside").cells(1, 2)
+    return load_robot("puma560"), cells, Task(standoff=0.01, cone_deg=60)
+
+
+def _explore_two_cells() -> None:
+    """Cover two cells in one motion, and replay it."""
     from feasibility.certification import replay
+    from feasibility.roadmap.exploration import Exploration
+    from feasibility.roadmap.motions import arrays_of
+    from feasibility.roadmap.search import close, explore
+    from feasibility.roadmap.walk import covering_walk
+
+    robot, cells, task = _two_cells((0.7, 0.72))
+    exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
+    explore(exploration)
+    close(exploration)
+    walk = covering_walk(exploration.roadmap, exploration.best)
+    replay(robot, cells, task, walk, exploration.covered)
+
+
+def _look_for_reasons() -> None:
+    """Rule cells out, explore their self-motions, cut, and say why they are missed."""
     from feasibility.roadmap.branch_and_bound import root_box
     from feasibility.roadmap.causes import diagnose
     from feasibility.roadmap.exploration import Exploration
     from feasibility.roadmap.motions import arrays_of
     from feasibility.roadmap.proving import Proving
-    from feasibility.roadmap.search import close, explore
-    from feasibility.roadmap.walk import covering_walk
-    from feasibility.task import Task
-    from robots import load_robot
-    from surfaces.patches import plane
+    from feasibility.roadmap.search import explore
 
-    robot = load_robot("puma560")
-    cells = plane(width=(0.7, 0.72), length=(0.1, 0.12), side="outside").cells(1, 2)
-    task = Task(standoff=0.01, cone_deg=60)
+    robot, cells, task = _two_cells((0.7, 0.72))
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), 0)
     explore(exploration)
-    close(exploration)
     exploration.explore_self_motions(0)
     exploration.rule(0, root_box(exploration.arrays), 1)
     Proving(exploration, task).attempt(1)
     diagnose(exploration, 0)
-    beyond = plane(width=(5.0, 5.02), length=(0.1, 0.12), side="outside").cells(1, 2)
-    diagnose(Exploration(robot, beyond, arrays_of(robot, beyond, task), 0), 0)
-    replay(
-        robot,
-        cells,
-        task,
-        covering_walk(exploration.roadmap, exploration.best),
-        exploration.covered,
-    )
-    _warm = True
+    robot, cells, task = _two_cells((5.0, 5.02))
+    diagnose(Exploration(robot, cells, arrays_of(robot, cells, task), 0), 0)
 
 
-_warm = False
+_warm = _rare = False

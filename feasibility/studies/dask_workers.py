@@ -98,7 +98,7 @@ class DaskWorkers:
                 self._client.get_executor(pure=False, workers=[name], allow_other_workers=True)
                 for name in machines.values()
             ]
-            wait([pool.submit(warm_up) for pool in pools])
+            wait([pool.submit(warm_up, True) for pool in pools])
 
     def renew(self) -> None:
         """Connect again; Dask replaces workers by itself.

@@ -226,17 +226,25 @@ def margin_shares(
         1 in the middle of all ranges, 0 at a limit or at the boundary of the cone, -1 where the
         projection failed.
     """
-    half = 0.5 * (arrays.upper - arrays.lower)
-    ranged = (half > 0.0) & (half < np.inf)
     margins = np.full(len(guesses), -1.0)
-    for g, q in enumerate(guesses):
+    _measure_margins(arrays, work, cell, guesses, margins)
+    return margins
+
+
+@kernel
+def _measure_margins(arrays, work, cell, guesses, margins):  # type: ignore[no-untyped-def]
+    """Write the margins of those guesses that can be projected."""
+    for g in range(guesses.shape[0]):
+        q = guesses[g]
         if not project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
             continue
         settle(arrays, work, cell, q, SETTLE_STEPS)
-        off_middle = np.abs((q - arrays.lower)[ranged] / half[ranged] - 1.0)
-        margins[g] = min(
+        margin = min(
             max(0.0, 1.0 - work.error[0, 1] / arrays.cone_chord),
             max(0.0, 1.0 - abs(work.error[0, 2]) / arrays.roll[1]),
-            (1.0 - off_middle).min(initial=np.inf),
         )
-    return margins
+        for j in range(q.shape[0]):
+            half = 0.5 * (arrays.upper[j] - arrays.lower[j])
+            if 0.0 < half < np.inf:
+                margin = min(margin, 1.0 - abs((q[j] - arrays.lower[j]) / half - 1.0))
+        margins[g] = margin

@@ -465,7 +465,8 @@ def test_the_others_wait_for_the_first_to_compile(monkeypatch, fails) -> None:
     """Threads in the place of processes: nobody else loads while the first one is at it."""
     gate, entered, may_end = Gate(), [], threading.Event()
 
-    def compile_or_load() -> None:
+    def compile_or_load(rarely_used: bool) -> None:
+        assert rarely_used
         entered.append(threading.current_thread())
         if len(entered) == 1:
             may_end.wait()
