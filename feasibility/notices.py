@@ -77,7 +77,7 @@ def compiling_notice(
         def on_start(self, about: Any) -> None:
             """A kernel that is in no cache begins to be compiled."""
             with self.lock:
-                if self.waiting:
+                if self.waiting or _open[-1] is not self:
                     return
                 left = max(0.0, began + wait - time.monotonic())
                 timer = threading.Timer(left, speak)
@@ -92,9 +92,11 @@ def compiling_notice(
             """It has been."""
 
     watch = Watch()
+    _open.append(watch)
     try:
         with event.install_listener("numba:compile", watch):
             yield
     finally:
+        _open.remove(watch)
         for timer in watch.waiting:
             timer.cancel()

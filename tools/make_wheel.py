@@ -21,10 +21,10 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 SOURCES = ("pyproject.toml", "README.md", "LICENSE", "coverable*.py")
 PACKAGES = ("coverable_meshes", "robots", "surfaces", "feasibility")
-FIRST = (("check", "paper/4a"),)
+FIRST = (("check", "paper/4a"), ("check", "paper/4d"))
 COMMANDS = (
     *FIRST,
-    ("check", "paper/4a", "--set", "surface.position=[4, 0, 0]"),
+    ("check", "paper/4a", "--set", "surface.position=[4, 0, 0]", "--area"),
     ("check", "paper/5e", "--set", "collision.clearance=0.005"),
     ("check", "paper/4f", "--set", "search.method=greedy"),
     ("check", "{greedy}"),

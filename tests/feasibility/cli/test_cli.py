@@ -529,6 +529,19 @@ def test_a_long_wait_for_kernels_is_explained(monkeypatch):
     assert sys.stderr.getvalue() == NOTICE + "\n"
 
 
+def test_what_says_itself_what_it_compiles_is_not_said_around_it(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with compiling_notice(patience=0.0):
+        with compiling_notice(patience=0.0, notice=notices.COLLISIONS):
+            for thread in threading.enumerate():
+                if isinstance(thread, threading.Timer):
+                    thread.join()
+            numba.njit(lambda x: x + 1)(1)
+        assert sys.stderr.getvalue() == notices.COLLISIONS + "\n"
+        numba.njit(lambda x: x + 2)(1)
+    assert sys.stderr.getvalue() == notices.COLLISIONS + "\n" + NOTICE + "\n"
+
+
 def test_what_is_compiled_is_said_once_for_each_purpose(monkeypatch, plate, capsys):
     """Cutting surfaces and the search, each with its own words."""
     monkeypatch.setattr(notices, "PATIENCE", 0.0)
