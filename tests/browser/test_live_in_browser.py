@@ -294,6 +294,18 @@ def test_two_pages_do_not_mix_and_a_closed_one_is_forgotten(browser, served, tab
     certified(tab, "feasible")
 
 
+def test_a_question_that_nobody_heard_is_asked_again(tab):
+    tab.context.set_offline(True)
+    tab.fill("#cone-number", "25")
+    tab.keyboard.press("Enter")
+    expect(tab.locator("#trouble")).to_contain_text("nobody answers", timeout=PATIENCE_MS)
+    assert tab.inner_text("#progress") == "not answered"
+    tab.context.set_offline(False)
+    certified(tab, "feasible")
+    expect(tab.locator("#trouble")).to_be_hidden()
+    assert values(tab)["cone_deg"] == 25
+
+
 def test_answers_while_something_is_dragged(browser):
     """Prints how many there are in a second, for paper/4a; nothing is asked of that number."""
     with Live(load_case("paper/4a")) as live:

@@ -5,6 +5,7 @@
 // answer goes out at once, and the program gives up the one before it.
 
 const BEAT = 45000; // ms, between two signs of life
+const AGAIN = 2000; // ms, after which a question that nobody heard is asked again
 
 async function post(name, asked) {
   const reply = await fetch(name, {
@@ -54,29 +55,38 @@ export class Questions {
   async send(values, final) {
     const number = ++this.number;
     this.counts.asked += 1;
-    try {
-      for (;;) {
-        if (this.session === null && !await this.open()) return;
-        const asked = {session: this.session, number, final, values};
-        const reply = await post("ask", asked);
-        this.broken(null);
-        if (reply.status === "gone") {
-          this.session = null;
-        } else if (reply.status === "deciding" && number === this.number) {
-          this.waits(reply.said);
-        } else {
-          if (number !== this.number) return;
-          // Given up, since nothing was heard of this page for long: a computer that slept.
-          if (reply.status !== "answered") return await this.send(values, final);
-          this.counts.answered += 1;
-          this.heard(reply.answer, final);
-          return;
-        }
+    while (number === this.number) {
+      try {
+        if (await this.answered(values, number, final)) return;
+      } catch (error) {
+        if (number !== this.number) return;
+        this.broken("nobody answers: the program that serves this page has ended, or cannot be "
+          + "reached");
+        await new Promise((done) => setTimeout(done, AGAIN));
       }
-    } catch (error) {
-      if (number === this.number) this.broken("nobody answers: the program that serves this page "
-        + "has ended, or cannot be reached");
     }
+  }
+
+  // Ask once, and hear the answer; false where it is to be asked again.
+  async answered(values, number, final) {
+    if (this.session === null && !await this.open()) return true;
+    const reply = await post("ask", {session: this.session, number, final, values});
+    this.broken(null);
+    if (number !== this.number) return true;
+    if (reply.status === "gone") {
+      this.session = null;
+    } else if (reply.status === "deciding") {
+      this.waits(reply.said);
+    } else if (reply.status === "answered") {
+      this.counts.answered += 1;
+      this.heard(reply.answer, final);
+      return true;
+    } else {
+      // Given up, since nothing was heard of this page for long: a computer that slept.
+      await this.send(values, final);
+      return true;
+    }
+    return false;
   }
 
   async open() {
