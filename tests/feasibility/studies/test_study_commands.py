@@ -396,7 +396,9 @@ def test_names_out_of_files_are_text_on_the_page(folder, capsys) -> None:
         (folder / f"{name}.urdf").write_text(urdf.format(escape(name)), encoding="utf-8")
         study = (
             f"description = {json.dumps('about ' + name)}\n"
-            + STUDY.replace('"xarm7"', json.dumps({"urdf": f"{name}.urdf"}).replace(":", "="))
+            + STUDY.replace(
+                '"xarm7"', json.dumps({"urdf": f"{name}.urdf"}).replace(":", "=")
+            ).replace(", 2.0]", "]")
             + 'vary."task.cone_deg" = [20, 30]\n'
         )
         (folder / f"{name}.toml").write_text(study, encoding="utf-8")
