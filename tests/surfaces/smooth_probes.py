@@ -1,8 +1,10 @@
 """What any smooth patch is measured with: differences, triangles, and a search without slopes."""
 
+import pickle
 from itertools import pairwise
 
 import numpy as np
+import pytest
 from scipy.optimize import least_squares, minimize
 
 POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
@@ -92,3 +94,17 @@ def same_surface(one, other, tolerance=0.0):
     ]
     agree = all(np.abs(first - second).max() <= tolerance for first, second in pairs)
     return agree and (a.inside == b.inside).all() and one.side == other.side
+
+
+def assert_pickles_and_moves(shape, motion):
+    """A pickled copy is the same, and a moved one (returned) has everything moved."""
+    assert same_surface(shape, pickle.loads(pickle.dumps(shape)))
+    rotation, translation = motion
+    moved = shape.moved(rotation, translation)
+    u, v = random_parameters(shape, 100)
+    points = shape.point(u, v)
+    assert moved.point(u, v) == pytest.approx(points @ rotation.T + translation)
+    closest_point = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
+    assert closest_point.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
+    assert closest_point.inside.all()
+    return moved

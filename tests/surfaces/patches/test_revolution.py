@@ -1,17 +1,16 @@
 """Surfaces of revolution: the profile, what it sweeps, and profiles that are refused."""
 
 import math
-import pickle
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from smooth_probes import (
     POSE,
+    assert_pickles_and_moves,
     extrapolated_area,
     least_distance,
     random_parameters,
-    same_surface,
     tangents,
 )
 
@@ -175,15 +174,7 @@ def test_two_points_make_a_cone_and_many_a_ball():
 
 
 def test_surfaces_pickle_and_move(shape, motion):
-    assert same_surface(shape, pickle.loads(pickle.dumps(shape)))
-    rotation, translation = motion
-    moved = shape.moved(rotation, translation)
-    u, v = random_parameters(shape, 100)
-    points = shape.point(u, v)
-    assert moved.point(u, v) == pytest.approx(points @ rotation.T + translation)
-    closest_point = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
-    assert closest_point.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
-    assert closest_point.inside.all()
+    assert_pickles_and_moves(shape, motion)
     with pytest.raises(ValueError, match="read-only"):
         shape.profile.points[0, 0] = 1.0
 

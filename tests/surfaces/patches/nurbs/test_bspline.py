@@ -1,13 +1,13 @@
 """B-spline and NURBS patches: exact quadrics, differences, brute force, and nets refused."""
 
 import math
-import pickle
 
 import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 from smooth_probes import (
     POSE,
+    assert_pickles_and_moves,
     extrapolated_area,
     least_distance,
     random_parameters,
@@ -217,15 +217,7 @@ def test_weights_of_one_and_default_knots_change_nothing():
 
 
 def test_surfaces_pickle_and_move(shape, motion):
-    assert same_surface(shape, pickle.loads(pickle.dumps(shape)))
-    rotation, translation = motion
-    moved = shape.moved(rotation, translation)
-    u, v = random_parameters(shape, 100)
-    points = shape.point(u, v)
-    assert moved.point(u, v) == pytest.approx(points @ rotation.T + translation)
-    closest_point = moved.closest((points + 0.01 * shape.normal(u, v)) @ rotation.T + translation)
-    assert closest_point.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
-    assert closest_point.inside.all()
+    moved = assert_pickles_and_moves(shape, motion)
     assert moved.net is shape.net
     for array in (shape.net.points, *shape.net.knots):
         with pytest.raises(ValueError, match="read-only"):
