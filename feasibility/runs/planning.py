@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from feasibility.checking import check
 from feasibility.clock import Clock
+from feasibility.runs.overruns import with_reached_overrun
 from feasibility.search import Search
 from feasibility.task import Task
 from feasibility.treated import TreatedArea, treated_by_passes
@@ -58,6 +61,9 @@ def plan_passes(
 ) -> PlannedPasses:
     """Look for one motion along passes that have been laid.
 
+    Where none is found, and the arm does not reach all of their overrun, that is shortened, which a
+    note says.
+
     Args:
         robot: the arm.
         laid: the passes.
@@ -82,6 +88,13 @@ def plan_passes(
     cells = pass_toolpath(laid, retract)
     asked = replace(task, footprint=None, coverage=None)
     verdict = check(robot, cells, asked, search, clock=clock)
+    if not verdict.feasible and verdict.components:
+        reached = np.zeros(len(cells), dtype=bool)
+        reached[np.concatenate(verdict.components)] = True
+        shorter = with_reached_overrun(laid, pass_places(laid, retract), reached)
+        if shorter is not None:
+            laid, cells = shorter, pass_toolpath(shorter, retract)
+            verdict = check(robot, cells, asked, search, clock=clock)
     laid = replace(laid, notes=(*laid.notes, *_stripes(laid, task)))
     return PlannedPasses(laid, pass_places(laid, retract), cells, task, verdict)
 

@@ -121,3 +121,16 @@ def test_runs_hold_the_speed_of_the_task() -> None:
     assert said
     assert any("would need" in cause and "rad/s; it allows 3.15" in cause for cause in said)
     assert any("along stretch" in cause for cause in said)
+
+
+def test_overrun_beyond_reach_is_shortened_and_said() -> None:
+    plate = plane((0.55, 0.75), (-0.1, 0.1), "outside", (0.0, 0.0, 0.2))
+    laid = parallel_passes(plate, 0.1, overrun=0.4, step=0.05)
+    along = plan_passes(UR5, laid, replace(TASK, cone_deg=20))
+    assert along.verdict.feasible
+    assert "ends is shortened to what can be reached" in along.passes.notes[-1]
+    assert laid.length - 0.8 < along.passes.length < laid.length - 0.1
+    for short, each in zip(along.passes.stretches, laid.stretches, strict=True):
+        assert short.on_surface.sum() == each.on_surface.sum()
+        assert np.isin(short.points, each.points).all()
+    assert len(along.cells) == len(along.places.points)
