@@ -24,6 +24,9 @@ from robots import Robot
 
 Floats = NDArray[np.float64]
 
+STEP = 0.2  # [rad], [m] of a joint from row to row of a way home: the judge has a budget for each
+WAYS = 5  # ways home that are looked for, until the judge accepts one
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Ends(ReadOnlyArrays):
@@ -80,11 +83,27 @@ def _move(path: CoveragePath, q: Floats, cell: int, approach: float, what: str) 
         return np.vstack([back, home])
     _judged(robot, lifted, home[None], f"{what}: home_deg")
     space = FreeSpace(robot, collision_buffer(lifted, robot))
-    way = free_motion(space, back[-1], home, seed=0)
-    if way is None:
-        raise PathError(f"{what}: no way between home and the surface was found that keeps clear")
-    _judged(robot, lifted, way, f"{what}: the way home")
-    return np.vstack([back, way[1:]])
+    refusal = "no way between home and the surface was found that keeps clear"
+    for seed in range(WAYS):
+        way = free_motion(space, back[-1], home, seed=seed)
+        if way is None:
+            continue
+        way = _in_short_steps(way)
+        refused = _refusal(robot, lifted, way)
+        if not refused:
+            return np.vstack([back, way[1:]])
+        refusal = f"the way home: {refused}"
+    raise PathError(f"{what}: {refusal}")
+
+
+def _in_short_steps(rows: Floats) -> Floats:
+    """The same way in rows that are closer to each other."""
+    counts = np.ceil(np.abs(np.diff(rows, axis=0)).max(axis=1) / STEP).astype(int)
+    pieces = [
+        np.linspace(a, b, max(count, 1), endpoint=False)
+        for a, b, count in zip(rows[:-1], rows[1:], counts.tolist(), strict=True)
+    ]
+    return np.vstack([*pieces, rows[-1:]])
 
 
 def _judged(robot: Robot, bodies: Bodies | None, rows: Floats, what: str) -> None:
@@ -93,8 +112,18 @@ def _judged(robot: Robot, bodies: Bodies | None, rows: Floats, what: str) -> Non
     Raises:
         PathError: they do.
     """
-    if bodies is None:
-        return
-    found = collision_replay(robot, bodies, rows)
-    if not found.accepted:
-        raise PathError(f"{what}: {found.refusal}")
+    refusal = "" if bodies is None else _refusal(robot, bodies, rows)
+    if refusal:
+        raise PathError(f"{what}: {refusal}")
+
+
+def _refusal(robot: Robot, bodies: Bodies, rows: Floats) -> str:
+    """What the judge of collisions says against rows (k, n) or their way back; empty for nothing.
+
+    Near the clearance it may certify one and not the other.
+    """
+    for way in (rows, rows[::-1]):
+        found = collision_replay(robot, bodies, way)
+        if not found.accepted:
+            return found.refusal
+    return ""

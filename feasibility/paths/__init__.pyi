@@ -10,3 +10,4 @@ from .order import Order as Order
 from .order import PathError as PathError
 from .order import check_order as check_order
 from .two_opt import improved as improved
+from .winding import unwound as unwound

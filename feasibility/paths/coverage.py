@@ -35,6 +35,7 @@ from feasibility.paths.order import (
     route,
     usual_order,
 )
+from feasibility.paths.winding import unwound
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
 from feasibility.verdict import Answer, Certificate, Verdict, Walk
@@ -120,6 +121,7 @@ def coverage_path(
     else:
         found = _least_revisiting(motion_graph_of(verdict), cells, order, needed)
         walk = found.graph.walk(_from_start(found, robot.start))
+    walk = unwound(robot, task, walk)
     replayed = replay(robot, cells, task, walk, needed)
     if not replayed.accepted:
         raise PathError(f"the independent replay refuses the path: {replayed.refusal}")

@@ -20,7 +20,7 @@ from feasibility.division import (
     collect_components,
     connect_pairs,
 )
-from feasibility.paths import CoveragePath, figures_of
+from feasibility.paths import CoveragePath, figures_of, unwound
 from feasibility.problem import Problem
 from feasibility.roadmap import (
     EDGES,
@@ -187,6 +187,7 @@ def _replayed(exploration: Exploration, task: Task, ways: Sequence[Way]) -> _Rep
     runs, refusals = list[CoveragePath](), list[str]()
     for way in ways:
         walk = route_walk(exploration.roadmap, way.nodes[0], np.array(way.route, dtype=np.int64))
+        walk = unwound(robot, task, walk)
         needed = np.zeros(len(cells), dtype=bool)
         needed[walk.cell[walk.cell >= 0]] = True
         judged = replay(robot, cells, task, walk, needed)
