@@ -143,7 +143,7 @@ def _measured(
         notes.append(
             f"asked for, though their convex bodies collide in each of {len(q):,} random "
             f"configurations, where their exact shapes do not: {named}; the search finds nothing "
-            'unless finer shapes, such as shapes = "pieces", part them'
+            "with one hull for each shape, and may with convex pieces"
         )
     left_out = [
         PairLeftOut(*pair, why, rates.get(pair)) for pair, why in found.items() if why is not None
