@@ -152,6 +152,8 @@ def box_bound(rotations, k, joints, a, b, halves, before, now):  # type: ignore[
         end = box_gap(rotations, k, joints, a, b, halves, n, now)
         if min(start, end) > best:  # not so where nothing is known of n
             best = min(start, end)
+        if best >= FAR:
+            break
     return best
 
 
