@@ -192,25 +192,30 @@ def _widen_margins(problem, aimed, work, cell, q, best):  # type: ignore[no-unty
             return
 
 
+@allocating
+def _widest_margins(problem, aimed, work, roadmap, component, best):  # type: ignore[no-untyped-def]
+    """Limits and cone (N, 2), the widest found over each cell, of one component's nodes."""
+    n = roadmap.q.shape[1]
+    q, here = np.empty(n), np.empty(2)
+    settled = np.zeros(best.shape[0], dtype=np.int64)
+    for x in range(roadmap.counters[NODES]):
+        cell = roadmap.cell[x]
+        if root_of(roadmap, roadmap.component[x]) != component or settled[cell] == MOST_SETTLED:
+            continue
+        settled[cell] += 1
+        put(q, roadmap.q[x])
+        _widen_margins(problem, aimed, work, cell, q, here)
+        if min(here[0], here[1]) > min(best[cell, 0], best[cell, 1]):
+            best[cell, 0], best[cell, 1] = here[0], here[1]
+
+
 def least_margins(exploration: Exploration) -> NDArray[np.float64]:
     """(2,) shares of limits and of cone that the best component leaves over every cell."""
-    problem, roadmap, work = exploration.arrays, exploration.roadmap, exploration.work
+    problem, work = exploration.arrays, exploration.work
     # Steps over a centre head for a cone that is next to nothing, and keep to the task's.
     aimed = problem._replace(
         cone_chord=NARROW * problem.cone_chord if problem.cone_chord < np.inf else np.inf
     )
-    here = np.empty(2)
-    best = np.full((len(exploration.cells), 2), -1.0)  # limits and cone, the widest so far
-    settled = np.zeros(len(exploration.cells), dtype=np.int64)
-    for x in range(int(roadmap.counters[NODES])):
-        cell = int(roadmap.cell[x])
-        if root_of(roadmap, roadmap.component[x]) != exploration.best:
-            continue
-        if settled[cell] == MOST_SETTLED:
-            continue
-        settled[cell] += 1
-        q = roadmap.q[x].copy()
-        _widen_margins(problem, aimed, work, cell, q, here)
-        if here.min() > best[cell].min():
-            best[cell] = here
+    best = np.full((len(exploration.cells), 2), -1.0)
+    _widest_margins(problem, aimed, work, exploration.roadmap, exploration.best, best)
     return np.clip(best.min(axis=0), 0.0, 1.0)

@@ -23,7 +23,8 @@ from feasibility.cases import (
     toml_document,
 )
 from feasibility.studies.axes import POSES, Variation
-from feasibility.studies.outcome import HOME, arm_of, case_of, mounted_as, mounting_fault
+from feasibility.studies.outcome import arm_of, mounted_as, mounting_fault
+from feasibility.studies.placed_cases import HOME, case_of
 from feasibility.studies.run import StudyTask
 
 ORIGIN = (0.0, 0.0, 0.0)

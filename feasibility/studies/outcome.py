@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
+from feasibility.cases import Case, parse_toml, read_robot, read_surface, toml_document
 from feasibility.clock import Clock
 from feasibility.collisions import gather
 from feasibility.division import undominated
+from feasibility.studies.placed_cases import HOME, case_of
 from feasibility.verdict import CauseKind, Verdict
 from robots import flange_axis
 
@@ -85,7 +86,6 @@ def _counted(kinds: list[str]) -> dict[str, int]:
 
 ROBOTS_KEPT = 32  # arms that one worker keeps
 MESHES_KEPT = 4
-HOME = {"position": (0.0, 0.0, 0.0), "rpy_deg": (0.0, 0.0, 0.0)}
 
 Tables = dict[str, Any]
 Outcome = dict[str, Any]
@@ -118,17 +118,6 @@ def evaluate(tables: Tables) -> Outcome:
 def clock_of(case: Case) -> Clock:
     """The time limit of a case, from now on; kernels are loaded before, like everywhere."""
     return Clock(case.search.time_limit).begin(time.monotonic())
-
-
-def case_of(tables: Tables) -> Case:
-    """The case of some tables, checked; tables that belong to no case are left out.
-
-    Raises:
-        CaseError: with everything that is wrong.
-    """
-    return Case.from_toml(
-        toml_document({title: tables[title] for title in TABLES if title in tables})
-    )
 
 
 def arm_of(case: Case) -> Robot:

@@ -15,6 +15,7 @@ from surfaces.arguments import Checks
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Finer, Triangles, Unrolled
 from surfaces.curve_fitting import CurveFit
+from surfaces.patches.fitted_at_home import fitted_at_home
 from surfaces.patches.patch import ClosedFormPatch, Patch
 from surfaces.surface import max_principal_curvature
 
@@ -86,7 +87,13 @@ class GridCells(Cells):
     @cached_property
     def curves(self) -> CellCurves:
         """See `Cells.curves`."""
-        return CurveFit.of(self).joined()
+        return fitted_at_home(self.surface, self.u, self.v, self.shape, self._fitted)
+
+    def _fitted(self, surface: Patch) -> CellCurves:
+        """The curves of the same cells with the surface at another pose, or at this one."""
+        same = surface is self.surface
+        cells = self if same else GridCells.cut(surface, *self.shape)
+        return CurveFit.of(cells).joined()
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Cells.trace`: straight in u and v; over a pole, closest to the straight line.
