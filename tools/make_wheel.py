@@ -42,6 +42,7 @@ name = "ur5"
 kind = "mesh"
 file = "sheet.off"
 position = [0.4, -0.1, 0.2]
+side = "outside"
 cells = 6
 [task]
 standoff = 0.02

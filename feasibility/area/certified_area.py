@@ -24,7 +24,7 @@ from feasibility.area.nodes import HeldTiles, Nodes
 from feasibility.area.spreading import spread_over
 from feasibility.certification import less_deviations
 from feasibility.certification.areas import joined, tiles_hold
-from feasibility.notices import compiling_notice
+from feasibility.notices import AREAS, compiling_notice
 from feasibility.roadmap.motions import arrays_of, work_for
 from feasibility.task import Task
 from feasibility.verdict import Verdict, Walk
@@ -160,7 +160,7 @@ def area_from(
     faces = len(cut.touching[0]) if cut.touching is not None else 0
     if budget is None:
         budget = max(BUDGET * len(which) + FACE_BUDGET * faces, LEAST_BUDGET)
-    with compiling_notice():
+    with compiling_notice(notice=AREAS):
         lander = Lander(
             arrays_of(robot, cells, asked), work_for(robot.n), tile_memory(robot.n), cut,
             task.fixed_approach(cells), budget,

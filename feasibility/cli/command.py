@@ -153,7 +153,7 @@ def open_case(
         from feasibility.cases import CaseError, load_case
         from feasibility.clock import Clock, OutOfTime
         from feasibility.collisions import gather
-        from feasibility.notices import CUTTING, compiling_notice
+        from feasibility.notices import CUTTING, MORE, compiling_notice
 
         case = load_case(args.case, args.settings)
         check_outputs(outputs, args.case)
@@ -176,7 +176,8 @@ def open_case(
             for note in bodies.notes if bodies is not None else ():
                 print_err(f"note: collisions: {note}")
             doing = "the search was prepared"
-            yield OpenCase(case, setup, progress, clock, began)
+            with compiling_notice(notice=MORE):
+                yield OpenCase(case, setup, progress, clock, began)
         except OutOfTime as late:
             text = f"The time limit of {clock.limit:g} s ran out while {doing}"
             files = [f"{flag}: {shown_path(path)}" for flag, path in outputs.items() if path]
