@@ -9,7 +9,7 @@ import numpy as np
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
-from feasibility.speed.routes import route
+from feasibility.speed.routes import possible
 from feasibility.verdict import Verdict
 
 
@@ -64,7 +64,7 @@ def largest_speed(rated: RatedGraph, begin: int | None, sigma: float = -np.inf) 
     low, high = -1, len(speeds)  # speeds[low] is possible, speeds[high] is not
     while high - low > 1:
         middle = (low + high) // 2
-        if route(rated, rated.fine(float(speeds[middle]), sigma), begin) is None:
+        if not possible(rated, rated.fine(float(speeds[middle]), sigma), begin):
             high = middle
         else:
             low = middle

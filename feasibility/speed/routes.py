@@ -20,22 +20,33 @@ def route(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> list[i
         edges: the motions that may be used.
         begin: the node that it has to begin at; None for any.
     """
-    graph = nx.Graph()
-    graph.add_nodes_from(range(len(rated.graph.cell)) if begin is None else [begin])
-    graph.add_edges_from(edges)
+    graph = _graph(rated, edges, begin)
     if rated.cells.in_order:
         return _in_order(graph, rated.graph.cell, len(rated.cells), begin)
     best = _largest(graph, rated, begin)
     if len({rated.graph.cell[x] for x in best}) < len(rated.cells):
         return None
-    return _visiting(graph.subgraph(best), rated.graph.cell, min(best) if begin is None else begin)
+    return _visiting(graph, best, rated.graph.cell, min(best) if begin is None else begin)
+
+
+def possible(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> bool:
+    """Is there a `route`?"""
+    if rated.cells.in_order:
+        return route(rated, edges, begin) is not None
+    return bool(covered(rated, edges, begin).all())
+
+
+def _graph(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> nx.Graph:
+    """The nodes, all or the first alone, and these motions."""
+    graph = nx.Graph()
+    graph.add_nodes_from(range(len(rated.graph.cell)) if begin is None else [begin])
+    graph.add_edges_from(edges)
+    return graph
 
 
 def covered(rated: RatedGraph, edges: Iterable[Edge], begin: int | None) -> NDArray[np.bool_]:
     """(N,) the most cells that one motion visits."""
-    graph = nx.Graph()
-    graph.add_nodes_from(range(len(rated.graph.cell)) if begin is None else [begin])
-    graph.add_edges_from(edges)
+    graph = _graph(rated, edges, begin)
     found = np.zeros(len(rated.cells), dtype=bool)
     if rated.cells.in_order:
         for last in range(len(rated.cells), 0, -1):
@@ -59,9 +70,10 @@ def _largest(graph: nx.Graph, rated: RatedGraph, begin: int | None) -> set[int]:
     return max(parts, key=rank, default=set[int]())
 
 
-def _visiting(graph: nx.Graph, cell: Sequence[int], begin: int) -> list[int]:
-    """A motion over all cells of a connected graph: on to the nearest one not yet visited."""
-    missing = {cell[x] for x in graph.nodes} - {cell[begin]}
+def _visiting(graph: nx.Graph, part: set[int], cell: Sequence[int], begin: int) -> list[int]:
+    """A motion over all cells of a component: on to the nearest one not yet visited."""
+    beside = {x: sorted(graph.adj[x]) for x in part}
+    missing = {cell[x] for x in part} - {cell[begin]}
     nodes = [begin]
     while missing:
         before: dict[int, int] = {nodes[-1]: -1}
@@ -70,7 +82,7 @@ def _visiting(graph: nx.Graph, cell: Sequence[int], begin: int) -> list[int]:
             x = queue.popleft()
             if cell[x] in missing:
                 break
-            for y in sorted(graph.neighbors(x)):
+            for y in beside[x]:
                 if y not in before:
                     before[y] = x
                     queue.append(y)

@@ -66,11 +66,13 @@ class _Pieces:
     high: Array
     first: Jacobians
     last: Jacobians
+    sigmas: Array
+    """(k, 2) the smallest singular values at both ends; NaN where they do not matter."""
 
     def of(self, rows: NDArray[np.bool_]) -> _Pieces:
         return _Pieces(
             self.owner[rows], self.low[rows], self.high[rows], self.first.of(rows),
-            self.last.of(rows),
+            self.last.of(rows), self.sigmas[rows],
         )  # fmt: skip
 
 
@@ -103,8 +105,7 @@ def segment_rates(
     rate, joint = allowed.min(axis=1, initial=np.inf), allowed.argmin(axis=1)
     rate = rate if resting is None else np.where(resting, np.inf, rate)
     groups = np.zeros(m, dtype=np.int64) if group is None else group
-    index, at = np.arange(m), jacobians(robot, np.vstack([starts, ends]))
-    left = _Pieces(index, np.zeros(m), np.ones(m), at.of(index), at.of(index + m))
+    left = _whole(robot, starts, ends, sigma is not None)
     v, s = _Least(groups, speed), _Least(groups, sigma)
     for level in range(LEVELS + 1):
         width, r = left.high - left.low, rate[left.owner]
@@ -121,10 +122,30 @@ def segment_rates(
         v.keep(left.owner[~open_], low[~open_])
         if sigma is not None:
             s.keep(left.owner[~open_], scaled[0][~open_])
-        left = _halved(robot, starts, ends, left.of(open_))
+        left = _halved(robot, starts, ends, left.of(open_), sigma is not None)
         if not len(left.owner):
             break
     return SegmentRates(v.low, v.exact, joint, v.share, s.low, s.exact)
+
+
+def _whole(robot: Robot, starts: Array, ends: Array, with_sigma: bool) -> _Pieces:
+    """Segments (m, n) as they are; where one begins where another ends, the arm is asked once."""
+    m = len(starts)
+    alone = np.ones(m, dtype=bool)
+    alone[:-1] = (ends[:-1] != starts[1:]).any(axis=1)
+    at = jacobians(robot, np.vstack([starts, ends[alone]]))
+    before, after = np.arange(m), np.arange(1, m + 1)
+    after[alone] = m + np.arange(alone.sum())
+    sigma = _sigma(robot, at, with_sigma)
+    sigmas = np.column_stack([sigma[before], sigma[after]])
+    return _Pieces(before, np.zeros(m), np.ones(m), at.of(before), at.of(after), sigmas)
+
+
+def _sigma(robot: Robot, at: Jacobians, asked: bool) -> Array:
+    """(k,) the smallest singular values, where they are asked for; NaN elsewhere."""
+    if not asked:
+        return np.full(len(at.points), np.nan)
+    return smallest_singular(at, length_unit(robot))
 
 
 class _Least:
@@ -152,7 +173,7 @@ class _Least:
         np.minimum.at(self.low, owner, np.maximum(low, 0.0))
 
 
-def _halved(robot: Robot, starts: Array, ends: Array, left: _Pieces) -> _Pieces:
+def _halved(robot: Robot, starts: Array, ends: Array, left: _Pieces, with_sigma: bool) -> _Pieces:
     """Both halves of each piece."""
     if not len(left.owner):
         return left
@@ -163,9 +184,11 @@ def _halved(robot: Robot, starts: Array, ends: Array, left: _Pieces) -> _Pieces:
     def joined(a: Jacobians, b: Jacobians) -> Jacobians:
         return Jacobians(*(np.concatenate(pair) for pair in zip(a, b, strict=True)))
 
+    sigma, (before, after) = _sigma(robot, at, with_sigma), left.sigmas.T
+    sigmas = np.vstack([np.column_stack([before, sigma]), np.column_stack([sigma, after])])
     return _Pieces(
         np.concatenate([left.owner, left.owner]), np.concatenate([left.low, middle]),
-        np.concatenate([middle, left.high]), joined(left.first, at), joined(at, left.last),
+        np.concatenate([middle, left.high]), joined(left.first, at), joined(at, left.last), sigmas,
     )  # fmt: skip
 
 
@@ -200,8 +223,8 @@ def _sigma_bounds(robot: Robot, steps: Array, p: _Pieces) -> tuple[Array, Array,
         # A joint that slides keeps its direction unless joints before it turn.
         change = np.where(robot.prismatic, own * (cap > 1.0), most * own + behind)
         square += ((change / unit) ** 2).sum(axis=1)
-    ends = [smallest_singular(at, scale) for at in (p.first, p.last)]
-    return 0.5 * (ends[0] + ends[1] - np.sqrt(square)), ends[0], ends[1]
+    first, last = p.sigmas.T
+    return 0.5 * (first + last - np.sqrt(square)), first, last
 
 
 def length_unit(robot: Robot) -> float:
