@@ -123,7 +123,9 @@ def _own_folders(source: Path) -> Iterator[Path]:
         yield Path(chosen) / inside
         return
     yield source.parent / "__pycache__"
-    yield Path(AppDirs("coverable", appauthor=False).user_cache_dir) / inside
+    home = Path(AppDirs("coverable", appauthor=False).user_cache_dir)
+    if home.is_absolute():  # else there is no home folder
+        yield home / inside
 
 
 def _read(path: Path, code: Path) -> Any:

@@ -135,6 +135,18 @@ def test_where_nothing_can_be_written(
     assert not kept(tmp_path)
 
 
+def test_without_a_home_folder_nothing_is_written_where_one_happens_to_be(
+    code: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (code.parent / "__pycache__").touch()
+    monkeypatch.setenv("XDG_CACHE_HOME", "~/.cache")  # as where nothing says what ~ is
+    monkeypatch.setattr("os.path.expanduser", str)
+    monkeypatch.chdir(tmp_path)
+    keep(KERNEL, code, pickled(5))
+    assert load(KERNEL, code) is None
+    assert not kept(tmp_path)
+
+
 def test_what_others_can_change_is_neither_read_nor_written(code: Path, tmp_path: Path) -> None:
     keep(KERNEL, code, pickled(5))
     (path,) = kept(tmp_path)
