@@ -39,6 +39,9 @@ SENTENCES = {
     "partial": "divided in part: the patches cover all cells that can be covered.",
     "undecided": "undecided: this division is the best one found, or could not be certified.",
 }
+PARTLY_FAST = (
+    "divided in part: at what is asked no motion was found to the cells that are left out."
+)
 NOTHING = "not divided: no cell can be covered."
 
 
@@ -153,7 +156,11 @@ def as_text(
     division: Division, title: str, before_s: float = 0.0, areas: PatchAreas | str | None = None
 ) -> str:
     """The division for people: the answer, the patches and moves in order, what is left out."""
-    head = SENTENCES[answer_of(division)]
+    answer = answer_of(division)
+    head = SENTENCES[answer]
+    asked = division.task.speed, division.task.min_manipulability
+    if answer == "partial" and any(asked):
+        head = PARTLY_FAST
     if division.decided and not division.patches and len(division.cells):
         head = NOTHING
     covered = f"{division.n_covered:,} of {len(division.cells):,} cells"

@@ -21,6 +21,7 @@ from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import LONGEST, Motion, paced
 from feasibility.viewer.scene import (
+    PATCHES,
     TRAIL,
     Layer,
     cells_layers,
@@ -45,6 +46,7 @@ BANDS: tuple[tuple[float, Colour, str], ...] = (
     (0.9, (0.95, 0.70, 0.10), "joints at 50 to 90 % of them"),
     (np.inf, (0.80, 0.10, 0.10), "joints above 90 % of them"),
 )  # share of the velocity limits, colour and words of a piece of the trail
+SHADE = 0.6  # [1] of a patch's colour: of what is certified of it
 STROKES = 160  # pieces of the trail that appear one after the other
 DENSE = 24  # points drawn of one move between patches
 FEW = 2  # joints of a move that the legend names
@@ -109,7 +111,9 @@ def view_division(
     for k, area in enumerate(() if areas is None else areas.patches):
         if area is not None:
             share = min(area.area / plan.patches[k].area, 1.0)
-            parts.append(certified_layer(area, f"certified of patch {k + 1}", share))
+            red, green, blue = (SHADE * part for part in PATCHES[k % len(PATCHES)])
+            name, tint = f"certified of patch {k + 1}", (red, green, blue)
+            parts.append(certified_layer(area, name, share, tint))
     walks = [patch.walk.q for patch in plan.patches if len(patch.walk.q)]
     motion = None
     if walks:

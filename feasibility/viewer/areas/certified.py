@@ -28,7 +28,10 @@ PIECES = 3  # of a tile's side: a large one is bent
 
 
 def certified_layer(
-    area: CertifiedArea, name: str = "certified area", share: float | None = None
+    area: CertifiedArea,
+    name: str = "certified area",
+    share: float | None = None,
+    colour: Colour = CERTIFIED,
 ) -> Layer:
     """The certified tiles, tinted on the side where the tool works.
 
@@ -36,6 +39,7 @@ def certified_layer(
         area: the tiles.
         name: in the legend.
         share: 0 to 1, told beside it; that of all cells' area by default.
+        colour: of the tint.
     """
     share = area.share if share is None else share
     cells, path = area.cells, f"/cells/{name}"
@@ -43,13 +47,13 @@ def certified_layer(
     cut = cell_tiles(cells, height)
     count, label = len(area.areas), f"{name} ({percent_down(share)})"
     if cut is None or not count:
-        return Layer((), Entry(label, CERTIFIED, path), 0)
+        return Layer((), Entry(label, colour, path), 0)
     weights, faces = _triangle() if area.tiles.corners.shape[1] == 3 else _square()
     x = np.einsum("wc,kci->kwi", weights, area.tiles.corners).reshape(-1, 2)
     vertices, normals = cut.offset.at(Places(np.repeat(area.tiles.chart, len(weights)), x))
     every = (faces + len(weights) * np.arange(count)[:, None, None]).reshape(-1, 3)
-    command = threejs.mesh(path, vertices, every, CERTIFIED, normals=normals, opacity=0.55)
-    return Layer((command,), Entry(label, CERTIFIED, path), count)
+    command = threejs.mesh(path, vertices, every, colour, normals=normals, opacity=0.55)
+    return Layer((command,), Entry(label, colour, path), count)
 
 
 def _triangle() -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -12,6 +12,7 @@ from feasibility import Answer, Task, check
 from feasibility.certification import replay
 from feasibility.certification.rates import replay_rates
 from feasibility.division import divide
+from feasibility.reports import division as report
 from robots import load_robot
 from surfaces import plane
 
@@ -40,6 +41,8 @@ def test_every_patch_holds_what_is_asked(asked, whole) -> None:
     assert set(left) == set(np.flatnonzero(~covered).tolist())
     said = "would need" if task.speed else "singular values fall to"
     assert all(said in detail for detail in left.values())
+    told = report.as_text(found, "plate")
+    assert told.startswith("divided: every cell") if whole else "no motion was found" in told
 
 
 def test_a_speed_beyond_all_joints_is_refused() -> None:
