@@ -20,7 +20,7 @@ from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import LONGEST, Motion, paced
-from feasibility.viewer.scene import OUTLINES, PATCHES, Layer, drawn_lines
+from feasibility.viewer.scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
 from feasibility.viewer.treated import painted_layers, surface_layer
 from feasibility.viewer.viewer import View, compose, titled
 from robots import Kinematics, Robot
@@ -70,6 +70,7 @@ def view_passes(
     parts += _pass_layers(along, paths)
     count = f"{laid.count} pass{'' if laid.count == 1 else 'es'}"
     runs = "one motion" if len(paths) == 1 else f"{len(paths)} motions"
+    runs += " over a part" if _left_out(along, paths) else ""
     text = f"{robot.name}: {count}, {1e3 * laid.spacing:.4g} mm apart, {laid.length:.4g} m"
     if treated is not None:
         text += f"; treated {share_words(treated)} of the area"
@@ -110,9 +111,31 @@ def _pass_layers(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[La
         label = "passes" if len(paths) == 1 else f"run {number + 1}"
         if lines:
             layers.append(drawn_lines(lines, THIN * spacing, colour, f"/passes/{label}", label))
+    left = _left_out(along, paths)
+    if left:
+        layers.append(drawn_lines(left, THIN * spacing, MISSED, "/passes/left", "left out"))
     digits = [line for each in along.passes.stretches for line in _number(each, along)]
     layers.append(drawn_lines(digits, THIN * spacing, OUTLINES, "/passes/numbers", "numbers"))
     return layers
+
+
+def _left_out(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[Floats]:
+    """Lines (k, 3) m of the parts of passes on which no path works."""
+    places, worked = along.places, np.zeros(len(along.cells) - 1, dtype=bool)
+    for path in paths:
+        own = np.flatnonzero(path.needed)
+        worked[own[0] : own[-1]] = True
+    stretch = places.stretch
+    open_ = ~worked & (stretch[1:] == stretch[:-1]) & (stretch[1:] >= 0)
+    parted = np.diff(stretch[:-1], prepend=-2) != 0
+    begins = np.flatnonzero(open_ & (parted | ~np.append(False, open_[:-1])))
+    lines = []
+    for first in begins.tolist():
+        last = first
+        while last < len(open_) and open_[last] and stretch[last] == stretch[first]:
+            last += 1
+        lines.append(places.points[first : last + 1])
+    return lines
 
 
 def _number(each: Pass, along: PlannedPasses) -> list[Floats]:

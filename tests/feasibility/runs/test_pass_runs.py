@@ -15,6 +15,7 @@ from feasibility.certification.rates import replay_rates
 from feasibility.clock import Clock
 from feasibility.reports import pass_runs as report
 from feasibility.runs import pass_runs, piece_of, plan_passes
+from feasibility.viewer.passes import view_passes
 from robots import load_robot
 from surfaces import plane, poses
 from surfaces.passes import PassPlaces, parallel_passes
@@ -96,6 +97,8 @@ def test_what_is_left_out_is_named_with_its_cause() -> None:
     assert 0.0 < runs.left_out < along.passes.length
     assert runs.left_out + sum(lengths) == pytest.approx(along.passes.length, abs=0.2)
     assert all(f"along stretch {1 + gap.stretches[0]}: " in gap.cause for gap in runs.gaps)
+    labels = [entry.label for entry in view_passes(along, runs.runs).legend.entries]
+    assert "left out" in labels
     told = report.as_json(along, replace(runs, runs=()), [], None)
     assert sum(gap["length_m"] for gap in told["left_out"]) == pytest.approx(told["left_out_m"])
     assert told["at_least"]["interruptions"] == len(runs.parted) == 1
