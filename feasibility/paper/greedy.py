@@ -86,8 +86,8 @@ def greedy_search(
         raise ArgumentError(KNOWS_NO_COLLISIONS)
     if task.approach is None and cells.approaches is not None:
         raise ArgumentError(KNOWS_NO_POSES)
-    steps = Steps.of(robot, cells, task, search)
     with compiling_notice(notice=GREEDY):
+        steps = Steps.of(robot, cells, task, search)
         space = JSpace(robot, cells, task, np.zeros(robot.n), search, steps)
         space.load()
     clock.start()
