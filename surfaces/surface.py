@@ -85,7 +85,7 @@ class Surface(Protected, ABC):
 
     @property
     def bare(self) -> bool:
-        """Whether there is nothing but the courses between cells, and so no surface to look at."""
+        """Whether there is nothing but the curves between cells, and so no surface to look at."""
         return False
 
     @property

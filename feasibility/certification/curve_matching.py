@@ -216,7 +216,7 @@ def _matched_parameters(
 def _matched_between_poses(
     curves: TargetCurves, curve: NDArray[np.int64], tools: Array, lean: float
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """(k,) t on each course for a tool point and its axis (k, 6); none is taken to be at a pose.
+    """(k,) t on each curve for a tool point and its axis (k, 6); none is taken to be at a pose.
 
     The axis tells places apart where the tool turns on the spot; elsewhere it hardly counts: an
     axis off by 1 as much as a point off by `lean` (m).

@@ -59,7 +59,7 @@ def replay(
     task: Task,
     walk: Walk,
     needed: NDArray[np.bool_],
-    strays: NDArray[np.float64] | None = None,
+    deviations: NDArray[np.float64] | None = None,
 ) -> Replay:
     """Check a walk: limits, tool point, cone and roll at and between waypoints, and its cells.
 
@@ -74,7 +74,7 @@ def replay(
             asked only of walks that are right in everything else.
         walk: the motion.
         needed: (N,) cells that must be visited.
-        strays: (m - 1, n) how far each joint may be from the straight lines between waypoints,
+        deviations: (m - 1, n) how far each joint may be from the straight lines between waypoints,
             for collisions; 0 by default.
 
     Returns:
@@ -84,7 +84,7 @@ def replay(
     bodies = gather(robot, cells.surface, task.collision, task.standoff)
     if bodies is None or not found.accepted:
         return found
-    clear = collision_replay(robot, bodies, walk.q, strays)
+    clear = collision_replay(robot, bodies, walk.q, deviations)
     certificate = replace(
         found.certificate, min_clearance=clear.min_clearance, nearest_pair=clear.nearest_pair
     )

@@ -30,7 +30,7 @@ def order_of_places(offset: OffsetSurface, samples: Samples, tolerance: float) -
     """Where a motion goes back along a toolpath by more than the tolerance.
 
     Args:
-        offset: the courses of the toolpath.
+        offset: the curves of the toolpath.
         samples: of the motion, as it passes them.
         tolerance: m.
     """

@@ -16,7 +16,7 @@ from surfaces import Cells, Surface, SurfaceParts
 from surfaces.toolpaths import PoseSurface, arc_at
 
 SAMPLES = 300
-AT_ONCE = 60  # courses between poses that are looked at
+AT_ONCE = 60  # curves between poses that are looked at
 ROUNDING = 1e-9  # [m], [1] that a radius is taken larger by
 ON_SURFACE = 1e-8  # [m], [1] by which a place and its own closest place may differ
 WITHIN = 2.0  # of (|df| / r_f)^2 + (|dn| / r_n)^2; a common x makes each at most 1
@@ -40,7 +40,7 @@ def disagreement(cells: Cells, parts: SurfaceParts) -> str:
 def places(cells: Cells, samples: int) -> tuple[Array, Array]:
     """Points (m, 3) m of the surface and outward normals (m, 3), cell centres among them.
 
-    Of poses, those of the courses between them.
+    Of poses, those of the curves between them.
     """
     rng = np.random.default_rng(0)
     if cells.surface.bare:
@@ -50,13 +50,13 @@ def places(cells: Cells, samples: int) -> tuple[Array, Array]:
     chosen = rng.integers(len(cells), size=samples)
     size = np.sqrt(cells.areas[chosen])[:, None]
     near = cells.centres[chosen] + size * rng.uniform(-1.0, 1.0, (samples, 3))
-    found = feet_of(cells.surface, near)
+    found = closest_places(cells.surface, near)
     some = np.linspace(0, len(cells) - 1, min(len(cells), samples)).astype(int)
     points = np.concatenate([cells.centres[some], found.points[found.on_patch]])
     return points, np.concatenate([cells.normals[some], found.normals[found.on_patch]])
 
 
-class Feet(NamedTuple):
+class ClosestPlaces(NamedTuple):
     """Places of a surface below given points."""
 
     points: Array
@@ -67,24 +67,24 @@ class Feet(NamedTuple):
     """(m,) False where there is no such place."""
 
 
-def feet_of(surface: Surface, points: Array) -> Feet:
+def closest_places(surface: Surface, points: Array) -> ClosestPlaces:
     """The places whose normals lead to points (m, 3).
 
     Beyond the border of a mesh or a seam the normal that `closest` gives leads elsewhere; so each
-    place is asked for its own closest place. Of poses it is the place of a course that is nearest.
+    place is asked for its own closest place. Of poses it is the place of a curve that is nearest.
     """
     if isinstance(surface, PoseSurface):
-        return _on_courses(surface, points)
+        return _on_curves(surface, points)
     found = surface.closest(points)
-    feet = points - found.height[:, None] * found.normal
-    again = surface.closest(feet)
+    closest = points - found.height[:, None] * found.normal
+    again = surface.closest(closest)
     alike = np.linalg.norm(again.normal - found.normal, axis=1) <= ON_SURFACE
     alike &= np.abs(again.height) <= ON_SURFACE
-    return Feet(feet, found.normal, np.asarray(found.inside & alike))
+    return ClosestPlaces(closest, found.normal, np.asarray(found.inside & alike))
 
 
-def _on_courses(surface: PoseSurface, points: Array) -> Feet:
-    """The places of the straight courses between poses that are nearest to points (m, 3)."""
+def _on_curves(surface: PoseSurface, points: Array) -> ClosestPlaces:
+    """The places of the straight lines between poses that are nearest to points (m, 3)."""
     start, end = (surface.placed_points[of] for of in surface.pairs.T)
     way = end - start
     off = points[:, None] - start
@@ -93,11 +93,11 @@ def _on_courses(surface: PoseSurface, points: Array) -> Feet:
     away = np.linalg.norm(off - share[..., None] * way, axis=2)
     nearest = np.argmin(np.nan_to_num(away, nan=np.inf), axis=1)
     t = share[np.arange(len(points)), nearest]
-    feet = start[nearest] + t[:, None] * way[nearest]
+    closest = start[nearest] + t[:, None] * way[nearest]
     i, j = surface.pairs[nearest].T
     outward = surface.turned(surface.outward)
     normals, _ = arc_at(outward[i], outward[j], t)
-    return Feet(feet, normals, np.asarray(np.isfinite(points).all(axis=1)))
+    return ClosestPlaces(closest, normals, np.asarray(np.isfinite(points).all(axis=1)))
 
 
 def on_a_finest_part(places: Array, parts: SurfaceParts) -> NDArray[np.bool_]:

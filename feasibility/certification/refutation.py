@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.box_exclusion import excess
 from feasibility.certification.linear_models import Arm, Array, Models, derivatives
-from feasibility.certification.parts_agreement import feet_of
+from feasibility.certification.parts_agreement import closest_places
 from feasibility.certification.region import Region
 from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
 from feasibility.roll import projected
@@ -65,11 +65,11 @@ class Refuter:
         q = np.clip(starts, low, high)
         for _ in range(STEPS):
             points, axes = self.arm.kinematics.tools(q)
-            target, approach, on_surface, feet = self._targets(points, cell)
+            target, approach, on_surface, closest = self._targets(points, cell)
             error, tilt = points - target, axes - approach
             kept = on_surface & (np.linalg.norm(error, axis=1) <= self.task.effective_tolerance)
             kept &= np.linalg.norm(tilt, axis=1) <= self.task.cone_chord
-            kept &= sums.sums_hold(q) & self._rolled(q, axes, approach, feet, cell)
+            kept &= sums.sums_hold(q) & self._rolled(q, axes, approach, closest, cell)
             if kept.any():
                 first = int(np.argmax(kept))
                 return Refutation(q[first], first)
@@ -86,7 +86,7 @@ class Refuter:
         And the surface's points under them.
         """
         sign = self.cells.surface.side_sign
-        found = feet_of(self.cells.surface, points)
+        found = closest_places(self.cells.surface, points)
         target = found.points + sign * self.task.standoff * found.normals
         away = np.linalg.norm(points[:, None] - self.targets.points, axis=2)
         near = np.where(cell < 0, np.argmin(away, axis=1), cell)
@@ -101,14 +101,14 @@ class Refuter:
         )
 
     def _rolled(
-        self, q: Array, axes: Array, approaches: Array, feet: Array, cell: NDArray[np.int64]
+        self, q: Array, axes: Array, approaches: Array, closest: Array, cell: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
         """(m,) whose roll is in its range, over the surface or at cells' targets."""
         roll, at_cells = self.task.roll, self.targets.references
         if roll is None or at_cells is None:
             return np.ones(len(q), dtype=bool)
         fixed = self.task.fixed_reference(self.cells)
-        along = u_directions(self.cells.surface, feet) if fixed is None else fixed
+        along = u_directions(self.cells.surface, closest) if fixed is None else fixed
         if along is None:
             references = np.full_like(approaches, np.nan)
         else:

@@ -31,7 +31,7 @@ from surfaces import components
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 Lists = list[list[int]]
-MOST_CUTS = 8  # nodes of one stray piece that get a constraint each
+MOST_CUTS = 8  # nodes of one detached piece that get a constraint each
 OPTIMAL, INFEASIBLE = 0, 2  # words of scipy.optimize.milp
 Row = dict[int, float]
 

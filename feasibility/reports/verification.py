@@ -41,7 +41,7 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
 
     Args:
         found: what became of the claim.
-        notes: what was left aside in the file.
+        notes: what was not used of the file.
     """
     missed = () if found.reached is None else np.flatnonzero(~found.reached)
     certificate = None
@@ -91,7 +91,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
         found: what became of the claim.
         case: what the case is called.
         source: the file that was judged.
-        notes: what was left aside in it.
+        notes: what was not used of it.
     """
     head = "holds" if found.holds else "does not hold"
     rows = [("case", case), (found.claim if found.claim != "tree" else "motion", source)]

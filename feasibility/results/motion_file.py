@@ -2,7 +2,7 @@
 
 Columns go by name and stand in any order. A joint's values are radians (metres where it slides), or
 degrees in a column `NAME_deg`. What else our own files and those of other programs have beside the
-joints (cell, time, velocities) is left aside, and said to be; any other column is a fault. So are a
+joints (cell, time, velocities) is not used, and said to be; any other column is a fault. So are a
 joint without a column, one with two, ragged rows, what is no finite number, and values that can
 only be degrees.
 """
@@ -47,7 +47,7 @@ class Motion(NamedTuple):
     q: NDArray[np.float64]
     """(m, n) rows, rad or m, in the order of the robot's joints."""
     notes: tuple[str, ...]
-    """What was left aside."""
+    """What was not used."""
 
 
 def load_motion(path: str | os.PathLike[str], robot: Robot) -> Motion:
@@ -113,8 +113,8 @@ def _from_csv(text: str, robot: Robot, name: str) -> Motion:
     if faults:
         raise FileError(faults, name)
     used = {column for column, _ in columns}
-    aside = [word for column, word in enumerate(head) if column not in used]
-    notes = [f"not used: {', '.join(map(printable, aside))}"] if aside else []
+    unused = [word for column, word in enumerate(head) if column not in used]
+    notes = [f"not used: {', '.join(map(printable, unused))}"] if unused else []
     return _checked(q, robot, name, tuple(notes))
 
 

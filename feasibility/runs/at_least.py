@@ -1,8 +1,8 @@
 """How many runs it takes at least, proved: whatever the search found or did not find.
 
 Poses 0 .. N - 1 stand along a toolpath, and runs 1 .. R work on it in order: run r on poses
-a_r .. b_r, each one continuous motion along the courses between them, with b_r <= a_(r + 1). Call
-i < j **parted** if no motion with the tool within tolerance and cone of the courses between poses
+a_r .. b_r, each one continuous motion along the curves between them, with b_r <= a_(r + 1). Call
+i < j **parted** if no motion with the tool within tolerance and cone of the curves between poses
 i .. j covers all of these. A cut tree for that piece of the toolpath by itself proves it: the part
 of a run from over pose i to over pose j is such a motion (`feasibility.cut_tree`). So does a single
 pose among them that is proved uncoverable, as a tree of one leaf.
@@ -83,7 +83,7 @@ class _Pieces:
     def verified(self, found: Parted) -> Parted | None:
         """A claim made as narrow as its leaves are, where the verifier accepts it.
 
-        A cut that nothing on the courses of some poses crosses is one that nothing on the courses
+        A cut that nothing on the curves of some poses crosses is one that nothing on the curves
         of some of them crosses.
 
         Raises:

@@ -32,7 +32,7 @@ NEAR = 2e-6  # [m] and [rad] that tool point and axis may be off a motion of str
 MOST_LINES = 64  # in place of one polynomial
 
 
-def strays(q: Array, bends: Array) -> Array:
+def deviations(q: Array, bends: Array) -> Array:
     """(m - 1, n) how far each joint may be from the straight lines between m samples.
 
     Args:
@@ -49,8 +49,8 @@ def strays(q: Array, bends: Array) -> Array:
     return np.asarray(np.abs(beside).max(axis=0) / 8.0 + ROUNDING)
 
 
-def strays_between(run: Trajectory, kind: Kind, q: Array) -> Array:
-    """`strays` of what a controller makes of a trajectory, looked at at some places.
+def deviations_between(run: Trajectory, kind: Kind, q: Array) -> Array:
+    """`deviations` of what a controller makes of a trajectory, looked at at some places.
 
     Args:
         run: k samples.
@@ -59,7 +59,7 @@ def strays_between(run: Trajectory, kind: Kind, q: Array) -> Array:
     """
     places = (len(q) - 1) // (len(run) - 1)
     stretch = np.diff(run.time)[:, None] / places
-    return strays(q, np.repeat(accelerations(run, kind) * stretch**2, places, axis=1))
+    return deviations(q, np.repeat(accelerations(run, kind) * stretch**2, places, axis=1))
 
 
 class NearMotion(NamedTuple):
@@ -75,11 +75,11 @@ class NearMotion(NamedTuple):
 def motion_near(robot: Robot, run: Trajectory, kind: Kind) -> NearMotion:
     """As few straight lines as are `NEAR` the polynomials: mostly one for each.
 
-    With strays d_j of the joints the tool point is off by at most sum r_j d_j, r_j its largest
+    With deviations d_j of the joints the tool point is off by at most sum r_j d_j, r_j its largest
     distance from the axis, and its axis by the sum over revolute joints. The lever arm r_j is at
     most that at the nearer end, and half of what the tool point moves meanwhile.
     """
-    off = strays_between(run, kind, run.q)
+    off = deviations_between(run, kind, run.q)
     bent = np.abs(accelerations(run, kind) * np.diff(run.time)[:, None] ** 2).max(axis=0) / 8.0
     levers = _longest(robot, run.q, np.abs(np.diff(run.q, axis=0)) + 2.0 * off)
     point, turn = _moves(robot, levers, off)

@@ -23,7 +23,7 @@ from feasibility.certification import collision_replay, replay
 from feasibility.collisions import Bodies, checked, gather
 from feasibility.paths import CoveragePath, PathError
 from feasibility.task import Task
-from feasibility.timing.between_samples import NearMotion, motion_near, strays_between
+from feasibility.timing.between_samples import NearMotion, deviations_between, motion_near
 from feasibility.timing.sampled_trajectory import (
     KINDS,
     PLACES,
@@ -259,7 +259,7 @@ def _near_enough(path: CoveragePath, task: Task, near: NearMotion) -> bool:
 def _collisions(robot: Robot, bodies: Bodies, run: Trajectory) -> str:
     """Which bodies come too near, as straight lines or interpolated; empty if all stay clear."""
     # At once, as lines between samples that all of them are near, where that is clear enough.
-    away = np.maximum.reduce([strays_between(run, kind, run.q) for kind in KINDS])
+    away = np.maximum.reduce([deviations_between(run, kind, run.q) for kind in KINDS])
     if not _collision(robot, bodies, run.q, run.time, away):
         return ""
     found = _collision(robot, bodies, run.walk.q, run.time)
@@ -267,13 +267,13 @@ def _collisions(robot: Robot, bodies: Bodies, run: Trajectory) -> str:
         walk = motion_between(run, kind, PLACES)
         share = np.arange(len(walk.q)) / PLACES
         time = np.interp(share, np.arange(len(run)), run.time)
-        strays = strays_between(run, kind, walk.q)
-        found = found or _collision(robot, bodies, walk.q, time, strays)
+        deviations = deviations_between(run, kind, walk.q)
+        found = found or _collision(robot, bodies, walk.q, time, deviations)
     return found
 
 
 def _collision(
-    robot: Robot, bodies: Bodies, q: Array, time: Array, strays: Array | None = None
+    robot: Robot, bodies: Bodies, q: Array, time: Array, deviations: Array | None = None
 ) -> str:
     """Which pair comes nearest to each other, how near, and when; empty if all stay clear.
 
@@ -282,9 +282,9 @@ def _collision(
         bodies: what can collide.
         q: (m, n) rows of the motion.
         time: (m,) s.
-        strays: (m - 1, n) how far joints may be from the straight lines between rows.
+        deviations: (m - 1, n) how far joints may be from the straight lines between rows.
     """
-    replayed = collision_replay(robot, bodies, q, strays)
+    replayed = collision_replay(robot, bodies, q, deviations)
     if replayed.accepted:
         return ""
     fault = replayed.faults[0]

@@ -23,7 +23,7 @@ from scipy.interpolate import BSpline
 from feasibility.certification import replay
 from feasibility.paths import PathError
 from feasibility.task import Task
-from feasibility.timing.between_samples import strays
+from feasibility.timing.between_samples import deviations
 from feasibility.verdict import Walk
 from robots import Kinematics, Robot
 from surfaces import Cells
@@ -197,7 +197,7 @@ def _refused(
     """Why the replay refuses which stretches between marks `first` and `last`, by halving."""
     nowhere = np.zeros(len(cells), dtype=bool)
     walk = sampled(robot, curve, first, last)
-    replayed = replay(robot, cells, task, walk, nowhere, _strays(curve, walk, first, last))
+    replayed = replay(robot, cells, task, walk, nowhere, _deviations(curve, walk, first, last))
     if replayed.accepted:
         return {}
     if last == first + 1:
@@ -209,11 +209,11 @@ def _refused(
     }
 
 
-def _strays(curve: Curve, walk: Walk, first: int, last: int) -> Array:
+def _deviations(curve: Curve, walk: Walk, first: int, last: int) -> Array:
     """(m - 1, n) how far the curve may be from the straight lines of `sampled`."""
     k = np.arange(int(curve.marks[first]), int(curve.marks[last]) + 1)
     bends = curve.spline().derivative(2)(k) / SAMPLES**2  # it runs straight from one to the next
-    return strays(walk.q, np.repeat(np.stack([bends[:-1], bends[1:]]), SAMPLES, axis=1))
+    return deviations(walk.q, np.repeat(np.stack([bends[:-1], bends[1:]]), SAMPLES, axis=1))
 
 
 def without_slivers(walk: Walk, sliver: float) -> Walk:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.task import Task
-from feasibility.treated.feet import Feet, feet_along, feet_on
+from feasibility.treated.contact_path import ContactPath, contacts_along, contacts_on
 from feasibility.treated.regions import UntreatedRegion, untreated_regions
 from feasibility.verdict import Walk
 from robots import Robot
@@ -35,7 +35,7 @@ MOST_COUNTED = 20_000  # faces on which visits are counted
 
 @dataclass(frozen=True, eq=False, slots=True)
 class TreatedArea(ReadOnlyArrays):
-    """What a tool treats along a motion: everything within half a footprint of its feet."""
+    """What a tool treats along a motion: everything within half a footprint of its contacts."""
 
     footprint: tuple[float, float]
     """m, along the path and across it."""
@@ -54,7 +54,7 @@ class TreatedArea(ReadOnlyArrays):
     shares: Floats
     """(F,) the treated share of each of its faces, at least."""
     lines: ToolLines
-    """The path of the tool's feet."""
+    """The path on the surface below the tool point."""
     notes: tuple[str, ...] = ()
     """What to know, one sentence each."""
 
@@ -69,7 +69,7 @@ def treated_by_walk(robot: Robot, cells: Cells, task: Task, walk: Walk) -> Treat
     """What a motion over cells treats; None where no footprint is asked for."""
     if task.disc is None or not len(walk.q) or cells.surface.bare:
         return None
-    return _measured(cells.surface, task.disc, feet_on(cells.surface, robot, walk))
+    return _measured(cells.surface, task.disc, contacts_on(cells.surface, robot, walk))
 
 
 def treated_by_passes(
@@ -87,18 +87,18 @@ def treated_by_passes(
     if task.disc is None:
         return None
     height = surface.side_sign * task.standoff
-    found = [feet_along(places, robot, walk, height) for walk in walks]
+    found = [contacts_along(places, robot, walk, height) for walk in walks]
     return _measured(surface, task.disc, _joined(found))
 
 
-def _joined(found: list[Feet]) -> Feet:
+def _joined(found: list[ContactPath]) -> ContactPath:
     """Several paths as one, their stretches numbered on."""
     lines, first = [each.lines for each in found], 0
     stretch = []
     for each in lines:
         stretch.append(each.stretch + first)
         first += int(each.stretch.max(initial=-1)) + 1
-    return Feet(
+    return ContactPath(
         ToolLines(
             np.concatenate([np.zeros((0, 3)), *(each.points for each in lines)]),
             np.concatenate([np.zeros((0, 3)), *(each.normals for each in lines)]),
@@ -108,18 +108,20 @@ def _joined(found: list[Feet]) -> Feet:
     )
 
 
-def _measured(surface: Surface, footprint: tuple[float, float], feet: Feet) -> TreatedArea:
+def _measured(
+    surface: Surface, footprint: tuple[float, float], contacts: ContactPath
+) -> TreatedArea:
     """The bracket: an ellipse holds the disc of its smaller axis, and lies in that of its larger.
 
-    The disc is a ball about each foot, see `surfaces.passes.treated`.
+    The disc is a ball about each contact, see `surfaces.passes.treated`.
     """
     inner, outer = 0.5 * min(footprint), 0.5 * max(footprint)
     mesh = _mesh_of(surface, FINE * inner)
     doubled = mesh.doubled_areas
     normals = doubled / np.maximum(np.linalg.norm(doubled, axis=1), 1e-300)[:, None]
-    off = min(feet.off, 0.5 * inner)
-    small = treated_share(mesh, normals, feet.lines, inner, off=off)
-    large = treated_share(mesh, normals, feet.lines, outer, off=off) if outer > inner else small
+    off = min(contacts.off, 0.5 * inner)
+    small = treated_share(mesh, normals, contacts.lines, inner, off=off)
+    large = treated_share(mesh, normals, contacts.lines, outer, off=off) if outer > inner else small
     found = TreatedArea(
         footprint=footprint,
         area=small.area,
@@ -129,7 +131,7 @@ def _measured(surface: Surface, footprint: tuple[float, float], feet: Feet) -> T
         untreated=untreated_regions(large),
         mesh=small.mesh,
         shares=small.shares,
-        lines=feet.lines,
+        lines=contacts.lines,
         notes=_notes(surface, small, footprint),
     )
     return _with_twice(found)

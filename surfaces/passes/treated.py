@@ -111,7 +111,7 @@ def treated_share(
         normals: (F, 3) outward unit normals of its faces.
         path: of the tool, on the surface.
         radius: m > 0, half of the footprint.
-        rounds: how often faces at the rim are cut in four, where the bracket is wide.
+        rounds: how often faces at the border are cut in four, where the bracket is wide.
         off: m >= 0, less than the radius, how far the tool may be from the path at most.
     """
     area = float(mesh.areas.sum())

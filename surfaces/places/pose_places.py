@@ -1,4 +1,4 @@
-"""Places of poses: how far along the course between two of them."""
+"""Places of poses: how far along the curve between two of them."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from surfaces.toolpaths import PoseSurface, arc_angles, arc_at
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
-NEAREST = 4  # poses around a point whose courses are looked at
+NEAREST = 4  # poses around a point whose curves are looked at
 TURN = 1e-3  # m beside which a turn of the tool by 1 rad is none, unless nothing else tells places
 
 
 @dataclass(frozen=True, eq=False)
 class PosePlaces(OffsetSurface):
-    """The places on the courses of some poses; x is (t, 0) on the course of a pair.
+    """The places on the curves of some poses; x is (t, 0) on the curve of a pair.
 
     Instead of normals these are the directions against the tool axis wanted ('outside'), or along
     it ('inside'): what normals are to any other surface.
@@ -54,7 +54,7 @@ class PosePlaces(OffsetSurface):
 
     @cached_property
     def _around(self) -> tuple[Ints, Ints]:
-        """(N + 1,) and (2 M,): the courses of each pose."""
+        """(N + 1,) and (2 M,): the curves of each pose."""
         ends = self.poses.pairs.reshape(-1)
         order = np.argsort(ends, kind="stable")
         count = np.bincount(ends, minlength=len(self._points))
@@ -62,7 +62,7 @@ class PosePlaces(OffsetSurface):
 
     @cached_property
     def _same(self) -> Ints:
-        """(N,) the first of the poses that each is equal to: a course between two has no length."""
+        """(N,) the first of the poses that each is equal to: a curve between two has no length."""
         both = np.column_stack([self._points, self._directions])
         _, first, group = np.unique(both, axis=0, return_index=True, return_inverse=True)
         return np.asarray(first[group.reshape(-1)])
@@ -86,7 +86,7 @@ class PosePlaces(OffsetSurface):
         return points, directions
 
     def nearest(self, points: Array, ahead: Array, within: float) -> Places:
-        """See `OffsetSurface.nearest`: on the courses of the poses around, by point and direction.
+        """See `OffsetSurface.nearest`: on the curves of the poses around, by point and direction.
 
         Where a tool looks `ahead` is, and tells places apart where it turns on the spot.
         """
@@ -97,28 +97,28 @@ class PosePlaces(OffsetSurface):
         axes = np.divide(axes, length, out=np.zeros_like(axes), where=length > 0.0)
         count = min(NEAREST, len(self._points))
         around = self._tree.query(points[known], k=count)[1].reshape(len(known), count)
-        row, course = self._courses_of(around)
+        row, curve = self._curves_of(around)
         if not len(row):
             return _placed(chart, t)
-        share, cost = self._closest(course, points[known[row]], axes[row])
+        share, cost = self._closest(curve, points[known[row]], axes[row])
         order = np.lexsort((cost, row))
         best = order[np.searchsorted(row[order], np.unique(row))]
         found = known[row[best]]
-        chart[found], t[found] = course[best], share[best]
+        chart[found], t[found] = curve[best], share[best]
         return _placed(chart, t)
 
-    def _courses_of(self, around: Ints) -> tuple[Ints, Ints]:
-        """Which row, and which course, of all courses of some poses (k, c)."""
-        starts, courses = self._around
+    def _curves_of(self, around: Ints) -> tuple[Ints, Ints]:
+        """Which row, and which curve, of all curves of some poses (k, c)."""
+        starts, curves = self._around
         pose = around.reshape(-1)
         count = starts[pose + 1] - starts[pose]
         row = np.repeat(np.repeat(np.arange(len(around)), around.shape[1]), count)
         within = np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)
-        keys = np.unique(np.stack([row, courses[np.repeat(starts[pose], count) + within]]), axis=1)
+        keys = np.unique(np.stack([row, curves[np.repeat(starts[pose], count) + within]]), axis=1)
         return keys[0], keys[1]
 
     def _closest(self, chart: Ints, points: Array, axes: Array) -> tuple[Array, Array]:
-        """(k,) t on each course, and its cost: the squared distance, with a little of the turn."""
+        """(k,) t on each curve, and its cost: the squared distance, with a little of the turn."""
         i, j = self._ends(chart)
         begin, ahead = self._points[i], self._points[j] - self._points[i]
         angle = arc_angles(self._directions[i], self._directions[j])
@@ -143,13 +143,13 @@ class PosePlaces(OffsetSurface):
         """See `OffsetSurface.along`."""
         if not self.poses.in_order:
             return None
-        courses = np.arange(len(self.poses.pairs))
-        starts = np.concatenate([[0.0], np.cumsum(self._length(courses, np.ones(len(courses))))])
+        curves = np.arange(len(self.poses.pairs))
+        starts = np.concatenate([[0.0], np.cumsum(self._length(curves, np.ones(len(curves))))])
         here = self._length(places.chart, places.x[:, 0])
         return np.where(places.chart >= 0, starts[places.chart] + here, np.nan)
 
     def paths(self, start: Places, end: Places) -> PlacePaths:
-        """See `OffsetSurface.paths`: along one course, or over the pose that two share."""
+        """See `OffsetSurface.paths`: along one curve, or over the pose that two share."""
         ends = self.at(start), self.at(end)
         known = (start.chart >= 0) & (end.chart >= 0)
         made = PlacePaths.straight(ends, np.full((len(start.chart), 2), np.inf), start, end)
@@ -167,7 +167,7 @@ class PosePlaces(OffsetSurface):
         return np.stack([np.zeros(len(chart)), ROUNDING * turn**2], axis=1)
 
     def _over_poses(self, made: PlacePaths, rows: Ints, start: Places, end: Places) -> None:
-        """Paths from one course to another, where they share a pose."""
+        """Paths from one curve to another, where they share a pose."""
         one, other = (self._same[self.poses.pairs[places.chart]] for places in (start, end))
         same = one[:, :, None] == other[:, None, :]
         some = np.flatnonzero(same.any(axis=(1, 2)))

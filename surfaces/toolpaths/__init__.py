@@ -1,4 +1,4 @@
-"""Poses as cells: a toolpath, or a set of points with normals, and the courses between them."""
+"""Poses as cells: a toolpath, or a set of points with normals, and the curves between them."""
 
 from lazy_loader import attach_stub
 

@@ -1,4 +1,4 @@
-"""Courses from pose to pose: points run straight, and directions along the great arc.
+"""Curves from pose to pose: points run straight, and directions along the great arc.
 
 As cubics: a straight line is one, and of a great arc cubics with its directions and slopes at both
 ends of pieces of at most 15 degrees are within angle^4 / 384 (1.2e-5).
@@ -18,7 +18,7 @@ Ints = NDArray[np.int64]
 
 PIECE = math.radians(15.0)
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations on derivative bounds
-STRAYS = 1e-14  # [1], of directions, by rounding
+ROUNDING_OF_DIRECTIONS = 1e-14  # [1], of directions, by rounding
 
 
 def arc_angles(starts: Array, ends: Array) -> Array:
@@ -65,14 +65,14 @@ def straight(points: Array, pairs: Ints, first: Ints) -> Array:
     return cubics
 
 
-def courses(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellCurves:
-    """The course between each pair of poses.
+def curves(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellCurves:
+    """The curve between each pair of poses.
 
     Args:
         points: (N, 3) m.
         directions: (N, 3) unit; those of a pair not opposite.
         pairs: (M, 2).
-        count: (M,) into how many cubics each course is cut.
+        count: (M,) into how many cubics each curve is cut.
 
     Returns:
         Curves whose "normals" are the directions.
@@ -91,6 +91,8 @@ def courses(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellC
     bounds[:, 1] = np.max([np.linalg.norm(one, axis=1) for one in bent], axis=0)
     bounds[:, 1] *= ROUNDING * count[owner] ** 2
     deviations = np.zeros((len(pairs), 2))
-    deviations[:, 1] = (arc_angles(directions[i], directions[j]) / count) ** 4 / 384.0 + STRAYS
+    deviations[:, 1] = (
+        arc_angles(directions[i], directions[j]) / count
+    ) ** 4 / 384.0 + ROUNDING_OF_DIRECTIONS
     cubics = np.concatenate([straight(points, pairs, first), turns], axis=2)
     return CellCurves(first, cubics, bounds, deviations, np.zeros(len(owner), dtype=bool))

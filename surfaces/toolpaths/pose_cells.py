@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
-from surfaces.toolpaths.arcs import arc_at, arc_pieces, courses
+from surfaces.toolpaths.arcs import arc_at, arc_pieces, curves
 from surfaces.toolpaths.pose_surface import PoseSurface
 
 Array = NDArray[np.float64]
@@ -93,7 +93,7 @@ class PoseCells(Cells):
         """
         turning = (self.normals, self.approaches, self.tangents)
         counts = [arc_pieces(some, self.pairs) for some in turning if some is not None]
-        return courses(self.centres, self.normals, self.pairs, np.max(counts, axis=0))
+        return curves(self.centres, self.normals, self.pairs, np.max(counts, axis=0))
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Cells.trace`."""

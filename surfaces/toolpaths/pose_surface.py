@@ -1,4 +1,4 @@
-"""PoseSurface: poses in place of a surface, with nothing known between them but their courses."""
+"""PoseSurface: poses in place of a surface, with nothing known between them but their curves."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from surfaces.parts import MOST_PARTS, SurfaceParts
 from surfaces.surface import ClosestPoint, Surface, SurfaceError, points_of
-from surfaces.toolpaths.course_parts import course_parts
+from surfaces.toolpaths.curve_parts import curve_parts
 
 if TYPE_CHECKING:
     from scipy.spatial import cKDTree
@@ -25,7 +25,7 @@ class PoseSurface(Surface):
     """N poses: points with outward normals, perhaps with tool axes and tangents of their own.
 
     There is no surface between them: no closest points but the poses' own planes, bounds on their
-    courses alone, and no sheet that an arm could collide with.
+    curves alone, and no sheet that an arm could collide with.
     """
 
     kind: ClassVar[str] = "poses"
@@ -102,19 +102,19 @@ class PoseSurface(Surface):
         return ClosestPoint.of_rows(points.shape[:-1], values, known)
 
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
-        """See `Surface.parts`: those of the courses between poses.
+        """See `Surface.parts`: those of the curves between poses.
 
         Raises:
-            SurfaceError: there are no courses or more than `most`, or the tool axes are given apart
+            SurfaceError: there are no curves or more than `most`, or the tool axes are given apart
                 from the normals.
         """
         if self.axes is not None:
             raise SurfaceError("poses with tool axes of their own have no bounds", self.kind)
         if not 0 < len(self.pairs) <= most:
-            what = f"there are {len(self.pairs):,} courses; bounds are made for 1 to {most:,}"
+            what = f"there are {len(self.pairs):,} curves; bounds are made for 1 to {most:,}"
             raise SurfaceError(what, self.kind)
         normals = self.turned(self.outward)
-        return course_parts(self.placed_points, normals, self.pairs, flat, straight, most)
+        return curve_parts(self.placed_points, normals, self.pairs, flat, straight, most)
 
     def __repr__(self) -> str:
         """One line."""

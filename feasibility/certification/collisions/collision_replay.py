@@ -118,7 +118,7 @@ def ready_bodies(bodies: Bodies) -> BodiesOfOwners:
 
 
 def collision_replay(
-    robot: Robot, bodies: Bodies, q: Array, strays: Array | None = None
+    robot: Robot, bodies: Bodies, q: Array, deviations: Array | None = None
 ) -> CollisionReplay:
     """Judge a motion that is straight in joint space between its rows.
 
@@ -126,20 +126,22 @@ def collision_replay(
         robot: the arm.
         bodies: everything that can collide, and the pairs that are asked for.
         q: (m, n) rows, rad or m, unwrapped. Values that are not finite refuse.
-        strays: (m - 1, n) bounds on how far each joint is from the straight lines, for motions that
-            are bent between rows; none by default.
+        deviations: (m - 1, n) bounds on how far each joint is from the straight lines, for motions
+            that are bent between rows; none by default.
 
     Raises:
-        ArgumentError: the bodies are malformed, or q or strays do not have that shape.
+        ArgumentError: the bodies are malformed, or q or deviations do not have that shape.
     """
     rows = np.ascontiguousarray(q, dtype=float)
     if rows.ndim != 2 or rows.shape[1] != robot.n:
         raise ArgumentError(f"q must have shape (m, {robot.n}), got {rows.shape}")
-    if strays is not None and np.shape(strays) != (max(len(rows) - 1, 0), robot.n):
-        raise ArgumentError(f"strays must have a row for each segment, got {np.shape(strays)}")
+    if deviations is not None and np.shape(deviations) != (max(len(rows) - 1, 0), robot.n):
+        raise ArgumentError(
+            f"deviations must have a row for each segment, got {np.shape(deviations)}"
+        )
     finite = np.isfinite(rows).all(axis=1)
-    if strays is not None:
-        finite[:-1] &= np.isfinite(strays).all(axis=1)
+    if deviations is not None:
+        finite[:-1] &= np.isfinite(deviations).all(axis=1)
     if not finite.all():
         row = int(np.argmin(finite))
         fault = CollisionFault(row, 0.0, "a joint value is not finite", ("", ""), np.nan)
@@ -148,8 +150,8 @@ def collision_replay(
     if not len(rows) or not bodies.pairs:
         return CollisionReplay(None, None, (), 0)
     if len(rows) == 1:  # an arm at rest: a motion that goes nowhere
-        rows, strays = np.repeat(rows, 2, axis=0), None
-    motion = Motion(robot, rows, None if strays is None else np.abs(strays))
+        rows, deviations = np.repeat(rows, 2, axis=0), None
+    motion = Motion(robot, rows, None if deviations is None else np.abs(deviations))
     return _judged(ready, motion)
 
 

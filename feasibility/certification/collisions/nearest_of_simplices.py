@@ -41,21 +41,21 @@ def nearest_of(corners: Array) -> tuple[Array, Array]:
 
 
 def _on_faces(corners: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """(k, 4, 3) feet of the origin on the faces, inf where they are beside; (k,) is it inside?"""
+    """(k, 4, 3) the origin projected onto the faces, inf if beside them; (k,) is it inside?"""
     a, b, c = (corners[:, FACES[:, i]] for i in range(3))
     normals = _cross(b - a, c - a)
     square = np.einsum("kfi,kfi->kf", normals, normals)
     flat = square <= FLAT
     height = np.einsum("kfi,kfi->kf", normals, a)
-    feet = (height / np.where(flat, 1.0, square))[:, :, None] * normals
-    ahead = feet - a, feet - b, feet - c
+    projected = (height / np.where(flat, 1.0, square))[:, :, None] * normals
+    ahead = projected - a, projected - b, projected - c
     turned = [_cross(one, other) for one, other in zip(ahead, ahead[1:] + ahead[:1], strict=True)]
     sides = np.stack([np.einsum("kfi,kfi->kf", normals, one) for one in turned])
     beside = flat | ~(sides.min(axis=0) >= 0.0)
     other = np.einsum("kfi,kfi->kf", normals, corners[:, OPPOSITE]) - height
     thin = flat | (np.abs(other) <= THIN * np.sqrt(square))
     inside = (~thin & (-height * other > 0.0)).all(axis=1)
-    return np.where(beside[:, :, None], np.inf, feet), inside
+    return np.where(beside[:, :, None], np.inf, projected), inside
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -60,8 +60,8 @@ def lever(twist, x, y, z):  # type: ignore[no-untyped-def]
 
 @kernel
 def chord_bounds(  # type: ignore[no-untyped-def]
-    rotations, points, twists, prismatic, steps, turned, strays,
-    joints, centres, balls, levers, delta, moved, stray,
+    rotations, points, twists, prismatic, steps, turned, deviations,
+    joints, centres, balls, levers, delta, moved, deviation,
 ):  # fmt: skip
     """How far points of bodies may be from their chords, and move, seen from every joint.
 
@@ -72,14 +72,14 @@ def chord_bounds(  # type: ignore[no-untyped-def]
         prismatic: (n,) which joints slide.
         steps: (m - 1, n) |d_j|.
         turned: (m - 1, n) T_(j-1).
-        strays: (m - 1, n) e_j.
+        deviations: (m - 1, n) e_j.
         joints: (B,) which joint carries each body, 0 for the root.
         centres: (B, 3) m, of their balls.
         balls: (B,) m, radii.
         levers: (B, n) m, for use in here.
         delta: (n + 1, m - 1, B) m, set where the body moves: how far a point may leave its chord.
         moved: the same, how far it may move.
-        stray: the same, how far straying from straight joint motion may move it besides.
+        deviation: the same, how far deviating from straight joint motion may move it besides.
     """
     for k in range(rotations.shape[0]):
         for b in range(joints.shape[0]):
@@ -96,15 +96,15 @@ def chord_bounds(  # type: ignore[no-untyped-def]
                     second += 2.0 * d * ahead
                     first += d
                     rate += d
-                    off += strays[k - 1, j]
+                    off += deviations[k - 1, j]
                 else:
                     mean = 0.5 * (before + now + rate)
                     second += mean * d * (d + 2.0 * ahead)
                     first += mean * d
                     rate += mean * d
-                    off += (mean + off) * strays[k - 1, j]
+                    off += (mean + off) * deviations[k - 1, j]
                 delta[j, k - 1, b] = max(second - 2.0 * ahead * first, 0.0) / 8.0
-                moved[j, k - 1, b], stray[j, k - 1, b] = rate, off
+                moved[j, k - 1, b], deviation[j, k - 1, b] = rate, off
 
 
 @kernel
@@ -159,7 +159,7 @@ def box_bound(rotations, k, joints, a, b, halves, before, now):  # type: ignore[
 
 @kernel
 def outer_bounds(  # type: ignore[no-untyped-def]
-    rotations, points, joints, centres, balls, halves, couples, delta, stray, low
+    rotations, points, joints, centres, balls, halves, couples, delta, deviation, low
 ):  # fmt: skip
     """How far couples stay apart by balls and boxes, whose centres keep to chords but for `delta`.
 
@@ -172,7 +172,7 @@ def outer_bounds(  # type: ignore[no-untyped-def]
         halves: (B, 3) m, half the sides of boxes along the axes of the joint; the same.
         couples: (c, 2) two bodies, the one nearer to the root first.
         delta: see there.
-        stray: see there.
+        deviation: see there.
         low: (c, m - 1) m, set: lower bounds along each segment.
     """
     for c in range(couples.shape[0]):
@@ -192,5 +192,5 @@ def outer_bounds(  # type: ignore[no-untyped-def]
                 away = np.sqrt(x * x + y * y + z * z) - radii
                 if away < FAR:
                     away = max(away, box_bound(rotations, k, joints, a, b, halves, before, now))
-                low[c, k - 1] = away - delta[joint, k - 1, b] - stray[joint, k - 1, b]
+                low[c, k - 1] = away - delta[joint, k - 1, b] - deviation[joint, k - 1, b]
             before = now

@@ -254,11 +254,11 @@ class Pairing:
 
         What coal calls far enough, but no plane of its own shows, is at the edge to rounding.
         """
-        k, stray = met.stretch, float(s.stray[met.stretch])
-        near = met.distance - stray < needed
+        k, deviation = met.stretch, float(s.deviation[met.stretch])
+        near = met.distance - deviation < needed
         if not near and met.n is not None and not can_be_cut(a, b):
             poses, n = (s.last if met.end else s.first).of(np.array([k])), met.n[None]
-            near = float(lows(b, poses, n)[0] - a.support(n)[0]) - stray < needed
+            near = float(lows(b, poses, n)[0] - a.support(n)[0]) - deviation < needed
         if near:
             row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if met.end else 0.0))
             over = share == 1.0
@@ -279,8 +279,8 @@ class Pairing:
         budget = Budget(distance, moved, self._most - self.calls)
         rows, first = np.unique(s.row, return_index=True)
         try:
-            bound = budget.certify(rows, needed + s.stray[first], aim)
-            self.bound = min(self.bound, bound - float(s.stray.max()))
+            bound = budget.certify(rows, needed + s.deviation[first], aim)
+            self.bound = min(self.bound, bound - float(s.deviation.max()))
         except TooNear as met:
             pose = self.motion.pose(*self.joints, met.row, met.share)
             depth = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]

@@ -3,7 +3,7 @@
 Seen from body a, the points of body b move nearly along chords (`relative_motion`). So, for any
 unit vector n, their distance along a stretch is at least
 
-    min(low(0), low(1)) - h_a(n) - delta - stray,    low(s) = n . t(s) - h_b(-R(s)^T n),
+    min(low(0), low(1)) - h_a(n) - delta - deviation,    low(s) = n . t(s) - h_b(-R(s)^T n),
 
 with h the supports of `pieces`, and R, t the pose of b at an end of the stretch. That n parts them
 is checked by this formula alone; it does not matter where n is from.
@@ -38,14 +38,14 @@ def parted(a: Piece, b: Piece, s: Stretches, n: Array) -> Array:
     own, other = a.outline, b.outline
     if own is not None and other is not None:
         found = np.empty(len(s.row))
-        less = s.delta + s.stray + (own.radius + other.radius)
+        less = s.delta + s.deviation + (own.radius + other.radius)
         part(
-            own.corners, own.rim, other.corners, other.rim, s.first.rotations, s.first.points,
+            own.corners, own.circle, other.corners, other.circle, s.first.rotations, s.first.points,
             s.last.rotations, s.last.points, np.ascontiguousarray(np.atleast_2d(n)), less, found,
         )  # fmt: skip
         return found
     low = np.minimum(lows(b, s.first, n), lows(b, s.last, n))
-    return np.asarray(low - a.support(np.atleast_2d(n)) - s.delta - s.stray)
+    return np.asarray(low - a.support(np.atleast_2d(n)) - s.delta - s.deviation)
 
 
 def guesses(a: Piece, b: Piece, s: Stretches) -> list[Array]:
@@ -61,7 +61,7 @@ def by_balls(a: Piece, b: Piece, s: Stretches) -> Array:
     """(k,) m, distances of balls around a and b along stretches, at least."""
     start, end = s.first.moved(b.centre), s.last.moved(b.centre)
     away = np.linalg.norm(nearest_points(start - a.centre, end - start), axis=1)
-    return np.asarray(away - a.ball - b.ball - s.delta - s.stray)
+    return np.asarray(away - a.ball - b.ball - s.delta - s.deviation)
 
 
 def nearest_points(start: Array, way: Array) -> Array:

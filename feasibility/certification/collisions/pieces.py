@@ -38,7 +38,7 @@ class Outline:
 
     corners: Array
     """(k, 3) m."""
-    rim: Array
+    circle: Array
     """(4,) an axis, and r (m); 0 where there is none."""
     radius: float
     """m."""
@@ -112,7 +112,7 @@ class Round(Piece):
 
     @cached_property
     def outline(self) -> Outline:
-        """Its axis, and a rim about it."""
+        """Its axis, and a circle about it."""
         half = 0.5 * self.shape.length * self.placement[:3, 2]
         ends = self.placement[:3, 3] + np.stack([-half, half])
         return Outline(ends, np.append(self.placement[:3, 2], self.shape.radius), 0.0)
@@ -125,14 +125,14 @@ class Round(Piece):
         return np.asarray(n @ self.placement[:3, 3] + own)
 
     def farthest(self, n: Array) -> Array:
-        """(k, 3) m, see `Piece`: on the rim of an end."""
+        """(k, 3) m, see `Piece`: on the circle of an end."""
         axis = self.placement[:3, 2]
         along = n @ axis
         across = n - along[:, None] * axis
         width = np.maximum(np.sqrt(np.einsum("ki,ki->k", across, across)), TINY)
-        rim = (self.shape.radius / width)[:, None] * across
+        circle = (self.shape.radius / width)[:, None] * across
         ends = np.copysign(0.5 * self.shape.length, along)
-        return np.asarray(self.placement[:3, 3] + ends[:, None] * axis + rim)
+        return np.asarray(self.placement[:3, 3] + ends[:, None] * axis + circle)
 
 
 class Below(Piece):

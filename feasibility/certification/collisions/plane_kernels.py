@@ -14,7 +14,7 @@ kernel = njit(cache=True, error_model="numpy", _nrt=False)  # makes no arrays: n
 
 
 @kernel
-def support(corners, rim, x, y, z):  # type: ignore[no-untyped-def]
+def support(corners, circle, x, y, z):  # type: ignore[no-untyped-def]
     """How far a body reaches along (x, y, z), see `Piece.outline`; without its radius.
 
     Every other corner is compared with a most of its own, which the processor does side by side.
@@ -30,33 +30,33 @@ def support(corners, rim, x, y, z):  # type: ignore[no-untyped-def]
         one = corners[k, 0] * x + corners[k, 1] * y + corners[k, 2] * z
         most = one if one > most else most
     most = more if more > most else most
-    if rim[3] > 0.0:
-        along = rim[0] * x + rim[1] * y + rim[2] * z
-        most += rim[3] * np.sqrt(max(x * x + y * y + z * z - along * along, 0.0))
+    if circle[3] > 0.0:
+        along = circle[0] * x + circle[1] * y + circle[2] * z
+        most += circle[3] * np.sqrt(max(x * x + y * y + z * z - along * along, 0.0))
     return most
 
 
 @kernel
-def least_along(corners, rim, turn, at, x, y, z):  # type: ignore[no-untyped-def]
+def least_along(corners, circle, turn, at, x, y, z):  # type: ignore[no-untyped-def]
     """The least that a placed body reaches along (x, y, z), without its radius."""
     u = turn[0, 0] * x + turn[1, 0] * y + turn[2, 0] * z
     v = turn[0, 1] * x + turn[1, 1] * y + turn[2, 1] * z
     w = turn[0, 2] * x + turn[1, 2] * y + turn[2, 2] * z
-    return at[0] * x + at[1] * y + at[2] * z - support(corners, rim, -u, -v, -w)
+    return at[0] * x + at[1] * y + at[2] * z - support(corners, circle, -u, -v, -w)
 
 
 @kernel
 def part(  # type: ignore[no-untyped-def]
-    a_corners, a_rim, b_corners, b_rim, first_turns, first_points, last_turns, last_points,
+    a_corners, a_circle, b_corners, b_circle, first_turns, first_points, last_turns, last_points,
     directions, less, low,
 ):  # fmt: skip
     """Set how far planes part body a and body b, as it moves along stretches.
 
     Args:
         a_corners: (i, 3) m, see `Piece.outline`.
-        a_rim: (4,) see there.
+        a_circle: (4,) see there.
         b_corners: (j, 3) m.
-        b_rim: (4,)
+        b_circle: (4,)
         first_turns: (k, 3, 3) rotations of b, seen from a, where stretches begin.
         first_points: (k, 3) m.
         last_turns: (k, 3, 3) the same where they end.
@@ -70,7 +70,7 @@ def part(  # type: ignore[no-untyped-def]
         n = directions[0 if same else k]
         x, y, z = n[0], n[1], n[2]
         if k == 0 or not same:
-            own = support(a_corners, a_rim, x, y, z)
-        start = least_along(b_corners, b_rim, first_turns[k], first_points[k], x, y, z)
-        end = least_along(b_corners, b_rim, last_turns[k], last_points[k], x, y, z)
+            own = support(a_corners, a_circle, x, y, z)
+        start = least_along(b_corners, b_circle, first_turns[k], first_points[k], x, y, z)
+        end = least_along(b_corners, b_circle, last_turns[k], last_points[k], x, y, z)
         low[k] = min(start, end) - own - less[k]

@@ -51,7 +51,7 @@ def ball_bounds(
     start, end = s.first.moved(b.centre), s.last.moved(b.centre)
     ahead = nearest_points(start[at] - level.centres[boxes], (end - start)[at])
     away = np.sqrt(np.einsum("ki,ki->k", ahead, ahead))
-    return away - level.balls[boxes] - (s.delta + s.stray + b.ball)[at], ahead
+    return away - level.balls[boxes] - (s.delta + s.deviation + b.ball)[at], ahead
 
 
 def searched(
@@ -84,7 +84,7 @@ def searched(
             n = np.copysign(1.0, np.einsum("ki,ki->k", v, across))[:, None] * across
         else:
             n = unit(v)
-        some, off = s.of(at[open_]), (s.delta + s.stray)[at[open_]]
+        some, off = s.of(at[open_]), (s.delta + s.deviation)[at[open_]]
         w = _beside(level.of(boxes[open_]), b, some, n)
         low[open_] = np.maximum(low[open_], np.einsum("ki,ki->k", n, w) - off)
         if step >= 0:

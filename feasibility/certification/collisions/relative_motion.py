@@ -12,8 +12,8 @@ with their rate L of motion it is at most (r_j(0) + r_j(1) + L) / 2.
 
 No point moves further than M = sum_j r_j |d_j|.
 
-A motion that is not straight, but strays at most e_j from the segment in each joint, moves each
-point by another sum_j r_j e_j at most, with r_j enlarged by what the joints behind j stray.
+A motion that is not straight, but deviates at most e_j from the segment in each joint, moves each
+point by another sum_j r_j e_j at most, with r_j enlarged by what the joints behind j deviation.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ class Stretches:
     """(k,) m, how far a point may leave its chord."""
     moved: Array
     """(k,) m, how far a point may move."""
-    stray: Array
-    """(k,) m, how far straying from straight joint motion may move it besides."""
+    deviation: Array
+    """(k,) m, how far deviating from straight joint motion may move it besides."""
     bound: Array
     """(k,) m, a lower bound of the distance along each that is known already."""
     across: Array
@@ -90,7 +90,7 @@ class Stretches:
             self.last.of(chosen),
             self.delta[chosen],
             self.moved[chosen],
-            self.stray[chosen],
+            self.deviation[chosen],
             self.bound[chosen],
             self.across[chosen],
         )
@@ -99,7 +99,7 @@ class Stretches:
         """The same with other bounds, (k,) m, and the normals (k, 3) of the planes behind them."""
         return Stretches(
             self.row, self.share, self.length, self.first, self.last, self.delta, self.moved,
-            self.stray, bound, across,
+            self.deviation, bound, across,
         )  # fmt: skip
 
 
@@ -115,20 +115,20 @@ class Sways:
     """m, how far a point may leave its chord."""
     moved: Array
     """m, how far a point may move."""
-    stray: Array
-    """m, how far straying from straight joint motion may move it besides."""
+    deviation: Array
+    """m, how far deviating from straight joint motion may move it besides."""
 
 
 class Motion:
     """A joint motion with Pinocchio's placements of every joint."""
 
-    def __init__(self, robot: Robot, q: Array, strays: Array | None = None) -> None:
+    def __init__(self, robot: Robot, q: Array, deviations: Array | None = None) -> None:
         """Place the arm.
 
         Args:
             robot: the arm, a serial chain.
             q: (m, n) rows, finite, m >= 2.
-            strays: (m - 1, n) how far each joint may be from the straight line; none by default.
+            deviations: (m - 1, n) how far each joint may be off the straight line; 0 by default.
 
         Raises:
             ArgumentError: the joints form no serial chain.
@@ -136,8 +136,10 @@ class Motion:
         if list(robot.model.parents)[1:] != list(range(robot.n)):
             raise ArgumentError(f"robot {robot.name!r}: its joints form no serial chain")
         self._robot, self.q, self.prismatic = robot, q, robot.prismatic
-        self.strays = (
-            np.zeros((len(q) - 1, robot.n)) if strays is None else np.ascontiguousarray(strays)
+        self.deviations = (
+            np.zeros((len(q) - 1, robot.n))
+            if deviations is None
+            else np.ascontiguousarray(deviations)
         )
         self._kinematics = Kinematics(robot)
         self._frames = self._kinematics.joints(q)
@@ -152,8 +154,8 @@ class Motion:
         frames, levers = self._frames, np.empty((len(joints), n))
         chord_bounds(
             frames.rotations, frames.points, _own_twists(self._robot), self.prismatic, steps,
-            turned, self.strays, joints, centres, balls, levers, found.delta, found.moved,
-            found.stray,
+            turned, self.deviations, joints, centres, balls, levers, found.delta, found.moved,
+            found.deviation,
         )  # fmt: skip
         return found
 
@@ -168,7 +170,7 @@ class Motion:
         frames, low = self._frames, np.empty((len(couples), len(self.q) - 1))
         outer_bounds(
             frames.rotations, frames.points, joints, centres, balls, halves, couples,
-            sways.delta, sways.stray, low,
+            sways.delta, sways.deviation, low,
         )  # fmt: skip
         return low
 
@@ -188,7 +190,7 @@ class Motion:
             Poses(poses.rotations[1:], poses.points[1:]),
             sways.delta[a, :, body],
             sways.moved[a, :, body],
-            sways.stray[a, :, body],
+            sways.deviation[a, :, body],
             bound,
             np.zeros((count, 3)),
         )
@@ -244,7 +246,7 @@ def joined(one: Stretches, other: Stretches) -> Stretches:
         one.last.and_(other.last),
         np.concatenate([one.delta, other.delta]),
         np.concatenate([one.moved, other.moved]),
-        np.concatenate([one.stray, other.stray]),
+        np.concatenate([one.deviation, other.deviation]),
         np.concatenate([one.bound, other.bound]),
         np.concatenate([one.across, other.across]),
     )

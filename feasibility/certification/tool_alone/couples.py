@@ -62,7 +62,7 @@ class Couple:
         away = moving.whole.corners - tip
         across = away - np.outer(away @ axis, axis)
         self.reach = float(np.linalg.norm(away, axis=1).max())
-        self.aside = float(np.linalg.norm(across, axis=1).max())
+        self.lateral = float(np.linalg.norm(across, axis=1).max())
 
     def near(self, point: Array) -> bool:
         """May they meet with the tool point at a place?"""

@@ -78,7 +78,7 @@ def never_clear(
         return PoseCheck(False, 0)
     onto = pin.Quaternion.FromTwoVectors(axis, approach).toRotationMatrix()
     plane = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), approach).toRotationMatrix()
-    reach, aside = np.mean([(one.reach, one.aside) for one in couples], axis=0)
+    reach, lateral = np.mean([(one.reach, one.lateral) for one in couples], axis=0)
     cone, looked = min(cone, np.pi), 0
     waiting = [_Box(0.0, 0.0, cone, 0.0, np.pi)]
     while waiting:
@@ -98,7 +98,7 @@ def never_clear(
         inside = np.hypot(box.u, box.v) <= cone
         if inside and not _blocked(couples, pose, 0.0, 0.0, tolerance):
             return PoseCheck(False, looked)  # nor would a smaller box be
-        waiting += _parts(box, float(reach), float(aside))
+        waiting += _parts(box, float(reach), float(lateral))
     return PoseCheck(True, looked)
 
 
@@ -110,15 +110,15 @@ def _blocked(
     The one that does comes to the front: the next box is often alike.
     """
     for k, one in enumerate(couples):
-        if one.collides(pose, one.reach * tilt + one.aside * roll + tolerance):
+        if one.collides(pose, one.reach * tilt + one.lateral * roll + tolerance):
             couples.insert(0, couples.pop(k))
             return True
     return False
 
 
-def _parts(box: _Box, reach: float, aside: float) -> list[_Box]:
+def _parts(box: _Box, reach: float, lateral: float) -> list[_Box]:
     """A box cut along what moves more."""
-    if np.sqrt(2.0) * box.half * reach < box.wide * aside:
+    if np.sqrt(2.0) * box.half * reach < box.wide * lateral:
         half = 0.5 * box.wide
         return [box._replace(roll=box.roll + way * half, wide=half) for way in (-1.0, 1.0)]
     half = 0.5 * box.half

@@ -186,8 +186,8 @@ def _capsule(cloud: Array, radius: float) -> list[float]:
     mean = cloud.mean(axis=0)
     axis = np.linalg.svd(cloud - mean, full_matrices=False)[2][0]
     along = (cloud - mean) @ axis
-    aside = np.linalg.norm(cloud - mean - along[:, None] * axis, axis=1)
-    round_end = np.sqrt(np.maximum(aside.max() ** 2 - aside**2, 0.0))
+    lateral = np.linalg.norm(cloud - mean - along[:, None] * axis, axis=1)
+    round_end = np.sqrt(np.maximum(lateral.max() ** 2 - lateral**2, 0.0))
     low, high = (along + round_end).min(), (along - round_end).max()
     if low > high:
         low = high = 0.5 * (low + high)

@@ -162,8 +162,8 @@ def _is_solution(arrays, work, places, part):  # type: ignore[no-untyped-def]
     if arrays.roll[1] < np.inf and places.children[part, 0] >= 0:
         inside &= places.radius[part, 2] < np.inf  # its children tell
     if rolls_over(arrays, places, part):
-        stray = SKEWED * (turned + places.radius[part, 2])
-        inside &= abs(work.error[1, 2]) + stray <= arrays.roll[1]
+        deviation = SKEWED * (turned + places.radius[part, 2])
+        inside &= abs(work.error[1, 2]) + deviation <= arrays.roll[1]
     return inside
 
 

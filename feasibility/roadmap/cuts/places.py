@@ -71,8 +71,8 @@ def _toward(surface: Surface, task: Task, parts: SurfaceParts) -> tuple[Array, A
         ends = np.minimum(length, 1.0 - parts.radius[:, 1])
         speed = turns / np.sqrt(np.maximum(ends**2 - 0.25 * turns**2, 0.0))
         # b is within its radius of the model, and so is the model of a unit vector.
-        stray = 2.2 * parts.radius[:, 1] + ROUNDING
-        away = np.minimum(np.abs(b @ r) + speed + stray, 1.0)
+        deviation = 2.2 * parts.radius[:, 1] + ROUNDING
+        away = np.minimum(np.abs(b @ r) + speed + deviation, 1.0)
         h = np.sqrt(1.0 - away * away)
         along = (b @ r)[:, None]
         t = (r - along * b) / np.sqrt(1.0 - along * along)
@@ -85,8 +85,8 @@ def _toward(surface: Surface, task: Task, parts: SurfaceParts) -> tuple[Array, A
         turning = np.cross(b[:, None], g) + about * b[:, None]
         middle = toward_middle(b, t, task.roll.middle)
         change = np.cross(turning, middle[:, None])
-        radius = speed**2 / h + (speed / h) ** 2 + stray / h
-    known = (ends > 0.5) & (speed < 1.0) & (h > LEAST) & (stray < 0.5)
+        radius = speed**2 / h + (speed / h) ** 2 + deviation / h
+    known = (ends > 0.5) & (speed < 1.0) & (h > LEAST) & (deviation < 0.5)
     return (
         np.where(known[:, None], middle, 0.0),
         np.where(known[:, None, None], change, 0.0),

@@ -152,7 +152,7 @@ def _follow(exploration: Exploration, node: int, poses: int) -> None:
 
 
 def _tracked(exploration: Exploration, cell: int, q: NDArray[np.float64]) -> int:
-    """Follow the course to a pose from the one before; the rows of waypoints, or less than 0."""
+    """Follow the curve to a pose from the one before; the rows of waypoints, or less than 0."""
     roadmap = exploration.reserve(MOST_STEPS + 1)
     rows = track(
         exploration.arrays, exploration.work, exploration.curve(cell - 1, cell), 0.0, 1.0, q, q,

@@ -80,7 +80,7 @@ def level(target):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def frame_turning(change, bend, slope, curl, off, aside):  # type: ignore[no-untyped-def]
+def frame_turning(change, bend, slope, curl, off, lateral):  # type: ignore[no-untyped-def]
     """How fast a frame turns, at most, whose b and t are nearly unit vectors at right angles.
 
     With b^ = b / |b|, P = 1 - b^ b^T, and t^ = P t / |P t|: the frame t^, b^ x t^, b^ turns with
@@ -91,14 +91,14 @@ def frame_turning(change, bend, slope, curl, off, aside):  # type: ignore[no-unt
         change: |b(1) - b(0)|.
         bend: largest |b''|.
         slope, curl: largest |t'| and |t''|.
-        off, aside: how far b and t are from such unit vectors, at most.
+        off, lateral: how far b and t are from such unit vectors, at most.
 
     Returns:
         (|b^'|, |Om|, |Om'|): bounds, inf where b or t may vanish.
     """
-    m, e = 1.0 - off, off + aside + off * aside
-    square = (1.0 - aside) ** 2 - (e / m) ** 2
-    if not (m > 0.0 and aside < 1.0 and square > 0.0):
+    m, e = 1.0 - off, off + lateral + off * lateral
+    square = (1.0 - lateral) ** 2 - (e / m) ** 2
+    if not (m > 0.0 and lateral < 1.0 and square > 0.0):
         return np.inf, np.inf, np.inf
     h, e = np.sqrt(square), e / m
     speed = (change + 0.5 * bend) / m  # |b'| is within |b''| / 2 of its mean
@@ -108,7 +108,7 @@ def frame_turning(change, bend, slope, curl, off, aside):  # type: ignore[no-unt
     about = (
         curl
         + slope * whole
-        + (slope + (1.0 + aside) * speed) * speed
+        + (slope + (1.0 + lateral) * speed) * speed
         + e * (bend + speed * whole)
         + (slope + e * speed) * turn
     ) / h

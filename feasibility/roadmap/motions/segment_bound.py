@@ -128,16 +128,16 @@ def roll_spread(work, chord, longer):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def roll_bound(arrays, work, chord, longer, aside):  # type: ignore[no-untyped-def]
+def roll_bound(arrays, work, chord, longer, lateral):  # type: ignore[no-untyped-def]
     """How far off the middle of its range roll may be on a segment, at most, rad.
 
     Args:
         arrays, work, chord, longer: as in `segment_holds` and `roll_spread`.
-        aside: m, second derivative of the tool point off its target.
+        lateral: m, second derivative of the tool point off its target.
     """
     rate, most = roll_spread(work, chord, longer)
-    if aside > 0.0:
-        most += work.derivative_bound[8] * aside
+    if lateral > 0.0:
+        most += work.derivative_bound[8] * lateral
     before, after = work.error[HERE, 2], work.error[NEXT, 2]
     if not rate < TURN - abs(after - before):
         return np.inf

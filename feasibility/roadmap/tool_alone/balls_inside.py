@@ -64,10 +64,10 @@ def _on_axis(radius: float, half: float) -> Array:
     return balls
 
 
-def _rings(aside: float, ball: float, half: float) -> Array:
+def _rings(lateral: float, ball: float, half: float) -> Array:
     """Balls around z at a distance from it, at the heights -half and half."""
     turn = 2.0 * np.pi * np.arange(AROUND) / AROUND
-    within = aside * (1.0 - 1e-12)  # rounding
+    within = lateral * (1.0 - 1e-12)  # rounding
     ring = np.column_stack([within * np.cos(turn), within * np.sin(turn)])
     rest = np.ones((AROUND, 1))
     return np.concatenate([np.hstack([ring, z * rest, ball * rest]) for z in (-half, half)])
@@ -78,8 +78,8 @@ def _in_cylinder(radius: float, half: float) -> Array:
     wide = min(radius, half)
     found = [_on_axis(wide, half - wide)]
     count = min(MOST, math.ceil((radius - wide) / wide))
-    asides = (radius - wide) * np.arange(1, count + 1) / max(count, 1)
-    found += [_rings(aside, wide, half - wide) for aside in asides.tolist()]
+    laterals = (radius - wide) * np.arange(1, count + 1) / max(count, 1)
+    found += [_rings(lateral, wide, half - wide) for lateral in laterals.tolist()]
     found += [_rings(radius - ball, ball, half - ball) for ball in (0.25 * wide, 0.0)]
     return np.concatenate(found)
 

@@ -81,8 +81,8 @@ def _of_primitive(shape: object, x: Array) -> Array:
             off = np.maximum(np.abs(x[..., 2]) - 0.5 * length, 0.0)
             return np.sqrt(x[..., 0] ** 2 + x[..., 1] ** 2 + off**2) - radius
         case Cylinder(radius, length):
-            aside = np.hypot(x[..., 0], x[..., 1]) - radius
-            past = np.stack([aside, np.abs(x[..., 2]) - 0.5 * length], axis=-1)
+            lateral = np.hypot(x[..., 0], x[..., 1]) - radius
+            past = np.stack([lateral, np.abs(x[..., 2]) - 0.5 * length], axis=-1)
         case Box(size):
             past = np.abs(x) - 0.5 * np.asarray(size)
         case _:  # a half space

@@ -215,17 +215,17 @@ class ToolAlone:
     ) -> _Measured:
         """Distances at the middles of boxes (k, 5), and how far balls are moved within them."""
         turns = frame.rotations(boxes)
-        spare, reach, aside = [], [], []
+        spare, reach, lateral = [], [], []
         for one in held:
             places = point + np.einsum("kij,bj->kbi", turns, one.centres)
             spare.append(one.distance(places) - one.radii - one.pair.clearance)
             reach.append(np.linalg.norm(one.centres, axis=1))
             across = one.centres - np.outer(one.centres @ self._axis, self._axis)
-            aside.append(np.linalg.norm(across, axis=1))
+            lateral.append(np.linalg.norm(across, axis=1))
         return _Measured(
             np.concatenate(spare, axis=1),
             np.outer(np.sqrt(2.0) * boxes[:, 2], np.concatenate(reach)),
-            np.outer(boxes[:, 4], np.concatenate(aside)),
+            np.outer(boxes[:, 4], np.concatenate(lateral)),
         )
 
 

@@ -18,7 +18,7 @@ from feasibility.paths import CoveragePath, PathError, coverage_path
 from feasibility.reports.path import as_json, as_text
 from feasibility.results.trajectory_files import as_csv
 from feasibility.timing import Trajectory, trajectory
-from feasibility.timing.between_samples import strays, strays_between
+from feasibility.timing.between_samples import deviations, deviations_between
 from feasibility.timing.path_timing import _refusal
 from feasibility.timing.sampled_trajectory import motion_between
 from feasibility.timing.smoothing import blended, sampled
@@ -58,7 +58,7 @@ def off_lines(rows: np.ndarray, dense: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_strays_bound_how_far_parabolas_and_cubics_are_from_their_chords(seed: int) -> None:
+def test_deviations_bound_how_far_parabolas_and_cubics_are_from_their_chords(seed: int) -> None:
     """Random cubics, some of them almost straight: the bound holds, and is not idle."""
     rng = np.random.default_rng(seed)
     count, n = 40, 3
@@ -75,7 +75,7 @@ def test_strays_bound_how_far_parabolas_and_cubics_are_from_their_chords(seed: i
     for k in range(count):
         rows = curve[k, [0, -1]]
         most.append(off_lines(rows, curve[k][None])[0].max(axis=0))
-        way_on.append(strays(rows, ends[k][:, None])[0])
+        way_on.append(deviations(rows, ends[k][:, None])[0])
     assert (np.array(most) <= np.array(way_on) + 1e-12).all()
     assert max((m / w).max() for m, w in zip(most, way_on, strict=True)) > 0.5
     straight = np.array(way_on)[::3]
@@ -83,10 +83,12 @@ def test_strays_bound_how_far_parabolas_and_cubics_are_from_their_chords(seed: i
 
 
 @pytest.mark.parametrize(("kind", "degree"), [("quintic", 5), ("cubic", 3)])
-def test_what_a_controller_makes_of_samples_stays_within_the_strays(kind: str, degree: int) -> None:
+def test_what_a_controller_makes_of_samples_stays_within_the_deviations(
+    kind: str, degree: int
+) -> None:
     places, finer = 4, 6
     walk = motion_between(run(), kind, places)  # type: ignore[arg-type]
-    bounds = strays_between(run(), kind, walk.q)  # type: ignore[arg-type]
+    bounds = deviations_between(run(), kind, walk.q)  # type: ignore[arg-type]
     q, _, _ = interpolated(run(), degree, places * finer)
     np.testing.assert_allclose(q[::finer], walk.q, atol=1e-9)
     dense = np.stack([q[k : len(q) - finer + k : finer] for k in range(finer + 1)], axis=1)

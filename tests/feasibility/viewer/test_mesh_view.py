@@ -1,4 +1,4 @@
-"""Pictures of meshes: what is drawn is the mesh, its cells and their courses, and no more."""
+"""Pictures of meshes: what is drawn is the mesh, its cells and their curves, and no more."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def test_within_a_radius_poses_of_one_side_are_neighbours():
     assert not cells.in_order
 
 
-def test_places_follow_the_courses_and_tell_turns_on_the_spot_apart():
+def test_places_follow_the_curves_and_tell_turns_on_the_spot_apart():
     cells = poses(LINE, TURNED)
     offset = offset_surface(cells.surface, 0.02)
     targets = LINE + 0.02 * TURNED
@@ -82,7 +82,7 @@ def test_paths_of_places_stay_within_their_bounds():
         line = 0.5 * (paths.normals[k, piece] + paths.normals[k, piece + 1])
         assert np.linalg.norm(true[0] - line) <= paths.bends[k, piece, 1] / 8.0 + 1e-12
     apart = offset.paths(start.of([0]), Places(np.array([2]), np.array([[0.5, 0.0]])))
-    assert np.isinf(apart.bends).any()  # two courses further there is no path in one step
+    assert np.isinf(apart.bends).any()  # two curves further there is no path in one step
 
 
 def test_what_makes_no_poses_is_named_all_at_once():

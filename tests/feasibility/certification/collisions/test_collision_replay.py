@@ -70,7 +70,7 @@ def test_faults_name_pair_place_and_depth_the_nearest_first():
     assert fault.text == f"link2 and wall are {1e3 * gap:.4g} mm apart, 50 mm are needed"
 
 
-def test_rows_that_stray_need_more_room():
+def test_rows_that_deviate_need_more_room():
     """A joint 0.02 rad off the line moves the arm's end 0.9 * 0.02 m: 18 mm and the radius."""
     robot, links = small_arm()
     bodies = bodies_of(links, [wall_at(1.0)], [pair("link2", "wall", 0.05)])
@@ -92,8 +92,8 @@ def test_values_that_are_no_numbers_are_refused(value):
     found = collision_replay(robot, bodies, q)
     assert found.refusal == "row 2: a joint value is not finite"
     assert not collision_replay(robot, bodies, q[:1], np.zeros((0, 2))).faults
-    strays = np.full((2, 2), value)
-    assert not collision_replay(robot, bodies, np.zeros((3, 2)), strays).accepted
+    deviations = np.full((2, 2), value)
+    assert not collision_replay(robot, bodies, np.zeros((3, 2)), deviations).accepted
 
 
 def test_what_cannot_be_judged_is_an_error_with_words():
@@ -101,7 +101,7 @@ def test_what_cannot_be_judged_is_an_error_with_words():
     good = bodies_of(links, [wall_at(2.0)], [pair("link2", "wall")])
     with pytest.raises(ArgumentError, match=r"shape \(m, 2\)"):
         collision_replay(robot, good, np.zeros((3, 3)))
-    with pytest.raises(ArgumentError, match="strays"):
+    with pytest.raises(ArgumentError, match="deviations"):
         collision_replay(robot, good, np.zeros((3, 2)), np.zeros((3, 2)))
     nobody = replace(good, pairs=(pair("link2", "shelf"),))
     with pytest.raises(ArgumentError, match="what has no body: shelf"):

@@ -86,5 +86,5 @@ def test_bounds_are_never_above_the_distance_and_seldom_far_below(body):
         assert aim <= descent.bound
         near = set(np.flatnonzero(true < aim))
         assert near <= left  # nothing is called clear that is not
-        lost = s.delta + s.stray  # what chords may be off
+        lost = s.delta + s.deviation  # what chords may be off
         assert not {k for k in left - near if true[k] - 2.0 * lost[k] > 1.01 * aim}

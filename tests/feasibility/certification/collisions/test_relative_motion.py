@@ -37,24 +37,24 @@ def test_no_point_moves_or_leaves_its_chord_further(step):
             a, b = np.sort(rng.choice(robot.n + 1, 2, replace=False)).tolist()
             rows = np.vstack([q, q + step * rng.normal(size=robot.n)])
             centre, ball = rng.normal(size=3) * 0.3, rng.uniform(0.01, 0.3)
-            strays = step * 0.2 * rng.random((1, robot.n))
-            s = Motion(robot, rows, strays).stretches(a, b, centre, ball)
+            deviations = step * 0.2 * rng.random((1, robot.n))
+            s = Motion(robot, rows, deviations).stretches(a, b, centre, ball)
             around = rng.normal(size=(60, 3))
             points = centre + ball * around / np.linalg.norm(around, axis=1, keepdims=True)
             t = np.linspace(0, 1, SAMPLES + 1)[:, None]
             straight = rows[0] + t * (rows[1] - rows[0])
             at = seen(kinematics, straight, a, b, points)
             chords = at[0] + t[:, :, None] * (at[-1] - at[0])
-            bent = straight + rng.choice([-1, 1], (SAMPLES + 1, robot.n)) * strays
+            bent = straight + rng.choice([-1, 1], (SAMPLES + 1, robot.n)) * deviations
             off = seen(kinematics, bent, a, b, points)
             shares = [
                 np.linalg.norm(at - chords, axis=2).max() - s.delta[0],
                 np.linalg.norm(at - at[0], axis=2).max() - s.moved[0],
-                np.linalg.norm(off - at, axis=2).max() - s.stray[0],
+                np.linalg.norm(off - at, axis=2).max() - s.deviation[0],
             ]
             assert max(shares) <= 1e-12
             true = [np.linalg.norm(at - chords, axis=2).max(), np.linalg.norm(at - at[0], axis=2)]
-            bounds = np.array([s.delta[0], s.moved[0], s.stray[0]])
+            bounds = np.array([s.delta[0], s.moved[0], s.deviation[0]])
             far = [true[0], true[1].max(), np.linalg.norm(off - at, axis=2).max()]
             tightest = np.maximum(tightest, np.array(far) / np.maximum(bounds, 1e-300))
             q = q + step * rng.normal(size=robot.n)

@@ -1,4 +1,4 @@
-"""The parts of courses between poses hold all of these courses."""
+"""The parts of courses between poses hold all of these curves."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def drawn(seed: int, count: int = 25, **more):
 
 
 @pytest.mark.parametrize("neighbours", ["order", 0.3])
-def test_every_place_of_every_course_is_held(neighbours) -> None:
+def test_every_place_of_every_curve_is_held(neighbours) -> None:
     cells = drawn(1, neighbours=neighbours)
     parts = cells.surface.parts(1e-3, 0.01)
     finest = np.flatnonzero(parts.children[:, 0] < 0)
@@ -27,7 +27,7 @@ def test_every_place_of_every_course_is_held(neighbours) -> None:
     points, normals = cells.trace(cells.pairs, shares)
     places = np.concatenate([points, normals], axis=2).reshape(-1, 6)
     held = np.zeros(len(places), dtype=bool)
-    # On a course x_2 changes nothing; x_1 is where the point is nearest.
+    # On a curve x_2 changes nothing; x_1 is where the point is nearest.
     for k in finest.tolist():
         centre, slope = parts.centre[k], parts.slopes[k, 0]
         assert not parts.slopes[k, 1].any()
@@ -43,5 +43,5 @@ def test_poses_without_bounds_say_so() -> None:
     own = drawn(2, approaches=np.tile([0.0, 0.0, -1.0], (25, 1)))
     with pytest.raises(SurfaceError, match="tool axes of their own have no bounds"):
         own.surface.parts(1e-3, 0.01)
-    with pytest.raises(SurfaceError, match="24 courses; bounds are made for 1 to 20"):
+    with pytest.raises(SurfaceError, match="24 curves; bounds are made for 1 to 20"):
         drawn(3).surface.parts(1e-3, 0.01, most=20)

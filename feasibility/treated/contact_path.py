@@ -1,9 +1,9 @@
-"""Where a tool touches the surface along a motion: the path of its feet.
+"""Where a tool touches the surface along a motion: the path of its contacts.
 
-The foot of a tool point is the place of the surface below it. Between two configurations the tool
-point leaves its chord by at most reach (sum of |dq|)^2 / 8, because the second derivative along a
-straight line in joint space is at most reach (sum of |dq|)^2 for joints that turn. So rows are put
-in until that is less than `SAG`.
+The contact of a tool point is the place of the surface below it. Between two configurations the
+tool point leaves its chord by at most reach (sum of |dq|)^2 / 8, because the second derivative
+along a straight line in joint space is at most reach (sum of |dq|)^2 for joints that turn. So rows
+are put in until that is less than `SAG`.
 """
 
 from __future__ import annotations
@@ -21,31 +21,31 @@ from surfaces.toolpaths import arc_at
 
 Floats = NDArray[np.float64]
 
-SAG = 1e-5  # [m] how far the path between two feet may be from straight
+SAG = 1e-5  # [m] how far the path between two contacts may be from straight
 FAR = 10.0  # [m] the reach of an arm whose slides have no ends
 MOST_ROWS = 400_000
 
 
-class Feet(NamedTuple):
-    """The path of a tool's feet."""
+class ContactPath(NamedTuple):
+    """The path on the surface below a tool point."""
 
     lines: ToolLines
     off: float
     """m, how far the path may be from these lines at most."""
 
 
-def feet_on(surface: Surface, robot: Robot, walk: Walk) -> Feet:
-    """The feet of a motion all of which runs over a surface."""
+def contacts_on(surface: Surface, robot: Robot, walk: Walk) -> ContactPath:
+    """The contacts of a motion all of which runs over a surface."""
     dense = _dense(robot, walk.q)
     points, _ = Kinematics(robot).tools(dense.q)
     at = surface.closest(points)
-    feet = points - at.height[:, None] * at.normal
-    lines = ToolLines(feet, at.normal, np.zeros(len(feet), dtype=np.int64))
-    return Feet(lines, 2.0 * dense.sag)
+    contacts = points - at.height[:, None] * at.normal
+    lines = ToolLines(contacts, at.normal, np.zeros(len(contacts), dtype=np.int64))
+    return ContactPath(lines, 2.0 * dense.sag)
 
 
-def feet_along(places: PassPlaces, robot: Robot, walk: Walk, height: float) -> Feet:
-    """The feet of a motion along passes; where the tool is lifted it has none.
+def contacts_along(places: PassPlaces, robot: Robot, walk: Walk, height: float) -> ContactPath:
+    """The contacts of a motion along passes; where the tool is lifted it has none.
 
     Args:
         places: the poses of the passes.
@@ -64,12 +64,12 @@ def feet_along(places: PassPlaces, robot: Robot, walk: Walk, height: float) -> F
     a, b = pose[before], pose[after]
     normals, _ = arc_at(places.normals[a], places.normals[b], _share(places.points, a, b, points))
     own = known & (places.stretch[a] >= 0) & (places.stretch[b] >= 0)
-    feet, stretch = (points - height * normals)[own], places.stretch[a][own]
+    contacts, stretch = (points - height * normals)[own], places.stretch[a][own]
     rows = np.flatnonzero(own)
-    # A new number where something lies between two feet that is none, so that they are not joined.
+    # A new number where something lies between two contacts, so that they are not joined.
     part = np.cumsum(np.diff(rows, prepend=rows[:1]) > 1)
     _, number = np.unique(np.column_stack([part, stretch]), axis=0, return_inverse=True)
-    return Feet(ToolLines(feet, normals[own], number.reshape(-1)), 2.0 * dense.sag)
+    return ContactPath(ToolLines(contacts, normals[own], number.reshape(-1)), 2.0 * dense.sag)
 
 
 def _share(points: Floats, a: NDArray[np.int64], b: NDArray[np.int64], tool: Floats) -> Floats:

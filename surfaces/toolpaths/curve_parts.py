@@ -1,4 +1,4 @@
-"""The courses between poses as parts with rigorous bounds, as surfaces have them.
+"""The curves between poses as parts with rigorous bounds, as surfaces have them.
 
 Between two poses the point runs straight, which is its own affine model. The normal turns evenly
 along the great arc: over half an angle h about a direction m, towards w square to it, it is
@@ -22,15 +22,15 @@ Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-def course_parts(
+def curve_parts(
     points: Array, normals: Array, pairs: Ints, flat: float, straight: float, most: int
 ) -> SurfaceParts:
-    """The tree of the parts of all courses.
+    """The tree of the parts of all curves.
 
     Args:
         points: (N, 3) m.
         normals: (N, 3) unit.
-        pairs: (M, 2) M at least 1, between which poses courses run.
+        pairs: (M, 2) M at least 1, between which poses curves run.
         flat: m, the largest r_f wanted.
         straight: the largest r_n wanted.
         most: how many parts may be made.
