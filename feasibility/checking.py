@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_errors import ArgumentError
+from feasibility.attempts import Method, attempts_at, with_pieces
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Collision
 from feasibility.found import Found
@@ -24,16 +24,14 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
-    import networkx as nx
-
     from feasibility.treated import TreatedArea
 
-
-NOT_BEGUN = "The time limit of {:g} s ran out while the search was prepared; nothing was searched."
-NOT_REPLAYED = (
-    "A motion over every cell was found, but the time limit of {:g} s ran out before the "
-    "independent replay had judged it."
+NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
+IN_PIECES = (
+    " (With one convex hull for each shape of a link, {} of {} cells were covered; so the links "
+    "were cut into convex pieces.)"
 )
+NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
 
 
 def check(
@@ -148,98 +146,6 @@ def greedy_check(
     return _measured(_decided(Problem.of(robot, cells, task), search, progress, from_start))
 
 
-IN_PIECES = (
-    " (With one convex hull for each shape of a link, {} of {} cells were covered; so the links "
-    "were cut into convex pieces.)"
-)
-NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
-NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
-Method = Callable[[Problem, Search, Clock], Found]
-
-
-class _Attempt(NamedTuple):
-    """One search, and the replay of the motion that it found."""
-
-    found: Found
-    replayed: Replay | None
-    search_s: float
-    certify_s: float
-
-    @property
-    def accepted(self) -> bool:
-        """Was a motion over all cells accepted?"""
-        return self.replayed is not None and self.replayed.accepted
-
-    @property
-    def decided(self) -> bool:
-        """Is there a motion that was accepted, or a proof?"""
-        return self.accepted or self.found.proof is not None
-
-    @property
-    def blocked(self) -> bool:
-        """Is nothing decided, and were convex bodies of the arm in the way?"""
-        return not self.decided and self.found.hindered
-
-
-def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> _Attempt:
-    """Search, and have the motion certified, both within the time limit."""
-    called = time.monotonic()
-    replayed = None
-    try:
-        found = method(problem, search, clock)
-    except OutOfTime:
-        found = _nothing(problem, clock)
-    searched = time.monotonic()
-    try:
-        if found.replay is not None:
-            with clock.enforced():
-                replayed = found.replay()
-    except OutOfTime:
-        found = replace(found, unfinished=NOT_REPLAYED.format(clock.limit))
-    search_s = searched - float(np.fmax(called, clock.loaded))
-    return _Attempt(found, replayed, search_s, time.monotonic() - searched)
-
-
-def _in_pieces(problem: Problem, clock: Clock) -> Problem | None:
-    """The problem with links cut into pieces, where that differs and there is time for it."""
-    try:
-        with clock.enforced():
-            return None if clock.out_of_time else problem.in_pieces
-    except OutOfTime:
-        return None
-
-
-def _attempts(problem: Problem, search: Search, clock: Clock, method: Method) -> list[_Attempt]:
-    """The attempt that counts, and then others that were made."""
-    first = _attempt(problem, search, clock, method)
-    if first.replayed is None or not first.replayed.narrowly_refused:
-        return [first]
-    # The replay measures the deviation between its samples, and may find a little more.
-    narrower = _attempt(problem.narrowed, search, clock, method)
-    return [narrower, first] if narrower.accepted else [first, narrower]
-
-
-def _nothing(problem: Problem, clock: Clock) -> Found:
-    """What a search found whose time ran out before it began."""
-    covered = np.zeros(len(problem.cells), dtype=bool)
-
-    def make_graph() -> nx.Graph:
-        from feasibility.cell_graph import cell_graph
-
-        return cell_graph(problem.cells, covered)
-
-    return Found(
-        covered=covered,
-        components=(),
-        start=None,
-        n_edges=0,
-        counts={"fk": 0},
-        unfinished=NOT_BEGUN.format(clock.limit),
-        make_graph=make_graph,
-        make_causes=tuple,
-    )
-
-
 def _decided(
     problem: Problem,
     search: Search,
@@ -250,11 +156,11 @@ def _decided(
     """Search, certify, and make the verdict."""
     called = time.monotonic()
     clock = Clock(search.time_limit, progress) if clock is None else clock
-    tried = _attempts(problem, search, clock, method)
+    tried = attempts_at(problem, search, clock, method)
     chosen, said = tried[0], ""
-    finer = _in_pieces(problem, clock) if chosen.blocked else None
+    finer = with_pieces(problem, clock) if chosen.blocked else None
     if finer is not None:
-        tried = [*_attempts(finer, search, clock, method), *tried]
+        tried = [*attempts_at(finer, search, clock, method), *tried]
         count, before = tried[0].found.covered.sum(), chosen.found.covered.sum()
         if tried[0].decided or count > before:
             said = IN_PIECES.format(before, len(problem.cells))

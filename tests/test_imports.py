@@ -81,7 +81,7 @@ feasibility.area.kernels
 feasibility.area
 feasibility.paths
 feasibility.speed
-feasibility: checking
+feasibility: attempts checking
 feasibility.timing
 feasibility.programs
 feasibility.division

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -91,8 +91,10 @@ class GridCells(Cells):
 
     def _fitted(self, surface: Patch) -> CellCurves:
         """The curves of the same cells with the surface at another pose, or at this one."""
-        same = surface is self.surface
-        cells = self if same else GridCells.cut(surface, *self.shape)
+        if surface is self.surface:
+            return CurveFit.of(self).joined()
+        centres, normals = surface.point(self.u, self.v), surface.normal(self.u, self.v)
+        cells = replace(self, surface=surface, centres=centres, normals=normals)
         return CurveFit.of(cells).joined()
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:

@@ -5,5 +5,5 @@ from .nearest import NearestAlong as NearestAlong
 from .nearest import NearPair as NearPair
 from .nearest import nearest_along as nearest_along
 from .pieces import Piece as Piece
-from .pieces import piece_of as piece_of
-from .pieces import sheet_piece as sheet_piece
+from .shape_pieces import piece_of as piece_of
+from .shape_pieces import sheet_piece as sheet_piece

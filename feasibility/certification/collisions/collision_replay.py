@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
 from feasibility.certification.collisions.pairing import ROUNDING, Pairing, Place
-from feasibility.certification.collisions.pieces import Below, piece_of, sheet_piece
+from feasibility.certification.collisions.pieces import Below
 from feasibility.certification.collisions.plane_search import NEAR
 from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
 from feasibility.certification.faults import Judged, MotionFault
 from feasibility.collisions import Bodies, Pair
 from robots import Robot

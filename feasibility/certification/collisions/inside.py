@@ -8,7 +8,8 @@ from typing import TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.collisions.pieces import MeshPart, Piece
+from feasibility.certification.collisions.mesh_pieces import MeshPart
+from feasibility.certification.collisions.pieces import Piece
 
 Array = NDArray[np.float64]
 

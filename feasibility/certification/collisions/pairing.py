@@ -23,8 +23,9 @@ from feasibility.certification.collisions.coal_distances import COAL, coal_dista
 from feasibility.certification.collisions.cutting import FEW, can_be_cut, cut, is_exact
 from feasibility.certification.collisions.descent import Descent, glimpse
 from feasibility.certification.collisions.inside import one_inside_other
+from feasibility.certification.collisions.mesh_pieces import MeshPart
 from feasibility.certification.collisions.parting import by_balls, guesses, lows, parted
-from feasibility.certification.collisions.pieces import Below, MeshPart, Piece
+from feasibility.certification.collisions.pieces import Below, Piece
 from feasibility.certification.collisions.plane_search import NEAR, Couples
 from feasibility.certification.collisions.relative_motion import Motion, Stretches, joined
 

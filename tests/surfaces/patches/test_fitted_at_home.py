@@ -61,3 +61,13 @@ def test_curves_do_not_depend_on_what_was_asked_before() -> None:
     again = GridCells.cut(replace(there, side="outside"), 3, 4).curves
     for item in fields(first):
         np.testing.assert_array_equal(getattr(first, item.name), getattr(again, item.name))
+
+
+def test_cells_that_are_not_evenly_spaced_keep_their_places() -> None:
+    rng = np.random.default_rng(9)
+    surface = posed(PATCHES["sphere"][0], rng)
+    even = GridCells.cut(surface, 3, 4)
+    u = even.u + rng.uniform(-0.05, 0.05, len(even))
+    cells = replace(even, u=u, centres=surface.point(u, even.v), normals=surface.normal(u, even.v))
+    start, _ = cells.curves.at(np.arange(len(cells.pairs)), np.zeros(len(cells.pairs)))
+    np.testing.assert_allclose(start, cells.centres[cells.pairs[:, 0]], rtol=0, atol=1e-14)

@@ -7,8 +7,8 @@ import pytest
 
 from feasibility.certification.collisions.coal_distances import COAL, coal_distance
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
-from feasibility.certification.collisions.pieces import piece_of
 from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.shape_pieces import piece_of
 from feasibility.collisions import HalfSpace
 from robots import load_robot
 from robots.urdf import Box, Capsule, Cylinder

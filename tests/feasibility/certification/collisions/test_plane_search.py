@@ -10,8 +10,8 @@ from scipy.optimize import nnls
 from feasibility.certification.collisions.coal_distances import coal_distance
 from feasibility.certification.collisions.descent import Descent, glimpse
 from feasibility.certification.collisions.nearest_of_simplices import nearest_of
-from feasibility.certification.collisions.pieces import piece_of, sheet_piece
 from feasibility.certification.collisions.relative_motion import Motion
+from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
 from feasibility.certification.collisions.trees import Tree
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
