@@ -26,6 +26,7 @@ from robots.shapes import (
     link_pairs,
     link_shapes,
     tool_reach,
+    with_crude_links_cut,
 )
 from surfaces import Surface, sheet_of
 
@@ -40,7 +41,8 @@ def gathered(robot: Robot, surface: Surface, collision: Collision, standoff: flo
     if faults:
         raise ArgumentError([fault.renamed({}, "collision") for fault in faults])
     names = tuple(one.name for one in collision.scene)
-    arm = _arm(robot, collision.shapes, collision.tool, collision.allow, collision.srdf, names)
+    of_arm = collision.tool, collision.allow, collision.srdf, names, collision.self_
+    arm = _arm(robot, collision.shapes, *of_arm)
     shapes, tool = arm.shapes, arm.tool
     solids = [*shapes.solids, *tool_solids(collision.tool, robot)]
     polytopes, soups = [*shapes.polytopes, *tool], list[Soup]()
@@ -98,19 +100,28 @@ def _arm(
     allow: tuple[tuple[str, str], ...],
     srdf: str | None,
     scene: tuple[str, ...],
+    with_itself: bool,
 ) -> _Arm:
     """What surface, places and clearances leave as it is: it takes most of the time of `gather`.
 
     Args:
         robot, fineness, tool, allow, srdf: see `Collision`.
         scene: names of its objects.
+        with_itself: is the arm to stay clear of itself?
     """
-    shapes, bodies = link_shapes(robot, fineness), tool_polytopes(tool, robot)
+    hulls, bodies = link_shapes(robot, fineness), tool_polytopes(tool, robot)
+
+    def sorted_pairs(shapes: LinkShapes) -> LinkPairs:
+        others = [*scene, SURFACE, TOOL]
+        return link_pairs(robot, shapes, allow, srdf, bodies, others, tool_solids(tool, robot))
+
+    shapes = hulls
+    if with_itself and fineness == "hulls":
+        shapes = with_crude_links_cut(robot, hulls, sorted_pairs(hulls).asked)
 
     @cache
     def pairs() -> LinkPairs:
-        others = [*scene, SURFACE, TOOL]
-        return link_pairs(robot, shapes, allow, srdf, bodies, others, tool_solids(tool, robot))
+        return sorted_pairs(shapes)
 
     return _Arm(shapes, tuple(bodies), tuple(tool_reach(robot, shapes, bodies)), pairs)
 

@@ -2,6 +2,7 @@ from .bodies import Fineness as Fineness
 from .bodies import Polytope as Polytope
 from .bodies import Solid as Solid
 from .bodies import Triangles as Triangles
+from .crude import with_crude_links_cut as with_crude_links_cut
 from .hulls import Hull as Hull
 from .hulls import hull_of as hull_of
 from .hulls import outer_hull as outer_hull

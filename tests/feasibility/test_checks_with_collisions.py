@@ -79,11 +79,12 @@ def test_an_object_that_may_be_touched_is_not_in_the_way() -> None:
 
 
 def test_links_are_cut_into_pieces_only_where_hulls_are_in_the_way(clear: Verdict) -> None:
-    """Base and upper arm fold beside each other, and their hulls overlap."""
+    """A ball stands in the hull of the upper arm, beside the link itself."""
     q = np.array([2.27, 2.74, 0.66, -1.62, 1.48, -0.77])
     folded = UR5.with_limits(np.column_stack([q - 0.06, q + 0.06]))
     small = plane((-0.01, 0.01), (-0.01, 0.01), "outside", (0.477, -0.75, -0.053)).cells(2, 2)
-    asked = Collision(surface=False, clearance=0.005)
+    ball = Obstacle.sphere("ball", 0.005, (0.0785, -0.2129, 0.0507))
+    asked = Collision(self_=False, surface=False, clearance=0.005, scene=(ball,))
     verdict = check(folded, small, TASK, collision=asked)
     assert verdict.feasible
     assert verdict.task.collision is not None
@@ -91,6 +92,12 @@ def test_links_are_cut_into_pieces_only_where_hulls_are_in_the_way(clear: Verdic
     assert "0 of 4 cells were covered; so the links were cut into convex pieces" in verdict.message
     assert clear.task.collision is not None
     assert clear.task.collision.shapes == "hulls"
+    # Base and upper arm fold beside each other: where the arm is to stay clear of itself, links
+    # whose hulls overlap so often are cut from the start.
+    verdict = check(folded, small, TASK, collision=Collision(surface=False, clearance=0.005))
+    assert verdict.feasible
+    assert verdict.task.collision is not None
+    assert verdict.task.collision.shapes == "hulls"
     # Nor where it is proved that something collides everywhere.
     crowded = Collision(surface=False, clearance=0.05)
     verdict = check(folded, small, TASK, collision=crowded)

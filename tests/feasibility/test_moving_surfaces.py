@@ -19,7 +19,7 @@ TABLE = Axis(
 @pytest.mark.parametrize("collision", [None, "scene"])
 def test_moving_everything_by_one_rigid_motion_changes_nothing(collision):
     motion = pin.SE3(pin.rpy.rpyToMatrix(0.4, -0.7, 1.9), np.array([0.5, -1.0, 0.3]))
-    part = plane((0.4, 0.7), (-0.2, 0.2), position=(0, 0, 0.1))
+    part = plane((0.45, 0.75), (-0.2, 0.2), position=(0, 0, 0.2))
     plate, moved = (p.cells(4, 5) for p in (part, part.moved(motion.rotation, motion.translation)))
     post = Obstacle.box("post", (0.1, 0.1, 0.4), position=(0.55, 0.35, 0.2))
     there = Obstacle("post", post.geometry, motion.homogeneous @ post.placement)
