@@ -34,7 +34,6 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
 FAILURES = 3  # of coal's directions in a row, after which another way is taken
 PATIENCE, TIRED = 4, 0.92  # stretches asked about, after which that share is aimed at
-NEARER = 0.98  # [1] share of the hulls' distance met, that is aimed at where meshes may have more
 HALVINGS = 3  # of stretches that no plane parts from a triangle, before coal is asked
 LOOKS = 3  # at stretches that no plane parts from triangles: are they too near?
 SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
@@ -180,8 +179,8 @@ class Pairing:
             worst = int(np.argmin(s.bound))
             for end in (False, True):
                 met = self._asked(a, b, s, worst, end)
-                if whole:  # planes find no higher bound than what was met
-                    aim = max(needed, min(aim, (NEAR if exact else NEARER) * met.distance))
+                if whole and exact:  # no higher bound can be found than what was met
+                    aim = max(needed, min(aim, NEAR * met.distance))
                 if exact and self._too_near(a, b, s, met, needed):
                     return s
                 s = _raised_along(a, b, s, met, aim)
