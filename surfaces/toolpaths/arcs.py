@@ -91,8 +91,7 @@ def curves(points: Array, directions: Array, pairs: Ints, count: Ints) -> CellCu
     bounds[:, 1] = np.max([np.linalg.norm(one, axis=1) for one in bent], axis=0)
     bounds[:, 1] *= ROUNDING * count[owner] ** 2
     deviations = np.zeros((len(pairs), 2))
-    deviations[:, 1] = (
-        arc_angles(directions[i], directions[j]) / count
-    ) ** 4 / 384.0 + ROUNDING_OF_DIRECTIONS
+    angles = arc_angles(directions[i], directions[j]) / count
+    deviations[:, 1] = angles**4 / 384.0 + ROUNDING_OF_DIRECTIONS
     cubics = np.concatenate([straight(points, pairs, first), turns], axis=2)
     return CellCurves(first, cubics, bounds, deviations, np.zeros(len(owner), dtype=bool))

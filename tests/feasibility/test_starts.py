@@ -70,7 +70,7 @@ def test_a_start_off_the_motion_set_is_refused_with_its_distance(anywhere):
 
 
 def test_a_start_that_collides_is_refused(started):
-    ball = Obstacle.sphere("ball", 0.3, position=(0.5, 0.0, 0.5))
+    ball = Obstacle.sphere("ball", 0.32, position=(0.5, 0.0, 0.5))
     with pytest.raises(ArgumentError, match="start collides"):
         check(started, PLATE, replace(TASK, collision=Collision(scene=(ball,))))
 

@@ -34,6 +34,7 @@ Array = NDArray[np.float64]
 ROUNDING = 1e-9  # [m] of placements, and what keeps distances from vanishing
 FAILURES = 3  # of coal's directions in a row, after which another way is taken
 PATIENCE, TIRED = 4, 0.92  # stretches asked about, after which that share is aimed at
+ENOUGH = 0.75  # [1] share of what is aimed at, which will do of the hulls of meshes
 HALVINGS = 3  # of stretches that no plane parts from a triangle, before coal is asked
 LOOKS = 3  # at stretches that no plane parts from triangles: are they too near?
 SHORTEST = 2.0**-24  # [1] share of a segment, below which a stretch is not halved again
@@ -100,13 +101,17 @@ class Pairing:
     def meet(self) -> float:
         """The distance (m) at the row that seemed worst when it was guessed, by coal.
 
-        That of the hulls of meshes: a hint of how near the bodies are at all.
+        That of the bodies themselves: their hulls may be much nearer.
         """
         s = self.stretches
         met = self._asked(self.a, self.b, s, int(np.argmin(self._hints)))
         if not (isinstance(self.a, MeshPart) and self.a.triangles > FEW):
             self.stretches = _raised_along(self.a, self.b, s, met, np.inf)
-        return met.distance
+        if is_exact(self.a, self.b):
+            return met.distance
+        pose = s.first.of(np.array([met.stretch]))
+        self.calls += 1
+        return coal_distance(self.a.truth, self.b.truth, pose.rotations[0], pose.points[0])[0]
 
     def certify(self, needed: float, aim: float) -> None:
         """Certify `needed` (m) everywhere, and `aim` >= needed where that takes little.
@@ -136,15 +141,18 @@ class Pairing:
             return []
         if can_be_cut(a, b):
             return [(*pieces, s) for pieces in cut(a, b)]
-        s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
-        if not is_exact(a, b):
-            bent = (s.length > 0.25) & (s.bound + s.delta >= needed)
+        if is_exact(a, b):
+            s = self._accepted(s, needed, (s.length <= 0.25) & (s.bound >= needed))
+            if len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most):
+                self.place = _middle(s)
+                return []
+        else:  # hulls may be near where the bodies are not
+            enough = max(needed, ENOUGH * aim)
+            s = self._accepted(s, enough, (s.length <= 0.25) & (s.bound >= enough))
+            bent = (s.length > 0.25) & (s.bound + s.delta >= enough)
             if not bent.all():
                 self._by_budget(a.truth, b.truth, s.of(~bent), needed, aim)
             s = s.of(bent)
-        elif len(s.row) and (s.length.min() < SHORTEST or self.calls > self._most):
-            self.place = _middle(s)
-            return []
         return [(a, b, self.motion.halves(s, *self.joints))] if len(s.row) else []
 
     def _accepted(
