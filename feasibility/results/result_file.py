@@ -56,7 +56,6 @@ if TYPE_CHECKING:
 
 FORMAT = "coverable-result"
 TASK = ("standoff", "cone_deg", "tolerance")  # what is stored of it; the rest is the case's
-OF_CASE = ("collision", "approach", "roll_deg", "roll_reference", "footprint", "coverage")
 FORMAT_VERSION = 3  # 2 had no proofs; 1 no `places`, and the kinds `CLOSED_FORM_KINDS` alone
 
 
@@ -203,7 +202,7 @@ def _verdict(fields: Fields, archive: Archive, setup: Setup) -> Verdict:
     components = unpack_ragged(archive, "components", count)
     start = None if fields.entries.get("start") is None else fields.cell("start", count)
     timing = fields.table("timing")
-    task = replace(_task(fields.table("task")), **{k: getattr(setup.task, k) for k in OF_CASE})
+    task = _task(fields.table("task"), setup.task)
     return Verdict(
         answer=fields.member("answer", Answer),
         evidence=fields.member("evidence", Evidence),
@@ -243,11 +242,12 @@ def _postures(fields: Fields, archive: Archive, count: int, n: int) -> NDArray[n
     return archive.array("postures", np.float64, (count, n))
 
 
-def _task(fields: Fields) -> Task:
-    """The task with the tolerance that was used."""
+def _task(fields: Fields, task: Task) -> Task:
+    """The case's task with the numbers that were used: a method may choose the tolerance."""
+    stored = {key: fields.number(key) for key in ("standoff", "cone_deg")}
     tolerance = None if fields.entries.get("tolerance") is None else fields.number("tolerance")
     try:
-        return Task(fields.number("standoff"), fields.number("cone_deg"), tolerance)
+        return replace(task, **stored, tolerance=tolerance)
     except ArgumentError as error:
         text = "; ".join(worded(fault.renamed({}, "task")) for fault in error.faults)
         raise fields.archive.error(f"meta.json: {text}") from error

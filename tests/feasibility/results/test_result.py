@@ -6,7 +6,7 @@ import os
 import pickle
 import random
 import zipfile
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -48,6 +48,19 @@ def test_what_the_arm_stays_clear_of_comes_back_with_the_case(tmp_path):
     assert loaded.verdict.task.standoff == verdict.task.standoff
     assert loaded.verdict.task.collision.checked == ("self", "surface", "scene")
     assert loaded.verdict.task.collision.scene[0].placement[2, 3] == -0.5
+
+
+def test_every_key_of_the_task_comes_back(tmp_path):
+    numbers = {
+        "speed": "0.02", "min_manipulability": "1e-3", "home_deg": "[0, -90, 90, 0, 90, 0]",
+        "approach": "[0, 0, -1]", "roll_deg": "[-90, 90]", "roll_reference": "[0, 1, 0]",
+        "footprint": "[0.06, 0.04]", "coverage": "0.9", "tolerance": "0.002",
+    }  # fmt: skip
+    case = small_case("plate").with_overrides([f"task.{key}={v}" for key, v in numbers.items()])
+    assert all(getattr(case.task, field.name) is not None for field in fields(case.task)
+               if field.name != "collision")  # fmt: skip
+    verdict = replace(small_verdict("plate"), task=case.task)
+    assert load_result(save_result(verdict, case, tmp_path / "a.result")).verdict.task == case.task
 
 
 def test_a_result_comes_back_exactly(saved):
