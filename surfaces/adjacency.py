@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coverable_arrays import Ints, Mask
 
 # Clockwise from the upper left; row = u grows downwards, column = v grows to the right.
 _CLOCKWISE = (
@@ -19,17 +20,17 @@ _CLOCKWISE = (
 class Neighbours(NamedTuple):
     """Neighbours of N cells, in compressed rows: see `of` for those of one cell."""
 
-    indptr: NDArray[np.int64]
+    indptr: Ints
     """(N + 1,) where each cell's list begins, and the end of the last."""
-    indices: NDArray[np.int64]
+    indices: Ints
     """Flat cell indices, each cell's list clockwise from its upper left neighbour."""
 
-    def of(self, k: int) -> NDArray[np.int64]:
+    def of(self, k: int) -> Ints:
         """The neighbours of cell k, clockwise."""
         return self.indices[self.indptr[k] : self.indptr[k + 1]]
 
     @property
-    def links(self) -> NDArray[np.int64]:
+    def links(self) -> Ints:
         """The row of `pairs` that each entry of `indices` belongs to."""
         count = len(self.indptr) - 1
         owner = np.repeat(np.arange(count, dtype=np.int64), np.diff(self.indptr))
@@ -37,7 +38,7 @@ class Neighbours(NamedTuple):
         return np.unique(keys, return_inverse=True)[1]
 
     @property
-    def pairs(self) -> NDArray[np.int64]:
+    def pairs(self) -> Ints:
         """(M, 2) pairs i < j of cells that touch, each once, sorted."""
         count = len(self.indptr) - 1
         owner = np.repeat(np.arange(count, dtype=np.int64), np.diff(self.indptr))
@@ -46,7 +47,7 @@ class Neighbours(NamedTuple):
         return np.column_stack(np.divmod(keys, max(count, 1)))
 
 
-def components(pairs: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+def components(pairs: Ints, count: int) -> Ints:
     """(count,) connected component of each of `count` nodes, numbered in the order of the nodes.
 
     Args:
@@ -80,7 +81,7 @@ def grid_neighbours(
     """
     i, j = np.divmod(np.arange(rows * columns, dtype=np.int64), max(columns, 1))
 
-    def step(offset: tuple[int, int]) -> NDArray[np.int64]:
+    def step(offset: tuple[int, int]) -> Ints:
         """Flat index one offset further, across closed seams; -1 where the grid ends."""
         row, column = i + offset[0], j + offset[1]
         if closed[0]:
@@ -105,13 +106,8 @@ def grid_neighbours(
 
 
 def _over_pole(
-    i: NDArray[np.int64],
-    j: NDArray[np.int64],
-    columns: int,
-    plain: list[NDArray[np.int64]],
-    last: NDArray[np.bool_],
-    upper: bool,
-) -> list[NDArray[np.int64]]:
+    i: Ints, j: Ints, columns: int, plain: list[Ints], last: Mask, upper: bool
+) -> list[Ints]:
     """Slots of the neighbours above or below, clockwise; in the last row those across the pole.
 
     Walking clockwise around a cell at the upper pole, one meets the columns across it in falling

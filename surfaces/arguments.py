@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from typing import Any, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 import coverable_errors
+from coverable_arrays import Array
 from coverable_errors import MISSING, Fault, real, shown
 from surfaces.surface import TURN_TOLERANCE, Side, SurfaceError, rotation_from_rpy
 
@@ -22,9 +22,9 @@ class Pose(TypedDict):
     """What every surface is built from besides its own shape."""
 
     side: Side
-    position: NDArray[np.float64]
+    position: Array
     """(3,) m."""
-    rotation: NDArray[np.float64]
+    rotation: Array
     """(3, 3)"""
 
 
@@ -57,12 +57,12 @@ class Checks(coverable_errors.Checks):
             self.wrong(name, value, "must lie in 0 .. 180 (degrees from the +z axis)")
         return math.radians(low), math.radians(high)
 
-    def vector(self, name: str, value: Any, unit: str) -> NDArray[np.float64]:
+    def vector(self, name: str, value: Any, unit: str) -> Array:
         """Three finite numbers."""
         found = self.numbers(name, value, 3, f"must be three finite numbers ({unit})")
         return np.zeros(3) if found is None else np.array(found)
 
-    def rotation(self, name: str, value: Any) -> NDArray[np.float64]:
+    def rotation(self, name: str, value: Any) -> Array:
         """The rotation of fixed-axis roll, pitch, yaw in degrees."""
         return rotation_from_rpy(*np.radians(self.vector(name, value, "degrees")))
 
@@ -93,7 +93,7 @@ LARGEST_COORDINATE = 1e6  # [m]
 
 def table(
     name: str, value: Any, shape: Shape, expected: str, cap: int, faults: list[Fault]
-) -> NDArray[np.float64] | None:
+) -> Array | None:
     """A rectangular array of finite numbers, or None after a fault.
 
     Args:
@@ -129,7 +129,7 @@ def table(
 
 def metres(
     name: str, value: Any, shape: Shape, expected: str, cap: int, faults: list[Fault]
-) -> NDArray[np.float64] | None:
+) -> Array | None:
     """A table of coordinates (m), none of them so large that its cube would be lost."""
     found = table(name, value, shape, expected, cap, faults)
     if found is not None and found.size and np.abs(found).max() > LARGEST_COORDINATE:
@@ -171,7 +171,7 @@ def _capped(name: str, lengths: tuple[int, ...], cap: int) -> None:
         raise SurfaceError(Fault(name, got, expected=f"must hold at most {cap:,} numbers"))
 
 
-def _leaves(value: Any, depth: int) -> NDArray[np.float64] | list[float]:
+def _leaves(value: Any, depth: int) -> Array | list[float]:
     """The numbers in one row; NaN for what is no number."""
     if isinstance(value, np.ndarray):
         return value.reshape(-1)

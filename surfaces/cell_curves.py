@@ -13,11 +13,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.protected import Protected
-
-Array = NDArray[np.float64]
 
 STOPPED = 1e-3  # [1] a parallel curve this much slower than the curve counts as stopped
 PLACES = 3  # along a piece, where its slopes are computed
@@ -27,7 +25,7 @@ PLACES = 3  # along a piece, where its slopes are computed
 class CellCurves(Protected):
     """One curve for each of M neighbouring pairs (i, j) of cells, from centre i to centre j."""
 
-    first: NDArray[np.int64]
+    first: Ints
     """(M + 1,) where each curve's pieces begin, equal shares of t, and the end of the last."""
     cubics: Array
     """(P, 4, 6) coefficients of 1, s, s^2, s^3 of point (m) and normal; s in 0..1 on the piece."""
@@ -35,7 +33,7 @@ class CellCurves(Protected):
     """(P, 2) largest |f''| (m) and |n''| on each piece, differentiated by t."""
     deviations: Array
     """(M, 2) how far point (m) and normal (1) deviate from the surface's own, at most."""
-    rests: NDArray[np.bool_]
+    rests: Mask
     """(P,) pieces at an end of which the point is at rest, next to a crease of a mesh."""
 
     def __len__(self) -> int:
@@ -48,13 +46,13 @@ class CellCurves(Protected):
         halves[:, 0, 0] += translation
         return replace(self, cubics=halves.reshape(-1, 4, 6))
 
-    def at(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    def at(self, curves: Ints, t: Array) -> tuple[Array, Array]:
         """Point (k, 3) m and normal (k, 3) at t (k,) of some curves (k,)."""
         powers, cubics = self._local(curves, t)
         values = np.einsum("kp,kpd->kd", powers, cubics)
         return values[:, :3], values[:, 3:]
 
-    def slopes(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    def slopes(self, curves: Ints, t: Array) -> tuple[Array, Array]:
         """Derivatives by t of point (k, 3) m and normal (k, 3)."""
         powers, cubics = self._local(curves, t)
         count = self.first[curves + 1] - self.first[curves]
@@ -62,7 +60,7 @@ class CellCurves(Protected):
         values = np.einsum("kp,kpd->kd", by_s, cubics[:, 1:]) * count[:, None]
         return values[:, :3], values[:, 3:]
 
-    def folds(self, height: float) -> NDArray[np.bool_]:
+    def folds(self, height: float) -> Mask:
         """(M,) where the parallel curve at a signed height (m) runs backwards or stops.
 
         There the height reaches the radius of curvature on the concave side, and the offset surface
@@ -102,13 +100,13 @@ class CellCurves(Protected):
             yield slope[:, :3], slope[:, 3:]
 
     @property
-    def creased(self) -> NDArray[np.bool_]:
+    def creased(self) -> Mask:
         """(M,) curves over a crease of a mesh, which come to rest at its strip."""
         if not self.rests.any():
             return np.zeros(len(self), dtype=bool)
         return np.logical_or.reduceat(self.rests, self.first[:-1])
 
-    def _local(self, curves: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    def _local(self, curves: Ints, t: Array) -> tuple[Array, Array]:
         """Powers 1, s, s^2, s^3 (k, 4), and the cubics (k, 4, 6) that hold at t."""
         first = self.first[curves]
         count = self.first[curves + 1] - first

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from surfaces.cells import Cells
 from surfaces.meshes import FaceTree
 from surfaces.meshes.cells import MeshCells
@@ -16,8 +16,6 @@ from surfaces.sheet import tiles_of
 from surfaces.surface import SurfaceError, max_principal_curvature
 from surfaces.tiles import Tiles
 from surfaces.triangle_kernel import TriangleKernel
-
-Array = NDArray[np.float64]
 
 SHARE = 0.01  # [1] of the tolerance: how far triangles may be off, if so many will do
 MOST_TILES = 16_384

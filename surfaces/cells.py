@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.protected import Protected
@@ -19,26 +20,24 @@ from surfaces.surface import Surface
 if TYPE_CHECKING:
     import networkx as nx
 
-Array = NDArray[np.float64]
-
 
 class Triangles(NamedTuple):
     """Triangles to draw."""
 
-    vertices: NDArray[np.float64]
+    vertices: Array
     """(V, 3) m, in the root frame."""
-    faces: NDArray[np.int64]
+    faces: Ints
     """(F, 3)"""
-    normals: NDArray[np.float64]
+    normals: Array
     """(V, 3) outward unit normals."""
 
 
 class Unrolled(NamedTuple):
     """Cells on a flat picture, x to the right and y down."""
 
-    centres: NDArray[np.float64]
+    centres: Array
     """(N, 2)"""
-    outlines: tuple[NDArray[np.float64], ...]
+    outlines: tuple[Array, ...]
     """N closed polylines (k, 2)."""
     labels: tuple[str, str]
     """Names of x and y with their units."""
@@ -50,7 +49,7 @@ class Finer(NamedTuple):
     """The same surface in finer cells, with the old centres among the new ones."""
 
     cells: Cells
-    same: NDArray[np.int64]
+    same: Ints
     """(N,) the finer cell with the same centre as each of the N cells."""
 
 
@@ -59,11 +58,11 @@ class Cells(Protected, ABC):
     """N cells of one surface, numbered from 0. Cells are values; they pickle."""
 
     surface: Surface
-    centres: NDArray[np.float64]
+    centres: Array
     """(N, 3) m, on the surface, in the root frame."""
-    normals: NDArray[np.float64]
+    normals: Array
     """(N, 3) outward unit normals at the centres, in the root frame."""
-    areas: NDArray[np.float64]
+    areas: Array
     """(N,) m^2."""
     shape: tuple[int, ...]
     """How cells are counted: (nu, nv) for a grid, (N,) for the cells of a mesh."""
@@ -117,14 +116,14 @@ class Cells(Protected, ABC):
         return int(np.argmin(np.linalg.norm(self.centres - mean, axis=1)))
 
     @cached_property
-    def pairs(self) -> NDArray[np.int64]:
+    def pairs(self) -> Ints:
         """(M, 2) pairs i < j of cells that touch, each once, sorted."""
         pairs = self.neighbours.pairs
         pairs.flags.writeable = False
         return pairs
 
     @cached_property
-    def links(self) -> NDArray[np.int64]:
+    def links(self) -> Ints:
         """The row of `pairs` that each entry of the neighbours' `indices` belongs to."""
         return self.neighbours.links  # not write-protected: to kernels that is another type
 
@@ -134,7 +133,7 @@ class Cells(Protected, ABC):
         """The smooth curves between the centres of the M `pairs`."""
 
     @abstractmethod
-    def trace(self, pairs: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
+    def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """Curves on the surface from cell centre to cell centre, to which `curves` are fitted.
 
         Args:
@@ -145,7 +144,7 @@ class Cells(Protected, ABC):
             Points (m, k, 3) m and outward unit normals (m, k, 3); both continuous in t.
         """
 
-    def closest_along(self, pairs: NDArray[np.int64], points: Array) -> tuple[Array, Array]:
+    def closest_along(self, pairs: Ints, points: Array) -> tuple[Array, Array]:
         """The points of the surface closest to points near the curve between two cells.
 
         Args:
@@ -158,7 +157,7 @@ class Cells(Protected, ABC):
         found = self.surface.closest(points)
         return points - found.height[..., None] * found.normal, found.normal
 
-    def smoothed(self, pairs: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def smoothed(self, pairs: Ints) -> Mask:
         """(m,) where `curves` are smoother than the surface; `closest_along` gives the error."""
         return np.full(len(pairs), self.surface.mean_edge_length > 0.0)
 
@@ -172,13 +171,11 @@ class Cells(Protected, ABC):
         return self.parallel_curvature(0.0)
 
     @property
-    def creased(self) -> NDArray[np.bool_]:
+    def creased(self) -> Mask:
         """(N,) cells with a strip along a crease where the normal turns; only meshes have them."""
         return np.zeros(len(self), dtype=bool)
 
-    def distances(
-        self, pairs: NDArray[np.int64], points: Array, everywhere: bool
-    ) -> tuple[Array, Array]:
+    def distances(self, pairs: Ints, points: Array, everywhere: bool) -> tuple[Array, Array]:
         """Distances (k,) m of points from the surface, and outward unit vectors along them (k, 3).
 
         On a mesh these are measured from the triangles, without interpolated normals.
@@ -192,7 +189,7 @@ class Cells(Protected, ABC):
         found = self.surface.closest(points)
         return np.abs(found.height), found.normal
 
-    def crease_distances(self, pairs: NDArray[np.int64], points: Array, everywhere: bool) -> Array:
+    def crease_distances(self, pairs: Ints, points: Array, everywhere: bool) -> Array:
         """(k,) m, how far points of the surface are from the crease on whose strip they lie.
 
         An upper bound; inf off the strips. See `distances` for the arguments.
@@ -209,14 +206,14 @@ class Cells(Protected, ABC):
         return graph
 
     @abstractmethod
-    def locate(self, points: ArrayLike) -> NDArray[np.int64]:
+    def locate(self, points: ArrayLike) -> Ints:
         """(k,) the cell that the surface's point nearest to each of `points` (k, 3) m lies in.
 
         -1 where that point is not on any cell.
         """
 
     @abstractmethod
-    def borders(self, samples: int = 8) -> NDArray[np.float64]:
+    def borders(self, samples: int = 8) -> Array:
         """(k, 2, 3) m, ends of short straight lines that draw the borders of all cells.
 
         Args:
@@ -224,9 +221,7 @@ class Cells(Protected, ABC):
         """
 
     @abstractmethod
-    def triangles(
-        self, which: NDArray[np.int64], samples: int = 8, inset: float = 0.0
-    ) -> Triangles:
+    def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
         """Triangles that fill some cells, smooth where the surface bends.
 
         Args:

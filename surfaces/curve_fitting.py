@@ -13,13 +13,10 @@ from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 PIECES = (1, 4, 8, 16, 32, 64)  # numbers of cubics that a curve may consist of
 CLOSE = 1e-6  # [1], share of its length that a curve may deviate, and [1] that its normal may
@@ -42,7 +39,7 @@ class CurveFit:
     """(M, 2) deviations of point (m) and normal that are small enough."""
     deviations: Array
     """(M, 2) deviations reached so far; inf before the first fit."""
-    creased: NDArray[np.bool_]
+    creased: Mask
     """(M,) curves that consist of `LEGS` legs and are at rest between them."""
     cubics: list[tuple[Ints, Array]] = field(default_factory=list)
     """Curves (k,) and their cubics (k, count, 4, 6); the last fit of each curve counts."""

@@ -8,14 +8,12 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import ArgumentError
 from surfaces.parts import PartModels, SurfaceParts, around
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
-Rows = Ints | NDArray[np.bool_]
+Rows = Ints | Mask
 
 _WAIT = 4.0  # parts this much better than the worst wait until that is cut
 
@@ -48,7 +46,7 @@ class Pieces(ABC):
         """(k, 2) how long they are: the longer one is cut where errors do not tell."""
 
     @property
-    def divisible(self) -> NDArray[np.bool_]:
+    def divisible(self) -> Mask:
         """(k,) which can be cut."""
         return np.ones(len(self.sides), dtype=bool)
 

@@ -14,12 +14,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.protected import Protected
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 MOST_PARTS = 8192
 _RELATIVE, _ABSOLUTE = 1e-9, 1e-12  # what is added to a radius for rounding
@@ -92,7 +89,7 @@ class PartModels(NamedTuple):
                 radius[~known, column] = 1.0 + _ABSOLUTE if column else np.inf
         return PartModels(centre, slopes, radius, np.nan_to_num(self.along, posinf=0.0))
 
-    def rows(self, some: Ints | NDArray[np.bool_]) -> PartModels:
+    def rows(self, some: Ints | Mask) -> PartModels:
         """Some of the parts."""
         return PartModels(*(array[some] for array in self))
 

@@ -9,8 +9,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import LARGEST, Checks
 from surfaces.meshes import MeshSurface
 from surfaces.patches import Patch
@@ -18,8 +18,6 @@ from surfaces.piecewise import Piecewise
 from surfaces.protected import Protected
 from surfaces.surface import Surface, SurfaceError
 from surfaces.tiles import Tiles, tiles
-
-Array = NDArray[np.float64]
 
 DEVIATION = 2e-4  # [m]
 MOST_TRIANGLES = 32_768
@@ -37,18 +35,18 @@ class Sheet(Protected):
     further than `deviation` from all of them does not touch the surface.
     """
 
-    own: NDArray[np.float64]
+    own: Array
     """(k, 3, 3) m, the corners of each triangle in the surface's own frame, the same wherever it
     stands."""
-    rotation: NDArray[np.float64]
+    rotation: Array
     """(3, 3) of that frame in the root frame."""
-    position: NDArray[np.float64]
+    position: Array
     """(3,) m"""
     deviation: float
     """m, no point of the surface is further than this from a triangle."""
 
     @property
-    def triangles(self) -> NDArray[np.float64]:
+    def triangles(self) -> Array:
         """(k, 3, 3) m, the corners of each triangle."""
         return np.asarray(self.own @ self.rotation.T + self.position)
 

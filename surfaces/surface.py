@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Mask
 from coverable_errors import ArgumentError, CoverableError
 from surfaces.parts import MOST_PARTS, SurfaceParts
 from surfaces.protected import Protected
@@ -30,22 +31,20 @@ class ClosestPoint:
     the patch. A mesh has nothing beyond its border: there they are always inside.
     """
 
-    u: NDArray[np.float64]
+    u: Array
     """First parameter, rad or m; an angle is wrapped into the patch's range where it can be. NaN
     where the surface has no parameters."""
-    v: NDArray[np.float64]
+    v: Array
     """Second parameter, likewise."""
-    height: NDArray[np.float64]
+    height: Array
     """m, signed distance along the outward normal: point = closest point + height * normal."""
-    normal: NDArray[np.float64]
+    normal: Array
     """(..., 3) outward unit normal at the closest point."""
-    inside: NDArray[np.bool_]
+    inside: Mask
     """True where it lies on the patch, and the normal there leads to the given point."""
 
     @staticmethod
-    def of_rows(
-        shape: tuple[int, ...], values: NDArray[np.float64], inside: NDArray[np.bool_]
-    ) -> ClosestPoint:
+    def of_rows(shape: tuple[int, ...], values: Array, inside: Mask) -> ClosestPoint:
         """From rows (k, 6) of u, v, height and normal, and `inside` (k,), to a leading shape."""
         u, v, height = values.T[:3].reshape(3, *shape)
         return ClosestPoint(u, v, height, values[:, 3:].reshape(*shape, 3), inside.reshape(shape))
@@ -61,9 +60,9 @@ class Surface(Protected, ABC):
 
     kind: ClassVar[str]
 
-    rotation: NDArray[np.float64]
+    rotation: Array
     """(3, 3) axes of the surface's own frame, as columns, in the root frame."""
-    position: NDArray[np.float64]
+    position: Array
     """(3,) m, origin of the surface's own frame in the root frame."""
     side: Side
     """'inside': the tool works at -d along the outward normal; 'outside': at +d."""
@@ -130,7 +129,7 @@ class Surface(Protected, ABC):
         return replace(self, rotation=turn @ self.rotation, position=turn @ self.position + shift)
 
 
-def points_of(points: ArrayLike) -> NDArray[np.float64]:
+def points_of(points: ArrayLike) -> Array:
     """Points as an array (..., 3).
 
     Raises:
@@ -142,9 +141,7 @@ def points_of(points: ArrayLike) -> NDArray[np.float64]:
     return array
 
 
-def max_principal_curvature(
-    steps: NDArray[np.float64], turns: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def max_principal_curvature(steps: Array, turns: Array) -> Array:
     """(k,) 1/m, the larger principal curvature by magnitude: how fast a normal turns, at most.
 
     Args:
@@ -166,12 +163,12 @@ def max_principal_curvature(
     return np.where(np.isfinite(largest), np.sqrt(np.maximum(largest, 0.0)), np.inf)
 
 
-def _products(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _products(a: Array, b: Array) -> Array:
     """(k,) scalar products of (k, 3); numpy's own sums are slow over three numbers."""
     return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
 
 
-def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
     """Rz(yaw) Ry(pitch) Rx(roll), (3, 3), from radians: URDF's fixed-axis roll, pitch, yaw."""
     cr, sr = math.cos(roll), math.sin(roll)
     cp, sp = math.cos(pitch), math.sin(pitch)

@@ -10,13 +10,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.parts import PartModels
 from surfaces.patches import Patch
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -38,7 +35,7 @@ class Tiles(NamedTuple):
     high: Array
     """(k, 2) u and v at x = (1, 1)."""
 
-    def rows(self, some: NDArray[np.bool_]) -> Tiles:
+    def rows(self, some: Mask) -> Tiles:
         """Some of them."""
         return Tiles(
             self.models.rows(some), self.twist[some], self.piece[some], self.low[some],

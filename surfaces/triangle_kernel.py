@@ -13,13 +13,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_kernels import njit
 from surfaces.meshes import WIDTH, FaceTree, nearest_face
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _NEWTON = 4  # steps to the place under a point; each squares what is left
 _FAR = 8.0  # [1] of a triangle: a place so far off it is not on its tile
@@ -38,9 +35,9 @@ class TriangleKernel(NamedTuple):
     """(F, 3, 3) outward normals at the corners."""
     crease_normals: Array
     """(F, 3, 3) the same on creases; see `MeshSurface`."""
-    on_crease: NDArray[np.bool_]
+    on_crease: Mask
     """(F, 3) corners that lie on one."""
-    on_border: NDArray[np.bool_]
+    on_border: Mask
     """(F, 2, 3) sides, by the corner across, and corners that lie on the border of a mesh."""
     cell: Ints
     """(F,) of a mesh the cell of each; -1 on patches."""
@@ -52,7 +49,7 @@ class TriangleKernel(NamedTuple):
     """(F, 3, 3) u directions at the corners; (0, 3, 3) where nobody asks for them."""
     ranges: Array
     """(patches, 2, 2) where u and v begin (first), and their widths."""
-    closed: NDArray[np.bool_]
+    closed: Mask
     """(patches, 2) whether u and v are."""
     counts: Ints
     """(patches, 3) cells along u and v, and the first cell."""

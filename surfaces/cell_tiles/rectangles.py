@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surfaces.cell_tiles.tiles import Array, CellTiles, Ints, Lines, TileBounds, Tiles
+from coverable_arrays import Array, Ints
+from surfaces.cell_tiles.tiles import CellTiles, Lines, TileBounds, Tiles
 from surfaces.patches import GridCells, Patch
 from surfaces.places import Places
 
@@ -105,7 +105,7 @@ class Rectangles(CellTiles):
             found[some] = patch.point(x[some, 0], x[some, 1])
         return found
 
-    def _by_patch(self, chart: Ints) -> list[tuple[Patch, float, NDArray[np.int64]]]:
+    def _by_patch(self, chart: Ints) -> list[tuple[Patch, float, Ints]]:
         """Each patch, its sign, and the rows that are on it."""
         return [
             (self.grids[k][0].surface, self.grids[k][1], np.flatnonzero(chart == k))

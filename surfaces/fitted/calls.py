@@ -6,13 +6,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Fault, shown
 from surfaces.arguments import LARGEST_COORDINATE
 from surfaces.surface import SurfaceError
-
-Array = NDArray[np.float64]
 
 HOW = (
     "g is called with two arrays of one shape, u and v, and returns x, y and z (m) of that shape: "

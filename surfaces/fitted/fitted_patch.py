@@ -4,13 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array
 from surfaces.patches import SpaceModel
 from surfaces.patches.nurbs import SplinePatch
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)

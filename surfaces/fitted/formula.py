@@ -12,8 +12,8 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.fitted.calls import HOW, Formula
@@ -27,8 +27,6 @@ from surfaces.fitted.interpolation import (
 )
 from surfaces.patches.nurbs import SplineMap, regularity_faults
 from surfaces.surface import Side, SurfaceError
-
-Array = NDArray[np.float64]
 
 DEGREE = 5
 FEWEST, MOST = 9, 129  # points along each parameter

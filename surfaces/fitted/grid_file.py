@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import CoverableError
 from coverable_files import read_regular
 from surfaces.arguments import Checks
@@ -21,7 +21,7 @@ WHAT = "a grid of points (.npy or .csv)"
 UNITS = {"m": 1.0, "mm": 1e-3}
 
 
-def read_grid(path: str | os.PathLike[str], units: str = "m") -> NDArray[np.float64]:
+def read_grid(path: str | os.PathLike[str], units: str = "m") -> Array:
     """Read a grid of points.
 
     A `.npy` file holds an array (m, n, 3), no pickle. A `.csv` file has the columns row, column, x,
@@ -57,7 +57,7 @@ def read_grid(path: str | os.PathLike[str], units: str = "m") -> NDArray[np.floa
     return scale * np.array(net.points, dtype=float).reshape(len(net.points), -1, 3)
 
 
-def _from_npy(data: bytes, name: str) -> NDArray[np.float64]:
+def _from_npy(data: bytes, name: str) -> Array:
     """The array of a .npy file."""
     try:
         found: Any = np.load(io.BytesIO(data), allow_pickle=False)

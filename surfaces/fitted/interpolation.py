@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from surfaces.patches.nurbs import SplineMap
 
-Array = NDArray[np.float64]
 Flags = tuple[bool, bool]
 
 ONE_PLACE = 1e-9  # of the extent: points this near are one

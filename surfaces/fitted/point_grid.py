@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.fitted.fitted_patch import FittedPatch
@@ -21,8 +21,6 @@ from surfaces.fitted.interpolation import (
 )
 from surfaces.patches.nurbs import MOST_POINTS, SplineMap, regularity_faults
 from surfaces.surface import Side, SurfaceError
-
-Array = NDArray[np.float64]
 
 DEGREE = 3
 SAMPLES = 8  # along each side of a field between four points, where the two surfaces are compared

@@ -10,14 +10,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_kernels import njit
 from surfaces.meshes.closest_point import on_triangle
 from surfaces.meshes.tree_building import boxes_around, sort_by_halves
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEAF = 2  # triangles in a leaf, at most
 SAME = 2e-14  # [1] of the largest coordinate: distances that differ by less are rounding

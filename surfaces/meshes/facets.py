@@ -15,12 +15,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.meshes.normals import WIDTH, crease_share
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FEWEST, MOST = 2, 6  # triangles or pairs of them from the edge of a strip to its crease
 
@@ -38,11 +35,7 @@ class Facets(NamedTuple):
 
 
 def facets_of(
-    corners: Array,
-    normals: Array,
-    crease_normals: Array,
-    on_crease: NDArray[np.bool_],
-    straight: float,
+    corners: Array, normals: Array, crease_normals: Array, on_crease: Mask, straight: float
 ) -> Facets:
     """Cut the faces of a mesh; see `MeshSurface` for its normals.
 
@@ -76,7 +69,7 @@ def facets_of(
     return Facets(weights @ corners[face], net, off)
 
 
-def _cut_faces(on: NDArray[np.bool_], steps: int) -> tuple[Ints, Array]:
+def _cut_faces(on: Mask, steps: int) -> tuple[Ints, Array]:
     """The face (G,) and the weights of the corners (G, 3, 3) of each facet.
 
     Args:

@@ -13,14 +13,11 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.meshes.facets import Facets
 from surfaces.part_growth import Pieces, Rows
 from surfaces.parts import PartModels
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _ALIKE = 0.25  # [1] of what r_n is to be
 _BINS = 8  # of a coordinate of the normals
@@ -68,7 +65,7 @@ class Clusters(Pieces):
         return np.ones((len(self.begin), 2))
 
     @property
-    def divisible(self) -> NDArray[np.bool_]:
+    def divisible(self) -> Mask:
         """Those of more than one facet."""
         return self.end - self.begin > 1
 

@@ -8,8 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.meshes.facets import facets_of
 from surfaces.meshes.mesh_parts import Clusters
@@ -31,8 +32,6 @@ if TYPE_CHECKING:
     from surfaces.meshes.cells import MeshCells
     from surfaces.meshes.face_tree import FaceTree
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ON = 1e-9  # [1] of the mean edge length: a point so close to a face lies on it
 
@@ -204,7 +203,7 @@ class MeshSurface(Surface):
         return MeshSurface(self.rotation, self.position, self.side, mesh, own, crease)
 
     @cached_property
-    def on_border(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    def on_border(self) -> tuple[Mask, Mask]:
         """(F, 3) sides of faces, by the corner across, and corners: those on the mesh's border."""
         faces, edges = self.mesh.faces, self.mesh.edges
         sides = np.zeros(faces.shape, dtype=bool)
@@ -213,14 +212,14 @@ class MeshSurface(Surface):
         np.logical_or.at(sides, edges.border_faces, across)
         return sides, np.isin(faces, edges.border_vertices)
 
-    def beyond_border(self, face: Ints, weights: Array) -> NDArray[np.bool_]:
+    def beyond_border(self, face: Ints, weights: Array) -> Mask:
         """(k,) which places nearest to points lie on the border, so that the points are beyond."""
         sides, corners = self.on_border
         off = (weights == 0.0) & sides[face] | (weights == 1.0) & corners[face]
         return np.asarray(off.any(axis=1))
 
     @cached_property
-    def on_crease(self) -> NDArray[np.bool_]:
+    def on_crease(self) -> Mask:
         """(F, 3) corners of faces that lie on a crease."""
         return np.asarray((self.corner_normals != self.crease_normals).any(axis=2))
 

@@ -15,17 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import components
 from surfaces.meshes.triangle_mesh import TriangleMesh, corner_angles, sum_by
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CREASE = np.radians(30.0)  # rad between the normals of two faces; usual for smooth shading
 WIDTH = 0.1  # [1] of a face, from a crease inwards, over which its normal turns
 
 
-def corner_normals(mesh: TriangleMesh) -> Floats:
+def corner_normals(mesh: TriangleMesh) -> Array:
     """(F, 3, 3) unit normal at each corner of each face.
 
     The mean of the normals of the faces at the vertex, weighted by their angles there; at a vertex
@@ -52,7 +50,7 @@ def corner_normals(mesh: TriangleMesh) -> Floats:
     return flat.reshape(-1, 3, 3)
 
 
-def carried(mesh: TriangleMesh, normals: Floats, fine: Floats, faces: Ints, parent: Ints) -> Floats:
+def carried(mesh: TriangleMesh, normals: Array, fine: Array, faces: Ints, parent: Ints) -> Array:
     """Corner normals (G, 3, 3) of a finer mesh of the same surface, linear over each old face.
 
     Args:
@@ -73,7 +71,7 @@ def carried(mesh: TriangleMesh, normals: Floats, fine: Floats, faces: Ints, pare
     return unit(np.einsum("gkc,gci->gki", weights, normals[parent]))
 
 
-def blended(vertices: Floats, faces: Ints, normals: Floats, groups: Ints) -> Floats:
+def blended(vertices: Array, faces: Ints, normals: Array, groups: Ints) -> Array:
     """(F, 3, 3) corner normals, one for each group of corners: the mean, weighted by angle.
 
     Args:
@@ -95,7 +93,7 @@ def blended(vertices: Floats, faces: Ints, normals: Floats, groups: Ints) -> Flo
     return np.asarray(unit(sums)[groups])
 
 
-def sharp_edges(mesh: TriangleMesh) -> NDArray[np.bool_]:
+def sharp_edges(mesh: TriangleMesh) -> Mask:
     """(E,) which of `mesh.edges` are creases."""
     pairs = mesh.face_normals[mesh.edges.faces]
     return np.asarray(np.einsum("ei,ei->e", pairs[:, 0], pairs[:, 1]) < np.cos(CREASE))
@@ -119,7 +117,7 @@ def sectors(mesh: TriangleMesh) -> Ints:
     return components(pairs, mesh.faces.size).reshape(-1, 3)
 
 
-def crease_share(on_crease: NDArray[np.bool_], weights: Floats) -> Floats:
+def crease_share(on_crease: Mask, weights: Array) -> Array:
     """(...,) how far the normal has turned to that on the crease: 0 off its strip, 1 on it.
 
     Args:
@@ -130,7 +128,7 @@ def crease_share(on_crease: NDArray[np.bool_], weights: Floats) -> Floats:
     return np.asarray(np.clip(1.0 - (1.0 - along) / WIDTH, 0.0, 1.0))
 
 
-def unit(vectors: NDArray[Any]) -> Floats:
+def unit(vectors: NDArray[Any]) -> Array:
     """The vectors (..., 3) at length 1."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 

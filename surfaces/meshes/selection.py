@@ -6,12 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import Fault, shown
 from surfaces.arguments import Checks
 from surfaces.meshes.repair import one_fan_each, weld_distance
-from surfaces.meshes.triangle_mesh import Floats, Ints, TriangleMesh
+from surfaces.meshes.triangle_mesh import TriangleMesh
 from surfaces.surface import SurfaceError
 
 
@@ -130,7 +131,7 @@ def take_faces(mesh: TriangleMesh, indices: ArrayLike) -> TriangleMesh:
 
 
 def _part(
-    mesh: TriangleMesh, vertices: Floats, faces: Ints, nothing: str, note: str
+    mesh: TriangleMesh, vertices: Array, faces: Ints, nothing: str, note: str
 ) -> TriangleMesh:
     """A clean mesh of these faces, with a note after those of `mesh`."""
     if not len(faces):
@@ -152,7 +153,7 @@ def _nothing_left(mesh: TriangleMesh, nothing: str) -> SurfaceError:
     return SurfaceError(f"{nothing}; the mesh lies in {_listed(low)} .. {_listed(high)} m")
 
 
-def _clipped(mesh: TriangleMesh, point: Floats, normal: Floats) -> tuple[Floats, Ints]:
+def _clipped(mesh: TriangleMesh, point: Array, normal: Array) -> tuple[Array, Ints]:
     """The faces on one side of a plane, and those that it crosses, cut; new vertices come last.
 
     Faces that lie in the plane are kept. Both faces of an edge get the same new vertex.
@@ -162,7 +163,7 @@ def _clipped(mesh: TriangleMesh, point: Floats, normal: Floats) -> tuple[Floats,
     sides = np.sign(heights)[mesh.faces]
     above, below = (sides > 0).sum(axis=1), (sides < 0).sum(axis=1)
 
-    def turned(chosen: NDArray[np.bool_], first: NDArray[np.bool_]) -> Ints:
+    def turned(chosen: Mask, first: Mask) -> Ints:
         """(3, n) corners of the chosen faces, from the one that is `first` on."""
         start = first[chosen].argmax(axis=1)[:, None]
         return np.take_along_axis(mesh.faces[chosen], (start + np.arange(3)) % 3, axis=1).T
@@ -189,7 +190,7 @@ def _clipped(mesh: TriangleMesh, point: Floats, normal: Floats) -> tuple[Floats,
     return vertices, np.concatenate(faces)
 
 
-def checked_plane(point: Any, normal: Any) -> tuple[Floats, Floats]:
+def checked_plane(point: Any, normal: Any) -> tuple[Array, Array]:
     """The point (3,) m and the unit normal (3,) of a plane.
 
     Raises:
@@ -202,7 +203,7 @@ def checked_plane(point: Any, normal: Any) -> tuple[Floats, Floats]:
     return through, direction
 
 
-def checked_box(low: Any, high: Any) -> tuple[Floats, Floats]:
+def checked_box(low: Any, high: Any) -> tuple[Array, Array]:
     """The corners (3,) m of a box.
 
     Raises:
@@ -218,7 +219,7 @@ def checked_box(low: Any, high: Any) -> tuple[Floats, Floats]:
     return least, most
 
 
-def checked_cone(direction: Any, half_angle_deg: Any) -> tuple[Floats, float]:
+def checked_cone(direction: Any, half_angle_deg: Any) -> tuple[Array, float]:
     """The unit axis (3,) and the half angle (degrees) of a cone.
 
     Raises:
@@ -232,12 +233,12 @@ def checked_cone(direction: Any, half_angle_deg: Any) -> tuple[Floats, float]:
     return axis, angle
 
 
-def _unit(direction: list[float]) -> Floats:
+def _unit(direction: list[float]) -> Array:
     """A direction at length 1; scaled first, so that squares neither vanish nor overflow."""
     vector = np.array(direction) / max(map(abs, direction))
     return vector / float(np.linalg.norm(vector))
 
 
-def _listed(point: Floats) -> str:
+def _listed(point: Array) -> str:
     """A point or direction for a message."""
     return "({:.4g}, {:.4g}, {:.4g})".format(*point)

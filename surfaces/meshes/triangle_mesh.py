@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.adjacency import components
 from surfaces.protected import Protected
 from surfaces.surface import SurfaceError
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -23,13 +20,13 @@ class Edges(Protected):
     """(E, 2) the two faces that share an edge, the lower index first."""
     vertices: Ints
     """(E, 2) the ends of that edge, in the order in which the first face runs along it."""
-    lengths: Floats
+    lengths: Array
     """(E,) m."""
     border_faces: Ints
     """(B,) the only face at each border edge."""
     border_vertices: Ints
     """(B, 2) the ends of each border edge, in the order in which its face runs along it."""
-    border_lengths: Floats
+    border_lengths: Array
     """(B,) m."""
 
 
@@ -46,17 +43,17 @@ class TriangleMesh(Protected):
             finite vertices, faces with an area, at most two faces on an edge, one outer side.
     """
 
-    vertices: Floats
+    vertices: Array
     """(V, 3) m."""
     faces: Ints
     """(F, 3) indices of vertices."""
     history: tuple[str, ...] = ()
     """What was repaired or cut since the mesh was read, in order."""
-    face_normals: Floats = field(init=False, repr=False)
+    face_normals: Array = field(init=False, repr=False)
     """(F, 3) outward unit normals."""
-    face_areas: Floats = field(init=False, repr=False)
+    face_areas: Array = field(init=False, repr=False)
     """(F,) m^2."""
-    vertex_normals: Floats = field(init=False, repr=False)
+    vertex_normals: Array = field(init=False, repr=False)
     """(V, 3) unit: the mean of the faces' normals, each weighted by its angle at the vertex.
 
     Angles and not areas, so that the normal belongs to the surface and not to how it is cut into
@@ -100,7 +97,7 @@ class TriangleMesh(Protected):
         return float(self.face_areas.sum())
 
     @property
-    def extent(self) -> Floats:
+    def extent(self) -> Array:
         """(3,) m, the sides of the box around the mesh, along x, y and z."""
         return np.ptp(self.vertices, axis=0)
 
@@ -110,7 +107,7 @@ class TriangleMesh(Protected):
         return piece_numbers(self.edges.faces, self.face_areas)
 
 
-def doubled_areas(vertices: Floats, faces: Ints) -> Floats:
+def doubled_areas(vertices: Array, faces: Ints) -> Array:
     """(F, 3) m^2: the normals of the faces, as long as twice their areas."""
     corners = vertices[faces]
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -160,7 +157,7 @@ def half_edge_ends(faces: Ints, halves: Ints) -> Ints:
     return np.stack([faces[face, corner], faces[face, (corner + 1) % 3]], axis=-1)
 
 
-def piece_numbers(pairs: Ints, areas: Floats) -> Ints:
+def piece_numbers(pairs: Ints, areas: Array) -> Ints:
     """(F,) number of the piece of each face, from pairs that share an edge; the largest is 0."""
     labels = components(pairs, len(areas))
     rank = np.empty(labels.max(initial=-1) + 1, np.int64)
@@ -168,7 +165,7 @@ def piece_numbers(pairs: Ints, areas: Floats) -> Ints:
     return rank[labels]
 
 
-def _check_arrays(vertices: Floats, faces: Ints) -> None:
+def _check_arrays(vertices: Array, faces: Ints) -> None:
     """Refuse arrays that are not a mesh at all."""
     for name, array in (("vertices", vertices), ("faces", faces)):
         if array.ndim != 2 or array.shape[1] != 3:
@@ -181,7 +178,7 @@ def _check_arrays(vertices: Floats, faces: Ints) -> None:
         raise SurfaceError("vertices must be finite numbers (metres)")
 
 
-def _edges(vertices: Floats, faces: Ints) -> Edges:
+def _edges(vertices: Array, faces: Ints) -> Edges:
     """The edges of faces that agree about the outer side."""
     halves = half_edges(faces)
     inner, border = _joined(faces, halves), halves.of_count(1)[:, 0]
@@ -216,14 +213,14 @@ def _joined(faces: Ints, halves: HalfEdges) -> Ints:
     return joined
 
 
-def sum_by(labels: Ints, values: Floats, count: int) -> Floats:
+def sum_by(labels: Ints, values: Array, count: int) -> Array:
     """(count, ...) sums of the rows of `values` (F,) or (F, C) that have the same label."""
     if values.ndim == 1:
         return np.bincount(labels, weights=values, minlength=count).astype(float)
     return np.column_stack([sum_by(labels, column, count) for column in values.T])
 
 
-def corner_angles(vertices: Floats, faces: Ints) -> Floats:
+def corner_angles(vertices: Array, faces: Ints) -> Array:
     """(F, 3) rad, of each face at its corners."""
     corners = vertices[faces]
     ahead = np.roll(corners, -1, axis=1) - corners
@@ -232,7 +229,7 @@ def corner_angles(vertices: Floats, faces: Ints) -> Floats:
     return np.arctan2(cross, np.einsum("fki,fki->fk", ahead, behind))
 
 
-def _vertex_normals(vertices: Floats, faces: Ints, normals: Floats) -> Floats:
+def _vertex_normals(vertices: Array, faces: Ints, normals: Array) -> Array:
     """Unit normals at the vertices, each face weighted by its angle there."""
     weighted = corner_angles(vertices, faces)[..., None] * normals[:, None]
     sums = sum_by(faces.ravel(), weighted.reshape(-1, 3), len(vertices))

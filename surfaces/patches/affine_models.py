@@ -27,11 +27,9 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from surfaces.parts import PartModels
-
-Array = NDArray[np.float64]
 
 
 class Arc(NamedTuple):

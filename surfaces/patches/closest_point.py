@@ -15,9 +15,8 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from coverable_arrays import Array, Ints, Mask
 
 _MOST_STEPS = 60
 _MOST_HALVINGS = 40
@@ -97,9 +96,7 @@ class ClosestPointSearch:
             found[owner[best]] = other[best]
         return found
 
-    def _rivals(
-        self, points: Array, radius: Array, start: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _rivals(self, points: Array, radius: Array, start: Ints) -> tuple[Ints, Ints]:
         """(point, sample): samples in each ball that are lowest among their neighbours."""
         lists = self._tree.query_ball_point(points, radius, return_sorted=False)
         lengths = np.array([len(found) for found in lists])
@@ -108,7 +105,7 @@ class ClosestPointSearch:
         other = sample != start[owner]
         owner, sample = owner[other], sample[other]
 
-        def square(which: NDArray[np.int64]) -> Array:
+        def square(which: Ints) -> Array:
             offset = self._places[which] - points[owner]
             return np.asarray(np.einsum("nm,nm->n", offset, offset))
 
@@ -122,7 +119,7 @@ class ClosestPointSearch:
         rank = np.arange(len(owner)) - np.searchsorted(owner, owner)
         return owner[rank < _MOST_RIVALS], sample[rank < _MOST_RIVALS]
 
-    def _beside(self, sample: NDArray[np.int64], shift: tuple[int, ...]) -> NDArray[np.int64]:
+    def _beside(self, sample: Ints, shift: tuple[int, ...]) -> Ints:
         """The sample that lies `shift` steps further on the grid, or at its border."""
         index = []
         for axis, place in enumerate(np.unravel_index(sample, self._shape)):
@@ -193,7 +190,7 @@ class ClosestPointSearch:
         return np.where(self._closed, self._low + np.mod(x - self._low, self._width), x)
 
 
-def _solved(newton: Array, gauss: Array, slope: Array, held: NDArray[np.bool_]) -> Array:
+def _solved(newton: Array, gauss: Array, slope: Array, held: Mask) -> Array:
     """-H^-1 slope over the parameters not held, H = newton where it is safely positive."""
     free = ~held
     both = free[:, :, None] & free[:, None, :]

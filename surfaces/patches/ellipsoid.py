@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.affine_models import SpaceModel
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.patches.sphere import turned_sphere, unit_sphere
 from surfaces.surface import Side
-
-Array = NDArray[np.float64]
 
 _MOST_STEPS = 200
 

@@ -11,12 +11,10 @@ from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from surfaces.cell_curves import CellCurves
 from surfaces.patches.patch import Patch
-
-Array = NDArray[np.float64]
 
 KEPT = 4  # patches, those asked for last
 MOST = 2_000  # cells: of more the curves take too much memory to be kept

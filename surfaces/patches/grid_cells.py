@@ -8,8 +8,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints
 from surfaces.adjacency import Neighbours, grid_neighbours
 from surfaces.arguments import Checks
 from surfaces.cell_curves import CellCurves
@@ -22,8 +23,6 @@ from surfaces.surface import max_principal_curvature
 if TYPE_CHECKING:
     from surfaces.patches.closed_form_kernels import PatchKernel
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 DIFFERENCE = 1e-4  # [1], share of a patch: step of differences
 
@@ -37,9 +36,9 @@ class GridCells(Cells):
 
     surface: Patch
     shape: tuple[int, int]
-    u: NDArray[np.float64]
+    u: Array
     """(N,) first parameter of each centre, rad or m."""
-    v: NDArray[np.float64]
+    v: Array
     """(N,) second parameter of each centre, rad or m."""
 
     @staticmethod

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.affine_models import CurveModel, SpaceModel, turned, unit_curve
 from surfaces.patches.normal_bounds import CurvatureSlices
 from surfaces.patches.patch import ClosedFormPatch
 from surfaces.surface import Side
-
-Array = NDArray[np.float64]
 
 SLICES = 512  # over which the curvatures are bounded
 

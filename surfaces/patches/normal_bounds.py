@@ -25,7 +25,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from coverable_arrays import Array
 
 ROUNDING = 1.0 + 1e-12  # covers the rounding of the few operations below
 
@@ -47,19 +48,19 @@ class CurvatureSlices(NamedTuple):
     normals spread; slopes are bounds on the absolute derivative by the meridian's arc length.
     """
 
-    meridian_low: NDArray[np.float64]
+    meridian_low: Array
     """(s,) 1/m, least kappa_1 on each slice."""
-    meridian_high: NDArray[np.float64]
+    meridian_high: Array
     """(s,) 1/m, largest kappa_1."""
-    parallel_low: NDArray[np.float64]
+    parallel_low: Array
     """(s,) 1/m, least kappa_2."""
-    parallel_high: NDArray[np.float64]
+    parallel_high: Array
     """(s,) 1/m, largest kappa_2."""
-    meridian_slope: NDArray[np.float64]
+    meridian_slope: Array
     """(s,) 1/m^2, at least |d kappa_1 / ds|."""
-    parallel_slope: NDArray[np.float64]
+    parallel_slope: Array
     """(s,) 1/m^2, at least |d kappa_2 / ds|."""
-    reach: NDArray[np.float64]
+    reach: Array
     """(s,) m, the signed height up to which points above the slice are closest to it."""
 
     @staticmethod
@@ -89,9 +90,7 @@ def normal_bounds(slices: CurvatureSlices, height: float, slack: float) -> Norma
     return NormalBounds(curvature * ROUNDING, bend * ROUNDING)
 
 
-def _corners(
-    low: NDArray[np.float64], high: NDArray[np.float64], height: float, slack: float
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _corners(low: Array, high: Array, height: float, slack: float) -> tuple[Array, Array]:
     """Largest |kappa / (1 + kappa h)| and largest 1 / (1 + kappa h); inf where a corner folds."""
     kappa = np.stack([low, high, low, high])
     h = np.array([height - slack, height - slack, height + slack, height + slack])[:, None]
@@ -102,9 +101,7 @@ def _corners(
     return bent.max(axis=0), stretch.max(axis=0)
 
 
-def _cubic_maximum(
-    p: NDArray[np.float64], q: NDArray[np.float64], k: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _cubic_maximum(p: Array, q: Array, k: Array) -> Array:
     """Upper bound on |p a^3 + 3 q a b^2 - 3 c k (a^2 + b^2)| over unit (a, b, c); p, q, k >= 0.
 
     With a = t x, t^2 = a^2 + b^2: first the largest C = p x^3 + 3 q x (1 - x^2) over x in 0..1,

@@ -12,8 +12,9 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.part_growth import Boxes, grown
 from surfaces.parts import MOST_PARTS, PartModels, SurfaceParts
 from surfaces.patches.normal_bounds import CurvatureSlices, NormalBounds, normal_bounds
@@ -74,22 +75,18 @@ class Patch(Surface):
         return tuple(value for value in values if isinstance(value, (int, float)))
 
     @abstractmethod
-    def local_point(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def local_point(self, u: Array, v: Array) -> Array:
         """Points (..., 3) m in the surface's own frame, from parameters of one shape."""
 
     @abstractmethod
-    def local_normal(self, u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    def local_normal(self, u: Array, v: Array) -> Array:
         """Outward unit normals (..., 3) in the surface's own frame."""
 
     @abstractmethod
-    def area(
-        self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike
-    ) -> NDArray[np.float64]:
+    def area(self, u0: ArrayLike, u1: ArrayLike, v0: ArrayLike, v1: ArrayLike) -> Array:
         """Area (m^2) of the part u0..u1 by v0..v1; exact, vectorised."""
 
-    def part_models(
-        self, low: NDArray[np.float64], high: NDArray[np.float64]
-    ) -> tuple[SpaceModel, SpaceModel]:
+    def part_models(self, low: Array, high: Array) -> tuple[SpaceModel, SpaceModel]:
         """Bounds on points and normals, in the own frame, over boxes of parameters (k, 2).
 
         Raises:
@@ -102,7 +99,7 @@ class Patch(Surface):
         )
 
     @property
-    def part_roots(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def part_roots(self) -> tuple[Array, Array]:
         """Lower and upper corners (m, 2) of boxes of parameters that together are the patch.
 
         With the hair's breadth around it that still counts as on it.
@@ -110,18 +107,14 @@ class Patch(Surface):
         ends = np.array([self.u_range, self.v_range])
         return ends[None, :, 0] - 2.0 * EDGE, ends[None, :, 1] + 2.0 * EDGE
 
-    def placed_models(
-        self, low: NDArray[np.float64], high: NDArray[np.float64], sign: float = 1.0
-    ) -> PartModels:
+    def placed_models(self, low: Array, high: Array, sign: float = 1.0) -> PartModels:
         """Models over boxes of parameters in the root frame; sign -1.0 turns normals over."""
         from surfaces.patches.affine_models import part_models
 
         found = part_models(*self.part_models(low, high))
         return found.placed(self.rotation, self.position, sign)
 
-    def twisted_models(
-        self, low: NDArray[np.float64], high: NDArray[np.float64]
-    ) -> tuple[PartModels, NDArray[np.float64]]:
+    def twisted_models(self, low: Array, high: Array) -> tuple[PartModels, Array]:
         """The same with closer points, where they are known: + x_1 x_2 t; see `Twisted`.
 
         Returns:
@@ -143,17 +136,15 @@ class Patch(Surface):
         roots = Boxes(self._root_models, np.arange(len(low)), low, high)
         return grown(roots, flat, straight, most)
 
-    def _root_models(
-        self, root: NDArray[np.int64], low: NDArray[np.float64], high: NDArray[np.float64]
-    ) -> PartModels:
+    def _root_models(self, root: Ints, low: Array, high: Array) -> PartModels:
         return self.placed_models(low, high)
 
-    def point(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+    def point(self, u: ArrayLike, v: ArrayLike) -> Array:
         """Points (..., 3) m of the surface in the root frame."""
         u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
         return self.local_point(u, v) @ self.rotation.T + self.position
 
-    def normal(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+    def normal(self, u: ArrayLike, v: ArrayLike) -> Array:
         """Outward unit normals (..., 3) in the root frame.
 
         Outward is away from the centre or axis of a sphere, cylinder or hyperboloid, and +z of
@@ -162,22 +153,18 @@ class Patch(Surface):
         u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
         return self.local_normal(u, v) @ self.rotation.T
 
-    def point_and_normal(
-        self, u: NDArray[np.float64], v: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def point_and_normal(self, u: Array, v: Array) -> tuple[Array, Array]:
         """`point` and `normal` at places of the same shape, at once."""
         points, normals = self.local_point_and_normal(u, v)
         if not np.array_equal(self.rotation, np.eye(3)):
             points, normals = points @ self.rotation.T, normals @ self.rotation.T
         return points + self.position, normals
 
-    def local_point_and_normal(
-        self, u: NDArray[np.float64], v: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def local_point_and_normal(self, u: Array, v: Array) -> tuple[Array, Array]:
         """`local_point` and `local_normal`; a kind that has both at once says so."""
         return self.local_point(u, v), self.local_normal(u, v)
 
-    def tangent(self, u: ArrayLike, v: ArrayLike) -> NDArray[np.float64]:
+    def tangent(self, u: ArrayLike, v: ArrayLike) -> Array:
         """Unit directions (..., 3), square to the normals, in which u grows, in the root frame.
 
         By central differences, to about 1e-9. Zero where the points do not move with u.
@@ -267,9 +254,6 @@ class ClosedFormPatch(Patch):
         return normal_bounds(self.curvature_slices(abs(slack)), height, abs(slack))
 
 
-Array = NDArray[np.float64]
-
-
 class LocalClosestPoints(NamedTuple):
     """Closest points to n points in the own frame of a patch, before the ranges are checked."""
 
@@ -281,7 +265,7 @@ class LocalClosestPoints(NamedTuple):
     """(n,) m, along the outward normal."""
     normal: Array
     """(n, 3) outward unit normals."""
-    upright: NDArray[np.bool_]
+    upright: Mask
     """(n,) True where the point lies on the normal there, to 1e-9 m."""
 
 
@@ -312,7 +296,7 @@ class SmoothPatch(Patch):
             inside[finite] = found.upright & self._on_patch(found.u, found.v)
         return ClosestPoint.of_rows(points.shape[:-1], values, inside)
 
-    def _on_patch(self, u: Array, v: Array) -> NDArray[np.bool_]:
+    def _on_patch(self, u: Array, v: Array) -> Mask:
         """True where the parameters lie in the patch's ranges."""
         (u0, u1), (v0, v1) = self.u_range, self.v_range
         within = (u >= u0 - EDGE) & (u <= u1 + EDGE) & (v >= v0 - EDGE) & (v <= v1 + EDGE)

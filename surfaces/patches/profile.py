@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import Fault
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.protected import Protected
@@ -16,8 +16,6 @@ from surfaces.protected import Protected
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _SAMPLES = 16  # of each piece of the spline, for starts and for crossings
 _LEAST = 1e-6  # of the profile's extent: lengths below this are none
@@ -196,7 +194,7 @@ class Profile(Protected):
         )
 
 
-def _straddles(a: Array, b: Array, c: Array, d: Array) -> NDArray[np.bool_]:
+def _straddles(a: Array, b: Array, c: Array, d: Array) -> Mask:
     """True where c and d do not lie strictly on one side of the line through a and b."""
     along = b - a
     first, second = (along[:, 0] * (e - a)[:, 1] - along[:, 1] * (e - a)[:, 0] for e in (c, d))

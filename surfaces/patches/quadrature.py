@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.surface import SurfaceError
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-10  # of a piece's area: the two rules differ by no more
 _ROUNDING = 1e-15  # of all of the rectangle's, likewise
@@ -85,7 +84,7 @@ def _clipped(low: Array, high: Array, breaks: Array) -> Array:
 
 
 def _integrated(
-    element: Callable[[Array, Array], Array], pieces: Array, owner: NDArray[np.int64], count: int
+    element: Callable[[Array, Array], Array], pieces: Array, owner: Ints, count: int
 ) -> Array:
     """Sum (count,) of the integrals over `pieces` (n, 4), each added to its owner."""
     done = np.zeros(count)
@@ -105,7 +104,7 @@ def _integrated(
     return done
 
 
-def _halved(pieces: Array, across_u: NDArray[np.bool_]) -> Array:
+def _halved(pieces: Array, across_u: Mask) -> Array:
     """Both halves of each rectangle, all lower ones first; cut across u or across v."""
     middle = np.where(across_u, pieces[:, :2].mean(axis=1), pieces[:, 2:].mean(axis=1))
     low, high = pieces.copy(), pieces.copy()

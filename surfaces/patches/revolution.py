@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.patches.affine_models import SpaceModel, bend, turned, unit_curve
@@ -16,8 +17,6 @@ from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimut
 from surfaces.patches.profile import Profile
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.surface import Side
-
-Array = NDArray[np.float64]
 
 MOST_POINTS = 1000
 

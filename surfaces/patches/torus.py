@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.patches.affine_models import SpaceModel, circle, turned
 from surfaces.patches.patch import LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.surface import Side
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)

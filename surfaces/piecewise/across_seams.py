@@ -8,16 +8,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import grid_neighbours
 from surfaces.piecewise.seams import Side, contacts, sides_of
 
 if TYPE_CHECKING:
     from surfaces.piecewise.piecewise_surface import Piecewise
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Counts = Sequence[tuple[int, int]]
 
 SMOOTH = math.radians(0.1)  # seams that bend by more are creases
@@ -47,7 +45,7 @@ class SeamPairs:
         row = np.searchsorted(_keys(self.pairs), _keys(pairs))
         return self.rows(row)
 
-    def rows(self, which: Ints | NDArray[np.bool_]) -> SeamPairs:
+    def rows(self, which: Ints | Mask) -> SeamPairs:
         """Some of the pairs."""
         return SeamPairs(self.pairs[which], self.crossings[which], self.normals[which])
 

@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Finer, Triangles, Unrolled
@@ -23,8 +24,6 @@ from surfaces.surface import SurfaceError
 if TYPE_CHECKING:
     from surfaces.piecewise.across_seams import SeamPairs
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 LEFT = 0.2  # rad, so far clockwise from the left a list of neighbours begins, as in a grid
 
@@ -138,7 +137,7 @@ class PieceCells(Cells):
             normals[both] = found.normals.reshape(-1, *points.shape[1:])
         return found_points, normals
 
-    def smoothed(self, pairs: Ints) -> NDArray[np.bool_]:
+    def smoothed(self, pairs: Ints) -> Mask:
         """See `Cells.smoothed`: across creases."""
         creased = self.piece[pairs[:, 0]] != self.piece[pairs[:, 1]]
         creased[creased] = self.seam_pairs.of(pairs[creased]).creases > SMOOTH

@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.patches import Patch
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 TIE = 1e-9  # [m]: of two pieces so equally close, the one with the point inside it counts
 BLOCK = 50_000  # points at once, to bound the memory
@@ -33,7 +30,7 @@ class PieceClosestPoints(NamedTuple):
     """(k, 3) outward unit normals of the joined surface there."""
     height: Array
     """(k,) m, distance with the sign of the side; beside the surface, its part along the normal."""
-    inside: NDArray[np.bool_]
+    inside: Mask
     """(k,) whether the normal there leads to the point; at a seam, one between both normals."""
 
 
@@ -63,9 +60,7 @@ def nearest_places(
     )
 
 
-def _closest_points(
-    patch: Patch, sign: float, points: Array
-) -> tuple[Array, Array, NDArray[np.bool_]]:
+def _closest_points(patch: Patch, sign: float, points: Array) -> tuple[Array, Array, Mask]:
     """On one patch: (k, 9) u, v, place, normal, height; distances (k,) m; and `inside` (k,)."""
     found = patch.closest(points)
     u, v = np.clip(found.u, *patch.u_range), np.clip(found.v, *patch.v_range)
@@ -78,7 +73,7 @@ def _closest_points(
 
 def _nearest(
     patches: Sequence[Patch], signs: Sequence[float], points: Array, gap: float
-) -> tuple[Ints, Array, NDArray[np.bool_]]:
+) -> tuple[Ints, Array, Mask]:
     """Piece (k,), values (k, 9) as in `_closest_points`, and `inside` (k,) of finite points."""
     found = [
         _closest_points(patch, sign, points) for patch, sign in zip(patches, signs, strict=True)
@@ -98,7 +93,7 @@ def _nearest(
     return piece, best, inside
 
 
-def _over_seam(points: Array, one: Array, other: Array, gap: float) -> NDArray[np.bool_]:
+def _over_seam(points: Array, one: Array, other: Array, gap: float) -> Mask:
     """Points over a seam: both pieces are nearest there, and the point lies off neither end.
 
     Over the outer side of a crease, or over the hair's breadth between two borders, the closest

@@ -9,8 +9,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints
 from coverable_errors import Fault
 from surfaces.adjacency import components
 from surfaces.arguments import ORIGIN, Checks
@@ -24,8 +25,6 @@ from surfaces.surface import ClosestPoint, Side, Surface, SurfaceError, points_o
 if TYPE_CHECKING:
     from surfaces.piecewise.cells import PieceCells
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
 SHARE = 1e-3  # [1], and the same as a share of the shortest border

@@ -12,13 +12,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.patches import Patch
 from surfaces.surface import SurfaceError
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 VERTICES = 129  # on a side, as a first guess of its nearest place
 REFINEMENTS = 8  # Gauss-Newton steps from there
@@ -264,7 +261,7 @@ def on_each_other(patches: Sequence[Patch], gap: float) -> tuple[int, ...]:
     return ()
 
 
-def _places(patch: Patch) -> NDArray[np.float64]:
+def _places(patch: Patch) -> Array:
     """(ACROSS^2, 3) m, inside the patch."""
     share = (np.arange(ACROSS) + 0.5) / ACROSS
     u, v = (low + share * (high - low) for low, high in (patch.u_range, patch.v_range))

@@ -14,14 +14,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.meshes import WIDTH, MeshSurface
 from surfaces.places.offset_triangles import OffsetTriangles
 from surfaces.places.places import (
     ROUNDING,
-    Array,
-    Ints,
     OffsetSurface,
     PlacePaths,
     Places,
@@ -76,7 +74,7 @@ class MeshPlaces(OffsetSurface):
             made.put(row, self._across(start.of(row), end.of(row), equal))
         return made
 
-    def _across(self, start: Places, end: Places, equal: NDArray[np.bool_]) -> PlacePaths:
+    def _across(self, start: Places, end: Places, equal: Mask) -> PlacePaths:
         """Paths from one face to another that shares an edge or a vertex with it.
 
         The edge is crossed where it comes closest to the straight line. There the place belongs to

@@ -20,12 +20,11 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from surfaces.places.places import second_derivative_of_unit
 from surfaces.places.spline_bounds import spline_bounds
 
-Array = NDArray[np.float64]
 BoxBounds = Callable[[Any, Array, Array], Array]
 
 

@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.patches import Patch
 from surfaces.patches.nurbs import SplinePatch
 from surfaces.places.patch_bounds import BoxBounds, box_bounds
-from surfaces.places.places import ROUNDING, Array, OffsetSurface, PlacePaths, Places
+from surfaces.places.places import ROUNDING, OffsetSurface, PlacePaths, Places
 from surfaces.places.spline_bounds import kinks
-
-Mask = NDArray[np.bool_]
 
 TANGENT_STEP = 1e-5  # [1], share of the range of u: of differences
 SLOWER = 1.0 - 1e-6  # covers their error
@@ -152,13 +150,7 @@ class PatchPlaces(OffsetSurface):
                                         across[some], at[some]))  # fmt: skip
 
     def _in_two(
-        self,
-        start: Array,
-        step: Array,
-        end: Array,
-        share: Array,
-        axis: NDArray[np.int64],
-        at: Array,
+        self, start: Array, step: Array, end: Array, share: Array, axis: Ints, at: Array
     ) -> PlacePaths:
         """Paths of two pieces, from `start` along `step` to where u or v is `at`, and on."""
         row = np.arange(len(start))

@@ -15,10 +15,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
+from coverable_arrays import Array, Ints, Mask
 
 ROUNDING = 1.0 + 1e-9  # covers the rounding of the bounds' own operations
 
@@ -31,7 +29,7 @@ class Places(NamedTuple):
     x: Array
     """(k, 2) u and v; on a face the weights of its second and third corner."""
 
-    def of(self, rows: Ints | NDArray[np.bool_] | slice) -> Places:
+    def of(self, rows: Ints | Mask | slice) -> Places:
         """Some of the places."""
         return Places(self.chart[rows], self.x[rows])
 
@@ -40,7 +38,7 @@ class Places(NamedTuple):
         """Places one after the other."""
         return Places(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
-    def put(self, rows: Ints | NDArray[np.bool_], others: Places) -> None:
+    def put(self, rows: Ints | Mask, others: Places) -> None:
         """Replace some of the places."""
         self.chart[rows], self.x[rows] = others.chart, others.x
 
@@ -92,14 +90,14 @@ class PlacePaths(NamedTuple):
         x = np.stack([start.x, start.x, start.x, end.x], axis=1)
         return PlacePaths(share, points, normals, every, chart, x)
 
-    def of(self, rows: Ints | NDArray[np.bool_]) -> PlacePaths:
+    def of(self, rows: Ints | Mask) -> PlacePaths:
         """Some of the paths."""
         return PlacePaths(
             self.share[rows], self.points[rows], self.normals[rows], self.bends[rows],
             self.chart[rows], self.x[rows],
         )  # fmt: skip
 
-    def put(self, rows: Ints | NDArray[np.bool_], others: PlacePaths) -> None:
+    def put(self, rows: Ints | Mask, others: PlacePaths) -> None:
         """Replace some of the paths."""
         for mine, other in zip(self, others, strict=True):
             mine[rows] = other

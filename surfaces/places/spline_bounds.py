@@ -15,12 +15,9 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.places.places import second_derivative_of_unit
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 ORDERS = ((0, 1), (1, 0), (0, 2), (1, 1), (2, 0), (0, 3), (1, 2), (2, 1), (3, 0))
 MOST_SPANS = 4  # of a box along one parameter; a wider one is not bounded

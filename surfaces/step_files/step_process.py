@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_files import FileFault, read_regular
 from coverable_processes import Limits, folder_of, run_apart
 from surfaces.surface import SurfaceError
@@ -47,9 +47,9 @@ class Read(NamedTuple):
     """`kind`, `area` (m^2) and `colour` ("#rrggbb" or "") of each; the first is number 1."""
     taken: list[int]
     """Numbers of the faces with triangles here."""
-    vertices: NDArray[np.float64]
+    vertices: Array
     """(V, 3) m."""
-    triangles: NDArray[np.int64]
+    triangles: Ints
     """(F, 3) corners, counterclockwise seen from outside."""
     deviation: float
     """m, the largest measured between the faces and their triangles."""

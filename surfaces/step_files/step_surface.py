@@ -108,9 +108,7 @@ def step_triangles(
 
 
 def checked_choice(
-    faces: Sequence[int] | None = None,
-    colour: str | None = None,
-    deviation: float = DEVIATION,
+    faces: Sequence[int] | None = None, colour: str | None = None, deviation: float = DEVIATION
 ) -> tuple[list[int], str]:
     """Which faces are meant: their numbers, and the colour in small letters.
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_kernels import njit
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_point import on_triangle
@@ -24,21 +24,15 @@ _DEEP = 0.8  # of the greatest distance to the border: as good as the greatest
 class Places(NamedTuple):
     """A place on each of N cells."""
 
-    points: NDArray[np.float64]
+    points: Array
     """(N, 3) m."""
-    faces: NDArray[np.int64]
+    faces: Ints
     """(N,) the face it lies on."""
-    weights: NDArray[np.float64]
+    weights: Array
     """(N, 3) barycentric coordinates on that face, >= 0, of sum 1."""
 
 
-def centre_places(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    labels: NDArray[np.int64],
-    areas: NDArray[np.float64],
-    border: NDArray[np.bool_],
-) -> Places:
+def centre_places(vertices: Array, faces: Ints, labels: Ints, areas: Array, border: Mask) -> Places:
     """The point of each cell nearest to its centroid; elsewhere where that is at its border.
 
     The centroid of a ring or a horseshoe lies outside, and the point nearest to it on the border.
@@ -136,17 +130,17 @@ def _choose(corners, middles, border, order, indptr, centroids, total, chosen, w
 class Outlines(Protected):
     """The closed border lines of cells, counter-clockwise seen from outside, holes clockwise."""
 
-    points: NDArray[np.float64]
+    points: Array
     """(K, 3) m, the corners of all loops, one loop after the other."""
-    vertices: NDArray[np.int64]
+    vertices: Ints
     """(K,) which vertex of the mesh each is."""
-    starts: NDArray[np.int64]
+    starts: Ints
     """(L + 1,) where each loop begins, and the end of the last."""
-    cells: NDArray[np.int64]
+    cells: Ints
     """(L,) the cell of each loop, in rising order; a cell has several if it has holes, and none
     if it is a closed surface."""
 
-    def of(self, cell: int) -> list[NDArray[np.float64]]:
+    def of(self, cell: int) -> list[Array]:
         """The loops of a cell as closed polylines (n + 1, 3) m: the last point is the first."""
         first, last = np.searchsorted(self.cells, [cell, cell + 1])
         bounds = zip(self.starts[first:last], self.starts[first + 1 : last + 1], strict=True)
@@ -156,20 +150,15 @@ class Outlines(Protected):
 class SharedBorders(NamedTuple):
     """Pairs of cells that share a border. Cells that touch in single points share none."""
 
-    pairs: NDArray[np.int64]
+    pairs: Ints
     """(M, 2) i < j, sorted."""
-    lengths: NDArray[np.float64]
+    lengths: Array
     """(M,) m."""
-    midpoints: NDArray[np.float64]
+    midpoints: Array
     """(M, 3) m, the place on each border that is nearest to its mean."""
 
 
-def outlines(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    partner: NDArray[np.int64],
-    labels: NDArray[np.int64],
-) -> Outlines:
+def outlines(vertices: Array, faces: Ints, partner: Ints, labels: Ints) -> Outlines:
     """The border lines of all cells.
 
     Args:
@@ -212,12 +201,7 @@ def _loops(faces, partner, labels, border, order, total):  # type: ignore[no-unt
     return chain, starts[: loops + 1], cells[:loops]
 
 
-def shared_borders(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    partner: NDArray[np.int64],
-    labels: NDArray[np.int64],
-) -> SharedBorders:
+def shared_borders(vertices: Array, faces: Ints, partner: Ints, labels: Ints) -> SharedBorders:
     """Which cells share a border, how long it is, and its middle; arguments as of `outlines`."""
     count = int(labels.max()) + 1
     other = np.where(partner >= 0, labels[partner // 3], -1)
@@ -236,9 +220,7 @@ def shared_borders(
     return SharedBorders(np.column_stack(np.divmod(keys, count)), total, nearest[first])
 
 
-def clockwise_neighbours(
-    borders: SharedBorders, centres: NDArray[np.float64], normals: NDArray[np.float64]
-) -> Neighbours:
+def clockwise_neighbours(borders: SharedBorders, centres: Array, normals: Array) -> Neighbours:
     """Each cell's neighbours, clockwise seen from its normal's tip, the lowest index first.
 
     Args:

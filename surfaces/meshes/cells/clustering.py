@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import Fault, shown
 from surfaces.adjacency import components
 from surfaces.meshes.cells.subdivision import MOST_FACES, Subdivision, subdivide
@@ -42,24 +42,24 @@ _MOST_STEP = 0.2  # between neighbours in one round
 class FaceGraph(NamedTuple):
     """Faces as nodes, joined across the edges they share. Edge k of a face is from its vertex k."""
 
-    across: NDArray[np.int64]
+    across: Ints
     """(F, 3) the face on the other side of each edge, or -1 at the border of the mesh."""
-    step: NDArray[np.float64]
+    step: Array
     """(F, 3) m, from a face's centre over the middle of the edge to the other's centre; 0 at
     the border."""
-    edge: NDArray[np.float64]
+    edge: Array
     """(F, 3) m, lengths of the edges."""
-    centre: NDArray[np.float64]
+    centre: Array
     """(F, 3) m, the mean of each face's vertices."""
-    normal: NDArray[np.float64]
+    normal: Array
     """(F, 3) unit normals; zero for a face without area."""
-    area: NDArray[np.float64]
+    area: Array
     """(F,) m^2."""
-    piece: NDArray[np.int64]
+    piece: Ints
     """(F,) which connected piece each face belongs to, counted from 0 in the order of faces."""
 
 
-def face_graph(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> FaceGraph:
+def face_graph(vertices: Array, faces: Ints) -> FaceGraph:
     """The graph of the faces of a clean mesh.
 
     Args:
@@ -93,17 +93,14 @@ class CellCut(Protected):
 
     mesh: Subdivision
     """The finer mesh, the old face of each new one, and `spread` for fields on vertices."""
-    labels: NDArray[np.int64]
+    labels: Ints
     """(G,) cell of each face of `mesh`, each of 0..count-1 at least once."""
     count: int
     """Number of cells."""
 
 
 def cells_for(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    count: int | None = None,
-    size: float | None = None,
+    vertices: Array, faces: Ints, count: int | None = None, size: float | None = None
 ) -> CellCut:
     """Cut a mesh into cells, after splitting its coarse triangles.
 
@@ -130,9 +127,7 @@ def cells_for(
     return CellCut(mesh, cluster_faces(mesh.vertices, mesh.faces, number), number)
 
 
-def cluster_faces(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], count: int
-) -> NDArray[np.int64]:
+def cluster_faces(vertices: Array, faces: Ints, count: int) -> Ints:
     """Labels (F,) of `count` connected cells of even area; separate pieces share by area.
 
     The faces should be much smaller than the cells; `cells_for` sees to it.
@@ -171,9 +166,7 @@ def cluster_faces(
     return labels
 
 
-def _lloyd(
-    graph: FaceGraph, target: NDArray[np.float64], seeds: NDArray[np.int64]
-) -> NDArray[np.int64]:
+def _lloyd(graph: FaceGraph, target: Array, seeds: Ints) -> Ints:
     """The most even labels of some rounds, all lengths in cells; `seeds` (N,) is changed."""
     across, centre, area = graph.across, graph.centre, graph.area
     labels = np.empty(len(area), dtype=np.int64)
@@ -200,12 +193,7 @@ def _lloyd(
     return best
 
 
-def _head_starts(
-    across: NDArray[np.int64],
-    edge: NDArray[np.float64],
-    labels: NDArray[np.int64],
-    missing: NDArray[np.float64],
-) -> NDArray[np.float64]:
+def _head_starts(across: Ints, edge: Array, labels: Ints, missing: Array) -> Array:
     """(N,) head starts that would give each cell the area it misses: one step of Newton's method.
 
     A border of length s moves by half the difference of its two head starts h, so a cell gains
@@ -224,7 +212,7 @@ def _head_starts(
     return change * min(_GAIN, _MOST_STEP / max(steepest, _MOST_STEP))
 
 
-def _shares(graph: FaceGraph, count: int) -> NDArray[np.int64]:
+def _shares(graph: FaceGraph, count: int) -> Ints:
     """(P,) cells of each piece: by area, at least one each and at most one for each face.
 
     Raises:

@@ -10,16 +10,13 @@ fit cuts off its turns then still lies on the surface.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
+from coverable_arrays import Array, Ints
 from surfaces.cells import Cells
 from surfaces.curve_fitting import PIECES, CurveFit, fit_between_centres
 from surfaces.meshes.mesh_surface import MeshSurface
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 RINGS = (9.0, 4.0, 2.0)  # [1] times as long: faces that touch the border, and those next to them
 SAMPLES = 8  # for each cubic

@@ -7,8 +7,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Triangles, Unrolled
@@ -19,8 +20,6 @@ from surfaces.surface import SurfaceError, max_principal_curvature, points_of
 if TYPE_CHECKING:
     from surfaces.meshes.cells.properties import Figures
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 JUMP = 3.0  # times the step along the straight line: there closest points jump
 
@@ -140,7 +139,7 @@ class MeshCells(Cells):
         return sharpest
 
     @property
-    def creased(self) -> NDArray[np.bool_]:
+    def creased(self) -> Mask:
         """See `Cells.creased`."""
         creased = np.zeros(len(self), dtype=bool)
         creased[self.labels[self.surface.on_crease.any(axis=1)]] = True

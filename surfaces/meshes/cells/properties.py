@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.cells.borders import (
     Outlines,
@@ -28,23 +28,23 @@ MOST_TURN_DEG = 30.0
 class Figures(Protected):
     """The figures of N cells of a mesh."""
 
-    centres: NDArray[np.float64]
+    centres: Array
     """(N, 3) m, on the faces."""
-    normals: NDArray[np.float64]
+    normals: Array
     """(N, 3) unit normals at the centres, interpolated between the vertices."""
-    areas: NDArray[np.float64]
+    areas: Array
     """(N,) m^2."""
-    faces: NDArray[np.int64]
+    faces: Ints
     """(N,) the face each centre lies on."""
-    weights: NDArray[np.float64]
+    weights: Array
     """(N, 3) the centres' barycentric coordinates there."""
-    mean_normals: NDArray[np.float64]
+    mean_normals: Array
     """(N, 3) unit, area-weighted; the centre's normal where the mean is zero (a closed cell)."""
-    flatness: NDArray[np.float64]
+    flatness: Array
     """(N,) rad, the largest angle between a face's normal and the mean normal."""
-    crease: NDArray[np.float64]
+    crease: Array
     """(N,) rad, the largest angle between two faces of the cell that share an edge."""
-    sagitta: NDArray[np.float64]
+    sagitta: Array
     """(N,) m, the largest distance of a vertex from the plane through the centre, across the
     mean normal."""
     borders: SharedBorders
@@ -55,12 +55,7 @@ class Figures(Protected):
     """The cells' border lines."""
 
 
-def figures(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    vertex_normals: NDArray[np.float64],
-    labels: NDArray[np.int64],
-) -> Figures:
+def figures(vertices: Array, faces: Ints, vertex_normals: Array, labels: Ints) -> Figures:
     """The figures of cells.
 
     Args:
@@ -146,7 +141,7 @@ def coarse(figures: Figures) -> str:
     return "; ".join(parts)
 
 
-def _share(which: NDArray[np.bool_]) -> str:
+def _share(which: Mask) -> str:
     """'12 of 200 cells (6 %) are'."""
     number = int(which.sum())
     percent = 100.0 * number / len(which)
@@ -160,11 +155,7 @@ def _round_up(number: float) -> int:
     return int(math.ceil(number / step) * step)
 
 
-def _unit(
-    vectors: NDArray[np.float64],
-    instead: NDArray[np.float64] | None = None,
-    least: NDArray[np.float64] | float = 0.0,
-) -> NDArray[np.float64]:
+def _unit(vectors: Array, instead: Array | None = None, least: Array | float = 0.0) -> Array:
     """Rows of length 1; those no longer than `least` are taken from `instead`, or zero."""
     length = np.linalg.norm(vectors, axis=1)
     short = (length <= least)[:, None]
@@ -172,6 +163,6 @@ def _unit(
     return np.where(short, 0.0 if instead is None else instead, unit)
 
 
-def _angle(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+def _angle(a: Array, b: Array) -> Array:
     """(K,) rad between unit vectors, exact for small angles too (Kahan)."""
     return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))

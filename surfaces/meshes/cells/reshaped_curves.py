@@ -17,16 +17,14 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.cell_curves import PLACES, slopes_of
 from surfaces.cells import Cells
 from surfaces.curve_fitting import BLOCK, PIECES, CurveFit, fit_between_centres, fit_cubics
 from surfaces.meshes.mesh_surface import MeshSurface
 from surfaces.meshes.normals import sharp_edges
 
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Shares = Callable[[Ints, Array], Array]
 """From pairs (m, 2) and points (m, k, 3) m to (m, k), see `MeshSurface.crease_share`."""
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_kernels import njit
 from surfaces.meshes.triangle_mesh import doubled_areas, half_edge_ends, half_edges
 from surfaces.protected import Protected
@@ -29,30 +29,30 @@ SAME = 1e-9  # relative: lengths this close are equal, so that rounding does not
 class Edges(NamedTuple):
     """The edges of a mesh, each once."""
 
-    ends: NDArray[np.int64]
+    ends: Ints
     """(E, 2) vertices, the lower index first."""
-    of_face: NDArray[np.int64]
+    of_face: Ints
     """(F, 3) the edge from vertex k to vertex k + 1 of each face."""
-    length: NDArray[np.float64]
+    length: Array
     """(E,) m."""
-    longest: NDArray[np.int64]
+    longest: Ints
     """(F,) which of a face's edges is the longest: 0, 1 or 2."""
 
 
 class Split(NamedTuple):
     """The faces after a round of splits."""
 
-    faces: NDArray[np.int64]
+    faces: Ints
     """(G, 3) vertex indices; new vertices follow the old ones."""
-    parent: NDArray[np.int64]
+    parent: Ints
     """(G,) the face each is a part of, in rising order."""
-    ends: NDArray[np.int64]
+    ends: Ints
     """(K, 2) the ends of the edge that each new vertex lies on."""
-    part: NDArray[np.float64]
+    part: Array
     """(K,) how far along it, 0 to 1 from the first end to the second."""
 
 
-def edges_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Edges:
+def edges_of(vertices: Array, faces: Ints) -> Edges:
     """The edges, and each face's longest; of equal ones that of the lowest index.
 
     Both faces of an edge then agree on the order of edges, and splits spread no further than
@@ -68,9 +68,7 @@ def edges_of(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Edges:
     return Edges(ends, of_face, length, longest)
 
 
-def halve(
-    faces: NDArray[np.int64], edges: Edges, wanted: NDArray[np.bool_], n_vertices: int
-) -> Split:
+def halve(faces: Ints, edges: Edges, wanted: Mask, n_vertices: int) -> Split:
     """Halve the wanted faces at their longest edges, and others as far as edges have to agree.
 
     With m the middle of a face's longest edge a-b, the halves are c-a-m and c-m-b. Either is
@@ -88,7 +86,7 @@ def halve(
     m, n, p = middle[np.take_along_axis(edges.of_face, turn, axis=1)].T
     table = np.full((len(faces), 4, 3), -1, dtype=np.int64)
 
-    def put(slot: int, rows: NDArray[np.bool_], *corners: NDArray[np.int64]) -> None:
+    def put(slot: int, rows: Mask, *corners: Ints) -> None:
         table[rows, slot] = np.stack(corners, axis=1)[rows]
 
     halved = m >= 0
@@ -105,12 +103,7 @@ def halve(
     return Split(parts[kept], parent, edges.ends[split], np.full(split.sum(), 0.5))
 
 
-def cut_across(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int64],
-    edges: Edges,
-    count: NDArray[np.int64],
-) -> Split:
+def cut_across(vertices: Array, faces: Ints, edges: Edges, count: Ints) -> Split:
     """Cut edges into `count` (E,) equal parts each, and join the points like a ladder's rungs.
 
     Every face needs an edge that stays whole: the ladder's base. The rungs lead from there to the
@@ -187,20 +180,20 @@ def _ladders(points, faces, of_face, longest, first, count, out):  # type: ignor
 class Subdivision(Protected):
     """A finer mesh of the same surface, and where each part of it comes from."""
 
-    vertices: NDArray[np.float64]
+    vertices: Array
     """(W, 3) m; the first V are the old ones."""
-    faces: NDArray[np.int64]
+    faces: Ints
     """(G, 3) vertex indices, turning as before."""
-    original: NDArray[np.int64]
+    original: Ints
     """(G,) the old face each one is a part of, in rising order."""
-    ends: NDArray[np.int64]
+    ends: Ints
     """(W - V, 2) the two vertices each new vertex lies between."""
-    part: NDArray[np.float64]
+    part: Array
     """(W - V,) how far it lies from the first to the second, 0 to 1."""
     stages: tuple[int, ...]
     """Number of vertices before each round and after the last; new ones use earlier rounds'."""
 
-    def spread(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def spread(self, values: Array) -> Array:
         """Values at the old vertices (V, ...) carried to all of them (W, ...).
 
         They are linear over each old face, so a field of normals keeps its shape. (The mean of the
@@ -217,9 +210,7 @@ class Subdivision(Protected):
         return out
 
 
-def subdivide(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], most_area: float
-) -> Subdivision:
+def subdivide(vertices: Array, faces: Ints, most_area: float) -> Subdivision:
     """Split faces until each is at most `most_area`, and no edge is longer than sqrt(8 most_area).
 
     The result is conforming: no vertex lies inside another face's edge. It depends on nothing but
@@ -261,14 +252,12 @@ def subdivide(
     return Subdivision(vertices, faces, original, ends, part, tuple(stages))
 
 
-def _area(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _area(vertices: Array, faces: Ints) -> Array:
     """(F,) m^2."""
     return np.linalg.norm(doubled_areas(vertices, faces), axis=1) / 2.0
 
 
-def _next_split(
-    vertices: NDArray[np.float64], faces: NDArray[np.int64], most_area: float
-) -> Split | None:
+def _next_split(vertices: Array, faces: Ints, most_area: float) -> Split | None:
     """One round of splits, or None where nothing is too large.
 
     First faces are halved until each has a short edge, then long ones are cut across from there,
@@ -277,14 +266,14 @@ def _next_split(
     edges = edges_of(vertices, faces)
     most = most_area * (1.0 + SAME)
     count = np.ceil(edges.length / math.sqrt(LONGEST * most)).astype(np.int64).clip(1)
-    wide: NDArray[np.bool_] = np.all(count[edges.of_face] > 1, axis=1)
+    wide: Mask = np.all(count[edges.of_face] > 1, axis=1)
     if wide.any():
         return halve(faces, edges, wide, len(vertices))
     if (count > 1).any():
         if count[edges.of_face].sum() - 2 * len(faces) > MOST_FACES:
             raise _too_many()
         return cut_across(vertices, faces, edges, count)
-    large: NDArray[np.bool_] = _area(vertices, faces) > most
+    large: Mask = _area(vertices, faces) > most
     return halve(faces, edges, large, len(vertices)) if large.any() else None
 
 

@@ -11,8 +11,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_kernels import njit
 
 kernel = njit(cache=True, error_model="numpy")
@@ -39,7 +39,7 @@ def units(distance):  # type: ignore[no-untyped-def]
     return np.int64(math.floor(distance * _FINE + 0.347))
 
 
-def whole_steps(step: NDArray[np.float64]) -> NDArray[np.int64]:
+def whole_steps(step: Array) -> Ints:
     """Lengths (in cells) as whole numbers > 0, as `far_seeds` takes them."""
     return np.maximum(np.floor(step * _FINE + 0.347).astype(np.int64), 1)
 
@@ -97,27 +97,21 @@ def _settle(across, step, distance, heap, size):  # type: ignore[no-untyped-def]
 class _Seeding(NamedTuple):
     """Seeds that are being chosen."""
 
-    distance: NDArray[np.int64]
+    distance: Ints
     """(F,) of each face from the seeds so far."""
-    heap: NDArray[np.int64]
+    heap: Ints
     """Room for `_settle`."""
-    queue: NDArray[np.int64]
+    queue: Ints
     """(F,) the faces, the farthest first; entries may be out of date."""
-    missing: NDArray[np.int64]
+    missing: Ints
     """(P,) seeds that each piece still needs."""
-    end: NDArray[np.int64]
+    end: Ints
     """(P,) where the seeds of each piece end."""
-    seeds: NDArray[np.int64]
+    seeds: Ints
     """(N,) written."""
 
 
-def far_seeds(
-    across: NDArray[np.int64],
-    step: NDArray[np.int64],
-    piece: NDArray[np.int64],
-    quota: NDArray[np.int64],
-    border: int,
-) -> NDArray[np.int64]:
+def far_seeds(across: Ints, step: Ints, piece: Ints, quota: Ints, border: int) -> Ints:
     """Seeds as far from each other as one after the other can be chosen.
 
     Args:

@@ -5,19 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints, Mask
 from surfaces.meshes.repair.degenerate import flipped, thin, weld_distance, welded
 from surfaces.meshes.repair.mesh_notes import counted
 from surfaces.meshes.repair.orientation import one_fan_each, oriented, place
-from surfaces.meshes.triangle_mesh import (
-    Floats,
-    Ints,
-    TriangleMesh,
-    doubled_areas,
-    half_edge_ends,
-    half_edges,
-)
+from surfaces.meshes.triangle_mesh import TriangleMesh, doubled_areas, half_edge_ends, half_edges
 from surfaces.surface import SurfaceError
 
 FARTHEST = 1e6  # mesh diagonals from the origin; beyond it, coordinates have no digits to spare
@@ -78,7 +72,7 @@ def clean(vertices: ArrayLike, faces: ArrayLike, history: Sequence[str] = ()) ->
     return TriangleMesh(points, corners, tuple(notes))
 
 
-def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
+def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Array, Ints]:
     """The arrays, if they are a mesh at all; every fault is named."""
     try:
         points, numbers = np.array(vertices, dtype=float), np.array(faces)
@@ -116,7 +110,7 @@ def _checked(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
     return points, corners
 
 
-def _refuse_lost_digits(points: Floats) -> None:
+def _refuse_lost_digits(points: Array) -> None:
     """A mesh that is huge, a point, or far away has no digits for areas and normals."""
     farthest = float(np.abs(points).max())
     if farthest > 1e9:
@@ -136,7 +130,7 @@ def _refuse_lost_digits(points: Floats) -> None:
         )
 
 
-def _compact(points: Floats, corners: Ints, notes: list[str]) -> tuple[Floats, Ints]:
+def _compact(points: Array, corners: Ints, notes: list[str]) -> tuple[Array, Ints]:
     """Leave out vertices that no face uses; the others keep their order."""
     used = np.zeros(len(points), bool)
     used[corners] = True
@@ -149,7 +143,7 @@ def _compact(points: Floats, corners: Ints, notes: list[str]) -> tuple[Floats, I
     return points[used], (np.cumsum(used) - 1)[corners]
 
 
-def _weld(points: Floats, corners: Ints, distance: float, notes: list[str]) -> Ints:
+def _weld(points: Array, corners: Ints, distance: float, notes: list[str]) -> Ints:
     """Join vertices that are one point, and drop the faces that this leaves without corners."""
     representative = welded(points, distance)
     moved = (points[representative] != points).any(axis=1)
@@ -169,7 +163,7 @@ def _weld(points: Floats, corners: Ints, distance: float, notes: list[str]) -> I
     return _kept(corners, ~collapsed, notes)
 
 
-def _drop_repeated(points: Floats, corners: Ints, notes: list[str]) -> Ints:
+def _drop_repeated(points: Array, corners: Ints, notes: list[str]) -> Ints:
     """Of faces with the same three corners, whatever their orientation, the first stays."""
     ordered = np.sort(corners, axis=1)
     ranks = np.lexsort(ordered.T[::-1])
@@ -184,7 +178,7 @@ def _drop_repeated(points: Floats, corners: Ints, notes: list[str]) -> Ints:
 
 
 def _drop_thin_at_non_manifold(
-    points: Floats, corners: Ints, distance: float, notes: list[str]
+    points: Array, corners: Ints, distance: float, notes: list[str]
 ) -> Ints:
     """Drop faces without area from non-manifold edges, those with more than two faces."""
     halves = half_edges(corners)
@@ -199,7 +193,7 @@ def _drop_thin_at_non_manifold(
     return _kept(corners, ~bad, notes)
 
 
-def _refuse_non_manifold(points: Floats, corners: Ints) -> None:
+def _refuse_non_manifold(points: Array, corners: Ints) -> None:
     """More than two faces on an edge leave open on which side of which face the tool works."""
     halves = half_edges(corners)
     bad = halves.counts > 2
@@ -213,7 +207,7 @@ def _refuse_non_manifold(points: Floats, corners: Ints) -> None:
         )
 
 
-def _kept(corners: Ints, kept: NDArray[np.bool_], notes: list[str]) -> Ints:
+def _kept(corners: Ints, kept: Mask, notes: list[str]) -> Ints:
     """The faces that are kept; refuses to keep none."""
     if not kept.any():
         raise SurfaceError(

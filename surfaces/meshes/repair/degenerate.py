@@ -11,22 +11,15 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
-from surfaces.meshes.triangle_mesh import (
-    Floats,
-    Ints,
-    components,
-    doubled_areas,
-    half_edge_ends,
-    half_edges,
-)
+from coverable_arrays import Array, Ints, Mask
+from surfaces.meshes.triangle_mesh import components, doubled_areas, half_edge_ends, half_edges
 
 WELD = 1e-6  # of the mesh's diagonal: no vertex moves further; thinner faces have no area
 PATIENCE = 10  # rounds in which no cap goes
 
 
-def weld_distance(vertices: Floats) -> float:
+def weld_distance(vertices: Array) -> float:
     """m: how far welding may move a vertex; 1 micrometre for a part of 1 m.
 
     The single-precision numbers of most files are 16 times finer, so that the same corner written
@@ -35,7 +28,7 @@ def weld_distance(vertices: Floats) -> float:
     return WELD * float(np.linalg.norm(np.ptp(vertices, axis=0)))
 
 
-def welded(vertices: Floats, distance: float) -> Ints:
+def welded(vertices: Array, distance: float) -> Ints:
     """The representative of each vertex.
 
     Vertices that share a box of a grid are replaced by the first of them; then such a first one by
@@ -82,14 +75,14 @@ def welded(vertices: Floats, distance: float) -> Ints:
     return representative[box.reshape(-1)].astype(np.int64)
 
 
-def thin(vertices: Floats, faces: Ints, height: float) -> NDArray[np.bool_]:
+def thin(vertices: Array, faces: Ints, height: float) -> Mask:
     """(F,) faces whose least height is below `height` (m)."""
     corners = vertices[faces]
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
     return np.linalg.norm(doubled_areas(vertices, faces), axis=1) <= height * longest
 
 
-def flipped(vertices: Floats, faces: Ints, height: float) -> tuple[Ints, int, int]:
+def flipped(vertices: Array, faces: Ints, height: float) -> tuple[Ints, int, int]:
     """Flip the long edges of caps until none is left, and drop those that cannot be flipped.
 
     A cap on the border, or whose flip would run along an edge that is there already, cannot.
@@ -126,7 +119,7 @@ def flipped(vertices: Floats, faces: Ints, height: float) -> tuple[Ints, int, in
     return faces, count, before - len(faces)
 
 
-def _flip_some(vertices: Floats, faces: Ints, is_cap: NDArray[np.bool_]) -> tuple[Ints, int]:
+def _flip_some(vertices: Array, faces: Ints, is_cap: Mask) -> tuple[Ints, int]:
     """Flip as many caps at once as do not touch each other's faces."""
     caps = np.flatnonzero(is_cap)
     corners = vertices[faces[caps]]

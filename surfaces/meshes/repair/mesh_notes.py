@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.adjacency import components
 
 if TYPE_CHECKING:
@@ -14,9 +14,6 @@ if TYPE_CHECKING:
 
 LISTED = 5  # pieces that a note names
 OUTWARD = 0.5  # [1] from which on a border line is a hole, see `_outward`
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 def notes_of(mesh: TriangleMesh) -> tuple[str, ...]:
@@ -56,7 +53,7 @@ def _about_borders(mesh: TriangleMesh) -> list[str]:
     _, ends = np.unique(edges.border_vertices, return_inverse=True)
     ends = ends.reshape(-1, 2)
     loops = components(ends, int(ends.max()) + 1)[ends[:, 0]]
-    lengths: Floats = np.bincount(loops, edges.border_lengths).astype(float)
+    lengths: Array = np.bincount(loops, edges.border_lengths).astype(float)
     piece = np.zeros(len(lengths), np.int64)
     piece[loops] = mesh.pieces[edges.border_faces]
     longest = np.zeros(len(lengths), dtype=bool)
@@ -79,7 +76,7 @@ def _about_borders(mesh: TriangleMesh) -> list[str]:
     return notes
 
 
-def _outward(mesh: TriangleMesh, loops: Ints, lengths: Floats) -> Floats:
+def _outward(mesh: TriangleMesh, loops: Ints, lengths: Array) -> Array:
     """How far the surface goes on away from the middle of each border line, -1 .. 1.
 
     1 round a hole in a plate, 0 at the end of a pipe, -1 at the outer border of a plate.

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from coverable_arrays import Array, Ints
 from surfaces.meshes.triangle_mesh import (
-    Floats,
-    Ints,
     components,
     doubled_areas,
     half_edge_ends,
@@ -16,7 +15,7 @@ from surfaces.meshes.triangle_mesh import (
 from surfaces.surface import SurfaceError
 
 
-def oriented(vertices: Floats, faces: Ints) -> tuple[Ints, int]:
+def oriented(vertices: Array, faces: Ints) -> tuple[Ints, int]:
     """Turn faces over until neighbours agree about the outer side.
 
     Every face is two nodes of a graph, unchanged and turned over; neighbours join the nodes that
@@ -66,7 +65,7 @@ def oriented(vertices: Floats, faces: Ints) -> tuple[Ints, int]:
     return faces, int(turned.sum())
 
 
-def one_fan_each(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, int]:
+def one_fan_each(vertices: Array, faces: Ints) -> tuple[Array, Ints, int]:
     """Give each fan of faces a vertex of its own where several fans touch in one.
 
     Returns:
@@ -95,6 +94,6 @@ def one_fan_each(vertices: Floats, faces: Ints) -> tuple[Floats, Ints, int]:
     return vertices, vertex_of_fan[fans].reshape(-1, 3), len(extra)
 
 
-def place(point: Floats) -> str:
+def place(point: Array) -> str:
     """A point for a message, in metres."""
     return "({:.4g}, {:.4g}, {:.4g}) m".format(*point)

@@ -7,9 +7,8 @@ from functools import cache
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from coverable_arrays import Array
 
 
 def span_matrix(knots: Array, degree: int, low: float, high: float) -> tuple[int, Array]:

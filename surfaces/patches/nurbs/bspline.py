@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from coverable_errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks, table
 from surfaces.patches.affine_models import SpaceModel
@@ -25,8 +26,6 @@ from surfaces.patches.nurbs.spline_parts import spline_models
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch
 from surfaces.patches.quadrature import rectangle_areas
 from surfaces.surface import Side, SurfaceError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, slots=True, repr=False)
@@ -141,12 +140,7 @@ def bspline(
 
 
 def _spline_map(
-    points: Any,
-    degree: Any,
-    knots: Any,
-    weights: Any,
-    ranges: tuple[Any, Any],
-    faults: list[Fault],
+    points: Any, degree: Any, knots: Any, weights: Any, ranges: tuple[Any, Any], faults: list[Fault]
 ) -> SplineMap | None:
     """The spline, or None after a fault."""
     net = checked_points(points, faults)

@@ -7,8 +7,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
 from surfaces.patches.nurbs.spline_parts import SpanNets, span_nets
 from surfaces.protected import Protected
@@ -16,7 +16,6 @@ from surfaces.protected import Protected
 if TYPE_CHECKING:
     from scipy.interpolate import NdBSpline
 
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 _FEWEST_SAMPLES = 48  # along each parameter, for starts of the search for closest points

@@ -6,13 +6,11 @@ import operator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import Fault, shown
 from surfaces.arguments import LARGEST_RATIO, metres, table
 from surfaces.patches.nurbs.nurbs import SplineMap
-
-Array = NDArray[np.float64]
 
 MOST_POINTS = 40_000  # control points
 MOST_DEGREE = 9

@@ -5,12 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from surfaces.patches.nurbs.bernstein import abscissae
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 
 class Pieces(NamedTuple):

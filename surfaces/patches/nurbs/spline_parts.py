@@ -19,8 +19,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from surfaces.patches.affine_models import SpaceModel, unit_model
 from surfaces.patches.nurbs.bernstein import (
     abscissae,
@@ -33,8 +33,6 @@ from surfaces.patches.nurbs.bernstein import (
     span_matrix,
 )
 from surfaces.patches.nurbs.span_pieces import Pieces, pieces_of
-
-Array = NDArray[np.float64]
 
 _QUARTERED = 128  # coefficients of N, with more a box is not cut at its middle
 _BLOCK = 300_000  # numbers held at a time, about
