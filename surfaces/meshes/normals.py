@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import components
-from surfaces.meshes.triangle_mesh import TriangleMesh, corner_angles, sum_by
+from surfaces.meshes.triangle_mesh import TriangleMesh, sum_by
 
 CREASE = np.radians(30.0)  # rad between the normals of two faces; usual for smooth shading
 WIDTH = 0.1  # [1] of a face, from a crease inwards, over which its normal turns
@@ -27,9 +27,12 @@ def corner_normals(mesh: TriangleMesh) -> Array:
     """(F, 3, 3) unit normal at each corner of each face.
 
     The mean of the normals of the faces at the vertex, weighted by their angles there; at a vertex
-    of a crease, of those only that turn less than `CREASE` from the face's own.
+    of a crease, of those only that turn less than `CREASE` from the face's own. Angles and not
+    areas, so that the normal belongs to the surface and not to how it is cut into triangles:
+    splitting a face through its corner changes nothing.
     """
-    normals = mesh.vertex_normals[mesh.faces]
+    alike = np.repeat(mesh.face_normals[:, None], 3, axis=1)
+    normals = blended(mesh.vertices, mesh.faces, alike, mesh.faces)
     sharp = sharp_edges(mesh)
     if not sharp.any():
         return normals
@@ -115,6 +118,15 @@ def sectors(mesh: TriangleMesh) -> Ints:
     ]
     pairs = np.column_stack([np.concatenate(joined[::2]), np.concatenate(joined[1::2])])
     return components(pairs, mesh.faces.size).reshape(-1, 3)
+
+
+def corner_angles(vertices: Array, faces: Ints) -> Array:
+    """(F, 3) rad, of each face at its corners."""
+    corners = vertices[faces]
+    ahead = np.roll(corners, -1, axis=1) - corners
+    behind = np.roll(corners, 1, axis=1) - corners
+    cross = np.linalg.norm(np.cross(ahead, behind), axis=2)
+    return np.arctan2(cross, np.einsum("fki,fki->fk", ahead, behind))
 
 
 def crease_share(on_crease: Mask, weights: Array) -> Array:

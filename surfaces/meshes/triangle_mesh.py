@@ -53,12 +53,6 @@ class TriangleMesh(Protected):
     """(F, 3) outward unit normals."""
     face_areas: Array = field(init=False, repr=False)
     """(F,) m^2."""
-    vertex_normals: Array = field(init=False, repr=False)
-    """(V, 3) unit: the mean of the faces' normals, each weighted by its angle at the vertex.
-
-    Angles and not areas, so that the normal belongs to the surface and not to how it is cut into
-    triangles: splitting a face through its corner changes nothing.
-    """
     edges: Edges = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -76,7 +70,6 @@ class TriangleMesh(Protected):
             "faces": faces,
             "face_normals": normals,
             "face_areas": 0.5 * lengths,
-            "vertex_normals": _vertex_normals(vertices, faces, normals),
             "edges": _edges(vertices, faces),
         }
         for name, value in derived.items():
@@ -111,6 +104,11 @@ def doubled_areas(vertices: Array, faces: Ints) -> Array:
     """(F, 3) m^2: the normals of the faces, as long as twice their areas."""
     corners = vertices[faces]
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def areas_of(vertices: Array, faces: Ints) -> Array:
+    """(F,) m^2."""
+    return np.linalg.norm(doubled_areas(vertices, faces), axis=1) / 2.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -218,27 +216,3 @@ def sum_by(labels: Ints, values: Array, count: int) -> Array:
     if values.ndim == 1:
         return np.bincount(labels, weights=values, minlength=count).astype(float)
     return np.column_stack([sum_by(labels, column, count) for column in values.T])
-
-
-def corner_angles(vertices: Array, faces: Ints) -> Array:
-    """(F, 3) rad, of each face at its corners."""
-    corners = vertices[faces]
-    ahead = np.roll(corners, -1, axis=1) - corners
-    behind = np.roll(corners, 1, axis=1) - corners
-    cross = np.linalg.norm(np.cross(ahead, behind), axis=2)
-    return np.arctan2(cross, np.einsum("fki,fki->fk", ahead, behind))
-
-
-def _vertex_normals(vertices: Array, faces: Ints, normals: Array) -> Array:
-    """Unit normals at the vertices, each face weighted by its angle there."""
-    weighted = corner_angles(vertices, faces)[..., None] * normals[:, None]
-    sums = sum_by(faces.ravel(), weighted.reshape(-1, 3), len(vertices))
-    lengths = np.linalg.norm(sums, axis=1)
-    # Normals of faces folded flat onto each other cancel; then one of them is taken.
-    folded = lengths < 1e-9
-    if folded.any():
-        some_face = np.zeros(len(vertices), np.int64)
-        some_face[faces.ravel()] = np.repeat(np.arange(len(faces)), 3)
-        sums[folded] = normals[some_face[folded]]
-        lengths[folded] = 1.0
-    return sums / lengths[:, None]

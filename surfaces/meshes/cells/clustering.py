@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 import operator
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,10 +17,9 @@ import numpy as np
 from coverable_arrays import Array, Ints
 from coverable_errors import Fault, shown
 from surfaces.adjacency import components
-from surfaces.meshes.cells.subdivision import MOST_FACES, Subdivision, subdivide
+from surfaces.meshes.cells.subdivision import Subdivision, subdivide
 from surfaces.meshes.cells.voronoi import far_seeds, flood, recentre, smooth, units, whole_steps
-from surfaces.meshes.triangle_mesh import doubled_areas, edge_partners, sum_by
-from surfaces.protected import Protected
+from surfaces.meshes.triangle_mesh import areas_of, doubled_areas, edge_partners, sum_by
 from surfaces.surface import SurfaceError
 
 FACES_PER_CELL = 80
@@ -87,16 +85,13 @@ def face_graph(vertices: Array, faces: Ints) -> FaceGraph:
     return FaceGraph(across, step, edge, centre, normal, length / 2.0, piece)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class CellCut(Protected):
+class CellCut(NamedTuple):
     """A mesh fine enough for its cells, and the cell of each face."""
 
     mesh: Subdivision
-    """The finer mesh, the old face of each new one, and `spread` for fields on vertices."""
+    """The finer mesh, and the old face of each new one."""
     labels: Ints
-    """(G,) cell of each face of `mesh`, each of 0..count-1 at least once."""
-    count: int
-    """Number of cells."""
+    """(G,) cell of each face of `mesh`, each number from 0 on at least once."""
 
 
 def cells_for(
@@ -117,14 +112,13 @@ def cells_for(
     Example:
         >>> square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0.0]])
         >>> cut = cells_for(square, np.array([[0, 1, 2], [0, 2, 3]]), size=0.25)
-        >>> cut.count, len(cut.labels)
+        >>> len(np.unique(cut.labels)), len(cut.labels)
         (16, 2048)
     """
-    double = doubled_areas(np.asarray(vertices, dtype=float), np.asarray(faces, dtype=np.int64))
-    total = float(np.linalg.norm(double, axis=1).sum() / 2.0)
+    total = float(areas_of(vertices, faces).sum())
     number = _number_of_cells(total, count, size)
     mesh = subdivide(vertices, faces, total / number / FACES_PER_CELL)
-    return CellCut(mesh, cluster_faces(mesh.vertices, mesh.faces, number), number)
+    return CellCut(mesh, cluster_faces(mesh.vertices, mesh.faces, number))
 
 
 def cluster_faces(vertices: Array, faces: Ints, count: int) -> Ints:
@@ -135,21 +129,12 @@ def cluster_faces(vertices: Array, faces: Ints, count: int) -> Ints:
     Args:
         vertices: (V, 3) m.
         faces: (F, 3) vertex indices of a clean mesh.
-        count: number of cells, at least one for each separate piece and at most one for each face.
+        count: number of cells, at most one for each face.
 
     Raises:
-        SurfaceError: `count` is no such number, or there are more than 4,000,000 faces.
+        SurfaceError: there are more separate pieces than cells.
     """
-    faces = np.asarray(faces, dtype=np.int64)
-    count = _whole(count)
-    if len(faces) > MOST_FACES:
-        raise SurfaceError(f"{len(faces):,} faces are too many; thin the mesh to {MOST_FACES:,}")
-    if not 1 <= count <= len(faces):
-        raise SurfaceError(
-            f"{count} cells cannot be made of {len(faces)} faces; each needs one at least. "
-            "Subdivide the mesh, or ask for fewer cells"
-        )
-    graph = face_graph(np.asarray(vertices, dtype=float), faces)
+    graph = face_graph(vertices, faces)
     quota = _shares(graph, count)
     # From here on, lengths are in cells: the side of a square of a cell's mean area is 1.
     unit = math.sqrt(graph.area.sum() / count)

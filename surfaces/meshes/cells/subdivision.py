@@ -8,15 +8,13 @@ edges, and the surface stays exactly what it was.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 from coverable_kernels import njit
-from surfaces.meshes.triangle_mesh import doubled_areas, half_edge_ends, half_edges
-from surfaces.protected import Protected
+from surfaces.meshes.triangle_mesh import areas_of, half_edge_ends, half_edges
 from surfaces.surface import SurfaceError
 
 kernel = njit(cache=True, error_model="numpy")
@@ -39,17 +37,15 @@ class Edges(NamedTuple):
     """(F,) which of a face's edges is the longest: 0, 1 or 2."""
 
 
-class Split(NamedTuple):
-    """The faces after a round of splits."""
+class Subdivision(NamedTuple):
+    """A finer mesh of the same surface, and where each part of it comes from."""
 
+    vertices: Array
+    """(W, 3) m; the first V are the old ones."""
     faces: Ints
-    """(G, 3) vertex indices; new vertices follow the old ones."""
-    parent: Ints
-    """(G,) the face each is a part of, in rising order."""
-    ends: Ints
-    """(K, 2) the ends of the edge that each new vertex lies on."""
-    part: Array
-    """(K,) how far along it, 0 to 1 from the first end to the second."""
+    """(G, 3) vertex indices, turning as before."""
+    original: Ints
+    """(G,) the old face each one is a part of, in rising order."""
 
 
 def edges_of(vertices: Array, faces: Ints) -> Edges:
@@ -68,7 +64,7 @@ def edges_of(vertices: Array, faces: Ints) -> Edges:
     return Edges(ends, of_face, length, longest)
 
 
-def halve(faces: Ints, edges: Edges, wanted: Mask, n_vertices: int) -> Split:
+def halve(vertices: Array, faces: Ints, edges: Edges, wanted: Mask) -> Subdivision:
     """Halve the wanted faces at their longest edges, and others as far as edges have to agree.
 
     With m the middle of a face's longest edge a-b, the halves are c-a-m and c-m-b. Either is
@@ -80,7 +76,7 @@ def halve(faces: Ints, edges: Edges, wanted: Mask, n_vertices: int) -> Split:
         split[longest[wanted]] = True
         wanted = split[edges.of_face].any(axis=1) & ~split[longest]
     middle = np.full(len(split), -1, dtype=np.int64)
-    middle[split] = n_vertices + np.arange(np.count_nonzero(split))
+    middle[split] = len(vertices) + np.arange(np.count_nonzero(split))
     turn = (edges.longest[:, None] + np.arange(3)) % 3
     a, b, c = np.take_along_axis(faces, turn, axis=1).T
     m, n, p = middle[np.take_along_axis(edges.of_face, turn, axis=1)].T
@@ -100,10 +96,12 @@ def halve(faces: Ints, edges: Edges, wanted: Mask, n_vertices: int) -> Split:
     parts = table.reshape(-1, 3)
     kept = parts[:, 0] >= 0
     parent = np.repeat(np.arange(len(faces)), 4)[kept]
-    return Split(parts[kept], parent, edges.ends[split], np.full(split.sum(), 0.5))
+    start, end = vertices[edges.ends[split]].swapaxes(0, 1)
+    points = np.concatenate([vertices, start + 0.5 * (end - start)])
+    return Subdivision(points, parts[kept], parent)
 
 
-def cut_across(vertices: Array, faces: Ints, edges: Edges, count: Ints) -> Split:
+def cut_across(vertices: Array, faces: Ints, edges: Edges, count: Ints) -> Subdivision:
     """Cut edges into `count` (E,) equal parts each, and join the points like a ladder's rungs.
 
     Every face needs an edge that stays whole: the ladder's base. The rungs lead from there to the
@@ -113,13 +111,12 @@ def cut_across(vertices: Array, faces: Ints, edges: Edges, count: Ints) -> Split
     edge = np.repeat(np.arange(len(count)), count - 1)
     rung = np.arange(len(edge)) - (first[edge] - len(vertices)) + 1
     part = rung / count[edge]
-    ends = edges.ends[edge]
-    added = vertices[ends[:, 0]] + part[:, None] * (vertices[ends[:, 1]] - vertices[ends[:, 0]])
+    start, end = vertices[edges.ends[edge]].swapaxes(0, 1)
     parts = count[edges.of_face].sum(axis=1) - 2
     new_faces = np.empty((parts.sum(), 3), dtype=np.int64)
-    points = np.concatenate([vertices, added])
+    points = np.concatenate([vertices, start + part[:, None] * (end - start)])
     _ladders(points, faces, edges.of_face, edges.longest, first, count, new_faces)
-    return Split(new_faces, np.repeat(np.arange(len(faces)), parts), ends, part)
+    return Subdivision(points, new_faces, np.repeat(np.arange(len(faces)), parts))
 
 
 @kernel
@@ -176,40 +173,6 @@ def _ladders(points, faces, of_face, longest, first, count, out):  # type: ignor
         written += 1
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Subdivision(Protected):
-    """A finer mesh of the same surface, and where each part of it comes from."""
-
-    vertices: Array
-    """(W, 3) m; the first V are the old ones."""
-    faces: Ints
-    """(G, 3) vertex indices, turning as before."""
-    original: Ints
-    """(G,) the old face each one is a part of, in rising order."""
-    ends: Ints
-    """(W - V, 2) the two vertices each new vertex lies between."""
-    part: Array
-    """(W - V,) how far it lies from the first to the second, 0 to 1."""
-    stages: tuple[int, ...]
-    """Number of vertices before each round and after the last; new ones use earlier rounds'."""
-
-    def spread(self, values: Array) -> Array:
-        """Values at the old vertices (V, ...) carried to all of them (W, ...).
-
-        They are linear over each old face, so a field of normals keeps its shape. (The mean of the
-        normals of the new faces would not: parts of a flat face are flat.)
-        """
-        old = self.stages[0]
-        out = np.empty((len(self.vertices), *values.shape[1:]))
-        out[:old] = values
-        for begin, end in zip(self.stages[:-1], self.stages[1:], strict=True):
-            ends, part = self.ends[begin - old : end - old], self.part[begin - old : end - old]
-            first, second = out[ends[:, 0]], out[ends[:, 1]]
-            part = part.reshape(-1, *(1,) * (values.ndim - 1))
-            out[begin:end] = first + part * (second - first)
-        return out
-
-
 def subdivide(vertices: Array, faces: Ints, most_area: float) -> Subdivision:
     """Split faces until each is at most `most_area`, and no edge is longer than sqrt(8 most_area).
 
@@ -235,29 +198,17 @@ def subdivide(vertices: Array, faces: Ints, most_area: float) -> Subdivision:
         raise SurfaceError(f"most_area must be a finite number > 0 (m^2), got {most_area!r}")
     vertices = np.asarray(vertices, dtype=float)
     faces = np.asarray(faces, dtype=np.int64)
-    original = np.arange(len(faces), dtype=np.int64)
-    stages, new = [len(vertices)], list[Split]()
-    if _area(vertices, faces).sum() / most_area > MOST_FACES:
+    found = Subdivision(vertices, faces, np.arange(len(faces), dtype=np.int64))
+    if areas_of(vertices, faces).sum() / most_area > MOST_FACES:
         raise _too_many()
-    while (split := _next_split(vertices, faces, most_area)) is not None:
+    while (split := _next_split(found.vertices, found.faces, most_area)) is not None:
         if len(split.faces) > MOST_FACES:
             raise _too_many()
-        start, end = vertices[split.ends[:, 0]], vertices[split.ends[:, 1]]
-        vertices = np.concatenate([vertices, start + split.part[:, None] * (end - start)])
-        faces, original = split.faces, original[split.parent]
-        stages.append(len(vertices))
-        new.append(split)
-    ends = np.concatenate([np.empty((0, 2), dtype=np.int64), *(split.ends for split in new)])
-    part = np.concatenate([np.empty(0), *(split.part for split in new)])
-    return Subdivision(vertices, faces, original, ends, part, tuple(stages))
+        found = split._replace(original=found.original[split.original])
+    return found
 
 
-def _area(vertices: Array, faces: Ints) -> Array:
-    """(F,) m^2."""
-    return np.linalg.norm(doubled_areas(vertices, faces), axis=1) / 2.0
-
-
-def _next_split(vertices: Array, faces: Ints, most_area: float) -> Split | None:
+def _next_split(vertices: Array, faces: Ints, most_area: float) -> Subdivision | None:
     """One round of splits, or None where nothing is too large.
 
     First faces are halved until each has a short edge, then long ones are cut across from there,
@@ -268,13 +219,13 @@ def _next_split(vertices: Array, faces: Ints, most_area: float) -> Split | None:
     count = np.ceil(edges.length / math.sqrt(LONGEST * most)).astype(np.int64).clip(1)
     wide: Mask = np.all(count[edges.of_face] > 1, axis=1)
     if wide.any():
-        return halve(faces, edges, wide, len(vertices))
+        return halve(vertices, faces, edges, wide)
     if (count > 1).any():
         if count[edges.of_face].sum() - 2 * len(faces) > MOST_FACES:
             raise _too_many()
         return cut_across(vertices, faces, edges, count)
-    large: Mask = _area(vertices, faces) > most
-    return halve(faces, edges, large, len(vertices)) if large.any() else None
+    large: Mask = areas_of(vertices, faces) > most
+    return halve(vertices, faces, edges, large) if large.any() else None
 
 
 def _too_many() -> SurfaceError:

@@ -11,7 +11,7 @@ from coverable_arrays import Array, Ints, Mask
 from surfaces.meshes.repair.degenerate import flipped, thin, weld_distance, welded
 from surfaces.meshes.repair.mesh_notes import counted
 from surfaces.meshes.repair.orientation import one_fan_each, oriented, place
-from surfaces.meshes.triangle_mesh import TriangleMesh, doubled_areas, half_edge_ends, half_edges
+from surfaces.meshes.triangle_mesh import TriangleMesh, areas_of, half_edge_ends, half_edges
 from surfaces.surface import SurfaceError
 
 FARTHEST = 1e6  # mesh diagonals from the origin; beyond it, coordinates have no digits to spare
@@ -170,7 +170,7 @@ def _drop_repeated(points: Array, corners: Ints, notes: list[str]) -> Ints:
     repeated = np.zeros(len(corners), bool)
     repeated[ranks[1:]] = (ordered[ranks[1:]] == ordered[ranks[:-1]]).all(axis=1)
     if repeated.any():
-        area = 0.5 * np.linalg.norm(doubled_areas(points, corners[repeated]), axis=1).sum()
+        area = areas_of(points, corners[repeated]).sum()
         notes.append(
             f"{counted(int(repeated.sum()), 'face')} ({area:.4g} m^2) that repeated others dropped"
         )

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from surfaces.meshes.triangle_mesh import components, doubled_areas, half_edge_ends, half_edges
+from surfaces.meshes.triangle_mesh import areas_of, components, half_edge_ends, half_edges
 
 WELD = 1e-6  # of the mesh's diagonal: no vertex moves further; thinner faces have no area
 PATIENCE = 10  # rounds in which no cap goes
@@ -79,7 +79,7 @@ def thin(vertices: Array, faces: Ints, height: float) -> Mask:
     """(F,) faces whose least height is below `height` (m)."""
     corners = vertices[faces]
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    return np.linalg.norm(doubled_areas(vertices, faces), axis=1) <= height * longest
+    return 2.0 * areas_of(vertices, faces) <= height * longest
 
 
 def flipped(vertices: Array, faces: Ints, height: float) -> tuple[Ints, int, int]:

@@ -6,8 +6,8 @@ import numpy as np
 
 from coverable_arrays import Array, Ints
 from surfaces.meshes.triangle_mesh import (
+    areas_of,
     components,
-    doubled_areas,
     half_edge_ends,
     half_edges,
     piece_numbers,
@@ -44,7 +44,7 @@ def oriented(vertices: Array, faces: Ints) -> tuple[Ints, int]:
         [np.stack([a, there], 1), np.stack([a + count, (there + count) % (2 * count)], 1)]
     )
     nodes = components(pairs.reshape(-1, 2), 2 * count)
-    areas = 0.5 * np.linalg.norm(doubled_areas(vertices, faces), axis=1)
+    areas = areas_of(vertices, faces)
     one_sided = nodes[:count] == nodes[count:]
     if one_sided.any():
         pieces = piece_numbers(np.column_stack([a, b]), areas)

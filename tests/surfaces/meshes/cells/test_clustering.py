@@ -109,8 +109,8 @@ def test_pieces_share_cells_by_area():
 
 
 def test_size_is_the_side_of_a_square():
-    assert cells_for(*sheet(), size=0.05).count == round(0.6 * 0.4 / 0.05**2)
-    assert cells_for(*sheet(), size=5.0).count == 1
+    assert len(np.unique(cells_for(*sheet(), size=0.05).labels)) == round(0.6 * 0.4 / 0.05**2)
+    assert not cells_for(*sheet(), size=5.0).labels.any()
 
 
 def test_a_face_each():
@@ -138,9 +138,7 @@ def test_bad_numbers_of_cells(arguments, message):
         cells_for(*sheet(), **arguments)
 
 
-def test_too_few_faces_or_cells():
-    with pytest.raises(SurfaceError, match="13 cells cannot be made of 12 faces"):
-        cluster_faces(*box(), 13)
+def test_too_few_cells():
     with pytest.raises(SurfaceError, match="2 cells are too few for 3 separate pieces"):
         cluster_faces(*islands(), 2)
 
@@ -173,8 +171,6 @@ def check_subdivision(mesh, most_area):
     assert border_length(fine.vertices, fine.faces) == pytest.approx(
         border_length(*mesh), rel=1e-12, abs=1e-12
     )
-    # Coordinates are linear over each face, so they are carried to where the vertices are.
-    np.testing.assert_allclose(fine.spread(mesh.vertices), fine.vertices, atol=1e-14)
     assert (np.diff(fine.original) >= 0).all()
     return fine
 

@@ -32,7 +32,7 @@ class Cut:
         self.mesh = mesh
         cut = cells_for(*mesh, count=count)
         self.vertices, self.faces, self.labels = cut.mesh.vertices, cut.mesh.faces, cut.labels
-        self.normals = cut.mesh.spread(normals_of(mesh))
+        self.normals = normals_of(Mesh(self.vertices, self.faces))
         self.figures = figures(self.vertices, self.faces, self.normals, self.labels)
 
 
