@@ -164,13 +164,13 @@ class Lander:
         return Landed(code, node, gains), results[:, 1]
 
     def _bends(self, lines: Lines) -> Array:
-        """(m, 2) of the piece that ends at each place, see `PlacePaths.bends`."""
+        """(m, 2) of the piece that ends at each place, see `PlacePaths.derivative_bounds`."""
         total = len(lines.places.chart)
         bends = np.zeros((total, 2))
         begin = np.delete(np.arange(total), lines.first[1:] - 1)
         path = self.cut.offset.paths(lines.places.of(begin), lines.places.of(begin + 1))
         single = path.share[:, 2] <= LONGER
-        bends[begin + 1] = np.where(single[:, None], path.bends[:, 2], np.inf)
+        bends[begin + 1] = np.where(single[:, None], path.derivative_bounds[:, 2], np.inf)
         if self.approach is not None:
             bends[:, 1] = 0.0
         return bends

@@ -178,12 +178,12 @@ class Judge:
     def bounds(self, s: Stretches) -> Bounds:
         """See the module's text."""
         path = self.offset.paths(s.start.places, s.end.places)
-        share = path.share[..., None]
+        share, bounds = path.share[..., None], path.derivative_bounds
         width = np.diff(path.share, axis=1) ** 2
         found = []
         approaches, turned = self._held.approaches(path.normals), self._held.bends(path)
         for start, end, aims, bend, bends in (
-            (s.start.points, s.end.points, path.points, s.bends[:, :1], path.bends[..., 0]),
+            (s.start.points, s.end.points, path.points, s.bends[:, :1], bounds[..., 0]),
             (s.start.axes, s.end.axes, approaches, s.bends[:, 1:2], turned),
         ):  # fmt: skip
             line = (1.0 - share) * start[:, None] + share * end[:, None]
@@ -191,7 +191,7 @@ class Judge:
             off = np.linalg.norm(line - aims, axis=2) + sag
             peak = peaks(off[:, :-1], off[:, 1:], width * bend + bends)
             found.append(peak.max(axis=1, initial=0.0))
-        joined = np.asarray(np.isfinite(path.bends).all(axis=(1, 2)))
+        joined = np.asarray(np.isfinite(bounds).all(axis=(1, 2)))
         first, last = ToolAxes(s.start.axes, s.start.x), ToolAxes(s.end.axes, s.end.x)
         roll = self._held.rolls_between(first, last, s.bends[:, 2], path, approaches)
         return Bounds(found[0], found[1], _apart(s), joined, roll)

@@ -166,11 +166,11 @@ def _margins_of_patch(
     """Sag (m) and turn between J-cells over a closed form."""
     d, da, length, _ = bends
     bounds = surface.bounds(height, tolerance)
-    if not math.isfinite(d + bounds.curvature + bounds.bend):
+    if not math.isfinite(d + bounds.curvature + bounds.second_derivative):
         return math.inf, math.inf  # the offset surface folds, or a rail has no end
     return (
         (d + bounds.curvature * length**2) / 8.0,
-        (da + bounds.bend * length**2 + bounds.curvature * d) / 8.0,
+        (da + bounds.second_derivative * length**2 + bounds.curvature * d) / 8.0,
     )
 
 

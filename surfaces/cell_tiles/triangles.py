@@ -17,7 +17,8 @@ from functools import cached_property
 
 import numpy as np
 
-from surfaces.cell_tiles.tiles import Array, CellTiles, Ints, Lines, TileBounds, Tiles, spaced
+from coverable_arrays import Array, Ints
+from surfaces.cell_tiles.tiles import CellTiles, Lines, TileBounds, Tiles, spaced
 from surfaces.meshes import MeshSurface
 from surfaces.meshes.cells import MeshCells
 from surfaces.places import Places

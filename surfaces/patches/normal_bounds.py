@@ -37,7 +37,7 @@ class NormalBounds:
 
     curvature: float
     """1/m, at least the operator norm of Dm: the largest curvature of the parallel surfaces."""
-    bend: float
+    second_derivative: float
     """1/m^2, at least |D^2 m[x, x]| for every unit vector x."""
 
 
@@ -86,8 +86,8 @@ def normal_bounds(slices: CurvatureSlices, height: float, slack: float) -> Norma
         return NormalBounds(math.inf, math.inf)
     p = slices.meridian_slope * stretch1**3
     q = slices.parallel_slope * stretch2**2 * stretch1
-    bend = float(_cubic_maximum(p, q, np.maximum(k1, k2) ** 2).max())
-    return NormalBounds(curvature * ROUNDING, bend * ROUNDING)
+    second = float(_cubic_maximum(p, q, np.maximum(k1, k2) ** 2).max())
+    return NormalBounds(curvature * ROUNDING, second * ROUNDING)
 
 
 def _corners(low: Array, high: Array, height: float, slack: float) -> tuple[Array, Array]:

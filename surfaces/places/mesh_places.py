@@ -24,6 +24,7 @@ from surfaces.places.places import (
     PlacePaths,
     Places,
     second_derivative_of_unit,
+    share_of,
 )
 
 GRID = np.linspace(0.0, 1.0, 9)  # places on an edge that are tried, in so many rounds
@@ -64,7 +65,8 @@ class MeshPlaces(OffsetSurface):
         made = PlacePaths.straight((self.at(start), self.at(end)), none, start, end)
         same = (start.chart == end.chart) & (start.chart >= 0)
         row = np.flatnonzero(same)
-        made.bends[row, 2] = self._bends(start.chart[row], start.x[row], end.x[row])
+        bounds = self._derivative_bounds(start.chart[row], start.x[row], end.x[row])
+        made.derivative_bounds[row, 2] = bounds
         row = np.flatnonzero(~same & (start.chart >= 0) & (end.chart >= 0))
         faces = self.surface.mesh.faces
         equal = faces[start.chart[row]][:, :, None] == faces[end.chart[row]][:, None, :]
@@ -101,28 +103,17 @@ class MeshPlaces(OffsetSurface):
         t = t[:, None]
         before = Places(start.chart, ((1.0 - t) * eye[corner] + t * eye[last])[:, 1:])
         after = Places(end.chart, ((1.0 - t) * eye[mates[0]] + t * eye[mates[1]])[:, 1:])
-        placed = [self.at(places) for places in (start, before, after, end)]
-        points = np.stack([point for point, _ in placed], axis=1)
-        to = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
-        fro = np.linalg.norm(points[:, 3] - points[:, 2], axis=1)
-        share = np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
-        zero = np.zeros_like(share)
-        bends = [
-            self._bends(start.chart, start.x, before.x),
-            np.zeros((len(row), 2)),
-            self._bends(end.chart, after.x, end.x),
-        ]
-        return PlacePaths(
-            np.stack([zero, share, share, zero + 1.0], axis=1),
-            points,
-            np.stack([normal for _, normal in placed], axis=1),
-            np.stack(bends, axis=1),
-            np.stack([places.chart for places in (start, before, after, end)], axis=1),
-            np.stack([places.x for places in (start, before, after, end)], axis=1),
+        four = (start, before, after, end)
+        placed = [self.at(places) for places in four]
+        to, fro = (np.linalg.norm(placed[k + 1][0] - placed[k][0], axis=1) for k in (0, 2))
+        bounds = (
+            self._derivative_bounds(start.chart, start.x, before.x),
+            self._derivative_bounds(end.chart, after.x, end.x),
         )
+        return PlacePaths.over(four, placed, share_of(to, fro), bounds)
 
     def _shortest(self, start: Places, end: Places, corner: Ints, last: Ints, t: Array) -> Array:
-        """(k,) 0..1, where on the edge from `corner` to `last` the way from T to T is shortest.
+        """(k,) 0..1, where on the edge from `corner` to `last` the path from T to T is shortest.
 
         On a crease's strip the straight line on the mesh may be a long way round. Looked for on
         ever finer grids, the first of them over the whole edge with `t` in it.
@@ -137,19 +128,19 @@ class MeshPlaces(OffsetSurface):
             chart = np.tile(start.chart, len(tried))
             over, _ = self.at(Places(chart, x.reshape(-1, 3)[:, 1:]))
             over = over.reshape(*tried.shape, 3)
-            way = np.linalg.norm(over - a, axis=2) + np.linalg.norm(over - b, axis=2)
-            best = tried[np.argmin(way, axis=0), np.arange(len(t))]
+            length = np.linalg.norm(over - a, axis=2) + np.linalg.norm(over - b, axis=2)
+            best = tried[np.argmin(length, axis=0), np.arange(len(t))]
             width = 1.5 * GRID[1] * (high - low)
             low, high = np.maximum(best - width, 0.0), np.minimum(best + width, 1.0)
         return np.asarray(best)
 
     def _on(self, places: Places) -> Array:
-        """(k, 3) m, points of the mesh itself; there the weights are straight, and on a crease's
-        strip the offset surface is not."""
+        """(k, 3) m, points of the mesh itself, which are linear in the weights; on a crease's strip
+        those of the offset surface are not."""
         return self.surface.points_at(places.chart, _weights(places.x))
 
-    def _bends(self, face: Ints, start: Array, stop: Array) -> Array:
-        """(k, 2) see `PlacePaths.bends`, for straight lines in the weights of a face.
+    def _derivative_bounds(self, face: Ints, start: Array, stop: Array) -> Array:
+        """(k, 2) see `PlacePaths.derivative_bounds`, for straight lines in the weights of a face.
 
         On one side of the strip's border v is smooth: v'' = 2 t' g' for the sum g of
         w_c (crease_c - own_c). A line over that border has a kink there; its slope is at most
@@ -181,8 +172,8 @@ class MeshPlaces(OffsetSurface):
         kinked = np.where(positive, 4.0 * slope / np.where(positive, least, 1.0), np.inf)
         normal = np.where(beside | within, smooth, kinked)
         normal = np.where((start == stop).all(axis=1), 0.0, normal) * ROUNDING
-        bend = abs(self.height) * normal if self.height else np.zeros_like(normal)
-        return np.stack([np.where(positive, bend, np.inf), normal], axis=1)
+        point = abs(self.height) * normal if self.height else np.zeros_like(normal)
+        return np.stack([np.where(positive, point, np.inf), normal], axis=1)
 
 
 def _weights(x: Array) -> Array:

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from coverable_arrays import Array, Ints
 from surfaces.meshes import WIDTH, MeshSurface
-from surfaces.places.places import Array, Ints
 
 if TYPE_CHECKING:
     from surfaces.meshes import FaceTree

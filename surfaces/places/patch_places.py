@@ -11,12 +11,18 @@ from coverable_arrays import Array, Ints, Mask
 from surfaces.patches import Patch
 from surfaces.patches.nurbs import SplinePatch
 from surfaces.places.patch_bounds import BoxBounds, box_bounds
-from surfaces.places.places import ROUNDING, OffsetSurface, PlacePaths, Places
+from surfaces.places.places import (
+    ROUNDING,
+    OffsetSurface,
+    PlacePaths,
+    Places,
+    by_closest_points,
+    share_of,
+)
 from surfaces.places.spline_bounds import kinks
 
 TANGENT_STEP = 1e-5  # [1], share of the range of u: of differences
 SLOWER = 1.0 - 1e-6  # covers their error
-GUESSES = 6  # closest points that lead from a guess to a place
 AT = 1e-9  # [1] of a range: a path that passes a kink by less does not cross it
 AROUND = 0.5  # rad of azimuth between two places from which on a path over a pole is looked at
 
@@ -48,33 +54,14 @@ class PatchPlaces(OffsetSurface):
         return self.patch.point(x[..., 0], x[..., 1]) + self.height * normals, normals
 
     def nearest(self, points: Array, ahead: Array, within: float) -> Places:
-        """See `OffsetSurface.nearest`: under closest points, first of the given points themselves.
+        """See `OffsetSurface.nearest`."""
+        return by_closest_points(self, self.closest, points, ahead, within)
 
-        Parallel surfaces share their normals, so the closest point of the patch is under that of
-        the offset surface, unless another part of the patch is nearer.
-        """
-        x = self.closest(points)
-        away = self._away(x, points)
-        rest = np.flatnonzero(~(away <= within))
-        guess = ahead[rest].copy()
-        for _ in range(GUESSES if len(rest) else 0):
-            found = self.closest(guess)
-            offset, normal = self._at(found)
-            there = np.linalg.norm(points[rest] - offset, axis=1)
-            nearer = there < away[rest]
-            x[rest[nearer]], away[rest[nearer]] = found[nearer], there[nearer]
-            guess = points[rest] - self.height * normal
-        return Places(np.zeros(len(x), dtype=np.int64), x)
-
-    def closest(self, points: Array) -> Array:
-        """(k, 2) u and v of the patch's places closest to points (k, 3) m, or nearly so."""
+    def closest(self, points: Array) -> Places:
+        """The patch's places closest to points (k, 3) m, or nearly so."""
         found = self.patch.closest(points)
-        limits = (self.patch.u_range, self.patch.v_range)
-        both = (np.clip(x, *ends) for x, ends in zip((found.u, found.v), limits, strict=True))
-        return np.stack(list(both), axis=-1)
-
-    def _away(self, x: Array, points: Array) -> Array:
-        return np.asarray(np.linalg.norm(points - self._at(x)[0], axis=-1))
+        u, v = np.clip(found.u, *self.patch.u_range), np.clip(found.v, *self.patch.v_range)
+        return Places(np.zeros(len(u), dtype=np.int64), np.stack([u, v], axis=-1))
 
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """See `OffsetSurface.paths`."""
@@ -84,18 +71,18 @@ class PatchPlaces(OffsetSurface):
                 step[:, axis] -= period * np.round(step[:, axis] / period)
         made = PlacePaths.straight(
             (self._at(start.x), self._at(end.x)),
-            self._bends(start.x, start.x + step),
+            self._derivative_bounds(start.x, start.x + step),
             start,
             Places(end.chart, start.x + step),
         )
-        self._over_kinks(made, start.x, step, end.x)
+        self._over_kinks(made, start, step, end)
         for pole, is_one in enumerate(self.patch.poles):
             if is_one:
-                self._over_pole(made, start.x, end.x, np.abs(step[:, 1]) > AROUND, pole)
+                self._over_pole(made, start, end, np.abs(step[:, 1]) > AROUND, pole)
         return made
 
-    def _bends(self, start: Array, stop: Array) -> Array:
-        """(k, 2) see `PlacePaths.bends`, for straight lines in u and v."""
+    def _derivative_bounds(self, start: Array, stop: Array) -> Array:
+        """(k, 2) see `PlacePaths.derivative_bounds`, for straight lines in u and v."""
         low, high = np.minimum(start, stop), np.maximum(start, stop)
         du, dv = (high - low).T
         squares = np.stack([du * du, 2.0 * du * dv, dv * dv], axis=1)
@@ -108,8 +95,8 @@ class PatchPlaces(OffsetSurface):
         """See `OffsetSurface.tangents`."""
         return self.patch.tangent(places.x[:, 0], places.x[:, 1])
 
-    def turning(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.turning`: of f_u / |f_u|, at most |f_uu u' + f_uv v'| / |f_u|."""
+    def tangent_slopes(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.tangent_slopes`: at most |f_uu u' + f_uv v'| / |f_u|."""
         low, high = np.minimum(start.x, end.x), np.maximum(start.x, end.x)
         du, dv = (high - low).T
         bounds = self._bounds(self.patch, low, high)[:, :, 0]
@@ -124,83 +111,71 @@ class PatchPlaces(OffsetSurface):
         found = np.divide(change, least, out=np.full(len(u), np.inf), where=known)
         return np.where(np.isnan(found), np.inf, found * ROUNDING)
 
-    def _over_kinks(self, made: PlacePaths, start: Array, step: Array, end: Array) -> None:
+    def _over_kinks(self, made: PlacePaths, start: Places, step: Array, end: Places) -> None:
         """Cut paths in two where they cross a line on which the surface has a kink."""
-        count = np.zeros(len(start), dtype=np.int64)
-        share = np.zeros(len(start))
-        across, at = np.zeros(len(start), dtype=np.int64), np.zeros(len(start))
+        x = start.x
+        count = np.zeros(len(x), dtype=np.int64)
+        share, at, across = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x), dtype=np.int64)
         for axis, lines in enumerate(self._kinks):
             limits = (self.patch.u_range, self.patch.v_range)[axis]
             width, period = limits[1] - limits[0], self.patch.periods[axis]
             if period:
                 lines = np.unique(np.concatenate([lines - period, lines, lines + period]))
-            low = np.minimum(start[:, axis], start[:, axis] + step[:, axis]) + AT * width
-            high = np.maximum(start[:, axis], start[:, axis] + step[:, axis]) - AT * width
+            low = np.minimum(x[:, axis], x[:, axis] + step[:, axis]) + AT * width
+            high = np.maximum(x[:, axis], x[:, axis] + step[:, axis]) - AT * width
             first = np.searchsorted(lines, low, side="right")
             crossed = np.maximum(np.searchsorted(lines, high, side="left") - first, 0)
             count += crossed
             some = np.flatnonzero(crossed)
             at[some], across[some] = lines[first[some]], axis
-            share[some] = (at[some] - start[some, axis]) / step[some, axis]
-        many = count > 1
-        made.bends[many] = np.inf
+            share[some] = (at[some] - x[some, axis]) / step[some, axis]
+        made.derivative_bounds[count > 1] = np.inf
         some = np.flatnonzero(count == 1)
         if len(some):
-            made.put(some, self._in_two(start[some], step[some], end[some], share[some],
+            made.put(some, self._in_two(start.of(some), step[some], end.of(some), share[some],
                                         across[some], at[some]))  # fmt: skip
 
     def _in_two(
-        self, start: Array, step: Array, end: Array, share: Array, axis: Ints, at: Array
+        self, start: Places, step: Array, end: Places, share: Array, axis: Ints, at: Array
     ) -> PlacePaths:
         """Paths of two pieces, from `start` along `step` to where u or v is `at`, and on."""
-        row = np.arange(len(start))
-        middle = start + share[:, None] * step
+        row = np.arange(len(share))
+        middle = start.x + share[:, None] * step
         ahead = np.sign(step[row, axis])
         before, after = middle.copy(), middle.copy()
         before[row, axis] = np.nextafter(at, at - ahead)
         after[row, axis] = np.nextafter(at, at + ahead)
         onward = after + (1.0 - share)[:, None] * step
-        shift = np.zeros_like(end)
         for k, period in enumerate(self.patch.periods):
             if period:  # the second piece may lie on the other side of the seam
-                shift[:, k] = period * np.round((end[:, k] - onward[:, k]) / period)
-        places = [self._at(x) for x in (start, before, after + shift, end)]
-        zero = np.zeros(len(start))
-        bends = [self._bends(start, before), np.zeros((len(start), 2)),
-                 self._bends(after + shift, end)]  # fmt: skip
-        return PlacePaths(
-            np.stack([zero, share, share, zero + 1.0], axis=1),
-            np.stack([point for point, _ in places], axis=1),
-            np.stack([normal for _, normal in places], axis=1),
-            np.stack(bends, axis=1),
-            np.zeros((len(zero), 4), dtype=np.int64),
-            np.stack([start, before, after + shift, end], axis=1),
-        )
+                after[:, k] += period * np.round((end.x[:, k] - onward[:, k]) / period)
+        return self._over(start, before, after, end, share)
 
-    def _over_pole(self, made: PlacePaths, start: Array, end: Array, some: Mask, pole: int) -> None:
+    def _over_pole(
+        self, made: PlacePaths, start: Places, end: Places, some: Mask, pole: int
+    ) -> None:
         """Lead paths over a pole where that bends less: straight to it along u, and away again."""
         row = np.flatnonzero(some)
         if not len(row):
             return
-        a, b = start[row], end[row]
+        start, end = start.of(row), end.of(row)
         at = self.patch.u_range[pole]
-        before, after = a.copy(), b.copy()
+        before, after = start.x.copy(), end.x.copy()
         before[:, 0] = after[:, 0] = at
-        places = [self._at(x) for x in (a, before, after, b)]
-        to, fro = np.abs(a[:, 0] - at), np.abs(b[:, 0] - at)
-        share = np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
-        zero = np.zeros(len(row))
-        over = PlacePaths(
-            np.stack([zero, share, share, zero + 1.0], axis=1),
-            np.stack([point for point, _ in places], axis=1),
-            np.stack([normal for _, normal in places], axis=1),
-            np.stack(
-                [self._bends(a, before), np.zeros((len(row), 2)), self._bends(after, b)], axis=1
-            ),
-            np.zeros((len(row), 4), dtype=np.int64),
-            np.stack([a, before, after, b], axis=1),
-        )
+        share = share_of(np.abs(start.x[:, 0] - at), np.abs(end.x[:, 0] - at))
+        over = self._over(start, before, after, end, share)
         ends = np.linalg.norm(over.points[:, 3] - over.points[:, 0], axis=1)
         detour = np.linalg.norm(np.diff(over.points, axis=1), axis=2).sum(axis=1) - ends
-        better = over.bends[:, :, 0].max(axis=1) + 8.0 * detour < made.bends[row, :, 0].max(axis=1)
+        most, before_most = (
+            paths.derivative_bounds[:, :, 0].max(axis=1) for paths in (over, made.of(row))
+        )
+        better = most + 8.0 * detour < before_most
         made.put(row[better], over.of(better))
+
+    def _over(
+        self, start: Places, before: Array, after: Array, end: Places, share: Array
+    ) -> PlacePaths:
+        """Paths of two pieces, straight to `before` (k, 2), and on from `after`, the same place."""
+        four = [start, Places(start.chart, before), Places(end.chart, after), end]
+        bounds = self._derivative_bounds(start.x, before), self._derivative_bounds(after, end.x)
+        return PlacePaths.over(four, [self.at(places) for places in four], share, bounds)

@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
+from coverable_arrays import Array
 from surfaces.piecewise import Piecewise
-from surfaces.places.patch_places import GUESSES, PatchPlaces
-from surfaces.places.places import Array, OffsetSurface, PlacePaths, Places
+from surfaces.places.patch_places import PatchPlaces
+from surfaces.places.places import OffsetSurface, PlacePaths, Places, by_closest_points, share_of
 
 BORDERS = 2.0  # [1] of the gap that seams may have: so far apart may two sides of one place be
 
@@ -40,19 +41,7 @@ class PiecePlaces(OffsetSurface):
 
     def nearest(self, points: Array, ahead: Array, within: float) -> Places:
         """See `OffsetSurface.nearest`."""
-        places = self._closest(points)
-        away = np.linalg.norm(points - self.at(places)[0], axis=1)
-        rest = np.flatnonzero(~(away <= within))
-        guess = ahead[rest].copy()
-        for _ in range(GUESSES if len(rest) else 0):
-            found = self._closest(guess)
-            offset, normal = self.at(found)
-            there = np.linalg.norm(points[rest] - offset, axis=1)
-            nearer = there < away[rest]
-            places.put(rest[nearer], found.of(nearer))
-            away[rest[nearer]] = there[nearer]
-            guess = points[rest] - self.height * normal
-        return places
+        return by_closest_points(self, self._closest, points, ahead, within)
 
     def _closest(self, points: Array) -> Places:
         found = self.surface.nearest(points)
@@ -75,34 +64,29 @@ class PiecePlaces(OffsetSurface):
         """Paths from one piece to another, over the place of their seam that is closest to both."""
         a, b = self.pieces[start.chart[0]], self.pieces[end.chart[0]]
         middle = 0.5 * (_on(a, start.x) + _on(b, end.x))
-        before = a.closest(middle)
+        before = a.closest(middle).x
         for _ in range(2):  # back and forth, from one border to the other
-            after = b.closest(_on(a, before))
-            before = a.closest(_on(b, after))
+            after = b.closest(_on(a, before)).x
+            before = a.closest(_on(b, after)).x
         apart = np.linalg.norm(_on(a, before) - _on(b, after), axis=1)
         joined = apart <= BORDERS * self.surface.gap
         first = a.paths(start, Places(start.chart, before))
         last = b.paths(Places(end.chart, after), end)
-        ends = ((first, 0), (first, 3), (last, 0), (last, 3))
-        points = np.stack([path.points[:, k] for path, k in ends], axis=1)
-        normals = np.stack([path.normals[:, k] for path, k in ends], axis=1)
         # Each side's path must be one straight piece: one over a kink or a pole is cut up first.
-        bends = np.zeros((len(points), 3, 2))
-        for piece, path in ((0, first), (2, last)):
-            single = (path.share[:, 2] == 0.0) & joined
-            bends[:, piece] = np.where(single[:, None], path.bends[:, 2], np.inf)
-        to = np.linalg.norm(points[:, 1] - points[:, 0], axis=1)
-        fro = np.linalg.norm(points[:, 3] - points[:, 2], axis=1)
-        share = np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
-        zero = np.zeros_like(to)
-        sides = np.repeat([[start.chart[0], end.chart[0]]], 2, axis=1)
-        return PlacePaths(
-            np.stack([zero, share, share, zero + 1.0], axis=1),
-            points,
-            normals,
-            bends,
-            np.repeat(sides, len(zero), axis=0),
-            np.stack([path.x[:, k] for path, k in ends], axis=1),
+        single = [(path.share[:, 2] == 0.0) & joined for path in (first, last)]
+        bounds = [path.derivative_bounds[:, 2] for path in (first, last)]
+        to, fro = (
+            np.linalg.norm(path.points[:, 3] - path.points[:, 0], axis=1) for path in (first, last)
+        )
+        ends = ((first, 0), (first, 3), (last, 0), (last, 3))
+        return PlacePaths.over(
+            [path.place(k) for path, k in ends],
+            [(path.points[:, k], path.normals[:, k]) for path, k in ends],
+            share_of(to, fro),
+            (
+                np.where(single[0][:, None], bounds[0], np.inf),
+                np.where(single[1][:, None], bounds[1], np.inf),
+            ),
         )
 
     def tangents(self, places: Places) -> Array:
@@ -113,12 +97,12 @@ class PiecePlaces(OffsetSurface):
             found[some] = self.pieces[k].tangents(places.of(some))
         return found
 
-    def turning(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.turning`."""
+    def tangent_slopes(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.tangent_slopes`."""
         found = np.full(len(start.chart), np.inf)
         for k in np.unique(start.chart[start.chart >= 0]):
             some = np.flatnonzero((start.chart == k) & (end.chart == k))
-            found[some] = self.pieces[k].turning(start.of(some), end.of(some))
+            found[some] = self.pieces[k].tangent_slopes(start.of(some), end.of(some))
         return found
 
 

@@ -11,6 +11,7 @@ of a piece knows them along it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,6 +20,7 @@ import numpy as np
 from coverable_arrays import Array, Ints, Mask
 
 ROUNDING = 1.0 + 1e-9  # covers the rounding of the bounds' own operations
+GUESSES = 6  # closest points that lead from a guess to a place
 
 
 class Places(NamedTuple):
@@ -52,9 +54,10 @@ class PlacePaths(NamedTuple):
     """(k, 4, 3) m, the offset surface's points over them."""
     normals: Array
     """(k, 4, 3) the surface's outward unit normals there."""
-    bends: Array
-    """(k, 3, 2) along each piece offset point (m) and normal differ from the straight line between
-    its ends by at most s (1 - s) / 2 times this; inf where nothing is known."""
+    derivative_bounds: Array
+    """(k, 3, 2) of second derivatives: along each piece offset point (m) and normal differ from the
+    straight line between its ends by at most s (1 - s) / 2 times this; inf where nothing is known.
+    """
     chart: Ints
     """(k, 4) patch or face of the four places."""
     x: Array
@@ -68,7 +71,7 @@ class PlacePaths(NamedTuple):
     @staticmethod
     def straight(
         ends: tuple[tuple[Array, Array], tuple[Array, Array]],
-        bends: Array,
+        bounds: Array,
         start: Places,
         end: Places,
     ) -> PlacePaths:
@@ -76,7 +79,7 @@ class PlacePaths(NamedTuple):
 
         Args:
             ends: points and normals (k, 3) of the first, and of the last places.
-            bends: (k, 2) of that piece.
+            bounds: (k, 2) derivative bounds of that piece.
             start, end: the places.
         """
         (point, normal), (last, last_normal) = ends
@@ -85,16 +88,43 @@ class PlacePaths(NamedTuple):
         points = np.stack([point, point, point, last], axis=1)
         normals = np.stack([normal, normal, normal, last_normal], axis=1)
         every = np.zeros((count, 3, 2))
-        every[:, 2] = bends
+        every[:, 2] = bounds
         chart = np.stack([start.chart, start.chart, start.chart, end.chart], axis=1)
         x = np.stack([start.x, start.x, start.x, end.x], axis=1)
         return PlacePaths(share, points, normals, every, chart, x)
 
+    @staticmethod
+    def over(
+        four: Sequence[Places],
+        placed: Sequence[tuple[Array, Array]],
+        share: Array,
+        bounds: tuple[Array, Array],
+    ) -> PlacePaths:
+        """Paths of two pieces, over a place that belongs to both: on an edge, a seam, a pole.
+
+        Args:
+            four: k places each: the first, that place twice, and the last.
+            placed: points and normals (k, 3) over them.
+            share: (k,) when a motion is to be at the place that belongs to both.
+            bounds: (k, 2) derivative bounds of the first, and of the last piece.
+        """
+        zero = np.zeros_like(share)
+        points, normals = (np.stack(part, axis=1) for part in zip(*placed, strict=True))
+        chart, x = (np.stack(part, axis=1) for part in zip(*four, strict=True))
+        return PlacePaths(
+            np.stack([zero, share, share, zero + 1.0], axis=1),
+            points,
+            normals,
+            np.stack([bounds[0], np.zeros_like(bounds[0]), bounds[1]], axis=1),
+            chart,
+            x,
+        )
+
     def of(self, rows: Ints | Mask) -> PlacePaths:
         """Some of the paths."""
         return PlacePaths(
-            self.share[rows], self.points[rows], self.normals[rows], self.bends[rows],
-            self.chart[rows], self.x[rows],
+            self.share[rows], self.points[rows], self.normals[rows],
+            self.derivative_bounds[rows], self.chart[rows], self.x[rows],
         )  # fmt: skip
 
     def put(self, rows: Ints | Mask, others: PlacePaths) -> None:
@@ -135,7 +165,7 @@ class OffsetSurface(ABC):
         """Unit u directions (k, 3) of the surface at places; NaN where it has none."""
         return np.full((len(places.chart), 3), np.nan)
 
-    def turning(self, start: Places, end: Places) -> Array:
+    def tangent_slopes(self, start: Places, end: Places) -> Array:
         """(k,) the largest slope of the u direction on straight lines between places of one patch.
 
         By the line's own parameter in 0..1; inf where nothing is known.
@@ -154,6 +184,45 @@ class OffsetSurface(ABC):
     @abstractmethod
     def paths(self, start: Places, end: Places) -> PlacePaths:
         """Continuous paths from places to places, meant for such that are near to each other."""
+
+
+def by_closest_points(
+    surface: OffsetSurface,
+    closest: Callable[[Array], Places],
+    points: Array,
+    ahead: Array,
+    within: float,
+) -> Places:
+    """See `OffsetSurface.nearest`: under closest points, first of the given points themselves.
+
+    Parallel surfaces share their normals, so the closest point of the surface is under that of the
+    offset surface, unless another part of the surface is nearer.
+
+    Args:
+        surface: the offset surface.
+        closest: the places of the surface itself that are closest to points (k, 3) m, or nearly so.
+        points: (k, 3) m.
+        ahead: (k, 3) m, likewise.
+        within: m, likewise.
+    """
+    places = closest(points)
+    away = np.linalg.norm(points - surface.at(places)[0], axis=1)
+    rest = np.flatnonzero(~(away <= within))
+    guess = ahead[rest].copy()
+    for _ in range(GUESSES if len(rest) else 0):
+        found = closest(guess)
+        offset, normal = surface.at(found)
+        there = np.linalg.norm(points[rest] - offset, axis=1)
+        nearer = there < away[rest]
+        places.put(rest[nearer], found.of(nearer))
+        away[rest[nearer]] = there[nearer]
+        guess = points[rest] - surface.height * normal
+    return places
+
+
+def share_of(to: Array, fro: Array) -> Array:
+    """(k,) the share of `to` in two lengths; 0 where both are 0."""
+    return np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
 
 
 def second_derivative_of_unit(length: Array, first: Array, second: Array) -> Array:

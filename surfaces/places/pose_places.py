@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from surfaces.places.places import ROUNDING, Array, Ints, OffsetSurface, PlacePaths, Places
+from coverable_arrays import Array, Ints
+from surfaces.places.places import ROUNDING, OffsetSurface, PlacePaths, Places, share_of
 from surfaces.toolpaths import PoseSurface, arc_angles, arc_at
 
 if TYPE_CHECKING:
@@ -154,14 +155,15 @@ class PosePlaces(OffsetSurface):
         known = (start.chart >= 0) & (end.chart >= 0)
         made = PlacePaths.straight(ends, np.full((len(start.chart), 2), np.inf), start, end)
         same = np.flatnonzero(known & (start.chart == end.chart))
-        made.bends[same, 2] = self._bends(start.chart[same], start.x[same, 0], end.x[same, 0])
+        bounds = self._derivative_bounds(start.chart[same], start.x[same, 0], end.x[same, 0])
+        made.derivative_bounds[same, 2] = bounds
         rest = np.flatnonzero(known & (start.chart != end.chart))
         if len(rest):
             self._over_poses(made, rest, start.of(rest), end.of(rest))
         return made
 
-    def _bends(self, chart: Ints, t0: Array, t1: Array) -> Array:
-        """(k, 2) see `PlacePaths.bends`; a point that turns with the angle's speed."""
+    def _derivative_bounds(self, chart: Ints, t0: Array, t1: Array) -> Array:
+        """(k, 2) see `PlacePaths.derivative_bounds`; a direction that turns at an even speed."""
         i, j = self._ends(chart)
         turn = (t1 - t0) * arc_angles(self._directions[i], self._directions[j])
         return np.stack([np.zeros(len(chart)), ROUNDING * turn**2], axis=1)
@@ -174,32 +176,19 @@ class PosePlaces(OffsetSurface):
         leave, enter = np.divmod(same[some].reshape(-1, 4).argmax(axis=1), 2)
         start, end, rows = start.of(some), end.of(some), rows[some]
         to, fro = leave.astype(float), enter.astype(float)
-        legs = [
-            self._length(chart, np.abs(t - at))
-            for chart, t, at in ((start.chart, start.x[:, 0], to), (end.chart, end.x[:, 0], fro))
-        ]
-        total = legs[0] + legs[1]
-        share = np.divide(legs[0], total, out=np.zeros_like(total), where=total > 0.0)
-        zero = np.zeros(len(some))
-        bends = [
-            self._bends(start.chart, start.x[:, 0], to),
-            np.zeros((len(some), 2)),
-            self._bends(end.chart, fro, end.x[:, 0]),
-        ]
-        four = [start, _placed(start.chart, to), _placed(end.chart, fro), end]
-        known = [self.at(places) for places in four]
-        over = PlacePaths(
-            np.stack([zero, share, share, zero + 1.0], axis=1),
-            np.stack([point for point, _ in known], axis=1),
-            np.stack([direction for _, direction in known], axis=1),
-            np.stack(bends, axis=1),
-            np.stack([places.chart for places in four], axis=1),
-            np.stack([places.x for places in four], axis=1),
+        share = share_of(
+            self._length(start.chart, np.abs(start.x[:, 0] - to)),
+            self._length(end.chart, np.abs(end.x[:, 0] - fro)),
         )
-        made.put(rows, over)
+        bounds = (
+            self._derivative_bounds(start.chart, start.x[:, 0], to),
+            self._derivative_bounds(end.chart, fro, end.x[:, 0]),
+        )
+        four = [start, _placed(start.chart, to), _placed(end.chart, fro), end]
+        made.put(rows, PlacePaths.over(four, [self.at(places) for places in four], share, bounds))
 
     def tangents(self, places: Places) -> Array:
-        """See `OffsetSurface.tangents`: on the way from the tangent of one pose to the next."""
+        """See `OffsetSurface.tangents`: between the tangents of both poses."""
         found = super().tangents(places)
         if self.poses.along is None:
             return found
@@ -209,10 +198,10 @@ class PosePlaces(OffsetSurface):
         found[known], _ = arc_at(along[i], along[j], places.x[known, 0])
         return found
 
-    def turning(self, start: Places, end: Places) -> Array:
-        """See `OffsetSurface.turning`."""
+    def tangent_slopes(self, start: Places, end: Places) -> Array:
+        """See `OffsetSurface.tangent_slopes`."""
         if self.poses.along is None:
-            return super().turning(start, end)
+            return super().tangent_slopes(start, end)
         along = self.poses.turned(self.poses.along)
         i, j = self._ends(start.chart)
         angle = arc_angles(along[i], along[j])
@@ -220,7 +209,7 @@ class PosePlaces(OffsetSurface):
         return np.where((start.chart >= 0) & (start.chart == end.chart), turn, np.inf)
 
     def _length(self, chart: Ints, share: Array) -> Array:
-        """(k,) m, of parts of courses; turns count a little."""
+        """(k,) m, of parts of curves; turns count a little."""
         i, j = self._ends(chart)
         turn = TURN * arc_angles(self._directions[i], self._directions[j])
         return np.asarray(
@@ -229,5 +218,5 @@ class PosePlaces(OffsetSurface):
 
 
 def _placed(chart: Ints, t: Array) -> Places:
-    """Places at t (k,) of courses."""
+    """Places at t (k,) of curves."""
     return Places(chart, np.stack([t, np.zeros(len(t))], axis=1))

@@ -45,7 +45,9 @@ def aim_at(work, target):  # type: ignore[no-untyped-def]
 
 @kernel
 def allow(arrays, work, bend):  # type: ignore[no-untyped-def]
-    """Bounds and allowances of a step whose target bends by `bend` (2,), see `PlacePaths.bends`.
+    """Bounds and allowances of a step; `bend` (2,) bounds the second derivatives of its target.
+
+    See `PlacePaths.derivative_bounds`.
 
     The places are known all along, so nothing is lost to matching them again; and the cone is asked
     for at the target.
@@ -111,7 +113,7 @@ def follow(arrays, work, q, targets, bends, first, last, path):  # type: ignore[
         arrays, work: the `SearchArrays` and the `Work`.
         q: (n,) rad or m.
         targets: (m, 2, 3) target points (m) and approach directions of places.
-        bends: (m, 2) of the piece that ends at each, see `PlacePaths.bends`.
+        bends: (m, 2) of the piece that ends at each, see `PlacePaths.derivative_bounds`.
         first, last: rows.
         path: (m, n) receives the configurations over the places.
 

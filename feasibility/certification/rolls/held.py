@@ -2,8 +2,8 @@
 
 Along a straight piece of a path of places let b differ from a straight line by at most
 s (1 - s) / 2 times D_b, and turn by at most beta = |db| + D_b / 2 in all. The reference e is fixed,
-or the u direction, of slope L_e at most (`OffsetSurface.turning`). Its part square to b has the
-length h, at least that at the ends less (beta + L_e) / 2, so
+or the u direction, of slope L_e at most (`OffsetSurface.tangent_slopes`). Its part square to b has
+the length h, at least that at the ends less (beta + L_e) / 2, so
 
     |t'| <= L_t = (beta + L_e) / h
 
@@ -82,7 +82,8 @@ class Held:
 
     def bends(self, path: PlacePaths) -> Array:
         """(k, 3) D_b of the pieces of paths."""
-        return path.bends[..., 1] if self.approach is None else np.zeros_like(path.bends[..., 1])
+        bounds = path.derivative_bounds[..., 1]
+        return bounds if self.approach is None else np.zeros_like(bounds)
 
     def _references(self, places: Places, approaches: Array) -> tuple[Array, Array]:
         """t (k, 3) and h (k,) at places."""
@@ -147,7 +148,7 @@ class Held:
         beta = np.linalg.norm(db, axis=2) + 0.5 * bend_b
         own = np.zeros_like(beta)
         for piece in (FIRST, LAST) if self.reference is None else ():
-            own[:, piece] = self.offset.turning(path.place(piece), path.place(piece + 1))
+            own[:, piece] = self.offset.tangent_slopes(path.place(piece), path.place(piece + 1))
         with np.errstate(invalid="ignore"):
             least = np.minimum(sines[:, :-1], sines[:, 1:]) - 0.5 * (beta + own)
             known = least > 0.0

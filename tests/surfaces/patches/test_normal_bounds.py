@@ -36,19 +36,19 @@ def test_bounds_hold_for_finite_differences(patch, share):
     bounds = patch.bounds(height, slack)
     if math.isinf(bounds.curvature):
         assert patch.kind == "hyperboloid"  # bends both ways, so normals meet on either side
-        assert math.isinf(bounds.bend)
+        assert math.isinf(bounds.second_derivative)
         return
     first, second = measured(patch, height, slack)
     # Truncation of the differences is of the order of (step * curvature)^2.
     assert first <= bounds.curvature * (1 + 1e-5) + 1e-9
-    assert second <= bounds.bend * (1 + 1e-4) + 1e-6
+    assert second <= bounds.second_derivative * (1 + 1e-4) + 1e-6
 
 
 def test_bounds_are_tight_at_one_height(patch):
     bounds = patch.bounds(0.0)
     first, second = measured(patch, 0.0, 0.0)
     assert first >= 0.93 * bounds.curvature
-    assert second >= (0.7 if patch.kind == "hyperboloid" else 0.93) * bounds.bend
+    assert second >= (0.7 if patch.kind == "hyperboloid" else 0.93) * bounds.second_derivative
 
 
 @pytest.mark.parametrize("height", [-0.3, 0.0, 0.4])
@@ -57,12 +57,12 @@ def test_bounds_of_sphere_and_cylinder_are_the_exact_values(height):
         bounds = surface.bounds(height, 0.1)
         rho = 0.5 + height - 0.1
         assert bounds.curvature == pytest.approx(1 / rho, rel=1e-11)
-        assert bounds.bend == pytest.approx(2 / math.sqrt(3) / rho**2, rel=1e-11)
+        assert bounds.second_derivative == pytest.approx(2 / math.sqrt(3) / rho**2, rel=1e-11)
 
 
 def test_a_plane_does_not_bend():
     bounds = plane((0, 1), (0, 1)).bounds(-5, 1)
-    assert (bounds.curvature, bounds.bend) == (0.0, 0.0)
+    assert (bounds.curvature, bounds.second_derivative) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_bounds_are_infinite_exactly_where_the_parallel_surface_folds(
 ):
     bounds = surface.bounds(height, slack)
     assert math.isinf(bounds.curvature) == folds
-    assert math.isinf(bounds.bend) == folds
+    assert math.isinf(bounds.second_derivative) == folds
 
 
 def test_a_finite_bound_means_that_closest_points_do_not_jump(patch):
@@ -159,7 +159,7 @@ def test_cubic_bound_is_at_least_the_sampled_maximum_for_random_tensors():
         slices = CurvatureSlices(*(np.array([x]) for x in (k1, k1, k2, k2, abs(p), abs(q), np.inf)))
         cubic = p * a**3 + 3 * q * a * b**2 - 3 * c * (k1**2 * a**2 + k2**2 * b**2)
         bound = normal_bounds(slices, 0.0, 0.0)
-        assert np.abs(cubic).max() <= bound.bend
+        assert np.abs(cubic).max() <= bound.second_derivative
         assert bound.curvature == pytest.approx(max(abs(k1), abs(k2)))
 
 
@@ -167,14 +167,14 @@ def test_more_slack_never_tightens_a_bound(patch):
     for height in (-0.05, 0.0, 0.05):
         ladder = [patch.bounds(height, slack) for slack in (0.0, 0.001, 0.01, 0.02)]
         curvatures = [bounds.curvature for bounds in ladder]
-        bends = [bounds.bend for bounds in ladder]
+        seconds = [bounds.second_derivative for bounds in ladder]
         assert curvatures == sorted(curvatures)
-        assert bends == sorted(bends)
+        assert seconds == sorted(seconds)
 
 
 @pytest.mark.parametrize("height", [-0.5, 0.7])
 def test_slopes_scale_with_the_parallel_surface(height):
-    """With slopes that outweigh the curvatures, bend is theirs alone, at that height."""
+    """With slopes that outweigh the curvatures, they alone count, at that height."""
     k1, k2, steep = -0.8, 0.5, 1e9
     scale1, scale2 = 1 + k1 * height, 1 + k2 * height
     for p, q, expected in [
@@ -182,4 +182,6 @@ def test_slopes_scale_with_the_parallel_surface(height):
         (0.0, steep, 2 / math.sqrt(3) * steep / (scale2**2 * scale1)),
     ]:
         slices = CurvatureSlices(*(np.array([x]) for x in (k1, k1, k2, k2, p, q, np.inf)))
-        assert normal_bounds(slices, height, 0.0).bend == pytest.approx(expected, rel=1e-8)
+        assert normal_bounds(slices, height, 0.0).second_derivative == pytest.approx(
+            expected, rel=1e-8
+        )

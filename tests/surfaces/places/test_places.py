@@ -155,13 +155,13 @@ def lines(start, end):
     return start[:, None] + DENSE[:, None] * (end - start)[:, None]
 
 
-def bounded(offset, places, bends):
+def bounded(offset, places, bounds):
     """Places along straight lines (k, dense) do not bend more than they may; the ratios."""
     count = places.x.shape[0]
     flat = Places(np.repeat(places.chart, len(DENSE)), places.x.reshape(-1, 2))
     point, normal = (part.reshape(count, len(DENSE), 3) for part in offset.at(flat))
-    known = np.isfinite(bends).all(axis=1)
-    for values, most in ((point, bends[:, 0]), (normal, bends[:, 1])):
+    known = np.isfinite(bounds).all(axis=1)
+    for values, most in ((point, bounds[:, 0]), (normal, bounds[:, 1])):
         assert (sag(values[known]) <= most[known] + 2e-10).all()
     return known, sag(point), sag(normal)
 
@@ -174,8 +174,8 @@ def test_straight_paths_bend_no_more_than_is_said(named, height):
     start, end = random_places(surface, 300, rng)
     offset = offset_surface(surface, height)
     if surface.kind == "mesh":
-        bends = offset._bends(start.chart, start.x, end.x)
-        known, _, _ = bounded(offset, Places(start.chart, lines(start.x, end.x)), bends)
+        most = offset._derivative_bounds(start.chart, start.x, end.x)
+        known, _, _ = bounded(offset, Places(start.chart, lines(start.x, end.x)), most)
         assert known.mean() > 0.9 or name == "ridge"
         return
     if surface.kind == "piecewise":
@@ -187,14 +187,14 @@ def test_straight_paths_bend_no_more_than_is_said(named, height):
             end.x[:, axis] = np.clip(
                 end.x[:, axis], cut[part] + 1e-12, np.nextafter(cut[part + 1], -9)
             )
-    bends = offset._bends(start.x, end.x)
-    known, points, _ = bounded(offset, Places(start.chart, lines(start.x, end.x)), bends)
+    most = offset._derivative_bounds(start.x, end.x)
+    known, points, _ = bounded(offset, Places(start.chart, lines(start.x, end.x)), most)
     short = np.linalg.norm(end.x - start.x, axis=1) < (0.002 if name == "weighted" else 0.02)
     assert known[short].mean() > 0.95
     if name != "plane":  # and the bounds are of the right order: not far above what there is
         some = short & known & (points > 1e-8)
         # Control points say little about the third derivatives of a rational spline.
-        assert np.median(bends[some, 0] / points[some]) < (5e3 if name == "weighted" else 20.0)
+        assert np.median(most[some, 0] / points[some]) < (5e3 if name == "weighted" else 20.0)
 
 
 @pytest.mark.parametrize("height", [0.0, -0.05])
@@ -210,12 +210,29 @@ def test_paths_begin_and_end_where_they_should(named, height):
     assert (np.diff(path.share, axis=1) >= 0.0).all()
     assert (path.share[:, 0] == 0.0).all()
     assert (path.share[:, 3] == 1.0).all()
+    for k in range(4):
+        np.testing.assert_allclose(offset.at(path.place(k))[0], path.points[:, k], atol=1e-12)
     jumps = np.linalg.norm(path.points[:, 2] - path.points[:, 1], axis=1)
-    known = np.isfinite(path.bends).all(axis=(1, 2)) & (path.share[:, 1] > 0.0)
+    known = np.isfinite(path.derivative_bounds).all(axis=(1, 2)) & (path.share[:, 1] > 0.0)
     if height == 0.0:  # where a path changes sides, it does so at one place
         assert (jumps[known] <= 2e-4).all()
     if surface.kind in ("mesh", "piecewise"):
         assert known.any()
+
+
+def test_paths_over_a_pole_stay_on_their_piece():
+    """What is known of their places, as how the u direction turns, is that of the right piece."""
+    ball = sphere(1.0, (0, 80), (0, 360), position=(0.0, 0.0, 2.0))
+    surface = piecewise([plane((0.0, 0.3), (0.0, 0.3)), ball])
+    offset = offset_surface(surface, 0.05)
+    start = Places(np.array([1]), np.array([[0.02, 0.1]]))
+    end = Places(np.array([1]), np.array([[0.02, 3.1]]))
+    path = offset.paths(start, end)
+    assert 0.0 < path.share[0, 1] < 1.0
+    np.testing.assert_array_equal(path.chart, [[1, 1, 1, 1]])
+    for k in range(4):
+        np.testing.assert_allclose(offset.at(path.place(k))[0], path.points[:, k], atol=1e-12)
+    assert (offset.tangent_slopes(path.place(0), path.place(1)) > 0.01).all()
 
 
 def test_nearest_places_are_no_further_than_samples(named):
@@ -242,4 +259,4 @@ def test_places_that_are_none(named):
     places = offset.nearest(points, points, 1e-3)
     assert np.isnan(offset.at(places)[0]).all()
     path = offset.paths(places, places)
-    assert not (np.isfinite(path.bends).all() and np.isfinite(path.points).all())
+    assert not (np.isfinite(path.derivative_bounds).all() and np.isfinite(path.points).all())

@@ -74,15 +74,15 @@ def test_paths_of_places_stay_within_their_bounds():
     start = Places(np.array([0, 0, 1]), np.array([[0.2, 0.0], [0.5, 0.0], [0.9, 0.0]]))
     end = Places(np.array([0, 1, 2]), np.array([[0.9, 0.0], [0.4, 0.0], [0.3, 0.0]]))
     paths = offset.paths(start, end)
-    assert np.isfinite(paths.bends).all()
+    assert np.isfinite(paths.derivative_bounds).all()
     for k, piece in ((0, 2), (1, 0), (2, 2)):
         chart = start.chart[k] if piece == 0 or k == 0 else end.chart[k]
         x = {0: 0.55, 1: 0.75, 2: 0.15}[k]
         _, true = offset.at(Places(np.array([chart]), np.array([[x, 0.0]])))
         line = 0.5 * (paths.normals[k, piece] + paths.normals[k, piece + 1])
-        assert np.linalg.norm(true[0] - line) <= paths.bends[k, piece, 1] / 8.0 + 1e-12
+        assert np.linalg.norm(true[0] - line) <= paths.derivative_bounds[k, piece, 1] / 8.0 + 1e-12
     apart = offset.paths(start.of([0]), Places(np.array([2]), np.array([[0.5, 0.0]])))
-    assert np.isinf(apart.bends).any()  # two curves further there is no path in one step
+    assert np.isinf(apart.derivative_bounds).any()  # none leads two curves further in one step
 
 
 def test_what_makes_no_poses_is_named_all_at_once():
