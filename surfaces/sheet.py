@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
 from coverable_arrays import Array
 from coverable_errors import LARGEST, Checks
+from surfaces.at_home import AtHome
 from surfaces.meshes import MeshSurface
 from surfaces.patches import Patch
 from surfaces.piecewise import Piecewise
@@ -98,37 +97,11 @@ def sheet_of(
         steps = min(steps, max(1, most // len(surface.mesh.faces) - 1)) if depth else 0
         triangles, normals, off = _of_mesh(surface)
     else:
-        triangles, normals, off = _of_tiles(_Shape(surface), wanted, depth, most // (steps + 1))
+        triangles, normals, off = _of_tiles(AtHome(surface), wanted, depth, most // (steps + 1))
     away = -surface.side_sign * normals
     layers = [triangles + t * away for t in np.linspace(0.0, depth, steps + 1)]
     between = depth / (2.0 * steps) if steps else 0.0
     return Sheet(np.concatenate(layers), surface.rotation, surface.position, off + between)
-
-
-class _Shape:
-    """A surface at home, where its own frame is the root frame; equal to others of its shape."""
-
-    def __init__(self, surface: Surface) -> None:
-        """Take it home."""
-        self.surface = replace(surface, rotation=np.eye(3), position=np.zeros(3))
-        named = (field.name for field in fields(surface) if field.init)
-        kept = [name for name in named if name not in ("rotation", "position")]
-        self.known = (type(surface), *(_plain(getattr(surface, name)) for name in kept))
-
-    def __eq__(self, other: object) -> bool:
-        """Whether all is the same but for the place."""
-        return isinstance(other, _Shape) and self.known == other.known
-
-    def __hash__(self) -> int:
-        """Of all that is compared."""
-        return hash(self.known)
-
-
-def _plain(value: Any) -> Hashable:
-    """A value that can be compared: arrays by their bytes, objects of ours by who they are."""
-    if isinstance(value, tuple):
-        return tuple(map(_plain, value))
-    return (value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value
 
 
 def _of_mesh(surface: MeshSurface) -> tuple[Array, Array, float]:
@@ -140,18 +113,15 @@ def _of_mesh(surface: MeshSurface) -> tuple[Array, Array, float]:
 
 @lru_cache(maxsize=KEPT)
 def _of_tiles(
-    shape: _Shape, deviation: float, depth: float, most: int
+    home: AtHome, deviation: float, depth: float, most: int
 ) -> tuple[Array, Array, float]:
-    """The triangles of a smooth surface, the normals at their corners by the models, and
-    r_f + T r_n.
-    """
-    surface = shape.surface
-    found = tiles_of(surface, deviation, depth, most // 2)
+    """Triangles of a smooth surface, normals at their corners by the models, and r_f + T r_n."""
+    found = tiles_of(home.surface, deviation, depth, most // 2)
     if found is None:
         raise SurfaceError(
             "no bounds are known on this surface, so nothing can be certified to stay clear of "
             "it; leave collisions with it out",
-            surface.kind,
+            home.surface.kind,
         )
     halves = found.halves()
     return halves[..., :3], halves[..., 3:], float(found.deviations(depth).max())

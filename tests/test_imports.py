@@ -34,7 +34,7 @@ robots.urdf.expansion
 robots.urdf: axes geometry visuals collisions joints tree srdf checked_urdf
 robots: arguments joint_checks chain chain_rows reach robot kinematics inverse_kinematics joint_selection pinocchio_model library
 robots.shapes
-surfaces: protected parts surface part_growth cells adjacency cell_curves curve_fitting arguments
+surfaces: protected parts surface at_home part_growth cells adjacency cell_curves curve_fitting arguments
 surfaces.patches
 surfaces.patches.nurbs
 surfaces.fitted

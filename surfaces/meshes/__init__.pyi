@@ -1,5 +1,6 @@
 from .face_tree import FaceTree as FaceTree
 from .face_tree import nearest_face as nearest_face
+from .facets import cut_faces as cut_faces
 from .mesh_surface import MeshSurface as MeshSurface
 from .mesh_surface import mesh as mesh
 from .normals import WIDTH as WIDTH

@@ -48,7 +48,7 @@ def facets_of(
     """
     turns = np.linalg.norm(crease_normals - normals, axis=2)
     steps = float(np.clip(np.ceil(turns.max() / straight), FEWEST, MOST))
-    face, weights = _cut_faces(on_crease, int(steps))
+    face, weights = cut_faces(on_crease, int(steps))
     middles = (weights + np.roll(weights, -1, axis=1)) / 2.0
     at = np.concatenate([weights, middles], axis=1)
     own, turn = normals[face], (crease_normals - normals)[face]
@@ -69,7 +69,7 @@ def facets_of(
     return Facets(weights @ corners[face], net, off)
 
 
-def _cut_faces(on: Mask, steps: int) -> tuple[Ints, Array]:
+def cut_faces(on: Mask, steps: int) -> tuple[Ints, Array]:
     """The face (G,) and the weights of the corners (G, 3, 3) of each facet.
 
     Args:

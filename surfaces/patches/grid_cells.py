@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +13,10 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array, Ints
 from surfaces.adjacency import Neighbours, grid_neighbours
 from surfaces.arguments import Checks
+from surfaces.at_home import AtHome
 from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Finer, Triangles, Unrolled
 from surfaces.curve_fitting import CurveFit
-from surfaces.patches.fitted_at_home import fitted_at_home
 from surfaces.patches.patch import ClosedFormPatch, Patch
 from surfaces.surface import max_principal_curvature
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 
 DIFFERENCE = 1e-4  # [1], share of a patch: step of differences
+KEPT = 4  # patches whose curves are remembered
+MOST = 2_000  # cells: of more the curves take too much memory to be kept
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -85,16 +87,10 @@ class GridCells(Cells):
 
     @cached_property
     def curves(self) -> CellCurves:
-        """See `Cells.curves`."""
-        return fitted_at_home(self.surface, self.u, self.v, self.shape, self._fitted)
-
-    def _fitted(self, surface: Patch) -> CellCurves:
-        """The curves of the same cells with the surface at another pose, or at this one."""
-        if surface is self.surface:
-            return CurveFit.of(self).joined()
-        centres, normals = surface.point(self.u, self.v), surface.normal(self.u, self.v)
-        cells = replace(self, surface=surface, centres=centres, normals=normals)
-        return CurveFit.of(cells).joined()
+        """See `Cells.curves`; fitted at home once for all poses."""
+        fitted = _fitted if len(self) <= MOST else _fitted.__wrapped__
+        curves = fitted(AtHome(self.surface, self.shape, self.u, self.v))
+        return curves.moved(self.surface.rotation, self.surface.position)
 
     def trace(self, pairs: Ints, t: Array) -> tuple[Array, Array]:
         """See `Cells.trace`: straight in u and v; over a pole, closest to the straight line.
@@ -261,6 +257,15 @@ class GridCells(Cells):
     def __repr__(self) -> str:
         """One line: how many cells of what."""
         return f"Cells({self.shape[0]} x {self.shape[1]} of {self.surface!r})"
+
+
+@lru_cache(maxsize=KEPT)
+def _fitted(home: AtHome) -> CellCurves:
+    """The curves of a grid of cells, given with its counts, u and v."""
+    surface, (shape, u, v) = home.surface, home.more
+    centres, normals = surface.point(u, v), surface.normal(u, v)
+    cells = GridCells(surface, centres, normals, np.zeros(len(u)), shape, u, v)
+    return CurveFit.of(cells).joined()
 
 
 def _bin(values: Array, limits: tuple[float, float], count: int) -> Ints:

@@ -12,12 +12,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
-from surfaces.meshes import WIDTH, MeshSurface
-from surfaces.places.offset_triangles import OffsetTriangles
+from surfaces.meshes import WIDTH, MeshSurface, cut_faces
 from surfaces.places.places import (
     ROUNDING,
     OffsetSurface,
@@ -27,8 +27,12 @@ from surfaces.places.places import (
     share_of,
 )
 
+if TYPE_CHECKING:
+    from surfaces.meshes import FaceTree
+
 GRID = np.linspace(0.0, 1.0, 9)  # places on an edge that are tried, in so many rounds
 ROUNDS = 8
+SLICES = 4  # of the strip along a crease, in flat triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,13 +51,24 @@ class MeshPlaces(OffsetSurface):
         return points, normals
 
     @cached_property
-    def _triangles(self) -> OffsetTriangles:
-        return OffsetTriangles.of(self.surface, self.height)
+    def _triangles(self) -> tuple[FaceTree, Places]:
+        """G flat triangles between points of the offset surface, and the places of their corners.
+
+        A face on a crease has several, so that the arc round an edge becomes a few of them. Nothing
+        rests on how well they fit.
+        """
+        from surfaces.meshes import FaceTree  # compiled: loaded when it is needed
+
+        face, weights = cut_faces(self.surface.on_crease, SLICES)
+        corners = Places(np.repeat(face, 3), weights.reshape(-1, 3)[:, 1:])
+        return FaceTree.of(self.at(corners)[0].reshape(-1, 3, 3)), corners
 
     def nearest(self, points: Array, ahead: Array, within: float) -> Places:
-        """See `OffsetSurface.nearest`: on the flat triangles between the offset corners."""
-        face, weights = self._triangles.nearest(points)
-        return Places(face, weights[:, 1:])
+        """See `OffsetSurface.nearest`: on the flat triangles between offset points."""
+        tree, corners = self._triangles
+        found, weights = tree.nearest(points)
+        chart = np.where(found >= 0, corners.chart[3 * found], -1)
+        return Places(chart, np.einsum("kc,kcj->kj", weights, corners.x.reshape(-1, 3, 2)[found]))
 
     def facets(self, points: Array) -> Array:
         """See `OffsetSurface.facets`."""
