@@ -14,7 +14,7 @@ from surfaces.patches import GridCells
 from surfaces.piecewise import PieceCells
 from surfaces.sheet import tiles_of
 from surfaces.surface import SurfaceError, max_principal_curvature
-from surfaces.tiles import Tiles
+from surfaces.tiles import FlatTiles
 from surfaces.triangle_kernel import TriangleKernel
 
 SHARE = 0.01  # [1] of the tolerance: how far triangles may be off, if so many will do
@@ -119,7 +119,7 @@ def _of_mesh(cells: MeshCells, height: float) -> Triangulation:
 
 
 def _of_tiles(
-    cells: Cells, grids: list[GridCells], found: Tiles, height: float, tolerance: float
+    cells: Cells, grids: list[GridCells], found: FlatTiles, height: float, tolerance: float
 ) -> Triangulation:
     """Two triangles for each tile."""
     halves, parameters = found.halves(), found.parameters()

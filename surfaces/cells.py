@@ -99,8 +99,8 @@ class Cells(Protected, ABC):
     def neighbours(self) -> Neighbours:
         """(indptr, indices): each cell's neighbours, clockwise seen from outside."""
 
-    def finer(self, ways: int = 3) -> Finer | None:
-        """Every cell cut into `ways` x `ways` ones, an odd number; None where there is no such cut.
+    def finer(self, parts: int = 3) -> Finer | None:
+        """Every cell cut into `parts` x `parts`, an odd number; None where there is no such cut.
 
         Cells of a mesh have no such cut: their borders are not at fixed shares of anything.
         """

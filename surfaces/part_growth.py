@@ -121,7 +121,7 @@ def grown(roots: Pieces, flat: float, straight: float, most: int) -> SurfacePart
     The worst parts are cut first: those within a factor of `_WAIT` of the worst, all at once.
 
     Args:
-        roots: pieces that together are the whole surface.
+        roots: pieces that together are the surface.
         flat: m, the largest r_f wanted.
         straight: the largest r_n wanted.
         most: how many parts may be made.
@@ -199,9 +199,9 @@ def _joined(roots: PartModels) -> _Top:
         group = group[np.argsort(centre[:, axis], kind="stable")]
         half = len(group) // 2
         waiting += [(number, 1, group[half:]), (number, 0, group[:half])]
-    whole = PartModels(*(np.concatenate([np.zeros_like(a[1:]), a]) for a in roots))
+    every = PartModels(*(np.concatenate([np.zeros_like(a[1:]), a]) for a in roots))
     for number in range(count - 2, -1, -1):
-        one, other = (whole.rows(children[[number], side]) for side in (0, 1))
-        for array, value in zip(whole, around(one, other), strict=True):
+        one, other = (every.rows(children[[number], side]) for side in (0, 1))
+        for array, value in zip(every, around(one, other), strict=True):
             array[number] = value[0]
-    return _Top(whole.rows(np.arange(count - 1)), children)
+    return _Top(every.rows(np.arange(count - 1)), children)

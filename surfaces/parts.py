@@ -103,9 +103,9 @@ def around(one: PartModels, other: PartModels) -> PartModels:
         apart = np.linalg.norm(b[:, some] - a[:, some], axis=1)
         p, q = ra[:, column], rb[:, column]
         # From the far end of one ball to that of the other; or the larger one where it holds both.
-        whole = np.maximum((apart + p + q) / 2.0, np.maximum(p, q))
+        size = np.maximum((apart + p + q) / 2.0, np.maximum(p, q))
         with np.errstate(invalid="ignore"):
-            share = np.clip((whole - p) / np.maximum(apart, 1e-300), 0.0, 1.0)
+            share = np.clip((size - p) / np.maximum(apart, 1e-300), 0.0, 1.0)
         share = np.nan_to_num(share)
         middle = a[:, some] + share[:, None] * (b[:, some] - a[:, some])
         to_a, to_b = (np.linalg.norm(middle - end[:, some], axis=1) for end in (a, b))

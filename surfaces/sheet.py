@@ -16,7 +16,7 @@ from surfaces.patches import Patch
 from surfaces.piecewise import Piecewise
 from surfaces.protected import Protected
 from surfaces.surface import Surface, SurfaceError
-from surfaces.tiles import Tiles, tiles
+from surfaces.tiles import FlatTiles, flat_tiles
 
 DEVIATION = 2e-4  # [m]
 MOST_TRIANGLES = 32_768
@@ -59,9 +59,9 @@ def sheet_of(
     """The surface as triangles, with a certified deviation.
 
     A mesh gives its own triangles. Any other surface is cut into tiles, on each of which
-    |f - (c + x_1 e_1 + x_2 e_2 + x_1 x_2 t)| <= r_f for |x_i| <= 1 (see `Tiles`). With t along one
-    of the slopes and no longer, that is a flat convex quadrilateral: its two triangles are taken,
-    and the deviation is the largest r_f. Nothing is sampled.
+    |f - (c + x_1 e_1 + x_2 e_2 + x_1 x_2 t)| <= r_f for |x_i| <= 1 (see `FlatTiles`). With t along
+    one of the slopes and no longer, that is a flat convex quadrilateral: its two triangles are
+    taken, and the deviation is the largest r_f. Nothing is sampled.
 
     With a thickness T the sheet is the slab of all points f + t b, 0 <= t <= T, with b the unit
     normal away from the working side; of a mesh, the normals of its faces, so each face carries a
@@ -127,7 +127,7 @@ def _of_tiles(
     return halves[..., :3], halves[..., 3:], float(found.deviations(depth).max())
 
 
-def tiles_of(surface: Surface, deviation: float, depth: float, most: int) -> Tiles | None:
+def tiles_of(surface: Surface, deviation: float, depth: float, most: int) -> FlatTiles | None:
     """Tiles of a patch, or of several; coarser where there would be more than `most`.
 
     None where no bounds are known on the surface.
@@ -136,7 +136,7 @@ def tiles_of(surface: Surface, deviation: float, depth: float, most: int) -> Til
     if isinstance(surface, Piecewise):
         pieces = list(zip(surface.placed, surface.signs, strict=True))
     while pieces and deviation <= LARGEST:
-        found = tiles(pieces, deviation, depth, most)
+        found = flat_tiles(pieces, deviation, depth, most)
         if found is not None:
             return found
         deviation *= COARSER

@@ -22,7 +22,7 @@ _AIM = 0.97  # of the deviation: what a cut aims at, since errors shrink only ne
 _AT_ONCE = 8  # cuts along one parameter that errors foretell well
 
 
-class Tiles(NamedTuple):
+class FlatTiles(NamedTuple):
     """k tiles of a surface: |f - (c + x_1 e_1 + x_2 e_2 + x_1 x_2 t)| <= r_f for |x_i| <= 1."""
 
     models: PartModels
@@ -35,9 +35,9 @@ class Tiles(NamedTuple):
     high: Array
     """(k, 2) u and v at x = (1, 1)."""
 
-    def rows(self, some: Mask) -> Tiles:
+    def rows(self, some: Mask) -> FlatTiles:
         """Some of them."""
-        return Tiles(
+        return FlatTiles(
             self.models.rows(some), self.twist[some], self.piece[some], self.low[some],
             self.high[some],
         )  # fmt: skip
@@ -59,9 +59,9 @@ class Tiles(NamedTuple):
         return np.asarray(self.models.radius @ np.array([1.0, depth]))
 
 
-def tiles(
+def flat_tiles(
     pieces: Sequence[tuple[Patch, float]], deviation: float, depth: float, most: int
-) -> Tiles | None:
+) -> FlatTiles | None:
     """Tiles that together are the patches, each with r_f + depth r_n <= deviation.
 
     Args:
@@ -73,12 +73,12 @@ def tiles(
     Returns:
         The tiles; None where more would be needed.
     """
-    found, count = list[Tiles](), 0
+    found, count = list[FlatTiles](), 0
     for piece, (patch, sign) in enumerate(pieces):
         low, high = patch.part_roots
         for number in range(MOST_ROUNDS):
             models, twist = _models(patch, low, high, sign, twisted=depth == 0.0)
-            made = Tiles(models, twist, np.full(len(low), piece), low, high)
+            made = FlatTiles(models, twist, np.full(len(low), piece), low, high)
             rough = made.deviations(depth)
             fine = rough <= deviation
             found.append(made.rows(fine))
@@ -93,7 +93,7 @@ def tiles(
             low, high = _cut(low, high, counts)
     columns = list(zip(*found, strict=True))
     joined = PartModels(*map(np.concatenate, zip(*columns[0], strict=True)))
-    return Tiles(joined, *map(np.concatenate, columns[1:]))
+    return FlatTiles(joined, *map(np.concatenate, columns[1:]))
 
 
 def _models(
@@ -121,9 +121,9 @@ def _counts(shares: Array, rough: Array, sides: Array, aim: float) -> Ints:
         sides: (k, 2) of the boxes.
         aim: m, the error that is wanted.
     """
-    whole = shares.sum(axis=1, keepdims=True)
-    told = np.isfinite(rough[:, None]) & (whole > 0.0)
-    part = np.where(told, shares * rough[:, None] / np.where(told, whole, 1.0), 0.0)
+    total = shares.sum(axis=1, keepdims=True)
+    known = np.isfinite(rough[:, None]) & (total > 0.0)
+    part = np.where(known, shares * rough[:, None] / np.where(known, total, 1.0), 0.0)
     first = np.argmax(part, axis=1)
     row = np.arange(len(part))
     small = np.minimum(part[row, 1 - first], part[row, first])
@@ -134,7 +134,7 @@ def _counts(shares: Array, rough: Array, sides: Array, aim: float) -> Ints:
     counts[row, first], counts[row, 1 - first] = np.maximum(more, 2.0), fewer
     counts = np.where(counts > _AT_ONCE, np.clip(np.ceil(counts / 5.0), 2.0, 16.0), counts)
     longest = np.where(np.arange(2) == np.argmax(sides, axis=1)[:, None], 2.0, 1.0)
-    return np.where(told, counts, longest).astype(np.int64)
+    return np.where(known, counts, longest).astype(np.int64)
 
 
 def _cut(low: Array, high: Array, counts: Ints) -> tuple[Array, Array]:

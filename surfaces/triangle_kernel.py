@@ -71,9 +71,7 @@ def cell_under(kernel, x, y, z):  # type: ignore[no-untyped-def]
 
     Args:
         kernel: a `TriangleKernel`.
-        x: m, as y and z.
-        y: m.
-        z: m.
+        x, y, z: m.
 
     Returns:
         (cell, height, nx, ny, nz): -1 for a point that is over no cell, N for one on the border of

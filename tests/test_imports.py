@@ -40,7 +40,7 @@ surfaces.patches.nurbs
 surfaces.fitted
 surfaces.piecewise
 surfaces.toolpaths
-surfaces.meshes: triangle_mesh normals closest_point tree_building face_tree places_on_faces facets mesh_parts
+surfaces.meshes: triangle_mesh normals closest_point face_tree places_on_faces facets mesh_parts
 surfaces.meshes.repair
 surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources

@@ -17,8 +17,8 @@ from coverable_arrays import Array
 from coverable_errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks
 from surfaces.fitted.calls import HOW, Formula
-from surfaces.fitted.fitted_patch import FittedPatch
-from surfaces.fitted.interpolation import (
+from surfaces.fitted.fitted_patch import (
+    FittedPatch,
     extent_of,
     meeting_ends,
     outward_words,

@@ -10,9 +10,9 @@ import numpy as np
 from coverable_arrays import Array
 from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
-from surfaces.fitted.fitted_patch import FittedPatch
-from surfaces.fitted.interpolation import (
+from surfaces.fitted.fitted_patch import (
     ONE_PLACE,
+    FittedPatch,
     extent_of,
     meeting_ends,
     outward_words,

@@ -22,9 +22,7 @@ def on_triangle(corners, f, x, y, z, weights):  # type: ignore[no-untyped-def]
     Args:
         corners: (F, 3, 3) m.
         f: which of them.
-        x: m, as y and z.
-        y: m.
-        z: m.
+        x, y, z: m.
         weights: (3,) receives the weights of the corners at the closest point.
     """
     ax, ay, az = corners[f, 0, 0], corners[f, 0, 1], corners[f, 0, 2]

@@ -43,7 +43,7 @@ class Clusters(Pieces):
     """(k,)"""
 
     @staticmethod
-    def whole(facets: Facets, straight: float) -> Clusters:
+    def of(facets: Facets, straight: float) -> Clusters:
         """All facets in one."""
         count = len(facets.corners)
         return Clusters(

@@ -134,9 +134,7 @@ def closest_on_patch(patch, x, y, z):  # type: ignore[no-untyped-def]
 
     Args:
         patch: a `PatchKernel`.
-        x: m, as y and z.
-        y: m.
-        z: m.
+        x, y, z: m.
 
     Returns:
         (u, v, height, nx, ny, nz): parameters (rad or m; an angle is wrapped into the patch's

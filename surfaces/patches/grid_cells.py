@@ -62,12 +62,12 @@ class GridCells(Cells):
             v=v,
         )
 
-    def finer(self, ways: int = 3) -> Finer:
+    def finer(self, parts: int = 3) -> Finer:
         """See `Cells.finer`."""
         nu, nv = self.shape
         i, j = np.divmod(np.arange(len(self)), nv)
-        same = (ways * i + ways // 2) * (ways * nv) + ways * j + ways // 2
-        return Finer(GridCells.cut(self.surface, ways * nu, ways * nv), same)
+        same = (parts * i + parts // 2) * (parts * nv) + parts * j + parts // 2
+        return Finer(GridCells.cut(self.surface, parts * nu, parts * nv), same)
 
     @cached_property
     def tangents(self) -> Array:

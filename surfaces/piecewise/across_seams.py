@@ -11,7 +11,7 @@ import numpy as np
 
 from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import grid_neighbours
-from surfaces.piecewise.seams import Side, contacts, sides_of
+from surfaces.piecewise.seams import Border, contacts, sides_of
 
 if TYPE_CHECKING:
     from surfaces.piecewise.piecewise_surface import Piecewise
@@ -75,7 +75,7 @@ def seam_pairs_of(surface: Piecewise, counts: Counts) -> SeamPairs:
 
 
 def _along_sides(
-    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Side]
+    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Border]
 ) -> tuple[Ints, Array]:
     """Pairs that share a stretch of border, and the middle of it, in the surface's own frame."""
     joined = {seam.pieces for seam in surface.seams}
@@ -106,7 +106,7 @@ def _along_sides(
 
 
 def _at_corners(
-    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Side], touching: Ints
+    surface: Piecewise, counts: Counts, first: Ints, sides: Sequence[Border], touching: Ints
 ) -> tuple[Ints, Array]:
     """Pairs that share a corner and a neighbour but no border, and the corners."""
     from scipy.sparse import coo_array
@@ -143,7 +143,7 @@ def _at_corners(
     return pairs[keep], spot[keep]
 
 
-def _cells_at(side: Side, counts: Counts, along: Ints) -> Ints:
+def _cells_at(side: Border, counts: Counts, along: Ints) -> Ints:
     """Cells of a piece's grid at places counted along one of its borders."""
     nu, nv = counts[side.piece]
     if side.fixed == 0:

@@ -6,7 +6,7 @@ import operator
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,13 +17,9 @@ from surfaces.cell_curves import CellCurves
 from surfaces.cells import Cells, Finer, Triangles, Unrolled
 from surfaces.curve_fitting import CurveFit
 from surfaces.patches import GridCells
-from surfaces.piecewise.across_seams import SMOOTH, curves_across
+from surfaces.piecewise.across_seams import SMOOTH, SeamPairs, curves_across, seam_pairs_of
 from surfaces.piecewise.piecewise_surface import Piecewise
 from surfaces.surface import SurfaceError
-
-if TYPE_CHECKING:
-    from surfaces.piecewise.across_seams import SeamPairs
-
 
 LEFT = 0.2  # rad, so far clockwise from the left a list of neighbours begins, as in a grid
 
@@ -52,11 +48,11 @@ class PieceCells(Cells):
             counts=checked,
         )
 
-    def finer(self, ways: int = 3) -> Finer:
+    def finer(self, parts: int = 3) -> Finer:
         """See `Cells.finer`."""
-        cells = PieceCells.cut(self.surface, [(ways * nu, ways * nv) for nu, nv in self.counts])
+        cells = PieceCells.cut(self.surface, [(parts * nu, parts * nv) for nu, nv in self.counts])
         starts = np.repeat(cells.first[:-1], np.diff(self.first))
-        same = np.concatenate([grid.finer(ways).same for grid in self.grids])
+        same = np.concatenate([grid.finer(parts).same for grid in self.grids])
         return Finer(cells, starts + same)
 
     @cached_property
@@ -79,8 +75,6 @@ class PieceCells(Cells):
     @cached_property
     def seam_pairs(self) -> SeamPairs:
         """The pairs of cells that touch across seams."""
-        from surfaces.piecewise.across_seams import seam_pairs_of
-
         return seam_pairs_of(self.surface, self.counts)
 
     @cached_property

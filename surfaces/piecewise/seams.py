@@ -27,7 +27,7 @@ INWARD = 1e-4  # [1], share of a patch: step from a border into the patch
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
+class Border:
     """One border of a patch, from s = 0 to s = 1 along the other parameter."""
 
     patch: Patch
@@ -134,10 +134,10 @@ class Seam(NamedTuple):
     """Whether both call the same side outward."""
 
 
-def sides_of(patches: Sequence[Patch], gap: float) -> list[Side]:
+def sides_of(patches: Sequence[Patch], gap: float) -> list[Border]:
     """All borders of some patches, without those joined to themselves or shrunk to a point."""
     sides = [
-        Side(patch, piece, fixed, upper)
+        Border(patch, piece, fixed, upper)
         for piece, patch in enumerate(patches)
         for fixed in (0, 1)
         if not (patch.u_closed, patch.v_closed)[fixed]
@@ -146,7 +146,7 @@ def sides_of(patches: Sequence[Patch], gap: float) -> list[Side]:
     return [side for side in sides if side.length > 10.0 * gap]
 
 
-def contacts(sides: Sequence[Side], marks: Sequence[Array], gap: float) -> Iterator[Contact]:
+def contacts(sides: Sequence[Border], marks: Sequence[Array], gap: float) -> Iterator[Contact]:
     """Which marks of each side lie within `gap` (m) of sides of other pieces.
 
     Args:
@@ -191,7 +191,7 @@ def survey(patches: Sequence[Patch], gap: float) -> tuple[tuple[Seam, ...], tupl
     return tuple(seam for _, seam in best.values()), min(crowds, default=())
 
 
-def _seam(one: Side, here: Array, other: Side, there: Array) -> Seam:
+def _seam(one: Border, here: Array, other: Border, there: Array) -> Seam:
     """The seam through places on one side that lie on another."""
     against = (one.heading(here) * other.heading(there)).sum(axis=1)
     agree = bool(np.median(against) < 0.0)

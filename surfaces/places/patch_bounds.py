@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from coverable_arrays import Array
-from surfaces.places.places import second_derivative_of_unit
+from surfaces.places.places import second_derivatives_of_unit
 from surfaces.places.spline_bounds import spline_bounds
 
 BoxBounds = Callable[[Any, Array, Array], Array]
@@ -127,19 +127,7 @@ def _ellipsoid(patch: Any, low: Array, high: Array) -> Array:
     by_v = by_v + second[:, 1] * half[:, 0] + second[:, 2] * half[:, 1]
     least = np.maximum(length - by_u * half[:, 0] - by_v * half[:, 1], 1.0 / axes.max())
     point = axes.max() * np.stack([ones, cos, sin], axis=1)
-    return np.stack([point, _of_unit(least, by_u, by_v, second)], axis=2)
-
-
-def _of_unit(length: Array, by_u: Array, by_v: Array, second: Array) -> Array:
-    """(k, 3) bounds for g / |g| from those for g: its length, and its derivatives.
-
-    Along (u', v') they bound the derivative as coefficients of u'^2, 2 |u' v'| and v'^2: |g'|^2 is
-    at most (|g_u| |u'| + |g_v| |v'|)^2, see `second_derivative_of_unit`.
-    """
-    firsts = (by_u, np.sqrt(by_u * by_v), by_v)
-    return np.stack(
-        [second_derivative_of_unit(length, firsts[k], second[:, k]) for k in range(3)], axis=1
-    )
+    return np.stack([point, second_derivatives_of_unit(least, by_u, by_v, second)], axis=2)
 
 
 def _revolution(patch: Any, low: Array, high: Array) -> Array:

@@ -225,6 +225,22 @@ def share_of(to: Array, fro: Array) -> Array:
     return np.divide(to, to + fro, out=np.zeros_like(to), where=to + fro > 0.0)
 
 
+def second_derivatives_of_unit(length: Array, by_u: Array, by_v: Array, second: Array) -> Array:
+    """(k, 3) bounds for g / |g| from those for g: its length, and its derivatives.
+
+    Along (u', v') they bound the derivative as coefficients of u'^2, 2 |u' v'| and v'^2: |g'|^2 is
+    at most (|g_u| |u'| + |g_v| |v'|)^2, see `second_derivative_of_unit`.
+
+    Args:
+        length: (k,) lower bounds of |g|.
+        by_u, by_v: (k,) bounds of |g_u| and |g_v|.
+        second: (k, 3) bounds of |g_uu|, |g_uv| and |g_vv|.
+    """
+    firsts = (by_u, np.sqrt(by_u * by_v), by_v)
+    found = [second_derivative_of_unit(length, firsts[k], second[:, k]) for k in range(3)]
+    return np.stack(found, axis=1)
+
+
 def second_derivative_of_unit(length: Array, first: Array, second: Array) -> Array:
     """Bound of |d2/ds2 (g / |g|)| for a curve g(s).
 

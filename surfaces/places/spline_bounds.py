@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from coverable_arrays import Array, Ints
-from surfaces.places.places import second_derivative_of_unit
+from surfaces.places.places import second_derivatives_of_unit
 
 ORDERS = ((0, 1), (1, 0), (0, 2), (1, 1), (2, 0), (0, 3), (1, 2), (2, 1), (3, 0))
 MOST_SPANS = 4  # of a box along one parameter; a wider one is not bounded
@@ -78,19 +78,14 @@ def _point_and_normal(
     u, v = s[1, 0], s[0, 1]
     by_u = s[2, 0] * v + u * s[1, 1]
     by_v = s[1, 1] * v + u * s[0, 2]
-    bends = np.stack(
-        [
-            s[3, 0] * v + 2.0 * s[2, 0] * s[1, 1] + u * s[2, 1],
-            s[2, 1] * v + s[2, 0] * s[0, 2] + u * s[1, 2],
-            s[1, 2] * v + 2.0 * s[1, 1] * s[0, 2] + u * s[0, 3],
-        ],
-        axis=1,
-    )
+    by_uu = s[3, 0] * v + 2.0 * s[2, 0] * s[1, 1] + u * s[2, 1]
+    by_uv = s[2, 1] * v + s[2, 0] * s[0, 2] + u * s[1, 2]
+    by_vv = s[1, 2] * v + 2.0 * s[1, 1] * s[0, 2] + u * s[0, 3]
     least = length - by_u * half[:, 0] - by_v * half[:, 1]
-    firsts = (by_u, np.sqrt(by_u * by_v), by_v)
-    normal = [second_derivative_of_unit(least, firsts[k], bends[:, k]) for k in range(3)]
+    second = np.stack([by_uu, by_uv, by_vv], axis=1)
+    normal = second_derivatives_of_unit(least, by_u, by_v, second)
     point = np.stack([s[2, 0], s[1, 1], s[0, 2]], axis=1)
-    return np.stack([point, np.stack(normal, axis=1)], axis=2)
+    return np.stack([point, normal], axis=2)
 
 
 @lru_cache(maxsize=64)  # splines are values, compared by identity

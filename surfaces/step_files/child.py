@@ -10,6 +10,7 @@ JSON too, and after it the bytes of the arrays it tells of: (V, 3) float64 m, (F
 
 from __future__ import annotations
 
+import importlib
 import io
 import json
 import os
@@ -21,6 +22,12 @@ from typing import Any
 MILLIMETRE = 1e-3  # m; Open CASCADE turns all units into millimetres
 # Of edges and inner points of a triangle, as weights of its corners: where it may lie off the face.
 WITHIN = ((0.5, 0.5, 0.0), (0.0, 0.5, 0.5), (0.5, 0.0, 0.5), (1 / 3, 1 / 3, 1 / 3))
+# Of Open CASCADE.
+MODULES = (
+    "BRep", "BRepAdaptor", "BRepGProp", "BRepMesh", "collections", "GeomAdaptor", "GProp",
+    "IFSelect", "Quantity", "STEPCAFControl", "TCollection", "TDocStd", "TopAbs", "TopExp",
+    "TopLoc", "TopoDS", "XCAFDoc",
+)  # fmt: skip
 
 
 class Refused(Exception):
@@ -249,24 +256,8 @@ def answer(job: dict[str, Any], data: bytes) -> bytes:
 
 def _load_all() -> None:
     """Import what reading takes, as long as files can be opened."""
-    import numpy  # noqa: F401
-    import OCP.BRep
-    import OCP.BRepAdaptor
-    import OCP.BRepGProp
-    import OCP.BRepMesh
-    import OCP.collections
-    import OCP.GeomAdaptor
-    import OCP.GProp
-    import OCP.IFSelect
-    import OCP.Quantity
-    import OCP.STEPCAFControl
-    import OCP.TCollection
-    import OCP.TDocStd
-    import OCP.TopAbs
-    import OCP.TopExp
-    import OCP.TopLoc
-    import OCP.TopoDS
-    import OCP.XCAFDoc  # noqa: F401
+    for name in ("numpy", *(f"OCP.{module}" for module in MODULES)):
+        importlib.import_module(name)
 
 
 def main() -> None:

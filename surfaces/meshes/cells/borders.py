@@ -21,8 +21,8 @@ _INSIDE = 0.25  # of sqrt(area): as far from the border as this is well inside (
 _DEEP = 0.8  # of the greatest distance to the border: as good as the greatest
 
 
-class Places(NamedTuple):
-    """A place on each of N cells."""
+class FacePoints(NamedTuple):
+    """A point of a face of each of N cells."""
 
     points: Array
     """(N, 3) m."""
@@ -32,7 +32,9 @@ class Places(NamedTuple):
     """(N, 3) barycentric coordinates on that face, >= 0, of sum 1."""
 
 
-def centre_places(vertices: Array, faces: Ints, labels: Ints, areas: Array, border: Mask) -> Places:
+def centre_points(
+    vertices: Array, faces: Ints, labels: Ints, areas: Array, border: Mask
+) -> FacePoints:
     """The point of each cell nearest to its centroid; elsewhere where that is at its border.
 
     The centroid of a ring or a horseshoe lies outside, and the point nearest to it on the border.
@@ -57,7 +59,7 @@ def centre_places(vertices: Array, faces: Ints, labels: Ints, areas: Array, bord
     weights = np.empty((count, 3))
     _choose(corners, middles, border, order, indptr, centroids, total, chosen, weights)
     points = np.einsum("nk,nkc->nc", weights, corners[chosen])
-    return Places(points, chosen, weights)
+    return FacePoints(points, chosen, weights)
 
 
 @kernel
@@ -88,7 +90,7 @@ def _depth(p, corners, border, members):  # type: ignore[no-untyped-def]
 
 @kernel
 def _choose(corners, middles, border, order, indptr, centroids, total, chosen, weights):  # type: ignore[no-untyped-def]
-    """Write each cell's face and the place on it; see `centre_places`."""
+    """Write each cell's face and the place on it; see `centre_points`."""
     here = np.empty(3)
     point = np.empty(3)
     for n in range(indptr.shape[0] - 1):

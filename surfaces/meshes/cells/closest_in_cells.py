@@ -18,9 +18,7 @@ def _nearest_of(corners, balls, radii, some, x, y, z, weights, found):  # type: 
         balls: (F, 3) m, a point of each face.
         radii: (F,) m, no point of the face is further from it.
         some: (k,) faces.
-        x: m, as y and z.
-        y: m.
-        z: m.
+        x, y, z: m.
         weights: (3,) receives the weights of the nearest point.
         found: (3,) scratch.
     """

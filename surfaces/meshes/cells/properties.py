@@ -12,7 +12,7 @@ from surfaces.adjacency import Neighbours
 from surfaces.meshes.cells.borders import (
     Outlines,
     SharedBorders,
-    centre_places,
+    centre_points,
     clockwise_neighbours,
     outlines,
     shared_borders,
@@ -79,7 +79,7 @@ def figures(vertices: Array, faces: Ints, vertex_normals: Array, labels: Ints) -
     face_areas = np.linalg.norm(double, axis=1) / 2.0
     face_normals = _unit(double)
     border = other != labels[:, None]
-    places = centre_places(vertices, faces, labels, face_areas, border)
+    places = centre_points(vertices, faces, labels, face_areas, border)
     normals = np.einsum("nk,nkc->nc", places.weights, vertex_normals[faces[places.faces]])
     normals = _unit(normals, instead=face_normals[places.faces])
     areas = sum_by(labels, face_areas, count)

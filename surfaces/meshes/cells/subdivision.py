@@ -24,7 +24,7 @@ LONGEST = 8.0  # edge^2 / most_area; 2.3 in an equilateral triangle, 4 in a halv
 SAME = 1e-9  # relative: lengths this close are equal, so that rounding does not choose
 
 
-class Edges(NamedTuple):
+class EdgeLengths(NamedTuple):
     """The edges of a mesh, each once."""
 
     ends: Ints
@@ -48,7 +48,7 @@ class Subdivision(NamedTuple):
     """(G,) the old face each one is a part of, in rising order."""
 
 
-def edges_of(vertices: Array, faces: Ints) -> Edges:
+def edges_of(vertices: Array, faces: Ints) -> EdgeLengths:
     """The edges, and each face's longest; of equal ones that of the lowest index.
 
     Both faces of an edge then agree on the order of edges, and splits spread no further than
@@ -61,10 +61,10 @@ def edges_of(vertices: Array, faces: Ints) -> Edges:
     of_length = length[of_face]
     near = of_length >= of_length.max(axis=1, keepdims=True) * (1.0 - SAME)
     longest = np.argmin(np.where(near, of_face, len(ends)), axis=1)
-    return Edges(ends, of_face, length, longest)
+    return EdgeLengths(ends, of_face, length, longest)
 
 
-def halve(vertices: Array, faces: Ints, edges: Edges, wanted: Mask) -> Subdivision:
+def halve(vertices: Array, faces: Ints, edges: EdgeLengths, wanted: Mask) -> Subdivision:
     """Halve the wanted faces at their longest edges, and others as far as edges have to agree.
 
     With m the middle of a face's longest edge a-b, the halves are c-a-m and c-m-b. Either is
@@ -101,7 +101,7 @@ def halve(vertices: Array, faces: Ints, edges: Edges, wanted: Mask) -> Subdivisi
     return Subdivision(points, parts[kept], parent)
 
 
-def cut_across(vertices: Array, faces: Ints, edges: Edges, count: Ints) -> Subdivision:
+def cut_across(vertices: Array, faces: Ints, edges: EdgeLengths, count: Ints) -> Subdivision:
     """Cut edges into `count` (E,) equal parts each, and join the points like a ladder's rungs.
 
     Every face needs an edge that stays whole: the ladder's base. The rungs lead from there to the

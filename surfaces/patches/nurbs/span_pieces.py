@@ -10,7 +10,7 @@ from coverable_arrays import Array, Ints
 from surfaces.patches.nurbs.bernstein import abscissae
 
 
-class Pieces(NamedTuple):
+class SpanPieces(NamedTuple):
     """What of the boxes lies in single spans, box by box."""
 
     starts: Ints
@@ -38,7 +38,7 @@ class Pieces(NamedTuple):
         return np.asarray((middle[:, None] + x)[:, :, None] + y[:, None])
 
 
-def pieces_of(breaks: tuple[Array, Array], low: Array, high: Array, quartered: bool) -> Pieces:
+def pieces_of(breaks: tuple[Array, Array], low: Array, high: Array, quartered: bool) -> SpanPieces:
     """Cut boxes where the spans end; and first, if asked, in the middle both ways.
 
     Args:
@@ -68,7 +68,7 @@ def pieces_of(breaks: tuple[Array, Array], low: Array, high: Array, quartered: b
         places.append(2.0 * (ends - middle) / width)
     (low_u, high_u), (low_v, high_v) = shares
     (x0, x1), (y0, y1) = places
-    return Pieces(
+    return SpanPieces(
         starts=np.searchsorted(box, np.arange(len(low))),
         box=box,
         span=along[0] * (len(breaks[1]) - 1) + along[1],

@@ -32,7 +32,7 @@ from surfaces.patches.nurbs.bernstein import (
     product,
     span_matrix,
 )
-from surfaces.patches.nurbs.span_pieces import Pieces, pieces_of
+from surfaces.patches.nurbs.span_pieces import SpanPieces, pieces_of
 
 _QUARTERED = 128  # coefficients of N, with more a box is not cut at its middle
 _BLOCK = 300_000  # numbers held at a time, about
@@ -155,7 +155,7 @@ def _models(nets: SpanNets, low: Array, high: Array) -> tuple[SpaceModel, SpaceM
     return points_model, _unit_normals(pieces, cut(nets.normals), nets.rounding)
 
 
-def _unit_normals(pieces: Pieces, net: Array, rounding: Array) -> SpaceModel:
+def _unit_normals(pieces: SpanPieces, net: Array, rounding: Array) -> SpaceModel:
     """From the nets (j, m, n, 3) of N of each piece, and what is wrong with those of spans.
 
     N is divided by an affine function first, that is nearly its length: the direction is the same,
@@ -179,7 +179,7 @@ def _unit_normals(pieces: Pieces, net: Array, rounding: Array) -> SpaceModel:
 class _Fit(NamedTuple):
     """An affine model of each box, and the coefficients of what it leaves of the pieces."""
 
-    pieces: Pieces
+    pieces: SpanPieces
     centre: Array
     """(k, 3)"""
     slopes: Array
@@ -188,7 +188,7 @@ class _Fit(NamedTuple):
     """(j, m, n, 3)"""
 
     @staticmethod
-    def of(pieces: Pieces, net: Array, weights: Array | None) -> _Fit:
+    def of(pieces: SpanPieces, net: Array, weights: Array | None) -> _Fit:
         """Least squares over the coefficients, the middle moved between the extremes.
 
         Args:
@@ -243,7 +243,7 @@ def _lengths(vectors: Array) -> Array:
     return np.asarray(np.sqrt(np.einsum("...d,...d->...", vectors, vectors)))
 
 
-def _least_squares(pieces: Pieces, values: Array) -> Array:
+def _least_squares(pieces: SpanPieces, values: Array) -> Array:
     """(k, 3, 3) for each box the affine function, 1, x_1, x_2, nearest to values (j, m, n, 3)."""
     (_, m, n, _), starts = values.shape, pieces.starts
     x, y = abscissae(m), abscissae(n)
