@@ -39,4 +39,4 @@ def test_a_kind_that_says_no_more_of_itself_is_followed_but_not_bounded(names):
     offset = offset_surface(own, 0.01)
     points = own.point([0.0, 0.01], [0.3, 0.3])
     places = offset.nearest(points, points, 1e-3)
-    assert not np.isfinite(offset.paths(places.of([0]), places.of([1])).bends).all()
+    assert not np.isfinite(offset.paths(places.of([0]), places.of([1])).derivative_bounds).all()
