@@ -244,10 +244,10 @@ def _postures(fields: Fields, archive: Archive, count: int, n: int) -> NDArray[n
 
 def _task(fields: Fields, task: Task) -> Task:
     """The case's task with the numbers that were used: a method may choose the tolerance."""
-    stored = {key: fields.number(key) for key in ("standoff", "cone_deg")}
+    standoff, cone_deg = fields.number("standoff"), fields.number("cone_deg")
     tolerance = None if fields.entries.get("tolerance") is None else fields.number("tolerance")
     try:
-        return replace(task, **stored, tolerance=tolerance)
+        return replace(task, standoff=standoff, cone_deg=cone_deg, tolerance=tolerance)
     except ArgumentError as error:
         text = "; ".join(worded(fault.renamed({}, "task")) for fault in error.faults)
         raise fields.archive.error(f"meta.json: {text}") from error
