@@ -1,4 +1,4 @@
-"""Attempts at an answer: a search, and the replay of its motion, within the time limit."""
+"""Attempts at an answer: a search and the replay of its motion, again where that may help."""
 
 from __future__ import annotations
 
@@ -23,6 +23,11 @@ NOT_REPLAYED = (
     "A motion over every cell was found, but the time limit of {:g} s ran out before the "
     "independent replay had judged it."
 )
+IN_PIECES = (
+    " (With one convex hull for each shape of a link, {} of {} cells were covered; so the links "
+    "were cut into convex pieces.)"
+)
+NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
 
 Method = Callable[[Problem, Search, Clock], Found]
 
@@ -30,6 +35,7 @@ Method = Callable[[Problem, Search, Clock], Found]
 class Attempt(NamedTuple):
     """One search, and the replay of the motion that it found."""
 
+    problem: Problem
     found: Found
     replayed: Replay | None
     search_s: float
@@ -45,14 +51,32 @@ class Attempt(NamedTuple):
         """Is there a motion that was accepted, or a proof?"""
         return self.accepted or self.found.proof is not None
 
-    @property
-    def blocked(self) -> bool:
-        """Is nothing decided, and were convex bodies of the arm in the way?"""
-        return not self.decided and self.found.hindered
+
+def attempts_at(
+    problem: Problem, search: Search, clock: Clock, method: Method
+) -> tuple[list[Attempt], str]:
+    """All attempts, that which counts first; and a remark on the shapes of the links, or "".
+
+    Where nothing is decided and convex hulls of links kept the search from going on, the links are
+    cut into convex pieces.
+    """
+    tried = _with_these_shapes(problem, search, clock, method)
+    if tried[0].decided or not tried[0].found.hindered:
+        return tried, ""
+    finer = _in_pieces(problem, clock)
+    if finer is None:
+        return tried, ""
+    more, total = _with_these_shapes(finer, search, clock, method), len(problem.cells)
+    before, count = (int(some[0].found.covered.sum()) for some in (tried, more))
+    if more[0].decided or count > before:
+        return more + tried, IN_PIECES.format(before, total)
+    return tried + more, "" if clock.out_of_time else NOT_IN_PIECES.format(count, total)
 
 
-def attempts_at(problem: Problem, search: Search, clock: Clock, method: Method) -> list[Attempt]:
-    """The attempt that counts, and then others that were made."""
+def _with_these_shapes(
+    problem: Problem, search: Search, clock: Clock, method: Method
+) -> list[Attempt]:
+    """An attempt, and a second one with a narrower task where the first is narrowly refused."""
     first = _attempt(problem, search, clock, method)
     if first.replayed is None or not first.replayed.narrowly_refused:
         return [first]
@@ -77,10 +101,10 @@ def _attempt(problem: Problem, search: Search, clock: Clock, method: Method) -> 
     except OutOfTime:
         found = replace(found, unfinished=NOT_REPLAYED.format(clock.limit))
     search_s = searched - float(np.fmax(called, clock.loaded))
-    return Attempt(found, replayed, search_s, time.monotonic() - searched)
+    return Attempt(problem, found, replayed, search_s, time.monotonic() - searched)
 
 
-def with_pieces(problem: Problem, clock: Clock) -> Problem | None:
+def _in_pieces(problem: Problem, clock: Clock) -> Problem | None:
     """The problem with links cut into pieces, where that differs and there is time for it."""
     try:
         with clock.enforced():

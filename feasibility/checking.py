@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from coverable_errors import ArgumentError
-from feasibility.attempts import Method, attempts_at, with_pieces
+from feasibility.attempts import Method, attempts_at
 from feasibility.clock import Clock, OutOfTime
 from feasibility.collisions import Collision
 from feasibility.found import Found
@@ -27,11 +27,6 @@ if TYPE_CHECKING:
     from feasibility.treated import TreatedArea
 
 NO_CELLS = "There are no cells, so there is nothing to cover; the arm was not looked at."
-IN_PIECES = (
-    " (With one convex hull for each shape of a link, {} of {} cells were covered; so the links "
-    "were cut into convex pieces.)"
-)
-NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
 
 
 def check(
@@ -89,23 +84,25 @@ def check(
         task = replace(task, collision=collision)
     problem = Problem.of(robot, cells, task, settings)
     check_asked(robot, task, search)
+    method: Method
     if search.method == "greedy":
         if seeds is not None:
             raise ArgumentError("seeds are for the complete search; the greedy one has a start")
         from feasibility.paper import greedy_search
 
-        from_start = partial(greedy_search, start=robot.start)
-        return _measured(_decided(problem, search, progress, from_start, clock), clock)
-    from feasibility.roadmap import complete_search
+        method = partial(greedy_search, start=robot.start)
+    else:
+        from feasibility.roadmap import complete_search
 
+        method = partial(complete_search, seeds=seeds)
     clock = Clock(search.time_limit, progress) if clock is None else clock
-    found = _decided(problem, search, progress, partial(complete_search, seeds=seeds), clock)
-    return _measured(_at_rates(found, clock), clock)
+    verdict = _decided(problem, search, clock, method)
+    return _measured(_at_rates(verdict, clock), clock)
 
 
 def _at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The verdict at the speed, and as far from singularities, as the task asks."""
-    if verdict.task.speed is None and verdict.task.min_manipulability is None:
+    if not verdict.task.asks_rates:
         return verdict
     from feasibility.speed import at_rates
 
@@ -139,41 +136,24 @@ def greedy_check(
     """
     from feasibility.paper import greedy_search
 
-    def from_start(problem: Problem, search: Search, clock: Clock) -> Found:
-        return greedy_search(problem, search, clock, start)
-
     search = Search(method="greedy") if search is None else search
-    return _measured(_decided(Problem.of(robot, cells, task), search, progress, from_start))
+    clock = Clock(search.time_limit, progress)
+    method = partial(greedy_search, start=start)
+    return _measured(_decided(Problem.of(robot, cells, task), search, clock, method), clock)
 
 
-def _decided(
-    problem: Problem,
-    search: Search,
-    progress: Progress | None,
-    method: Method,
-    clock: Clock | None = None,
-) -> Verdict:
+def _decided(problem: Problem, search: Search, clock: Clock, method: Method) -> Verdict:
     """Search, certify, and make the verdict."""
     called = time.monotonic()
-    clock = Clock(search.time_limit, progress) if clock is None else clock
-    tried = attempts_at(problem, search, clock, method)
-    chosen, said = tried[0], ""
-    finer = with_pieces(problem, clock) if chosen.blocked else None
-    if finer is not None:
-        tried = [*attempts_at(finer, search, clock, method), *tried]
-        count, before = tried[0].found.covered.sum(), chosen.found.covered.sum()
-        if tried[0].decided or count > before:
-            said = IN_PIECES.format(before, len(problem.cells))
-            problem, chosen = finer, tried[0]
-        elif not clock.out_of_time:
-            said = NOT_IN_PIECES.format(count, len(problem.cells))
-    bodies, found, replayed = problem.bodies, chosen.found, chosen.replayed
+    tried, remark = attempts_at(problem, search, clock, method)
+    problem, found, replayed = tried[0].problem, tried[0].found, tried[0].replayed
+    bodies = problem.bodies
     answer, evidence, message = _answer(problem, found, replayed)
     feasible = answer is Answer.FEASIBLE
     return Verdict(
         answer=answer,
         evidence=evidence,
-        message=message + said,
+        message=message + remark,
         robot=problem.robot,
         cells=problem.cells,
         task=problem.task,
@@ -211,12 +191,11 @@ def _causes(found: Found, clock: Clock) -> tuple[Cause, ...]:
         return ()
 
 
-def _measured(verdict: Verdict, clock: Clock | None = None) -> Verdict:
-    """The verdict with what its motion treats, which may be too little for the coverage asked."""
+def _measured(verdict: Verdict, clock: Clock) -> Verdict:
+    """The verdict with what its motion treats, which may be too little for its coverage."""
     task = verdict.task
     if not verdict.feasible or task.footprint is None:
         return verdict
-    clock = Clock() if clock is None else clock
     if task.coverage is None:
         return replace(verdict, treated=deferred(lambda: _treated(verdict, clock)))
     treated = _treated(verdict, clock)

@@ -15,8 +15,6 @@ from feasibility.verdict import Cause, Replay, Walk
 if TYPE_CHECKING:
     import networkx as nx
 
-    from feasibility.verdict import Replay
-
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Found:
@@ -41,13 +39,13 @@ class Found:
     replay: Callable[[], Replay] | None = None
     """Replays the motion over all cells by Pinocchio; None where none was found."""
     accepted: str = ""
-    """What to say when the replay accepts; {waypoints} stands for their number."""
+    """The message when the replay accepts; {waypoints} is replaced by their number."""
     refused: str = ""
-    """What to say when it refuses; {refusal} stands for its reason."""
+    """The message when it refuses; {refusal} is replaced by its reason."""
     proof: CutTree | None = None
     """Why no motion covers all cells; None where that is not proved."""
     proved: str = ""
-    """What to say about the proof."""
+    """The message about the proof."""
     unfinished: str = ""
     """What was left untried, a time limit that ran out, say; empty where nothing was."""
     exhausted: str = ""
