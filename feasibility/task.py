@@ -16,11 +16,11 @@ from feasibility.roll import Roll, projected, roll_of_range
 from surfaces import Cells
 
 DEFAULT_TOLERANCE = 1e-3  # [m]
-FIXED_DEG = 0.1  # [deg] to either side: "fixed", where a task leaves an angle no room at all
+FIXED_DEG = 0.1  # [deg] to either side: a range that counts as "fixed"
 
 
 class Targets(NamedTuple):
-    """A task applied to cells: where the tool point has to be, and which way its axis points."""
+    """A task applied to cells: where the tool point has to be, and where its axis points."""
 
     points: NDArray[np.float64]
     """(N, 3) m, in the root frame: centre -+ standoff * normal."""
@@ -70,7 +70,7 @@ class Task:
     """The least and the largest roll, degrees: the angle about the approach direction from the
     reference direction on the surface to the reference axis of the TCP (`feasibility.roll`). None,
     or 360 degrees and more, leaves it free. One roll alone, such as (0, 0), means that one up to
-    `FIXED_DEG` to either side, for no motion could be certified without any room; then a cone of 0
+    `FIXED_DEG` to either side, for without a margin no motion could be certified; then a cone of 0
     is one of `FIXED_DEG` too, and the orientation is fixed: eq. (2)."""
     roll_reference: Direction | None = None
     """The reference direction in the surface's own frame; its part square to the approach counts.
@@ -79,14 +79,14 @@ class Task:
     """What the tool treats at once, metres: the diameter of a disc, or an ellipse's along its path
     and across. Answers then have the treated share of the area; it alone changes no verdict."""
     coverage: float | None = None
-    """The share of the area that has to be treated for "feasible", besides every cell."""
+    """The share of the area that has to be treated for "feasible", in addition to every cell."""
 
     speed: float | None = None
     """m/s, of the tool relative to the surface: what the joints' velocity limits have to allow all
-    along the motion, but where it stops (`feasibility.certification.rates`). None asks for none."""
+    along the motion, but where it stops (`feasibility.certification.rates`). None for any."""
     min_manipulability: float | None = None
     """What the smallest singular value along the motion has to be at least: of the Jacobian of tool
-    point (over the arm's reach) and approach axis, a pure number. None asks for none."""
+    point (over the arm's reach) and approach axis, a pure number. None for any."""
     home_deg: tuple[float, ...] | None = None
     """(n,) degrees, where a path comes from and goes back to; None where it begins and ends over
     the surface. For arms whose joints all turn."""
@@ -94,38 +94,34 @@ class Task:
     def __post_init__(self) -> None:
         """Refuse numbers that describe no task; keep them as plain floats."""
         checks = Checks("task")
-        kept: dict[str, float | None] = {
+        kept: dict[str, Any] = {
             "standoff": checks.number(
                 "standoff", self.standoff, "must be a finite number >= 0 (metres)", low=0.0
             ),
             "cone_deg": checks.number(
                 "cone_deg", self.cone_deg, "must lie in 0 .. 180 (degrees)", 0.0, 180.0
             ),
-            "tolerance": None
-            if self.tolerance is None
-            else checks.positive("tolerance", self.tolerance),
         }
-        for name, unit in (("speed", "m/s"), ("min_manipulability", "a pure number")):
-            given = getattr(self, name)
-            kept[name] = None if given is None else checks.positive(name, given, unit)
+        units = {"tolerance": "metres", "speed": "m/s", "min_manipulability": "a pure number"}
+        for name, unit in units.items():
+            if getattr(self, name) is not None:
+                kept[name] = checks.positive(name, getattr(self, name), unit)
         if not isinstance(self.collision, Collision | None):
             expected = "must be a Collision, such as Collision(clearance=0.005), or None"
             checks.wrong("collision", self.collision, expected)
-        kept_too: dict[str, Any] = {
-            "approach": self._checked_approach(checks),
-            "roll_deg": self._checked_roll(checks, kept["cone_deg"]),
-            "roll_reference": None
-            if self.roll_reference is None
-            else tuple(checks.direction("roll_reference", self.roll_reference)),
-            "footprint": self._checked_footprint(checks),
-            "coverage": self._checked_coverage(checks),
-            "home_deg": self._checked_home(checks),
-        }
+        kept["approach"] = self._checked_approach(checks)
+        kept["roll_deg"] = roll = self._checked_roll(checks, kept["cone_deg"])
+        if self.roll_reference is not None:
+            reference = checks.direction("roll_reference", self.roll_reference)
+            kept["roll_reference"] = tuple(reference)
+        kept["footprint"] = self._checked_footprint(checks)
+        kept["coverage"] = self._checked_coverage(checks)
+        kept["home_deg"] = self._checked_home(checks)
         checks.done()
-        if self.roll_deg is not None and kept_too["roll_deg"][0] == kept_too["roll_deg"][1]:
-            kept_too["roll_deg"] = _about(kept_too["roll_deg"][0])
+        if roll is not None and roll[0] == roll[1]:
+            kept["roll_deg"] = _about(roll[0])
             kept["cone_deg"] = kept["cone_deg"] or FIXED_DEG
-        for name, value in {**kept, **kept_too}.items():
+        for name, value in kept.items():
             object.__setattr__(self, name, value)
 
     def _checked_footprint(self, checks: Checks) -> float | tuple[float, float] | None:
@@ -151,8 +147,8 @@ class Task:
         if share == 0.0 and len(checks.faults) == known:
             checks.wrong("coverage", self.coverage, expected)
         if self.footprint is None:
-            wanted = "give task.footprint, in metres, or leave coverage out"
-            checks.keep(Fault("coverage", "needs a footprint to measure", expected=wanted))
+            expected = "give task.footprint, in metres, or leave coverage out"
+            checks.keep(Fault("coverage", "needs a footprint to measure", expected=expected))
         return share
 
     def _checked_approach(self, checks: Checks) -> Any:
@@ -165,7 +161,7 @@ class Task:
         return tuple(checks.direction("approach", self.approach))
 
     def _checked_home(self, checks: Checks) -> tuple[float, ...] | None:
-        """Numbers, one for each joint; how many there are, only the arm tells."""
+        """Numbers, one for each joint, as many as there are; the arm is not known here."""
         if self.home_deg is None:
             return None
         count = np.size(self.home_deg) if np.ndim(self.home_deg) == 1 else 1
@@ -199,6 +195,11 @@ class Task:
         """m, the footprint along the path and across it; None where none is given."""
         given = self.footprint
         return given if given is None or isinstance(given, tuple) else (given, given)
+
+    @property
+    def asks_rates(self) -> bool:
+        """Is a speed, or a distance from singularities, asked for?"""
+        return self.speed is not None or self.min_manipulability is not None
 
     @property
     def effective_tolerance(self) -> float:
@@ -283,11 +284,9 @@ def check_footprint(cells: Cells, task: Task) -> None:
         ArgumentError: the cells are poses.
     """
     if task.footprint is not None and cells.surface.wall is None:
-        expected = "leave it out, or lay passes over the surface itself"
-        raise ArgumentError(
-            Fault("footprint", "is given, but between poses there is no surface to treat",
-                  expected=expected), "task",
-        )  # fmt: skip
+        expected = "leave it out, or plan passes over the surface itself"
+        what = "is given, but between poses there is no surface to treat"
+        raise ArgumentError(Fault("footprint", what, expected=expected), "task")
 
 
 def _about(roll_deg: float) -> tuple[float, float]:

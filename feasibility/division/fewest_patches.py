@@ -28,7 +28,7 @@ from feasibility.roadmap import (
 from feasibility.roadmap.causes import cause_of, causes_of, diagnose, disconnected
 from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.search import Progress, Search
-from feasibility.speed import asks_rates, check_asked, keep_fast_motions
+from feasibility.speed import check_asked, keep_fast_motions
 from feasibility.targets import blocked_curves
 from feasibility.task import Task
 from feasibility.verdict import Cause
@@ -214,7 +214,7 @@ def _searched(robot: Robot, cells: Cells, task: Task, seed: int, clock: Clock) -
             apart = prove_apart(exploration, task)
     except OutOfTime:
         ended = False
-    slow = keep_fast_motions(exploration, task) if asks_rates(task) else {}
+    slow = keep_fast_motions(exploration, task) if task.asks_rates else {}
     exploration.clock = Clock()
     return _Searched(exploration, apart, ended, slow)
 

@@ -27,7 +27,6 @@ from feasibility.division.partition import TIME_LIMIT, Partition, fewest_patches
 from feasibility.division.reconfiguration import itinerary
 from feasibility.division.set_covering import set_cover
 from feasibility.roadmap import Exploration, Links, improve, links_of, patch_walk
-from feasibility.speed import asks_rates
 from feasibility.task import Task
 from feasibility.verdict import Walk
 
@@ -94,13 +93,13 @@ def plan_of(
     if len(partition) == 0:
         return Plan((), (), partition.bound)
     wanted = [partition.patch == p for p in range(len(partition))]
-    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers, asks_rates(task)))
+    chosen = itinerary(robot, _choices(exploration, wanted, roots, covers, task.asks_rates))
     patches = []
     for p, walk in zip(chosen.order, chosen.walks, strict=True):
         mine = wanted[p]
         replayed = replay(robot, cells, task, walk, mine)
         refusal = replayed.refusal
-        if not refusal and asks_rates(task):
+        if not refusal and task.asks_rates:
             refusal = "; ".join(replay_rates(robot, cells, task, walk).refusals)
         patches.append(
             SubPatch(

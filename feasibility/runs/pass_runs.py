@@ -36,7 +36,7 @@ from feasibility.runs.at_least import Parted, parted_pieces
 from feasibility.runs.fewest import Stations, Way, fewest_ways
 from feasibility.runs.gaps import Gap, along_stretch, gaps_of, place_words
 from feasibility.runs.stopping import Stop, where_it_stops
-from feasibility.speed import asks_rates, keep_fast_motions
+from feasibility.speed import keep_fast_motions
 from feasibility.task import Task
 from robots import Robot
 from surfaces.passes import PassPlaces
@@ -134,7 +134,7 @@ def pass_runs(
             connect_pairs(exploration, root, everywhere & exploration.covers(root))
     except OutOfTime:
         pass  # what was found until then counts
-    slow = keep_fast_motions(exploration, task) if asks_rates(task) else {}
+    slow = keep_fast_motions(exploration, task) if task.asks_rates else {}
     stations = _stations(exploration, places)
     found = _replayed(exploration, task, fewest_ways(stations))
     worked, passed = np.zeros(len(stations.pieces), dtype=bool), np.zeros(len(cells), dtype=bool)
@@ -192,7 +192,7 @@ def _replayed(exploration: Exploration, task: Task, ways: Sequence[Way]) -> _Rep
         needed[walk.cell[walk.cell >= 0]] = True
         judged = replay(robot, cells, task, walk, needed)
         refused = judged.refusal
-        if not refused and asks_rates(task):
+        if not refused and task.asks_rates:
             refused = "; ".join(replay_rates(robot, cells, task, walk).refusals)
         if refused:
             refusals.append(refused)

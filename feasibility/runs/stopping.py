@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from feasibility.collisions import Pair
 from feasibility.roadmap import MOST_STEPS, Exploration, track
 from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
-from feasibility.speed import asks_rates, motion_rates
+from feasibility.speed import motion_rates
 from feasibility.task import Task
 
 WORDS = {
@@ -58,7 +58,7 @@ def where_it_stops(
             break
         motions.append(np.vstack([begin, rows[:count]]))
         pose += 1
-    if asks_rates(task):
+    if task.asks_rates:
         rates = motion_rates(exploration.robot, exploration.cells, task, motions)
         slow = np.flatnonzero(~rates.fine(task))
         if len(slow):

@@ -5,6 +5,5 @@ from .fast_motions import keep_fast_motions as keep_fast_motions
 from .largest import RateFigures as RateFigures
 from .largest import rate_figures as rate_figures
 from .motion_rates import MotionRates as MotionRates
-from .motion_rates import asks_rates as asks_rates
 from .motion_rates import motion_rates as motion_rates
 from .of_paths import path_rates as path_rates

@@ -18,7 +18,7 @@ def check_asked(robot: Robot, task: Task, search: Search) -> None:
             search.
     """
     _check_home(robot, task)
-    if task.speed is None and task.min_manipulability is None:
+    if not task.asks_rates:
         return
     if search.method != "complete":
         what = "needs the complete search: the greedy one has no motion over the cells' centres"

@@ -17,7 +17,7 @@ from feasibility.certification import replay
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.clock import Clock, OutOfTime
 from feasibility.speed.largest import begin_of, largest_speed
-from feasibility.speed.motion_rates import asks_rates, too_slow_words
+from feasibility.speed.motion_rates import too_slow_words
 from feasibility.speed.rated_graph import RatedGraph, grow, rated_graph
 from feasibility.speed.routes import covered, route
 from feasibility.verdict import (
@@ -39,7 +39,7 @@ TOO_SLOW = "covered, but not as fast or as far from singularities as asked"
 def at_rates(verdict: Verdict, clock: Clock) -> Verdict:
     """The same verdict where it is not feasible, or nothing is asked; else the one at the speed."""
     task, walk = verdict.task, verdict.witness
-    if not asks_rates(task) or not verdict.feasible or walk is None or not len(verdict.cells):
+    if not task.asks_rates or not verdict.feasible or walk is None or not len(verdict.cells):
         return verdict
     judged = replay_rates(verdict.robot, verdict.cells, task, walk)
     if judged.accepted:

@@ -51,11 +51,6 @@ class MotionRates(NamedTuple):
         )
 
 
-def asks_rates(task: Task) -> bool:
-    """Does a task ask for a speed, or a distance from singularities?"""
-    return task.speed is not None or task.min_manipulability is not None
-
-
 def too_slow_words(robot: Robot, joint: int, share: float, speed: float, where: str = "") -> str:
     """What a joint would need for a speed (m/s), and what it has.
 

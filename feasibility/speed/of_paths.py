@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from feasibility.certification.rates import RateReplay, replay_rates
 from feasibility.paths import CoveragePath, PathError
-from feasibility.speed.motion_rates import asks_rates
 from feasibility.verdict import Walk
 
 
@@ -22,7 +21,7 @@ def path_rates(path: CoveragePath, walk: Walk | None = None) -> RateReplay | Non
         PathError: singular values fall below what the task asks.
     """
     task = path.task
-    if not asks_rates(task):
+    if not task.asks_rates:
         return None
     judged = replay_rates(path.robot, path.cells, task, path.walk if walk is None else walk)
     least = task.min_manipulability
