@@ -70,7 +70,7 @@ compiling = _Compiling()
 
 
 class Clock:
-    """A time limit and a progress callback, of a search or of a whole command.
+    """A time limit and a progress callback, of a search or of a command.
 
     The clock stands still while kernels are compiled, which happens once on a machine.
 

@@ -59,17 +59,17 @@ class CutTree:
     root: Cut | Leaf
     opened: tuple[tuple[int, float], ...] = ()
     """(joint, t) of joints that turn freely, or through more than a turn, and can nowhere be at
-    t + 2 pi k while the tool is on the surface: the root's region has t .. t + 2 pi for them, which
-    stands for every winding."""
+    t + 2 pi k while the tool is on the surface: the root's region has t .. t + 2 pi for them, for
+    all windings alike."""
 
     @property
     def kind(self) -> str:
-        """'cell' where one leaf is the whole proof, 'cut' otherwise."""
+        """'cell' where the proof is one leaf, 'cut' otherwise."""
         return "cell" if isinstance(self.root, Leaf) and not self.opened else "cut"
 
     @property
     def n_cuts(self) -> int:
-        """Number of cuts, those that open turning joints not counted."""
+        """Number of cuts, those that open joints on their circle not counted."""
         return sum(isinstance(node, Cut) for node in self.nodes())
 
     def leaves(self) -> Iterator[Leaf]:
@@ -85,8 +85,8 @@ class CutTree:
             q[..., joint] = value + np.mod(q[..., joint] - value, 2.0 * np.pi)
         return q
 
-    def way(self, q: NDArray[np.float64]) -> tuple[tuple[Cut, bool], ...]:
-        """The cuts on the way from the root to the leaf whose region holds q (n,).
+    def path_to(self, q: NDArray[np.float64]) -> tuple[tuple[Cut, bool], ...]:
+        """The cuts from the root to the leaf whose region holds q (n,).
 
         Each with whether q is above it. All of a motion is in the same region.
         """
@@ -98,13 +98,13 @@ class CutTree:
         return tuple(found)
 
     def opened_by(self, walk: NDArray[np.float64]) -> Cut | Leaf | tuple[int, float]:
-        """What a motion (m, n) of a changed case shows to hold no more.
+        """What a motion (m, n) of a changed case shows to be true no more.
 
         Straight lines between its rows.
 
         Returns:
             The first cut that it crosses, or the (joint, t) of `opened` that it passes; a leaf
-            where it crosses none: its region holds the whole motion.
+            where it crosses none: its region holds all of the motion.
         """
         for joint, value in self.opened:
             turns = np.floor((walk[:, joint] - value) / (2.0 * np.pi))
@@ -120,7 +120,7 @@ class CutTree:
 
     def parting(self, q: NDArray[np.float64], other: NDArray[np.float64]) -> Cut | None:
         """The cut between two configurations (n,) that no motion joins; None in one region."""
-        for (cut, above), (_, beyond) in zip(self.way(q), self.way(other), strict=False):
+        for (cut, above), (_, beyond) in zip(self.path_to(q), self.path_to(other), strict=False):
             if above != beyond:
                 return cut
         return None

@@ -108,9 +108,9 @@ def what_opens(tree: CutTree, walk: NDArray[np.float64], robot: Robot, cells: Ce
         name = robot.joint_names[joint]
         return f"{name} then passes {joint_value(robot, joint, value)}, as in no motion now"
     text = f"cell {_cell(found, cells)} can then be covered"
-    way = tree.way(walk[0])
-    if way:
-        cut, above = way[-1]
+    path = tree.path_to(walk[0])
+    if path:
+        cut, above = path[-1]
         text += f" {'above' if above else 'below'} {place_of(cut, robot)}, as it cannot now"
     return text
 

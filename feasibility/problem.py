@@ -53,8 +53,8 @@ class Problem:
         )
         check_references(cells, task)
         check_footprint(cells, task)
-        asked = task_over(cells, task)
-        return cls(robot, cells, asked, asked)
+        task = task_over(cells, task)
+        return cls(robot, cells, task, task)
 
     @property
     def bodies(self) -> Bodies | None:
@@ -87,12 +87,12 @@ class Problem:
     def in_pieces(self) -> Problem | None:
         """The same problem with the links cut into convex pieces; None where that is no different.
 
-        Nor is it tried where the task says what is to stand for a link other than hulls.
+        Nor is it tried where the task chooses other shapes of links than hulls.
         """
-        asked, bodies = self.task.collision, self.bodies
-        if asked is None or bodies is None or asked.shapes != "hulls":
+        collision, bodies = self.task.collision, self.bodies
+        if collision is None or bodies is None or collision.shapes != "hulls":
             return None
-        finer = replace(asked, shapes="pieces")
+        finer = replace(collision, shapes="pieces")
         task, searched = (replace(one, collision=finer) for one in (self.task, self.searched))
         problem = replace(self, task=task, searched=searched)
         cut = problem.bodies
@@ -117,7 +117,7 @@ def task_over(cells: Cells, task: Task) -> Task:
 
 
 def _cells_wanted(given: object) -> str:
-    """What the cells should be, for whom gave a surface that is not cut, or a function."""
+    """What the cells should be, where a surface that is not cut was given, or a function."""
     if callable(given):
         return (
             "a surface cut into cells; a function g(u, v) of your own becomes one by "

@@ -24,7 +24,7 @@ ALONG = math.sin(math.radians(1.0))  # [1] a reference this near to the approach
 
 
 class Roll(NamedTuple):
-    """The rolls that a task allows: those within `half` of `middle`, up to whole turns."""
+    """The rolls that a task allows: those within `half` of `middle`, up to full turns."""
 
     middle: float
     """rad."""

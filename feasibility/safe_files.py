@@ -1,4 +1,4 @@
-"""Files at the edge: untrusted ones are read with a cap, new ones appear whole or not at all."""
+"""Files from elsewhere are read with a cap; new ones appear complete or not at all."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 def write_whole(path: str | os.PathLike[str], write: Callable[[IO[bytes]], object]) -> Path:
     """Write a file under another name beside it, then put it in place in one step.
 
-    Whatever stood there before stays until the new file is complete.
+    What was there before stays until the new file is complete.
 
     Args:
         path: the file.

@@ -103,9 +103,9 @@ class Certificate:
     is free."""
     max_speed: float | None = None
     """m/s, lower bound of the speed that the tool may have all along but for the stops, inside the
-    joints' velocity limits; None where no speed is asked for."""
+    joints' velocity limits; None where the task has none."""
     min_singular_value: float | None = None
-    """Lower bound of the smallest singular value along the walk; None where it is not asked for."""
+    """Lower bound of the smallest singular value along the walk; None where the task has none."""
     stops_in_place: int | None = None
     """How often the tool waits while the arm changes its posture; None as for the speed."""
     corners: int | None = None
@@ -124,14 +124,14 @@ class Replay:
 
     @property
     def accepted(self) -> bool:
-        """True when every constraint holds along the whole motion and every cell is visited."""
+        """True when every constraint holds along the motion and every cell is visited."""
         return not self.refusal
 
     @property
     def narrowly_refused(self) -> bool:
         """Is the motion refused for numbers that less tolerance and cone in the search may better?
 
-        Neither makes room between bodies.
+        Neither moves bodies apart.
         """
         if self.accepted or self.collides:
             return False
@@ -201,7 +201,7 @@ class Verdict:
     unchecked_links: tuple[str, ...] = ()
     """Links without any shape, where collisions are checked."""
     pairs_left_out: tuple[LeftOut, ...] = ()
-    """Pairs that are not asked for, and why."""
+    """Pairs that are not checked, and why."""
     treated: Any = None
     """What the motion that was found treats, a `feasibility.treated.TreatedArea`; None unless the
     task has a footprint and a motion was accepted. Measured when first read."""

@@ -76,7 +76,7 @@ feasibility.roadmap: bridging expansion exploration proving search seeding
 feasibility.roadmap.causes
 feasibility.roadmap: walk
 feasibility.roadmap.forward
-feasibility.roadmap: between_rounds complete graph_g outcome refinement warmup
+feasibility.roadmap: complete graph_g outcome refinement warmup
 feasibility.certification.rates
 feasibility.area.kernels
 feasibility.area

@@ -9,6 +9,7 @@ from .graph import EDGES as EDGES
 from .graph import NODES as NODES
 from .graph import Roadmap as Roadmap
 from .graph import root_of as root_of
+from .graph import roots_of_nodes as roots_of_nodes
 from .motions import CONE_SLACK as CONE_SLACK
 from .motions import HERE as HERE
 from .motions import MOST_STEPS as MOST_STEPS
@@ -46,6 +47,5 @@ from .walk import edge_motion as edge_motion
 from .walk import links_of as links_of
 from .walk import patch_walk as patch_walk
 from .walk import route_walk as route_walk
-from .warmup import SharedLock as SharedLock
 from .warmup import warm_up as warm_up
 from .warmup import warm_up_in_turn as warm_up_in_turn

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.expansion import CONNECT_STEPS
-from feasibility.roadmap.graph import NODES, Roadmap, add_motion, root_of
+from feasibility.roadmap.graph import Roadmap, add_motion, roots_of_nodes
 from feasibility.roadmap.motions import (
     MOST_STEPS,
     SearchArrays,
@@ -38,13 +38,10 @@ def nearest_pairs(
     Near means that a motion from one to the other would move the tool little, see
     `self_motion.effects`; at a singularity two sheets are near although their joints are far apart.
     """
-    nodes = np.arange(roadmap.counters[NODES])
-    roots = np.array([root_of(roadmap, slot) for slot in range(len(roadmap.parent))])
-    here = roots[roadmap.component[nodes]]
-    node_over = []
+    root, node_over = roots_of_nodes(roadmap), []
     for component in (one, other):
         node = np.full(len(roadmap.first_node), -1)
-        mine = nodes[here == component]
+        mine = np.flatnonzero(root == component)
         node[roadmap.cell[mine]] = mine
         node_over.append(node)
     both = np.vstack([pairs, pairs[:, ::-1]])
@@ -59,19 +56,16 @@ def nearest_pairs(
 def bridge(
     arrays: SearchArrays, work: Work, reserve: Reserve, x: int, y: int, curve: int, share: float
 ) -> bool:
-    """Try to connect two nodes over neighbouring cells at a point between their centres.
+    """Try to connect two nodes over neighbouring cells at a point of the curve between them.
 
     Args:
-        arrays: the search's arrays.
-        work: working memory.
-        reserve: see `Reserve`.
-        x: node over one cell.
-        y: node over a neighbour of it.
-        curve: the curve between the two cells.
+        arrays, work, reserve: of the search, see `Reserve`.
+        x, y: the nodes.
+        curve: the curve between their cells.
         share: parameter of the point on it, in [0, 1].
 
     Returns:
-        True when an edge was added and the components are one now.
+        True when an edge was added; the components are one then.
     """
     roadmap = reserve(0)
     starts = (0.0, 1.0) if roadmap.cell[x] < roadmap.cell[y] else (1.0, 0.0)

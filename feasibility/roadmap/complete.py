@@ -14,7 +14,6 @@ from feasibility.collisions import blamed, segment_clear
 from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
-from feasibility.roadmap.between_rounds import between_rounds
 from feasibility.roadmap.causes import causes_of
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.forward import Run, changes_in_place, run_in_order
@@ -28,14 +27,18 @@ from feasibility.roadmap.outcome import (
     unfinished_words,
 )
 from feasibility.roadmap.proving import Proving
-from feasibility.roadmap.search import close, explore
+from feasibility.roadmap.refinement import COARSE, FINE, refine
+from feasibility.roadmap.search import close, explore, restart
 from feasibility.roadmap.walk import covering_walk
 from feasibility.roadmap.warmup import warm_up
 from feasibility.search import Search
 from feasibility.targets import start_cell
+from feasibility.task import Task
 from feasibility.verdict import Cause, Replay, Walk
 from robots import Kinematics
 
+FIRST, SECOND, THIRD, LAST = 1, 4, 8, 16  # rounds without gain
+FEW_BOXES, MORE_BOXES = 20_000, 200_000
 IN_PLACE = 0.1  # [1] share of the tolerance within which a tool point stays over a pose
 
 
@@ -86,7 +89,7 @@ def _search(
         if seeds is not None:
             _plant(exploration, seeds)
         if known is None:
-            explore(exploration, between_rounds(exploration, proving, problem.searched))
+            explore(exploration, partial(between_rounds, exploration, proving, problem.searched))
         close(exploration)
         if problem.cells.in_order and exploration.complete and known is None:
             run = run_in_order(exploration)
@@ -95,6 +98,35 @@ def _search(
     exploration.clock = Clock()  # graph and causes are made later, when somebody reads them
     found = _found(problem, exploration, proving, in_time, known)
     return found if run is None else _in_order(found, run, problem, exploration)
+
+
+def between_rounds(exploration: Exploration, proving: Proving, task: Task, idle: int) -> None:
+    """What is tried after rounds that gained nothing; rounds go on where it gains something.
+
+    In this order, because each costs more than the one before: a cut proof with few boxes; with
+    more boxes, and then the surface in finer cells; new starts all over the surface; the finest
+    cells and the last proof.
+
+    `task` is the one that the search keeps to; `idle` rounds in a row have gained nothing.
+    """
+
+    def proved(budget: int) -> bool:
+        # Where a cell is proved uncoverable already, only more cells can be gained.
+        return not exploration.proved and proving.attempt(budget)
+
+    if not exploration.apart:
+        return
+    if idle == FIRST:
+        proved(FEW_BOXES)
+    elif idle == SECOND and not proved(MORE_BOXES):
+        refine(exploration, task, COARSE)
+    elif idle == THIRD:
+        before = exploration.sizes()
+        restart(exploration)
+        if exploration.sizes() == before:
+            proved(MORE_BOXES)
+    elif idle == LAST and not refine(exploration, task, FINE):
+        proved(MORE_BOXES)
 
 
 def _check_seeds(problem: Problem, seeds: Walk) -> None:

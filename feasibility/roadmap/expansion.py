@@ -13,14 +13,13 @@ from feasibility.roadmap.graph import (
     COVERED,
     CURSOR,
     DONE,
-    EDGES,
     FULL,
     HEAD,
-    NODES,
     TAIL,
     WAYPOINTS,
     add_edge,
     add_node,
+    is_full,
     root_of,
     unite,
 )
@@ -95,8 +94,7 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
 
     Args:
         arrays, work, roadmap: the `SearchArrays`, the `Work` and the `Roadmap`.
-        indptr: (N + 1,) where each cell's neighbours begin in `indices`.
-        indices: (k,) neighbours.
+        indptr, indices: (N + 1,) where each cell's neighbours begin in `indices` (k,).
         links: (k,) the curve to each, see `Neighbours.links`.
         budget: evaluations of the arm before returning.
 
@@ -115,9 +113,7 @@ def spread_out(arrays, work, roadmap, indptr, indices, links, budget):  # type: 
         while first + count[CURSOR] < last:
             if work.counts[0] > stop:
                 return BUDGET
-            if count[NODES] + 2 > roadmap.cell.shape[0] or count[EDGES] + 2 > len(roadmap.ends):
-                return FULL
-            if count[TAIL] + 2 > roadmap.queue.shape[0]:
+            if is_full(roadmap):
                 return FULL
             target = indices[first + count[CURSOR]]
             own = root_of(roadmap, roadmap.component[x])
@@ -167,8 +163,7 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
     could not.
 
     Args:
-        arrays, work, roadmap: the `SearchArrays`, the `Work` and the `Roadmap`.
-        cell: the cell.
+        arrays, work, roadmap, cell: as in `seed_cell`.
         guesses: (k, n) random configurations.
         most: failed connections after which two components are left alone.
 
@@ -184,9 +179,7 @@ def explore_self_motions(arrays, work, roadmap, cell, guesses, most):  # type: i
         for k in range(MOST_RIVALS):
             tried[k] = -1
         for k in range(MOST_RIVALS):
-            if count[NODES] + 2 > roadmap.cell.shape[0] or count[EDGES] + 3 > len(roadmap.ends):
-                return FULL, g, merged
-            if count[TAIL] + 2 > roadmap.queue.shape[0]:
+            if is_full(roadmap):
                 return FULL, g, merged
             if k == 0:
                 # Head for a random configuration of the manifold.
@@ -265,9 +258,7 @@ def close_pairs(arrays, work, roadmap, pairs, state, component, budget):  # type
         if state[k] == 0:
             if work.counts[0] > stop:
                 return BUDGET
-            if count[EDGES] + 2 > len(roadmap.ends) or count[NODES] + 2 > len(roadmap.cell):
-                return FULL
-            if count[TAIL] + 2 > len(roadmap.queue):
+            if is_full(roadmap):
                 return FULL
             best_x, best_y = _nearest_nodes(roadmap, pairs[k, 0], pairs[k, 1], component)
             state[k] = 2

@@ -27,6 +27,7 @@ from feasibility.roadmap.graph import (
     empty_roadmap,
     grown,
     joined_pairs,
+    nodes_over,
     root_of,
 )
 from feasibility.roadmap.joint_boxes import Blockers
@@ -34,6 +35,9 @@ from feasibility.roadmap.motions import SearchArrays, Work, passable, work_for
 from feasibility.roadmap.seeding import seed_cell
 from robots import Robot
 from surfaces import Cells, components
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 BUDGET = 8_000  # evaluations of the arm between two checks of the clock
 GUESSES = 4  # of one `explore_self_motions`
@@ -66,7 +70,7 @@ class Exploration:
     """Into how many by how many each cell was cut for a search in finer cells."""
     tried: dict[tuple[int, int], int] = field(default_factory=dict)
     """How often a bridge between two nodes was tried."""
-    pairs: NDArray[np.int64] = field(init=False)
+    pairs: Ints = field(init=False)
     """(M + 1,) state of each neighbouring pair, see `close_pairs`."""
 
     begun: tuple[int, int] | None = None
@@ -84,7 +88,7 @@ class Exploration:
         middle = 0.5 * (np.where(bounded, lower, 0.0) + np.where(bounded, upper, 0.0))
         # A joint with a range of more than a full turn is seeded over one turn: other windings are
         # reached by motion, or not at all.
-        self.low: NDArray[np.float64] = np.where(wide, middle - np.pi, lower)
+        self.low: Array = np.where(wide, middle - np.pi, lower)
         self.high = np.where(wide, middle + np.pi, upper)
         # A prismatic joint is seeded as far as the cells, the arm and the other slides reach.
         ends = np.where(bounded & self.robot.prismatic, np.maximum(abs(lower), abs(upper)), 0.0)
@@ -99,7 +103,7 @@ class Exploration:
     # -- reading the roadmap -------------------------------------------------------------------
 
     @cached_property
-    def parts(self) -> NDArray[np.int64]:
+    def parts(self) -> Ints:
         """(N,) which part of the surface each cell is in, as the curves join them."""
         return components(self.cells.pairs[passable(self.arrays)], len(self.cells))
 
@@ -174,13 +178,12 @@ class Exploration:
         """(N,) cells of a component."""
         return self.roadmap.cover[root_of(self.roadmap, component)].astype(bool)
 
-    def posture(self, component: int) -> NDArray[np.float64]:
+    def posture(self, component: int) -> Array:
         """(n,) a configuration of a component."""
         root = root_of(self.roadmap, component)
-        node = int(self.roadmap.first_node[self.covers(root).argmax()])
-        while root_of(self.roadmap, self.roadmap.component[node]) != root:
-            node = int(self.roadmap.following[node])
-        return np.array(self.roadmap.q[node])
+        nodes = nodes_over(self.roadmap, int(self.covers(root).argmax()))
+        mine = (x for x in nodes if root_of(self.roadmap, self.roadmap.component[x]) == root)
+        return np.array(self.roadmap.q[next(mine)])
 
     # -- growing it ----------------------------------------------------------------------------
 
@@ -196,7 +199,7 @@ class Exploration:
         """Evaluations of the arm that compiled loops may use before they return to `tick`."""
         return BUDGET
 
-    def guesses(self, k: int) -> NDArray[np.float64]:
+    def guesses(self, k: int) -> Array:
         """(k, n) random configurations inside the limits."""
         return self.rng.uniform(self.low, self.high, (k, self.robot.n))
 
@@ -221,7 +224,7 @@ class Exploration:
                 self.roadmap = grown(self.roadmap)
             self.tick("spreading over the surface")
 
-    def begin_at(self, cell: int, q: NDArray[np.float64]) -> None:
+    def begin_at(self, cell: int, q: Array) -> None:
         """Make the start, a configuration over a cell, the first node, and spread from it."""
         self.roadmap = grown(self.roadmap)
         component = int(self.roadmap.counters[COMPONENTS])
@@ -230,7 +233,7 @@ class Exploration:
         self.begun = int(node), component
         self.spread()
 
-    def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
+    def add_seeds(self, cell: int, guesses: Array) -> int:
         """Seed a cell and spread the new nodes; returns how many guesses could be projected."""
         found = 0
         for guess in guesses:
@@ -276,7 +279,7 @@ class Exploration:
         entries = slice(self.indptr[cell], self.indptr[cell + 1])
         return int(self.links[entries][self.indices[entries] == other][0])
 
-    def join(self, state: NDArray[np.int64], component: int) -> None:
+    def join(self, state: Ints, component: int) -> None:
         """Search a motion of a component between every two neighbouring cells.
 
         Args:
@@ -308,21 +311,24 @@ class Exploration:
             self.roadmap = grown(self.roadmap)
         return self.roadmap
 
-    def border(self, component: int) -> NDArray[np.int64]:
+    def border(self, component: int) -> Ints:
         """Cells of a component with a neighbour that it does not cover."""
         inside = self.covers(component)
         owners = np.repeat(np.arange(len(self.cells)), np.diff(self.indptr))
         return np.unique(owners[inside[owners] & ~inside[self.indices]])
 
-    def blocked(self, cell: int, arm: bool = False) -> bool:
-        """Is it proved that the tool collides wherever it is over a cell, or any of the `arm`?"""
-        if self.blockers is None:
+    def tool_collides(self, cell: int) -> bool:
+        """Is it proved that the tool collides in every pose over a cell? Sets its ruling."""
+        if self.blockers is None or not self.blockers.tool_collides(self.arrays, cell):
             return False
+        self.rulings[cell] = Ruling.PROVED
+        return True
+
+    def prove_collisions(self, cell: int) -> None:
+        """Try to prove that something of the arm collides wherever the tool is over a cell."""
         tick = partial(self.tick, "proving that the arm collides")
-        found = self.blockers.over(self.arrays, self.work, cell, tick if arm else None)
-        if found:
+        if self.blockers and self.blockers.arm_collides(self.arrays, self.work, cell, tick):
             self.rulings[cell] = Ruling.PROVED
-        return found
 
     def rule(self, cell: int, boxes: Boxes, most: int) -> Ruling:
         """Branch and bound on one cell; a configuration that it finds becomes a seed."""
@@ -340,7 +346,7 @@ class Exploration:
         return ruling
 
 
-def wound(arrays: SearchArrays, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def wound(arrays: SearchArrays, q: Array) -> Array:
     """(n,) the same placement of the arm, with windings that bring joints inside their limits."""
     turn = np.where(arrays.chain.prismatic, 0.0, 2.0 * np.pi)
     q = q + turn * np.ceil(np.maximum(arrays.lower - q, 0.0) / (2.0 * np.pi))

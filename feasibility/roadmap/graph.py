@@ -1,8 +1,8 @@
 """The roadmap of the complete search: (cell, configuration) nodes joined by certified motions.
 
 The paper keeps one configuration per cell, so its answer depends on where it starts. Here a cell
-may hold many nodes, one for each connected component that was found over it, and a union-find tells
-which nodes one continuous motion can visit. A component that covers every cell is a covering
+may hold many nodes, one for each connected component that was found over it, and a union-find gives
+the nodes that one continuous motion can visit. A component that covers every cell is a covering
 motion; the cells that the best component does not cover are the missed ones.
 
 The arrays are made and grown in Python; the compiled loops fill them and return when an array is
@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 from feasibility.compiled import kernel
 from feasibility.roadmap.motions import NEXT, effects, place
 
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
 NODES, EDGES, WAYPOINTS, COMPONENTS, HEAD, TAIL, CURSOR, BEST = range(8)
 """Indices into `Roadmap.counters`."""
 DONE, BUDGET, FULL, COVERED = range(4)
@@ -28,38 +31,38 @@ DONE, BUDGET, FULL, COVERED = range(4)
 class Roadmap(NamedTuple):
     """The search's state as plain arrays; rows beyond the counters are unused."""
 
-    cell: NDArray[np.int64]
+    cell: Ints
     """(nodes,) the cell of each node."""
-    q: NDArray[np.float64]
+    q: Array
     """(nodes, n) the configuration of each node, over its cell's centre."""
-    effect: NDArray[np.float64]
+    effect: Array
     """(nodes, n) how much each joint moves the tool there, see `self_motion.effects`."""
-    component: NDArray[np.int64]
+    component: Ints
     """(nodes,) the component slot that the node was made in; `root_of` gives the present one."""
-    following: NDArray[np.int64]
+    following: Ints
     """(nodes,) next node over the same cell, -1 at the end."""
-    first_node: NDArray[np.int64]
+    first_node: Ints
     """(N,) first node over each cell, -1 where there is none."""
-    queue: NDArray[np.int64]
+    queue: Ints
     """(nodes,) nodes to be spread to neighbouring cells, between HEAD and TAIL."""
-    ends: NDArray[np.int64]
+    ends: Ints
     """(edges, 2) nodes that each edge joins."""
-    edge_rows: NDArray[np.int64]
+    edge_rows: Ints
     """(edges, 2) first row and number of rows of the edge's waypoints in `waypoints`."""
-    waypoints: NDArray[np.float64]
+    waypoints: Array
     """(rows, n) waypoints of all edges; an edge's start is not among them, its end is."""
-    parent: NDArray[np.int64]
+    parent: Ints
     """(components,) union-find over component slots."""
     cover: NDArray[np.uint8]
     """(components, N) cells that each root component covers."""
-    size: NDArray[np.int64]
+    size: Ints
     """(components,) number of cells that each root component covers."""
-    failures: NDArray[np.int64]
+    failures: Ints
     """(components, components) failed connections between two root components."""
-    blocked: NDArray[np.int64]
+    blocked: Ints
     """(N, 3) why a motion into each cell stopped: a code of `arrays`, a joint, and the component
     that it came from (the largest that was stopped there); -1 where none was."""
-    counters: NDArray[np.int64]
+    counters: Ints
     """(8,) see NODES ... BEST."""
 
 
@@ -117,12 +120,37 @@ def grown(roadmap: Roadmap) -> Roadmap:
 
 
 @kernel
+def is_full(roadmap):  # type: ignore[no-untyped-def]
+    """Has an array no space for two more nodes, or three more edges?"""
+    count = roadmap.counters
+    nodes = max(count[NODES] - roadmap.cell.shape[0], count[TAIL] - roadmap.queue.shape[0])
+    return nodes + 2 > 0 or count[EDGES] + 3 > roadmap.ends.shape[0]
+
+
+@kernel
 def root_of(roadmap, slot):  # type: ignore[no-untyped-def]
     """The root component of a slot, with path halving."""
     while roadmap.parent[slot] != slot:
         roadmap.parent[slot] = roadmap.parent[roadmap.parent[slot]]
         slot = roadmap.parent[slot]
     return slot
+
+
+def roots_of_nodes(roadmap: Roadmap) -> Ints:
+    """(nodes,) the root component of every node."""
+    root = roadmap.component[: roadmap.counters[NODES]]
+    while np.any(roadmap.parent[root] != root):
+        root = roadmap.parent[root]
+    return root
+
+
+def nodes_over(roadmap: Roadmap, cell: int) -> list[int]:
+    """The nodes over a cell, the latest first."""
+    found, node = list[int](), int(roadmap.first_node[cell])
+    while node >= 0:
+        found.append(node)
+        node = int(roadmap.following[node])
+    return found
 
 
 @kernel
@@ -188,7 +216,7 @@ def add_edge(roadmap, x, y, rows):  # type: ignore[no-untyped-def]
     count[WAYPOINTS] += rows
 
 
-def add_motion(roadmap: Roadmap, x: int, y: int, motion: NDArray[np.float64]) -> None:
+def add_motion(roadmap: Roadmap, x: int, y: int, motion: Array) -> None:
     """Add an edge from node x to node y by a motion (k, n), its first configuration left out.
 
     Their components become one. The arrays need space for it, see `Exploration.reserve`.

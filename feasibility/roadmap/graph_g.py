@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import EDGES, NODES, root_of
+from feasibility.roadmap.graph import EDGES, roots_of_nodes
 from feasibility.roadmap.walk import edge_motion
 
 if TYPE_CHECKING:
@@ -23,9 +25,8 @@ def graph_of(exploration: Exploration) -> nx.Graph:
 
     roadmap, best = exploration.roadmap, exploration.best
     graph = cell_graph(exploration.cells, exploration.covered)
-    for x in range(roadmap.counters[NODES] - 1, -1, -1):
-        if root_of(roadmap, roadmap.component[x]) == best:
-            graph.nodes[int(roadmap.cell[x])]["q"] = roadmap.q[x].copy()
+    for x in np.flatnonzero(roots_of_nodes(roadmap) == best)[::-1]:  # a cell's first node counts
+        graph.nodes[int(roadmap.cell[x])]["q"] = roadmap.q[x].copy()
     for (i, j), e in pair_edges(exploration).items():
         motion = edge_motion(roadmap, e)
         if roadmap.cell[roadmap.ends[e, 0]] != i:
@@ -36,11 +37,11 @@ def graph_of(exploration: Exploration) -> nx.Graph:
 
 def pair_edges(exploration: Exploration) -> dict[tuple[int, int], int]:
     """One edge of the best component for each connected pair of cells."""
-    roadmap, best = exploration.roadmap, exploration.best
+    roadmap = exploration.roadmap
+    mine = roots_of_nodes(roadmap) == exploration.best
     edges: dict[tuple[int, int], int] = {}
-    for e in range(roadmap.counters[EDGES]):
-        x, y = roadmap.ends[e]
-        i, j = int(roadmap.cell[x]), int(roadmap.cell[y])
-        if i != j and root_of(roadmap, roadmap.component[x]) == best:
-            edges.setdefault((min(i, j), max(i, j)), e)
+    for e, (x, y) in enumerate(roadmap.ends[: roadmap.counters[EDGES]].tolist()):
+        i, j = sorted((int(roadmap.cell[x]), int(roadmap.cell[y])))
+        if i != j and mine[x]:
+            edges.setdefault((i, j), e)
     return edges

@@ -78,7 +78,7 @@ def unfinished_words(problem: Problem, proving: Proving, in_time: bool) -> str:
         )
     if proving.unable or proving.attempts == 0 or (proving.starved and not proving.alarmed):
         return ""
-    kept = [gap for gap in proving.blocked if gap.points > 0]
+    kept = [gap for gap in proving.open_gaps if gap.points > 0]
     where = ""
     if kept:
         widest = max(kept, key=lambda gap: gap.high - gap.low)

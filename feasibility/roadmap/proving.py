@@ -1,9 +1,9 @@
-"""Attempts at a cut proof between the rounds of a search, and what they teach it.
+"""Attempts at a cut proof between the rounds of a search, and the seeds that they find.
 
 An attempt costs little beside rounds that gain nothing. What refutes its guesses are configurations
 that the search did not know: they go back into it as seeds. Where points of the motion set were
 found on every cut between two components, the two may well be joined by a motion that was not
-found; that is told, and such a search does not count as exhausted.
+found: the verdict says so, and such a search does not count as exhausted.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from feasibility.roadmap.cuts import Blocked, Prover, components_of, places_on
+from feasibility.roadmap.cuts import OpenGap, Prover, components_of, places_on
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.targets import blocked_curves
 from feasibility.task import Task
@@ -29,8 +29,8 @@ class Proving:
     exploration: Exploration
     """Its `cut_tree` is set once there is a proof."""
     task: Task
-    blocked: tuple[Blocked, ...] = ()
-    """What kept the last attempt, see `Attempt.blocked`."""
+    open_gaps: tuple[OpenGap, ...] = ()
+    """Of the last attempt, see `ProofAttempt.open_gaps`."""
     starved: bool = False
     """Did the last attempt run out of boxes? Otherwise it had nothing left to prove."""
     boxes: int = 0
@@ -44,16 +44,13 @@ class Proving:
     @property
     def alarmed(self) -> bool:
         """Do points of the motion set keep every gap open, so that there may well be a motion?"""
-        return bool(self.blocked) and all(gap.points > 0 for gap in self.blocked)
+        return bool(self.open_gaps) and all(gap.points > 0 for gap in self.open_gaps)
 
     def attempt(self, budget: int) -> bool:
         """Try a proof, and again as long as the seeds found gain something.
 
-        Args:
-            budget: boxes that may be examined; up to `MOST_BOXES` if it looks as if they would do.
-
-        Returns:
-            True when there is a proof, or a gain.
+        A budget of boxes may be examined, up to `MOST_BOXES` if it looks as if they would do. True
+        when there is a proof, or a gain.
         """
         gained = False
         for _ in range(ATTEMPTS):
@@ -79,7 +76,7 @@ class Proving:
         made = prover.attempt(components_of(exploration.roadmap), budget, tick)
         self.attempts += 1
         self.boxes += made.boxes
-        exploration.cut_tree, self.blocked = made.tree, made.blocked
+        exploration.cut_tree, self.open_gaps = made.tree, made.open_gaps
         self._left = made.boxes_left
         self.starved = made.boxes >= budget
         before = exploration.sizes()

@@ -2,9 +2,9 @@
 
 The search moves along the curves between neighbouring centres. Where that joins two components by
 no motion, there may still be one over the patch beside these curves. So the surface is cut into
-finer cells, whose centres are waypoints only: the components found are put there, spread over the
-finer curves, and where they meet, or reach a cell that they had missed, the motion becomes an edge
-of the roadmap itself.
+finer cells, whose centres are waypoints only: the components found are copied there and spread over
+the finer curves. Where two are joined, or one reaches a cell that it had missed, the motion becomes
+an edge of the roadmap itself.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from feasibility.roadmap.graph import (
     add_node,
     grown,
     root_of,
+    roots_of_nodes,
 )
 from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import improve
@@ -54,12 +55,12 @@ def refine(exploration: Exploration, task: Task, levels: tuple[int, ...]) -> boo
         OutOfTime: the deadline passed.
     """
     before = exploration.sizes()
-    for ways in levels:
-        finer = exploration.cells.finer(ways)
+    for parts in levels:
+        finer = exploration.cells.finer(parts)
         if finer is None or len(finer.cells) > MOST_CELLS or not exploration.apart:
             break
         _search_over(exploration, task, finer)
-        exploration.finest = max(exploration.finest, ways)
+        exploration.finest = max(exploration.finest, parts)
     return exploration.sizes() != before
 
 
@@ -73,17 +74,17 @@ def _search_over(exploration: Exploration, task: Task, finer: Finer) -> None:
     if not exploration.improvable and fine.parts.max() == exploration.parts.max():
         return  # the finer curves pass where the others do not either
     fine.clock = _Budget(exploration, fine)
-    origin = _put_there(exploration, fine, finer.same)
+    origin = _copy_nodes(exploration, fine, finer.same)
     try:
         fine.spread()
-        dry = 0 if _take_over(exploration, fine, finer.same, origin) else 1
-        while exploration.apart and fine.improvable and dry <= BRIDGING_ROUNDS + ROUNDS:
+        idle = 0 if _take_over(exploration, fine, finer.same, origin) else 1
+        while exploration.apart and fine.improvable and idle <= BRIDGING_ROUNDS + ROUNDS:
             fine.rounds += 1
-            if dry > BRIDGING_ROUNDS:
+            if idle > BRIDGING_ROUNDS:
                 improve(fine, fine.roots()[:MOST])
             else:
                 _bridge(fine)
-            dry = 0 if _take_over(exploration, fine, finer.same, origin) else dry + 1
+            idle = 0 if _take_over(exploration, fine, finer.same, origin) else idle + 1
     except _BudgetSpentError:
         _take_over(exploration, fine, finer.same, origin)
     finally:
@@ -120,19 +121,19 @@ def _bridge(fine: Exploration) -> None:
             fine.bridge(one, other, BRIDGES)
 
 
-def _put_there(
+def _copy_nodes(
     exploration: Exploration, fine: Exploration, same: NDArray[np.int64]
 ) -> dict[int, int]:
-    """Put every node over its finer cell, a component a slot; returns old nodes by new ones."""
+    """Copy every node to its finer cell, each component to a slot; returns old nodes by new."""
     old = exploration.roadmap
     slots = {root: slot for slot, root in enumerate(exploration.roots())}
     fine.roadmap.counters[COMPONENTS] = len(slots)
     while len(fine.roadmap.parent) < len(slots) + 2:
         fine.roadmap = grown(fine.roadmap)
     origin = {}
-    for node in range(old.counters[NODES]):
+    for node, root in enumerate(roots_of_nodes(old).tolist()):
         fine.roadmap = grown(fine.roadmap)
-        slot = slots[int(root_of(old, old.component[node]))]
+        slot = slots[root]
         cell = int(same[old.cell[node]])
         new = add_node(fine.arrays, fine.work, fine.roadmap, cell, old.q[node], slot)
         origin[int(new)] = node
@@ -175,7 +176,7 @@ def _joining(exploration: Exploration, roadmap: Roadmap, routes: _Routes) -> NDA
     """Edges over finer cells that join two components; one joined stays so, so none is missed."""
     a, b = roadmap.ends[: roadmap.counters[EDGES]].T
     known = np.flatnonzero((routes.old[a] >= 0) & (routes.old[b] >= 0))
-    root = _roots(exploration)
+    root = roots_of_nodes(exploration.roadmap)
     return known[root[routes.old[a[known]]] != root[routes.old[b[known]]]]
 
 
@@ -185,22 +186,13 @@ def _covering(
     """Nodes over the centre of a cell that their component misses."""
     cells = cell_of[roadmap.cell[: len(routes.old)]]
     there = np.flatnonzero((routes.old >= 0) & (cells >= 0))
-    root = _roots(exploration)[routes.old[there]]
+    root = roots_of_nodes(exploration.roadmap)[routes.old[there]]
     return there[exploration.roadmap.cover[root, cells[there]] == 0]
 
 
 def _root(exploration: Exploration, node: int) -> int:
     """The component of a node."""
     return int(root_of(exploration.roadmap, exploration.roadmap.component[node]))
-
-
-def _roots(exploration: Exploration) -> NDArray[np.int64]:
-    """The component of every node."""
-    parent = exploration.roadmap.parent
-    found = exploration.roadmap.component[: exploration.roadmap.counters[NODES]]
-    while np.any(parent[found] != found):
-        found = parent[found]
-    return found
 
 
 class _Routes:

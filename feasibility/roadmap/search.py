@@ -32,7 +32,7 @@ from feasibility.roadmap.motions import margin_shares
 PIVOT_SEEDS = 8
 TOP = 5  # components that a round works on
 RESTARTS = 6  # cells seeded anew before a search counts as exhausted
-DRY_ROUNDS = 24  # rounds without gain after which the search is exhausted
+IDLE_ROUNDS = 24  # rounds without gain after which the search is exhausted
 SETTLED_ROUNDS = 12  # the same once a proof decides the verdict, and only more cells can be gained
 PARTED_ROUNDS = 3  # the same once a cut tree parts the components found
 MOST_ROUNDS = 200
@@ -41,7 +41,7 @@ FIRST_BOXES = 1000  # boxes for each cell that no component has reached
 MORE_BOXES = 20_000  # boxes once Newton has failed there too
 DEEP_BOXES = 2_000_000  # boxes for the few cells that are examined until one is proved
 DEEP_CELLS = 3
-ARM_CELLS = 4  # that are asked whether the whole arm collides
+ARM_CELLS = 4  # for which a collision of any part of the arm is tried to be proved
 MOST_RULED = 500  # cells examined in a row without reaching any; on a fine grid the rest are alike
 NEWTON_STARTS = 25
 
@@ -88,15 +88,15 @@ def _unreached(exploration: Exploration) -> None:
     for cell in np.flatnonzero(beyond).tolist():
         exploration.rulings[cell] = Ruling.PROVED
     open_boxes: dict[int, Boxes] = {}
-    fruitless = 0
+    in_vain = 0
     for cell in evenly(np.flatnonzero(~exploration.reached & ~beyond)).tolist():
         if exploration.reached[cell]:
-            fruitless = 0
+            in_vain = 0
             continue  # reached from a cell examined before it
-        fruitless += 1
-        if fruitless > MOST_RULED:
+        in_vain += 1
+        if in_vain > MOST_RULED:
             break
-        if exploration.blocked(cell):
+        if exploration.tool_collides(cell):
             continue
         boxes = root_box(exploration.arrays)
         if exploration.rule(cell, boxes, FIRST_BOXES) is Ruling.OPEN:
@@ -114,13 +114,9 @@ def _unreached(exploration: Exploration) -> None:
     if exploration.proved:
         return
     # One proof is enough for the verdict: examine the furthest of the remaining cells deeper.
-    left = [
-        c
-        for c in open_boxes
-        if exploration.rulings[c] is Ruling.OPEN and not exploration.reached[c]
-    ]
-    left.sort(key=lambda c: -distance[c])
-    for cell in left[:DEEP_CELLS]:
+    left = [cell for cell in open_boxes if not exploration.reached[cell]]
+    left = [cell for cell in left if exploration.rulings[cell] is Ruling.OPEN]
+    for cell in sorted(left, key=lambda cell: -distance[cell])[:DEEP_CELLS]:
         if exploration.rule(cell, open_boxes[cell], DEEP_BOXES) is Ruling.PROVED:
             return
 
@@ -147,17 +143,19 @@ def _at_the_target(exploration: Exploration) -> None:
 
 
 def _where_the_arm_collides(exploration: Exploration) -> None:
-    """Ask of a few cells that are still open whether something collides wherever the tool is there.
+    """Try to prove of a few open cells that something collides wherever the tool is there.
 
     Over these the tool can be, as far as limits, cone and roll go.
     """
     if exploration.blockers is None:
         return
-    landed = (Ruling.REACHED, Ruling.UNKNOWN)
-    left = [cell for cell, ruling in exploration.rulings.items() if ruling in landed]
-    left = [cell for cell in left if not exploration.reached[cell]]
-    for cell in evenly(np.array(left, dtype=np.int64))[:ARM_CELLS].tolist():
-        exploration.blocked(cell, arm=True)
+    open_ = [
+        cell
+        for cell, ruling in exploration.rulings.items()
+        if ruling in (Ruling.REACHED, Ruling.UNKNOWN) and not exploration.reached[cell]
+    ]
+    for cell in evenly(np.array(open_, dtype=np.int64))[:ARM_CELLS].tolist():
+        exploration.prove_collisions(cell)
 
 
 def evenly(cells: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -172,7 +170,7 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
     What is gained are cells of the largest components. A small component that is found, joins
     another, and is found again is no gain, or there would be no end.
     """
-    dry, most = 0, exploration.sizes(TOP)
+    idle, most = 0, exploration.sizes(TOP)
     for _ in range(MOST_ROUNDS):
         roots = exploration.roots()
         if not roots or not exploration.apart:
@@ -180,16 +178,16 @@ def _rounds(exploration: Exploration, between: Between | None) -> None:
         if exploration.improvable:
             _round(exploration, roots[:TOP])
         exploration.rounds += 1
-        dry += 1
+        idle += 1
         if exploration.sizes(TOP) > most:
-            dry, most = 0, exploration.sizes(TOP)
-        if exploration.complete or dry >= _enough(exploration):
+            idle, most = 0, exploration.sizes(TOP)
+        if exploration.complete or idle >= _enough(exploration):
             return
         if exploration.cut_tree is not None or between is None:
             continue
-        between(dry)
+        between(idle)
         if exploration.cut_tree is not None or exploration.sizes(TOP) > most:
-            dry, most = 0, max(most, exploration.sizes(TOP))
+            idle, most = 0, max(most, exploration.sizes(TOP))
     exploration.stopped = True
 
 
@@ -197,7 +195,7 @@ def _enough(exploration: Exploration) -> int:
     """Rounds without gain after which they end; fewer once a proof decides the verdict."""
     if exploration.cut_tree is not None:
         return PARTED_ROUNDS
-    return SETTLED_ROUNDS if exploration.proved else DRY_ROUNDS
+    return SETTLED_ROUNDS if exploration.proved else IDLE_ROUNDS
 
 
 def _round(exploration: Exploration, top: list[int]) -> None:

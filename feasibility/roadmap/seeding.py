@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from feasibility.collisions import clearance_gradient, segment_clear
 from feasibility.compiled import allocating, kernel, put
 from feasibility.roadmap.expansion import join
-from feasibility.roadmap.graph import COMPONENTS, EDGES, NODES, TAIL, add_node
+from feasibility.roadmap.graph import COMPONENTS, add_node, is_full
 from feasibility.roadmap.motions import (
     CONE_SLACK,
     HERE,
@@ -33,15 +33,15 @@ PUSH = 0.2  # [rad] or [m] of one step
 def moved_clear(arrays: SearchArrays, work: Work, cell: int, q: NDArray[np.float64]) -> bool:
     """Move q (n,), in place, over its cell until it collides no more; False where it still does.
 
-    Each step goes down the gradient of the penetration, and is projected back onto the target. The
-    way is no motion of the arm: q becomes another start.
+    Each step goes down the gradient of the penetration, and is projected back onto the target. This
+    is no motion of the arm: q becomes another start.
     """
     return len(arrays.collisions) == 0 or bool(_pushed_clear(arrays, work, cell, q))
 
 
 @kernel
 def _pushed_clear(arrays, work, cell, q):  # type: ignore[no-untyped-def]
-    """`moved_clear`, where collisions are asked for."""
+    """`moved_clear`, where collisions are checked."""
     if segment_clear(arrays.collisions, q, q) > 0.0:
         return True
     look_at(arrays, work, cell)
@@ -76,9 +76,7 @@ def seed_cell(arrays, work, roadmap, cell, guesses):  # type: ignore[no-untyped-
     count = roadmap.counters
     found, made = 0, 0
     for k in range(guesses.shape[0]):
-        if count[COMPONENTS] >= len(roadmap.parent) or count[EDGES] + 2 > len(roadmap.ends):
-            break
-        if count[NODES] + 2 > len(roadmap.cell) or count[TAIL] + 2 > len(roadmap.queue):
+        if count[COMPONENTS] >= len(roadmap.parent) or is_full(roadmap):
             break
         q = guesses[k].copy()
         if not project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):

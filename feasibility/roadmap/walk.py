@@ -100,10 +100,9 @@ def _to_nearest(roadmap, links, wanted, here, turn, search, first):  # type: ign
     rule, so that corners are not left behind).
 
     Args:
-        roadmap: the `Roadmap`.
-        links: the motions of the component.
+        roadmap, links: the `Roadmap`, and the motions of the component.
         wanted: (N,) cells.
-        here: where the path begins.
+        here: the node where the path begins.
         turn: another number for each search, from 1 on.
         search: (nodes, 4) for each node the last search that visited it, zero at first, the step
             that led to it and the node before it; and the queue.
@@ -208,15 +207,10 @@ def links_of(roadmap: Roadmap, component: int) -> Links:
 
 
 def covering_walk(roadmap: Roadmap, component: int, start: int | None = None) -> Walk:
-    """One continuous motion through every cell that a component covers.
+    """One continuous motion through every cell that a root component covers, at least one.
 
-    Args:
-        roadmap: the roadmap.
-        component: a root component that covers at least one cell.
-        start: the node to begin at; any by default.
-
-    Returns:
-        The walk; consecutive waypoints lie on certified segments of the roadmap's edges.
+    It begins at the node `start`, at any by default; consecutive waypoints lie on certified
+    segments of the roadmap's edges.
     """
     links = links_of(roadmap, component)
     if start is None:  # a node with the fewest steps: corners are best visited first
@@ -229,10 +223,7 @@ def covering_walk(roadmap: Roadmap, component: int, start: int | None = None) ->
 def route_walk(roadmap: Roadmap, start: int, route: NDArray[np.int64]) -> Walk:
     """The motion from a node along a route.
 
-    Args:
-        roadmap: the roadmap.
-        start: a node.
-        route: edges + 1, negative where one is run backwards, each from where the last one ends.
+    The route is of edges + 1, negative where one is run backwards, each from the end of the last.
     """
     return Walk(*_string(roadmap, start, route))
 
@@ -243,13 +234,9 @@ def patch_walk(roadmap: Roadmap, links: Links, wanted: NDArray[np.bool_], start:
     It may lead over any cell of the component; only the wanted ones have to be visited.
 
     Args:
-        roadmap: the roadmap.
-        links: the motions of the component.
+        roadmap, links: the roadmap, and the motions of the component.
         wanted: (N,) cells to visit; the component covers them.
         start: a node of the component over a wanted cell.
-
-    Returns:
-        The walk; consecutive waypoints lie on certified segments of the roadmap's edges.
 
     Raises:
         ValueError: the component does not reach a wanted cell.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Protocol
+from multiprocessing.synchronize import Lock
 
 from feasibility.notices import compiling_notice
 from feasibility.task import Task
@@ -11,17 +11,7 @@ from robots import Robot
 from surfaces import Cells
 
 
-class SharedLock(Protocol):
-    """A lock that processes share, such as `multiprocessing.Lock()`."""
-
-    def acquire(self, block: bool = True) -> bool:
-        """Take it; without `block`, only if nobody holds it."""
-
-    def release(self) -> None:
-        """Give it back."""
-
-
-def warm_up_in_turn(lock: SharedLock, say: Callable[[], None]) -> None:
+def warm_up_in_turn(lock: Lock, say: Callable[[], None]) -> None:
     """`warm_up` in one of several new processes: one of them compiles, the others load the result.
 
     Args:

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from feasibility.clock import OutOfTime
 from feasibility.compiled import kernel
 from feasibility.roadmap import (
-    NODES,
     Exploration,
     SearchArrays,
     Work,
     moved_clear,
     project_onto_cell,
+    roots_of_nodes,
     within,
 )
 from feasibility.verdict import Answer, Evidence, Walk
@@ -81,11 +81,8 @@ def configurations(exploration: Exploration) -> NDArray[np.float64]:
     """(N, n) a configuration of the best component over each cell; NaN where it has none."""
     roadmap = exploration.roadmap
     q = np.full((len(exploration.cells), exploration.robot.n), np.nan)
-    nodes = np.arange(roadmap.counters[NODES])[::-1]  # the first one over a cell is written last
-    root = roadmap.component[nodes]
-    while not np.array_equal(roadmap.parent[root], root):
-        root = roadmap.parent[root]
-    mine = nodes[np.equal(root, exploration.best)]
+    # The first one over a cell is written last.
+    mine = np.flatnonzero(roots_of_nodes(roadmap) == exploration.best)[::-1]
     q[roadmap.cell[mine]] = roadmap.q[mine]
     return q
 

@@ -201,7 +201,7 @@ class Prober:
             self.suspect(cell)
             return Ruling.PROVED, None
         blockers = self._collisions.at(at)
-        if blockers is not None and blockers.over(arrays, self.work, cell):
+        if blockers is not None and blockers.tool_collides(arrays, cell):
             self.suspect(cell)
             return Ruling.PROVED, None
         boxes = max(int(self.allowance * boxes), min(boxes, LEAST_BOXES))
@@ -220,7 +220,7 @@ class Prober:
         projected = int(project_all(arrays, self.work, np.array([cell]), row)) == 1
         if projected or blockers is None:
             return ruling, row[cell] if projected else None
-        blocked = blockers.over(arrays, self.work, cell, self.tick)
+        blocked = blockers.arm_collides(arrays, self.work, cell, self.tick)
         return Ruling.PROVED if blocked else ruling, None
 
     def beyond_reach(self, arrays: SearchArrays) -> Bools:

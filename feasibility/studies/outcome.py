@@ -71,7 +71,7 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     pairs = () if bodies is None else bodies.pairs
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
     for cell in few.tolist():
-        exploration.blocked(cell)
+        exploration.tool_collides(cell)
     examined = [cause_of(exploration, cell, pairs) for cell in few.tolist()]
     centres = verdict.cells.centres
     away = np.linalg.norm(centres[lost][:, None] - centres[few][None], axis=2)  # (L, E)

@@ -14,11 +14,12 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Lock
 from typing import Any
 
 from feasibility.clock import OutOfTime
 from feasibility.notices import compiling_notice, notify
-from feasibility.roadmap import SharedLock, warm_up, warm_up_in_turn
+from feasibility.roadmap import warm_up, warm_up_in_turn
 from feasibility.studies.scheduling import BREAKS, Workers, WorkersError
 
 ATTEMPTS = 3  # to start worker processes anew
@@ -198,7 +199,7 @@ def _pass_on(heard: Connection) -> None:
     notify()
 
 
-def _begin(parent: Connection, notices: Connection, lock: SharedLock | None) -> None:
+def _begin(parent: Connection, notices: Connection, lock: Lock | None) -> None:
     """In a new worker: watch the parent; load the kernels, one worker first, if there is a lock."""
 
     def watch() -> None:

@@ -8,14 +8,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.targets.beside_facets import beside_facets
 from feasibility.targets.directions import approach_curves
 from feasibility.targets.frames import FrameCurves, frame_curves
 from feasibility.task import Task
 from surfaces import Cells
 from surfaces.toolpaths import straight
 
-RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows how the surface bends
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+RELIABLE = 0.03  # [1] a curve whose normal deviates no further shows the curvature of the surface
 LATERAL = 1.1  # [1] the normal may turn that much faster between the places looked at
 FEW, MANY = 3, 32  # places on a curve over a mesh; and on one over a crease, or off its facets by
 OFF = 0.05  # [1] of the tolerance
@@ -24,15 +26,15 @@ OFF = 0.05  # [1] of the tolerance
 class TargetCurves(NamedTuple):
     """Target point f + h n, approach direction and reference along the M curves of some cells."""
 
-    first: NDArray[np.int64]
+    first: Ints
     """(M + 1,) where each curve's pieces begin, and the end of the last."""
-    cubics: NDArray[np.float64]
+    cubics: Array
     """(P, 4, 6) coefficients of 1, s, s^2, s^3 of point (m) and direction; s in 0..1."""
-    derivative_bounds: NDArray[np.float64]
+    derivative_bounds: Array
     """(P, 2) largest second derivatives of both by t in 0..1; inf where the offset folds."""
-    curvature: NDArray[np.float64]
+    curvature: Array
     """(P,) 1/m, how fast the direction turns for each metre on the target surface, at most."""
-    deviations: NDArray[np.float64]
+    deviations: Array
     """(M, 2) how far target point (m) and direction may be from the surface's own, at most."""
     centre_curvature: float
     """1/m, the largest `curvature` next to the cells' centres."""
@@ -58,9 +60,55 @@ def folded_curves(cells: Cells, height: float) -> NDArray[np.bool_]:
     return np.asarray(folded | cell[cells.pairs].any(axis=1))
 
 
-def _see_facets(
-    cells: Cells, standoff: float, tolerance: float, deviations: NDArray[np.float64]
-) -> None:
+class BesideFacets(NamedTuple):
+    """How targets at k places on curves lie to the triangles of a mesh themselves."""
+
+    off: Array
+    """(k,) m, by how much the target's distance from them is not the standoff."""
+    leans: Array
+    """(k,) |n - m| of the curve's normal n and the direction m from the mesh to the target; on
+    the strips along creases only, elsewhere normals are interpolated."""
+    away: Array
+    """(k,) m, the target's distance from them."""
+
+
+def beside_facets(
+    cells: Cells,
+    standoff: float,
+    tolerance: float,
+    curves: Ints,
+    point: Array,
+    normal: Array,
+    everywhere: bool,
+) -> BesideFacets:
+    """Compare targets with the triangles of a mesh, without any interpolation.
+
+    On the strip along a crease, and where normals are interpolated, the targets are nearer to the
+    mesh than the standoff. So they are where something protrudes from it. Nearer to a crease than
+    the tolerance leaves over the standoff, the normal is any of those that meet there.
+
+    Args:
+        cells: of a mesh.
+        standoff: m.
+        tolerance: m, of the tool point.
+        curves: (k,) which curves.
+        point: (k, 3) m, a place on each of them.
+        normal: (k, 3) their normals there.
+        everywhere: compare with all of the mesh, which takes long at large standoffs; otherwise
+            with the cells of the curve and those that touch both.
+    """
+    pairs = cells.pairs[curves]
+    target = point + cells.surface.side_sign * standoff * normal
+    away, direction = cells.distances(pairs, target, everywhere)
+    leans = np.zeros(len(point))
+    off = np.abs(standoff - away) if standoff > 0.0 else leans
+    strip = cells.crease_distances(pairs, point, everywhere)
+    some = np.isfinite(strip) & (strip >= tolerance - standoff)
+    leans[some] = np.linalg.norm(normal[some] - direction[some], axis=1)
+    return BesideFacets(off, leans, away)
+
+
+def _see_facets(cells: Cells, standoff: float, tolerance: float, deviations: Array) -> None:
     """Raise the deviations (M, 2) of curves over a mesh to those from its triangles."""
     some = np.arange(len(deviations))
     for count in (FEW, MANY):
@@ -139,9 +187,7 @@ def _target_curves(cells: Cells, task: Task) -> TargetCurves:
     )
 
 
-def _normal_curvature(
-    cells: Cells, standoff: float, tolerance: float
-) -> tuple[NDArray[np.float64], float]:
+def _normal_curvature(cells: Cells, standoff: float, tolerance: float) -> tuple[Array, float]:
     """(P,) 1/m, how fast the normal turns on the target surface, at most; and beside any centre.
 
     To the side of a curve the normal may turn faster than along it.

@@ -25,7 +25,7 @@ class DirectionCurves(NamedTuple):
     cubics: Array
     """(P, 4, 3) coefficients of 1, s, s^2, s^3; s in 0..1 on the piece."""
     derivative_bounds: Array
-    """(P, 2) the largest first and second derivative by t in 0..1 of the whole curve."""
+    """(P, 2) the largest first and second derivative by t in 0..1 of all the curve."""
     deviations: Array
     """(M,) how far they are from the direction meant, at most."""
 
@@ -67,8 +67,8 @@ def _derivative_bounds(cubics: Array, counts: Ints) -> Array:
     """(P, 2) see `DirectionCurves`: the derivative of a cubic lies in the hull of three vectors."""
     b, c, d = (cubics[:, power] for power in (1, 2, 3))
     slopes = [np.linalg.norm(v, axis=1) for v in (b, b + c, b + 2.0 * c + 3.0 * d)]
-    bends = [np.linalg.norm(v, axis=1) for v in (2.0 * c, 2.0 * c + 6.0 * d)]
-    both = np.column_stack([np.max(slopes, axis=0) * counts, np.max(bends, axis=0) * counts**2])
+    seconds = [np.linalg.norm(v, axis=1) for v in (2.0 * c, 2.0 * c + 6.0 * d)]
+    both = np.column_stack([np.max(slopes, axis=0) * counts, np.max(seconds, axis=0) * counts**2])
     return ROUNDING * both
 
 

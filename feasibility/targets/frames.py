@@ -28,7 +28,7 @@ class FrameCurves(NamedTuple):
     """(P, 4, 3) coefficients of 1, s, s^2, s^3 of t, square to b and of length 1 but for
     `deviations`; s in 0..1."""
     derivative_bounds: Array
-    """(P, 2) the largest |t'| and |t''| by t in 0..1 of the whole curve, as those of
+    """(P, 2) the largest |t'| and |t''| by t in 0..1 of all the curve, as those of
     `TargetCurves`; inf where nothing is known, next to where the reference is along b."""
     deviations: Array
     """(M,) how far t may be from the surface's own, at most."""

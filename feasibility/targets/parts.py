@@ -10,7 +10,7 @@ from surfaces import Surface, SurfaceParts
 MOST = 8192
 
 
-# Search and replay may ask for the same; surfaces are values, compared by identity.
+# A search is often run again; surfaces are values, compared by identity.
 @lru_cache(maxsize=4)
 def target_parts(
     surface: Surface,

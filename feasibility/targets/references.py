@@ -1,7 +1,7 @@
 """The reference direction that roll is measured from, before its part square to b is taken.
 
 One direction all over the surface, or the direction in which u grows; between poses, whose tangents
-are known at the poses alone, the direction on the way from one tangent to the next.
+are known at the poses alone, directions in between, along the arc from one tangent to the next.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ class OnPatch(NamedTuple):
     """Places on one patch."""
 
     rows: Ints
-    """(k,) which of the points asked for."""
+    """(k,) which of the given points."""
     patch: Patch
     u: Array
     """(k,)"""

@@ -10,14 +10,14 @@ from feasibility.task import Targets, Task
 from robots import Kinematics, Robot
 from surfaces import Cells
 
-EXACT = 1e-9  # [m] and [rad], for a start that was rounded on its way here
+EXACT = 1e-9  # [m] and [rad], for a start that was rounded
 
 
 def start_cell(robot: Robot, cells: Cells, task: Task) -> int | None:
-    """The cell whose target the arm's start meets; None where the arm has no start.
+    """The cell whose target the arm's start is at; None where the arm has no start.
 
     Raises:
-        ArgumentError: it meets none: the message has distance and angles to the nearest target.
+        ArgumentError: it is at none: the message has distance and angles to the nearest target.
     """
     if robot.start is None or len(cells) == 0:
         return None

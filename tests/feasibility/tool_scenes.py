@@ -13,7 +13,7 @@ from feasibility import Task
 from feasibility.certification.collisions.inside import winding
 from feasibility.certification.tool_alone import PoseCheck, never_clear
 from feasibility.collisions import Bodies, Collision, Obstacle, ToolShape, gather
-from feasibility.roadmap.tool_alone import Blocking, tool_alone_of
+from feasibility.roadmap.tool_alone import ToolAlone, ToolBlocked
 from robots import Robot, load_robot
 from robots.shapes import Triangles, checked_triangles
 from surfaces import Cells, Surface, plane
@@ -43,10 +43,10 @@ class Over:
         assert found is not None
         return found
 
-    def claimed(self) -> Blocking | None:
+    def claimed(self) -> ToolBlocked | None:
         """What the search says."""
-        alone = tool_alone_of(self.robot, self.surface, self.task)
-        assert alone is not None
+        task = self.task
+        alone = ToolAlone(self.robot, self.bodies, task.cone, task.effective_tolerance)
         return alone.blocking(self.point, self.approach)
 
     def confirmed(self) -> PoseCheck:

@@ -1,6 +1,7 @@
 from .boxes import Slabs as Slabs
 from .boxes import place_at_rest as place_at_rest
 from .boxes import toward_middle as toward_middle
+from .branching import DIRECTIONS as DIRECTIONS
 from .branching import Boxes as Boxes
 from .branching import Places as Places
 from .branching import Ruling as Ruling

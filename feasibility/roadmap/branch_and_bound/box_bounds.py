@@ -97,8 +97,7 @@ def reach_of_box(arrays, work, half, longest, lever, sine):  # type: ignore[no-u
     """Largest levers and sines over a box about slot 1; returns (first, D/2, first, Da/2).
 
     Args:
-        arrays: the `SearchArrays`.
-        work: the `Work`; slot 1 holds the box's centre.
+        arrays, work: the `SearchArrays` and the `Work`; slot 1 holds the box's centre.
         half: (n,) half widths.
         longest: (n,) of `static_levers`.
         lever, sine: (n,) out.

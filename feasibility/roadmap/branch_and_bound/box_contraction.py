@@ -6,7 +6,7 @@ e_2 x_2 up to a radius r, and the approach direction likewise. A target at rest 
 parameters, of radius 0.
 
 **Lemma.** Let c be the middle of a box, J the derivatives of the tool point there, and D/2 its
-second-order bound over the box (`feasibility.roadmap.box_bounds`). Let y = c + (dq, dx) be in the
+second-order bound over the box (`box_bounds`). Let y = c + (dq, dx) be in the
 box, with a place of the part at its x whose target point is within the tolerance of p. Then for
 every unit w
 

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from feasibility.roadmap.motions import SearchArrays
 
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
 STACK = 512  # most boxes on the stack; depth first, so their number grows with the depth only
 
 
@@ -19,17 +22,17 @@ class Places(NamedTuple):
     as a plain tuple of arrays.
     """
 
-    centre: NDArray[np.float64]
+    centre: Array
     """(K, 9) target point (m), approach direction, and where the tool's reference axis is to point:
     the reference direction, turned to the middle of the range of roll."""
-    slopes: NDArray[np.float64]
+    slopes: Array
     """(K, 2, 9) their change by x."""
-    radius: NDArray[np.float64]
+    radius: Array
     """(K, 3) how far they may be from that model (m, 1, 1); the last is inf where roll is free, or
     not known well enough: proofs then leave it out."""
-    children: NDArray[np.int64]
+    children: Ints
     """(K, 2) parts that a part is cut into; -1 where it is not."""
-    axis: NDArray[np.int64]
+    axis: Ints
     """(K,) the parameter that is halved, or -1."""
 
 
@@ -48,22 +51,20 @@ def place_at_rest(arrays: SearchArrays, cell: int) -> Places:
     )
 
 
-def toward_middle(
-    approach: NDArray[np.float64], reference: NDArray[np.float64], middle: float
-) -> NDArray[np.float64]:
+def toward_middle(approach: Array, reference: Array, middle: float) -> Array:
     """A reference direction (..., 3) turned about the approach direction by an angle (rad)."""
     turned = np.cos(middle) * reference + np.sin(middle) * np.cross(approach, reference)
     return np.asarray(turned, dtype=np.float64)
 
 
 class Slabs(NamedTuple):
-    """Bounds low <= w . q <= high that every box has besides its own."""
+    """Bounds low <= w . q <= high that every box has in addition to its own."""
 
-    weights: NDArray[np.float64]
+    weights: Array
     """(m, n)"""
-    low: NDArray[np.float64]
+    low: Array
     """(m,) may be -inf."""
-    high: NDArray[np.float64]
+    high: Array
     """(m,) may be inf."""
 
 
@@ -75,48 +76,48 @@ def no_slabs(n: int) -> Slabs:
 class Boxes(NamedTuple):
     """A stack of boxes to be examined; m is n joints, or n + 2 with the parameters of a part."""
 
-    low: NDArray[np.float64]
+    low: Array
     """(STACK, m)"""
-    high: NDArray[np.float64]
+    high: Array
     """(STACK, m)"""
-    part: NDArray[np.int64]
+    part: Ints
     """(STACK,) index into the `Places`."""
-    weight: NDArray[np.float64]
-    """(STACK,) share of the whole: halves of a box have half of its share each."""
-    counts: NDArray[np.int64]
+    weight: Array
+    """(STACK,) share of the first box: each half of a box has half of its share."""
+    counts: Ints
     """(2,) boxes on the stack; boxes examined so far."""
 
 
 class BoxWork(NamedTuple):
     """Working memory for boxes of m intervals; q, middle and half are those of the present box."""
 
-    q: NDArray[np.float64]
+    q: Array
     """(n,)"""
-    middle: NDArray[np.float64]
+    middle: Array
     """(m,)"""
-    half: NDArray[np.float64]
+    half: Array
     """(m,)"""
-    lever: NDArray[np.float64]
+    lever: Array
     """(n,) m, the largest over the box."""
-    sine: NDArray[np.float64]
+    sine: Array
     """(n,)"""
-    longest: NDArray[np.float64]
+    longest: Array
     """(n,)"""
-    point_rows: NDArray[np.float64]
+    point_rows: Array
     """(3, m) derivatives of tool point less target point."""
-    axis_rows: NDArray[np.float64]
+    axis_rows: Array
     """(3, m) derivatives of tool axis less approach direction."""
-    reference_rows: NDArray[np.float64]
+    reference_rows: Array
     """(3, m) the same of the reference axis less where it is to point."""
-    reference_sine: NDArray[np.float64]
+    reference_sine: Array
     """(n,)"""
-    toward: NDArray[np.float64]
+    toward: Array
     """(3,) where the reference axis is to point, at the box's centre."""
-    gap: NDArray[np.float64]
+    gap: Array
     """(3, 3) of tool point, axis and reference axis at the box's centre."""
-    most: NDArray[np.float64]
+    most: Array
     """(3,) how far rows times d may be from these gaps; inf where that says nothing."""
-    row: NDArray[np.float64]
+    row: Array
     """(m,)"""
 
 
@@ -141,8 +142,8 @@ def box_work(n: int, parameters: int) -> BoxWork:
     )
 
 
-def box_of(low: NDArray[np.float64], high: NDArray[np.float64], parameters: int = 0) -> Boxes:
-    """A stack with one box: the joints from low to high (n,), and the whole of part 0.
+def box_of(low: Array, high: Array, parameters: int = 0) -> Boxes:
+    """A stack with one box: the joints from low to high (n,), and all of part 0.
 
     Args:
         low, high: (n,) rad or m.

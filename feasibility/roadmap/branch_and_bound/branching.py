@@ -1,6 +1,6 @@
 """Proofs by branch and bound: no configuration of a box holds the tool where it should be.
 
-Boxes are discarded or contracted (`feasibility.roadmap.box_contraction`), and what is left of them
+Boxes are discarded or contracted (`box_contraction`), and what is left of them
 is halved. Contraction makes boxes thin, which is why their widths may become very small before a
 box is called undecided. A place that lies on a part of the surface lies on one of its children: a
 box may be handed to them.
@@ -31,15 +31,7 @@ from feasibility.roadmap.branch_and_bound.boxes import (
 from feasibility.roadmap.motions import SearchArrays, Work
 
 DIRECTIONS = np.array(
-    [
-        [1.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0],
-        [0.0, 0.0, 1.0],
-        [1.0, 1.0, 1.0],
-        [1.0, 1.0, -1.0],
-        [1.0, -1.0, 1.0],
-        [-1.0, 1.0, 1.0],
-    ]
+    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float
 )
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
@@ -139,10 +131,9 @@ def branch_and_bound(arrays, work, places, slabs, boxes, most, directions, space
     """Examine up to `most` boxes; returns the value of a `Ruling`.
 
     Args:
-        arrays: the `SearchArrays`.
-        work: the `Work`.
+        arrays, work: the `SearchArrays` and the `Work`.
         places: the `Places` of the target.
-        slabs: the `Slabs` that bound every box besides.
+        slabs: the `Slabs` that also bound every box.
         boxes: the `Boxes` on the stack; start from `box_of` or `root_box`.
         most: boxes to examine before returning OPEN.
         directions: (k, 3) unit directions for the cuts.

@@ -1,4 +1,4 @@
-"""What roll leaves of a box: kernels. Its range is seen in two ways.
+"""What the range of the roll leaves of a box, by two bounds: kernels.
 
 The reference axis x of the tool is in a ball about the direction in the middle of cone and range,
 wherever the target may be: with sines against x in place of levers, as for the axis. And over a
@@ -114,7 +114,7 @@ def contract_roll(arrays, work, half, sine, g, low, high):  # type: ignore[no-un
     cosine = np.sqrt(0.5 * along)
     if not turn / cosine < TURN - most - abs(off):
         return True
-    bend = (2.0 * paired + mixed * chord) / along + turn * axis * chord / along
-    most += 0.5 * bend + ROUNDING
+    second = (2.0 * paired + mixed * chord) / along + turn * axis * chord / along
+    most += 0.5 * second + ROUNDING
     roll_gradient(work.target, work.axis[1], work.axes[1], arrays.chain.prismatic, g)
     return contract(g, -most - off, most - off, low, high)

@@ -16,18 +16,15 @@ from feasibility.roadmap.motions import PROJECTION_STEPS, project_near_cell
 from feasibility.roadmap.seeding import moved_clear
 from feasibility.verdict import Cause, CauseKind
 
-LANDINGS = 60  # random configurations that are projected onto the cell
-PUSHED = 5  # of the best landings, which are moved away from what they collide with
-NAMED = 2  # pairs that the detail names with their share of the landings
+GUESSES = 60  # random configurations that are projected onto the cell
+PUSHED = 5  # of the best of these, which are moved away from what they collide with
+NAMED = 2  # pairs that the detail names, with how often they collide
 
 
 def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> Cause | None:
     """The cause of a cell where every configuration that was found collides; None otherwise.
 
-    Args:
-        exploration: a finished search.
-        cell: a cell that no component covers.
-        pairs: those that are asked for, in the order of the search's arrays.
+    Pairs are those that have to stay clear, in the order of the search's arrays.
     """
     arrays, work = exploration.arrays, exploration.work
     proof = None if exploration.blockers is None else exploration.blockers.arm.get(cell)
@@ -35,10 +32,10 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
     if not len(arrays.collisions) or (proved and proof is None):
         return None
     needed = np.array([pair.clearance for pair in pairs])
-    landed, spare = [], []  # spare: of each landing, distance beyond the clearance by pair
-    for q in exploration.guesses(LANDINGS):
+    found, spare = [], []  # spare: of each, distance beyond the clearance by pair
+    for q in exploration.guesses(GUESSES):
         if project_near_cell(arrays, work, cell, q, PROJECTION_STEPS):
-            landed.append(q.copy())
+            found.append(q.copy())
             spare.append(configuration_bounds(arrays.collisions, q) - needed)
             if (spare[-1] > 0.0).all():
                 return None
@@ -46,15 +43,15 @@ def colliding(exploration: Exploration, cell: int, pairs: tuple[Pair, ...]) -> C
         return None if proof is None else _proved(cell, proof)
     best = spare[int(np.argmax([row.min() for row in spare]))]
     for k in np.argsort([-row.min() for row in spare], kind="stable")[:PUSHED].tolist():
-        if moved_clear(arrays, work, cell, landed[k]):
+        if moved_clear(arrays, work, cell, found[k]):
             return None
-        pushed = configuration_bounds(arrays.collisions, landed[k]) - needed
+        pushed = configuration_bounds(arrays.collisions, found[k]) - needed
         best = pushed if pushed.min() > best.min() else best
     cause = _worded(cell, np.array(spare), best, pairs)
     return cause if proof is None else _proved(cell, proof, cause)
 
 
-def blocked(exploration: Exploration, cell: int) -> Cause | None:
+def proved_collision(exploration: Exploration, cell: int) -> Cause | None:
     """The cause of a cell over which the tool, or the arm, is proved to collide; or None."""
     if exploration.blockers is None:
         return None
@@ -78,10 +75,7 @@ def blocked(exploration: Exploration, cell: int) -> Cause | None:
 def _proved(cell: int, proof: ArmBlocked, found: Cause | None = None) -> Cause:
     """The cause of a cell from which collisions are proved to keep the arm.
 
-    Args:
-        cell: the cell.
-        proof: which pairs they are.
-        found: what some configurations over it told.
+    `found` is what was seen of some configurations over it.
     """
     named = ", ".join(f"{first} and {second}" for first, second in proof.pairs)
     detail = f"wherever the tool is there, one of these pairs collides: {named}"
@@ -94,12 +88,12 @@ def _proved(cell: int, proof: ArmBlocked, found: Cause | None = None) -> Cause:
 def _worded(
     cell: int, spare: NDArray[np.float64], best: NDArray[np.float64], pairs: tuple[Pair, ...]
 ) -> Cause:
-    """What is in the way of the best configuration, and who blocks how many of the landings.
+    """What the best configuration collides with, and which pairs collide in how many.
 
     Args:
         cell: the cell.
-        spare: (k, P) of each landing, distance beyond the clearance by pair, m.
-        best: (P,) the same of the best configuration, a landing or one that was pushed.
+        spare: (k, P) of each configuration, distance beyond the clearance by pair, m.
+        best: (P,) the same of the best one, or of one that was pushed.
         pairs: the P pairs.
     """
     pair = pairs[int(best.argmin())]
@@ -107,12 +101,12 @@ def _worded(
     if distance < 0.0:
         how = f"overlap by {-1e3 * distance:.1f} mm"
     else:
-        short = math.floor(1e4 * distance) / 10.0  # never rounded up to what is asked for
+        short = math.floor(1e4 * distance) / 10.0  # never rounded up to the clearance
         how = f"come within {short:.1f} mm, {1e3 * pair.clearance:g} mm are asked for"
-    blocked = (spare <= 0.0).sum(axis=0)
-    most = np.argsort(-blocked, kind="stable")[:NAMED]
+    often = (spare <= 0.0).sum(axis=0)
+    most = np.argsort(-often, kind="stable")[:NAMED]
     shares = ", ".join(
-        f"{pairs[k].first} and {pairs[k].second} in {blocked[k]}" for k in most if blocked[k]
+        f"{pairs[k].first} and {pairs[k].second} in {often[k]}" for k in most if often[k]
     )
     detail = (
         f"at best {pair.first} and {pair.second} {how}; of {len(spare)} configurations over the "

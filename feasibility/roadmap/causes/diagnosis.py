@@ -23,12 +23,12 @@ from numpy.typing import NDArray
 
 from feasibility.collisions import Pair
 from feasibility.compiled import allocating, put
+from feasibility.cone import angle_of
 from feasibility.cut_tree import CutTree
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.causes.collision import blocked, colliding
+from feasibility.roadmap.causes.collision import colliding, proved_collision
 from feasibility.roadmap.causes.disconnection import disconnected
-from feasibility.roadmap.causes.relaxed import STARTS, solve, with_cone
-from feasibility.roadmap.causes.roll import other_rolls
+from feasibility.roadmap.causes.relaxed import STARTS, other_rolls, solutions, with_cone
 from feasibility.roadmap.expansion import CONNECT_STEPS
 from feasibility.roadmap.exploration import Exploration
 from feasibility.roadmap.motions import (
@@ -43,6 +43,8 @@ from feasibility.roadmap.motions import (
 from feasibility.roadmap.search import evenly
 from feasibility.verdict import Cause, CauseKind
 from robots import Kinematics, Robot, jacobians
+
+Array = NDArray[np.float64]
 
 MOST_EXAMINED = 400  # cells that are diagnosed one by one
 ENOUGH = 5  # solutions among which the least violation is taken
@@ -103,7 +105,7 @@ def _nearest_point(arrays, work, cell, guesses):  # type: ignore[no-untyped-def]
     return best
 
 
-def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _wrapped(robot: Robot, q: Array) -> Array:
     """q with each revolute joint at the winding that passes its limits least."""
     best, least = q, np.full(robot.n, np.inf)
     for k in (-1.0, 0.0, 1.0):
@@ -114,14 +116,16 @@ def _wrapped(robot: Robot, q: NDArray[np.float64]) -> NDArray[np.float64]:
     return best
 
 
-def _nearest_to_limits(
-    exploration: Exploration, relaxed: SearchArrays, cell: int, solutions: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n,) the configuration over a cell that passes the limits least, among those found."""
+def _past_limits(exploration: Exploration, relaxed: SearchArrays, cell: int, found: Array) -> str:
+    """Which joints pass their limits, and how far, in words; empty when none has to.
+
+    Of the configurations found (k, n) over a cell, from which self-motions lead towards the limits,
+    the one that passes them least.
+    """
     robot = exploration.robot
     waypoints = np.empty((64, robot.n))
-    best, least = solutions[0], np.inf
-    for q in solutions:
+    best, least = found[0], np.inf
+    for q in found:
         here = _wrapped(robot, q)
         goal = np.clip(here, robot.lower, robot.upper)
         look_at(relaxed, exploration.work, cell)
@@ -130,45 +134,35 @@ def _nearest_to_limits(
         past = float(np.abs(here - np.clip(here, robot.lower, robot.upper)).sum())
         if past < least:
             best, least = here, past
-    return best
-
-
-def _one(exploration: Exploration) -> NDArray[np.float64]:
-    """An array for one solution."""
-    return np.empty((1, exploration.robot.n))
+    limit = np.clip(best, robot.lower, robot.upper)
+    parts = []
+    for j in np.argsort(-np.abs(best - limit)):
+        if abs(best[j] - limit[j]) > 1e-6:
+            scale, unit = (1e3, "mm") if robot.prismatic[j] else (np.degrees(1.0), "deg")
+            parts.append(
+                f"{robot.joint_names[j]} would need {scale * best[j]:.1f} {unit}; "
+                f"it stops at {scale * limit[j]:.1f} {unit}"
+            )
+    return ", and ".join(parts)
 
 
 def _smallest_angle(exploration: Exploration, relaxed: SearchArrays, cell: int) -> float:
     """Smallest angle (rad) between tool axis and approach direction with the point reached."""
     approach = relaxed.approaches[cell]
-    found = np.empty((STARTS, exploration.robot.n))
-    count = solve(relaxed, exploration.work, cell, exploration.guesses(2 * STARTS), found)
-    _, axes = Kinematics(exploration.robot).tools(found[:count])
+    work = exploration.work
+    found = solutions(relaxed, work, cell, exploration.guesses(2 * STARTS), STARTS)
+    _, axes = Kinematics(exploration.robot).tools(found)
     chords = [float(np.linalg.norm(axis - approach)) for axis in axes]
     low, high = 0.0, 2.0 * np.arcsin(min(0.5 * min(chords, default=2.0), 1.0))
     # Bisect on the cone: is there a configuration inside a narrower one?
     for _ in range(9):
         middle = 0.5 * (low + high)
         narrowed = with_cone(relaxed, 2.0 * np.sin(0.5 * middle))
-        if solve(narrowed, exploration.work, cell, exploration.guesses(STARTS), _one(exploration)):
+        if len(solutions(narrowed, work, cell, exploration.guesses(STARTS))):
             high = middle
         else:
             low = middle
     return high
-
-
-def _past_limits(robot: Robot, q: NDArray[np.float64]) -> str:
-    """Which joints of q pass their limits, and how far, in words; empty when none does."""
-    limit = np.clip(q, robot.lower, robot.upper)
-    parts = []
-    for j in np.argsort(-np.abs(q - limit)):
-        if abs(q[j] - limit[j]) > 1e-6:
-            scale, unit = (1e3, "mm") if robot.prismatic[j] else (np.degrees(1.0), "deg")
-            parts.append(
-                f"{robot.joint_names[j]} would need {scale * q[j]:.1f} {unit}; "
-                f"it stops at {scale * limit[j]:.1f} {unit}"
-            )
-    return ", and ".join(parts)
 
 
 def decimals(value: float, bound: float, least: int) -> int:
@@ -185,20 +179,15 @@ def decimals(value: float, bound: float, least: int) -> int:
 
 
 def diagnose(exploration: Exploration, cell: int) -> Cause:
-    """Why no component reaches a cell.
+    """Why no component of a finished search reaches a cell.
 
     The relaxed problems hold the tool point at its target, as the search does. A proof takes the
     full tolerance into account; without one the detail says that this was not done.
 
-    Args:
-        exploration: a finished search.
-        cell: a cell that no component covers.
-
-    Returns:
-        The cause; proved where branch and bound or the reach bound ruled the cell out, or the tool
-        collides in every pose over it.
+    It is proved where branch and bound or the reach bound ruled the cell out, or the tool collides
+    in every pose over it.
     """
-    cause = blocked(exploration, cell) or _cause(exploration, cell)
+    cause = proved_collision(exploration, cell) or _cause(exploration, cell)
     settled = cause.proved or cause.kind is CauseKind.DISCONNECTED
     if settled or not exploration.arrays.cone_chord > 0.0:
         return cause
@@ -209,12 +198,9 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
     """The cause, its detail without the remark that it is not proved."""
     arrays, robot, work = exploration.arrays, exploration.robot, exploration.work
     proved = exploration.rulings.get(cell) is Ruling.PROVED
-    n = robot.n
-    solutions = np.empty((ENOUGH, n))
-    revolute = ~robot.prismatic
     unlimited = arrays._replace(
-        lower=np.where(revolute, -np.inf, robot.lower),
-        upper=np.where(revolute, np.inf, robot.upper),
+        lower=np.where(robot.prismatic, robot.lower, -np.inf),
+        upper=np.where(robot.prismatic, robot.upper, np.inf),
     )
     slack_cone = with_free_roll(with_cone(arrays, np.inf))
     anything = with_free_roll(with_cone(unlimited, np.inf))
@@ -222,35 +208,18 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
     if not arrays.cone_chord > 0.0 and not proved:
         detail = "a cone of 0 degrees leaves no margin in which a motion could be certified"
         return Cause(cell, CauseKind.ORIENTATION, False, detail)
-    if not solve(anything, work, cell, guesses, _one(exploration)):
+    if not len(solutions(anything, work, cell, guesses)):
         distance = _nearest_point(unlimited, work, cell, guesses[:6])
-        away = float(robot.distance_from_base(arrays.points[cell]))
-        reach = robot.reach
-        short, far = decimals(1e3 * distance, 0.0, 0), decimals(away, reach, 3)
-        detail = (
-            f"the tool point stays {1e3 * distance:.{short}f} mm short; the target is "
-            f"{away:.{far}f} m from the first joint, "
-        )
-        detail += (
-            f"the arm reaches at most {reach:.{far}f} m"
-            if away > reach
-            else f"within its outer reach of {reach:.{far}f} m, but no configuration brings the "
-            "tool point there"
-        )
-        return Cause(cell, CauseKind.OUT_OF_REACH, proved, detail)
-    found = solve(unlimited, work, cell, guesses, solutions)
-    past = ""
-    if found:
-        past = _past_limits(
-            robot, _nearest_to_limits(exploration, unlimited, cell, solutions[:found])
-        )
+        return Cause(cell, CauseKind.OUT_OF_REACH, proved, _short(exploration, cell, distance))
+    found = solutions(unlimited, work, cell, guesses, ENOUGH)
+    past = _past_limits(exploration, unlimited, cell, found) if len(found) else ""
     rolls = other_rolls(exploration, cell)
     if rolls:
         detail = f"{rolls}; or {past}" if past else rolls
         return Cause(cell, CauseKind.ORIENTATION, proved, detail)
-    if solve(slack_cone, work, cell, guesses, _one(exploration)):
+    if len(solutions(slack_cone, work, cell, guesses)):
         angle = np.degrees(_smallest_angle(exploration, slack_cone, cell))
-        alpha = np.degrees(2.0 * np.arcsin(min(0.5 * arrays.cone_chord, 1.0)))
+        alpha = np.degrees(angle_of(arrays.cone_chord))
         if angle <= alpha and not proved:
             detail = "the arm has a configuration there, but the search ended before it was reached"
             return Cause(cell, CauseKind.DISCONNECTED, False, detail)
@@ -260,10 +229,8 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
             detail += f"; or {past}"
         return Cause(cell, CauseKind.ORIENTATION, proved, detail)
     if not past:
-        found = solve(anything, work, cell, guesses, solutions)
-        past = _past_limits(
-            robot, _nearest_to_limits(exploration, anything, cell, solutions[:found])
-        )
+        found = solutions(anything, work, cell, guesses, ENOUGH)
+        past = _past_limits(exploration, anything, cell, found)
         past = (
             f"for the tool point alone {past}; no configuration was found inside the cone"
             if past
@@ -272,14 +239,25 @@ def _cause(exploration: Exploration, cell: int) -> Cause:
     return Cause(cell, CauseKind.JOINT_LIMITS, proved, past)
 
 
-def cause_of(exploration: Exploration, cell: int, pairs: tuple[Pair, ...] = ()) -> Cause:
-    """Why no component reaches a cell, collisions considered; see `diagnose`.
+def _short(exploration: Exploration, cell: int, distance: float) -> str:
+    """By how much (m) the tool point falls short of a cell, in words."""
+    reach = exploration.robot.reach
+    away = float(exploration.robot.distance_from_base(exploration.arrays.points[cell]))
+    short, far = decimals(1e3 * distance, 0.0, 0), decimals(away, reach, 3)
+    bound = (
+        f"the arm reaches at most {reach:.{far}f} m"
+        if away > reach
+        else f"within its outer reach of {reach:.{far}f} m, but no configuration brings the tool "
+        "point there"
+    )
+    return (
+        f"the tool point stays {1e3 * distance:.{short}f} mm short; the target is {away:.{far}f} m "
+        f"from the first joint, {bound}"
+    )
 
-    Args:
-        exploration: a finished search.
-        cell: a cell that no component covers.
-        pairs: that have to stay clear of each other.
-    """
+
+def cause_of(exploration: Exploration, cell: int, pairs: tuple[Pair, ...] = ()) -> Cause:
+    """Why no component reaches a cell, see `diagnose`; or a collision of some of `pairs`."""
     return colliding(exploration, cell, pairs) or diagnose(exploration, cell)
 
 
@@ -294,7 +272,7 @@ def causes_of(
     Args:
         exploration: a finished search.
         proof: that no motion covers every cell.
-        pairs: that had to stay clear of each other.
+        pairs: that have to stay clear of each other.
 
     Raises:
         OutOfTime: the deadline passed.

@@ -8,7 +8,7 @@ from feasibility.collisions import Pair
 from feasibility.cut_tree import CutTree
 from feasibility.cut_words import nowhere
 from feasibility.roadmap.exploration import Exploration
-from feasibility.roadmap.graph import root_of
+from feasibility.roadmap.graph import nodes_over, root_of
 from feasibility.roadmap.motions import COLLISION, CONE, FOLD, LIMIT, LONG, ROLL, SINGULAR
 from feasibility.verdict import Cause, CauseKind
 
@@ -21,17 +21,11 @@ def disconnected(
 ) -> Cause:
     """Why the best component misses a cell that another one covers; proved where a cut parts them.
 
-    Args:
-        exploration: a finished search.
-        cell: a cell that a component covers, but not the best one.
-        proof: that no motion covers every cell.
-        pairs: that had to stay clear of each other.
+    `proof` is that no motion covers every cell; `pairs` have to stay clear of each other.
     """
     roadmap, robot = exploration.roadmap, exploration.robot
-    roots, node = set[int](), int(roadmap.first_node[cell])
-    while node >= 0:
-        roots.add(int(root_of(roadmap, roadmap.component[node])))
-        node = int(roadmap.following[node])
+    slots = roadmap.component[nodes_over(roadmap, cell)]
+    roots = {int(root_of(roadmap, slot)) for slot in slots}
     other = max(roots, key=lambda root: int(roadmap.size[root]))
     detail = (
         f"reached by another motion only, which covers {int(roadmap.size[other])} of "
@@ -72,7 +66,7 @@ def _stopped_by(pair: Pair | None) -> str:
 def _parted(exploration: Exploration, proof: CutTree, other: int, roots: set[int]) -> str:
     """Which cut keeps the best component from another one; empty where none parts it from `roots`.
 
-    All of a component is on one side of each cut that it meets: one configuration tells which.
+    All of a component is on one side of each cut of its region: one configuration is enough.
     """
     best = exploration.posture(exploration.best)
     cuts = {root: proof.parting(best, exploration.posture(root)) for root in roots}

@@ -1,30 +1,98 @@
-"""Relaxed problems over one cell, solved by Newton from random starts."""
+"""Relaxed problems over one cell, solved by Newton from random starts.
+
+Where the range of the roll alone prevents a cell: at which rolls the arm has it.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.roadmap.motions import PROJECTION_STEPS, SearchArrays, Work, project_onto_cell
+from feasibility.certification.rolls import reference_axes
+from feasibility.roadmap.exploration import Exploration
+from feasibility.roadmap.motions import (
+    PROJECTION_STEPS,
+    SearchArrays,
+    Work,
+    project_onto_cell,
+    with_free_roll,
+)
+from feasibility.roll import Roll, roll_of
+from robots import Kinematics
+
+Array = NDArray[np.float64]
 
 STARTS = 16  # Newton starts for each relaxed problem
+MANY = 32  # configurations whose rolls are looked at
+GAP = np.radians(15.0)  # between neighbouring rolls of one range
+HALVINGS = 9  # of the way from the range to the nearest roll that was seen
 
 
-def solve(
-    arrays: SearchArrays, work: Work, cell: int, guesses: NDArray[np.float64],
-    solutions: NDArray[np.float64],
-) -> int:  # fmt: skip
-    """Fill `solutions` with configurations of a relaxed problem over one cell; returns how many."""
-    found = 0
+def solutions(arrays: SearchArrays, work: Work, cell: int, guesses: Array, most: int = 1) -> Array:
+    """(k, n) configurations of a relaxed problem over one cell, from guesses (g, n); k <= most."""
+    found: list[Array] = []
     for guess in guesses:
-        solutions[found] = guess
-        if project_onto_cell(arrays, work, cell, solutions[found], PROJECTION_STEPS):
-            found += 1
-            if found == len(solutions):
+        q = guess.copy()
+        if project_onto_cell(arrays, work, cell, q, PROJECTION_STEPS):
+            found.append(q)
+            if len(found) == most:
                 break
-    return found
+    return np.reshape(found, (-1, guesses.shape[1]))
 
 
 def with_cone(arrays: SearchArrays, cone_chord: float) -> SearchArrays:
     """The same arrays with another cone, for one cell's centre: no curve deviates there."""
     return arrays._replace(cone_chord=cone_chord, inner_cone_chord=cone_chord)
+
+
+def other_rolls(exploration: Exploration, cell: int) -> str:
+    """The nearest rolls at which the arm has the cell, in words; empty where others prevent it."""
+    arrays, work = exploration.arrays, exploration.work
+    middle, half = arrays.roll.tolist()
+    if not half < np.inf:
+        return ""
+    free = with_cone(with_free_roll(arrays), arrays.cone_chord)
+    q = solutions(free, work, cell, exploration.guesses(4 * MANY), MANY)
+    off = np.sort(_off_middle(exploration, cell, q))
+    if not len(q) or np.abs(off).min() <= half:
+        return ""
+    nearest = float(off[np.argmin(np.abs(off))])
+    low, high = half, abs(nearest)
+    for _ in range(HALVINGS):
+        tried = 0.5 * (low + high)
+        wider = free._replace(roll=np.array([middle, tried]))
+        q = solutions(wider, work, cell, exploration.guesses(STARTS))
+        if len(q):
+            found = float(_off_middle(exploration, cell, q)[0])
+            nearest = found if half < abs(found) < abs(nearest) else nearest
+            high = min(tried, abs(nearest))
+        else:
+            low = tried
+    ends = sorted((nearest, _far_end(off, nearest)))
+    first, last, least, most = (
+        f"{np.degrees(middle + end):.1f}".removesuffix(".0") for end in (*ends, -half, half)
+    )
+    where = f"from {first} to {last} deg" if first != last else f"at {first} deg"
+    return f"roll: could be had {where}; {least} to {most} deg are allowed"
+
+
+def _off_middle(exploration: Exploration, cell: int, q: Array) -> Array:
+    """(k,) rad, rolls of configurations (k, n) over a cell, from the middle of the range."""
+    arrays, robot = exploration.arrays, exploration.robot
+    _, axes = Kinematics(robot).tools(q)
+    at = np.ones((len(q), 1))
+    rolls = roll_of(
+        reference_axes(robot, q), axes, at * arrays.references[cell], at * arrays.approaches[cell]
+    )
+    return Roll(float(arrays.roll[0]), 0.0).off(rolls)
+
+
+def _far_end(off: Array, nearest: float) -> float:
+    """The furthest of rolls (k,) that follow the nearest one without a gap."""
+    beyond = np.sort(np.abs(off[np.sign(off) == np.sign(nearest)]))
+    end = abs(nearest)
+    for roll in beyond[beyond > end]:
+        if roll - end > GAP:
+            break
+        end = float(roll)
+    return float(np.copysign(end, nearest))

@@ -1,6 +1,6 @@
 from .gaps import Component as Component
-from .guess import Blocked as Blocked
-from .known import components_of as components_of
+from .gaps import components_of as components_of
+from .guess import OpenGap as OpenGap
 from .places import places_on as places_on
-from .prover import Attempt as Attempt
+from .prover import ProofAttempt as ProofAttempt
 from .prover import Prover as Prover

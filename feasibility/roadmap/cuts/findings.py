@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.roadmap.branch_and_bound import Places, place_at_rest
-from feasibility.roadmap.cuts.counting import Statement
 from feasibility.roadmap.cuts.regions import Region, folded
 from feasibility.roadmap.cuts.samples import projected, random_targets
+from feasibility.roadmap.cuts.statements import Statement
 from feasibility.roadmap.motions import SearchArrays, Work, with_free_roll, work_for
 from robots.chain import tool
+
+Array = NDArray[np.float64]
 
 SAMPLES = 100  # Newton tries onto the motion set, each attempt
 MOST_SAMPLES = 600
@@ -27,7 +29,7 @@ class ProvedCut(NamedTuple):
     """In the region the tool is nowhere on the surface with w . q = t."""
 
     region: Region
-    weights: NDArray[np.float64]
+    weights: Array
     """(n,) w"""
     value: float
     """t"""
@@ -51,13 +53,13 @@ class Findings:
     work: Work = field(init=False)
     over_places: SearchArrays = field(init=False)
     """`arrays`, with any roll where it is not known over all places."""
-    samples: NDArray[np.float64] = field(init=False)
+    samples: Array = field(init=False)
     """(k, n) points of the motion set, at any winding."""
     cuts: list[ProvedCut] = field(default_factory=list)
     leaves: list[ProvedLeaf] = field(default_factory=list)
-    uncovered: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
+    uncovered: list[tuple[int, Array]] = field(default_factory=list)
     """(cell, configuration) that refuted a leaf, in this attempt."""
-    on_cuts: list[tuple[int, NDArray[np.float64]]] = field(default_factory=list)
+    on_cuts: list[tuple[int, Array]] = field(default_factory=list)
     """(nearest cell, configuration) that refuted a cut, in this attempt."""
     unfinished: dict[tuple[object, ...], Statement] = field(default_factory=dict)
 
@@ -99,7 +101,7 @@ class Findings:
         self.keep(q, cell)
         return len(q) > 0
 
-    def keep(self, q: NDArray[np.float64], cell: int = -1) -> None:
+    def keep(self, q: Array, cell: int = -1) -> None:
         """Keep points of the motion set (k, n), the first of which refutes a leaf or a cut.
 
         Args:
@@ -119,12 +121,12 @@ class Findings:
         self.uncovered.clear()
         self.on_cuts.clear()
 
-    def samples_in(self, region: Region, opened: dict[int, float]) -> NDArray[np.float64]:
+    def samples_in(self, region: Region, opened: dict[int, float]) -> Array:
         """(k, n) those in a region, with opened joints inside their turn."""
         q = folded(self.samples, opened)
         return q[region.inside(q)]
 
-    def _nearest(self, q: NDArray[np.float64]) -> int:
+    def _nearest(self, q: Array) -> int:
         """The cell whose target point is nearest to the tool point."""
         point, _ = tool(self.arrays.chain, q)
         return int(np.argmin(np.linalg.norm(self.arrays.points - point, axis=1)))
@@ -132,7 +134,7 @@ class Findings:
     # -- statements ----------------------------------------------------------------------------
 
     def statement(self, region: Region, cell: int = -1) -> Statement:
-        """'In the region the tool is nowhere on the surface', or not over a cell; as it stands."""
+        """'In the region the tool is nowhere on the surface', or not over a cell, as left."""
         key = (*(array.tobytes() for array in (region.low, region.high, *region.slabs)), cell)
         if key not in self.unfinished:
             if len(self.unfinished) >= MOST_KEPT:

@@ -4,14 +4,24 @@ Components are seen by their intervals; points of the motion set that belong to 
 gap into smaller ones. The widest are the likeliest to hold a cut, in their middle. Where the
 intervals of every joint overlap, several joints together may still have a gap, along the line
 between the nearest points of two components' convex hulls.
+
+A joint that turns freely, or through more than a turn, has gaps on its circle: all its windings
+place the tool alike. Where it can nowhere be at t + 2 pi k, one turn from t is enough for all
+windings, and a motion stays inside its own.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from feasibility.roadmap.cuts.regions import TURN
+from feasibility.roadmap.graph import EDGES, NODES, WAYPOINTS, Roadmap, roots_of_nodes
+
+Array = NDArray[np.float64]
 
 NARROWEST = 1e-3  # [rad], [m]: gaps that are not worth a try
 KEPT = 8  # gaps kept of those between the same two components
@@ -23,16 +33,36 @@ STEPS = 200  # towards the nearest points of two hulls
 class Component(NamedTuple):
     """Configurations that motions of the roadmap join, and the cells that they cover."""
 
-    q: NDArray[np.float64]
+    q: Array
     """(k, n) samples of its motions."""
     cover: NDArray[np.bool_]
     """(N,)"""
 
 
+def components_of(roadmap: Roadmap) -> list[Component]:
+    """The components of a roadmap, the largest first: nodes and waypoints, and covered cells."""
+    nodes, edges, rows = roadmap.counters[[NODES, EDGES, WAYPOINTS]]
+    if nodes == 0:
+        return []
+    at_nodes = roots_of_nodes(roadmap)
+    # Waypoints are stored edge by edge.
+    counts = roadmap.edge_rows[:edges, 1]
+    at_rows = np.repeat(at_nodes[roadmap.ends[:edges, 0]], counts)
+    q = np.vstack([roadmap.q[:nodes], roadmap.waypoints[:rows]])
+    label = np.concatenate([at_nodes, at_rows])
+    order = np.argsort(label, kind="stable")
+    kinds, starts = np.unique(label[order], return_index=True)
+    found = [
+        Component(part, roadmap.cover[kind].astype(bool))
+        for kind, part in zip(kinds, np.split(q[order], starts[1:]), strict=True)
+    ]
+    return sorted(found, key=lambda component: -int(component.cover.sum()))
+
+
 class Gap(NamedTuple):
     """An interval of w . q without a known point of the motion set, between two components."""
 
-    weights: NDArray[np.float64]
+    weights: Array
     """(n,) w"""
     low: float
     high: float
@@ -47,15 +77,10 @@ class Gap(NamedTuple):
         return 0.5 * (self.low + self.high)
 
 
-def gaps(
-    joints: tuple[int, ...], components: list[Component], samples: NDArray[np.float64]
-) -> list[Gap]:
+def gaps(joints: tuple[int, ...], components: list[Component], samples: Array) -> list[Gap]:
     """The gaps of some joints, the most promising first.
 
-    Args:
-        joints: which.
-        components: those inside a region.
-        samples: (k, n) other points of the motion set inside it.
+    Components are those inside a region, samples (k, n) other points of the motion set inside it.
     """
     found: list[Gap] = []
     for joint in joints:
@@ -63,9 +88,7 @@ def gaps(
     return sorted(found, key=lambda gap: -gap.promise)
 
 
-def slanted_gaps(
-    joints: tuple[int, ...], components: list[Component], samples: NDArray[np.float64]
-) -> list[Gap]:
+def slanted_gaps(joints: tuple[int, ...], components: list[Component], samples: Array) -> list[Gap]:
     """The gaps along several joints together, the most promising first; as `gaps`."""
     found: list[Gap] = []
     for k, one in enumerate(components[:PAIRED]):
@@ -77,7 +100,7 @@ def slanted_gaps(
     return sorted(found, key=lambda gap: -gap.promise)
 
 
-def _between_hulls(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+def _between_hulls(one: Array, other: Array) -> Array:
     """The unit vector (m,) between the nearest points of two hulls of points (k, m).
 
     Gilbert's algorithm on their difference: a point of it moves towards the corner that is furthest
@@ -96,9 +119,7 @@ def _between_hulls(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDAr
     return near / size if size > NARROWEST else np.zeros_like(near)
 
 
-def gaps_along(
-    weights: NDArray[np.float64], components: list[Component], samples: NDArray[np.float64]
-) -> list[Gap]:
+def gaps_along(weights: Array, components: list[Component], samples: Array) -> list[Gap]:
     """The gaps of w . q between components, each cut at the samples, the widest `KEPT` of each."""
     along = [component.q @ weights for component in components]
     low = np.array([values.min() for values in along])
@@ -127,3 +148,29 @@ def gaps_along(
             if ends[i + 1] - ends[i] > NARROWEST
         ]
     return found
+
+
+def openings(joint: int, components: list[Component], samples: Array) -> Iterator[float]:
+    """Angles (-pi to pi) at which the circle of a joint may be cut open, the widest gap's first.
+
+    Neither components nor samples (k, n), other points of the motion set, are there.
+    """
+    starts = [samples[:, joint]]
+    widths = [np.zeros(len(samples))]
+    for component in components:
+        values = component.q[:, joint]
+        starts.append(values.min(keepdims=True))
+        widths.append(np.ptp(values, keepdims=True))
+    start, width = np.mod(np.concatenate(starts), TURN), np.concatenate(widths)
+    if not len(start):
+        yield 0.0
+        return
+    order = np.argsort(start, kind="stable")
+    start, end = start[order], np.maximum.accumulate((start + width)[order])
+    # What reaches past a full turn covers the circle's beginning too.
+    end = np.maximum(end, end[-1] - TURN)
+    gap = np.append(start[1:], start[0] + TURN) - end
+    for k in np.argsort(-gap, kind="stable")[:KEPT]:
+        if gap[k] > NARROWEST:
+            t = float(end[k] + 0.5 * gap[k])
+            yield float(np.mod(t + np.pi, TURN) - np.pi)

@@ -16,24 +16,27 @@ from numpy.typing import NDArray
 
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound import Ruling
-from feasibility.roadmap.cuts.counting import Counted, Statement
-from feasibility.roadmap.cuts.findings import Findings, ProvedCut
+from feasibility.roadmap.cuts.findings import Findings, ProvedCut, ProvedLeaf
 from feasibility.roadmap.cuts.gaps import Component, Gap, gaps, slanted_gaps
-from feasibility.roadmap.cuts.leaves import GuessedLeaf, guessed_leaf, prove_leaves
 from feasibility.roadmap.cuts.regions import Region
+from feasibility.roadmap.cuts.statements import Budget, Statement
+
+Array = NDArray[np.float64]
 
 CANDIDATES = 8  # cuts proved in turns
 REFINED = 3  # times that gaps are cut anew by the points found on them
 DEEPEST = 12  # cuts above each other
+CELLS = 4  # of a leaf that are examined
+TURNS = (2000, 4000, 16_000, 64_000, 256_000, 1_000_000)  # boxes of one leaf in its turns
 
-Line = tuple[NDArray[np.float64], float]
+Line = tuple[Array, float]
 """Weights w (n,) and value t of a cut w . q = t."""
 
 
-class Blocked(NamedTuple):
-    """A gap between components that points of the motion set keep open."""
+class OpenGap(NamedTuple):
+    """A gap between components through which no cut was proved."""
 
-    weights: NDArray[np.float64]
+    weights: Array
     """(n,) w"""
     low: float
     high: float
@@ -42,12 +45,34 @@ class Blocked(NamedTuple):
     """Points of the motion set found there."""
 
 
+@dataclass(eq=False)
+class _GuessedLeaf:
+    """A region in which all known components miss the same cells."""
+
+    region: Region
+    statements: dict[int, Statement] = field(default_factory=dict)
+    """By cell."""
+    cell: int | None = None
+    """The one that is proved."""
+
+    @property
+    def open(self) -> bool:
+        """Can it still be proved?"""
+        return any(s.ruling is Ruling.OPEN for s in self.statements.values())
+
+    @property
+    def boxes_left(self) -> float:
+        """An estimate of the boxes that its proof still needs; inf where it has none."""
+        left = (s.boxes_left for s in self.statements.values() if s.ruling is Ruling.OPEN)
+        return min(left, default=np.inf) if self.cell is None else 0.0
+
+
 class _Guess(NamedTuple):
     """A cut that is proved, above two guesses."""
 
     line: Line
-    below: _Guess | GuessedLeaf
-    above: _Guess | GuessedLeaf
+    below: _Guess | _GuessedLeaf
+    above: _Guess | _GuessedLeaf
 
 
 @dataclass(eq=False)
@@ -55,12 +80,12 @@ class Guessing:
     """One guess at a tree."""
 
     findings: Findings
-    counted: Counted
+    budget: Budget
     joints: tuple[int, ...]
     """Those that cuts may go through."""
     opened: dict[int, float]
-    blocked: list[Blocked] = field(default_factory=list)
-    leaves: list[GuessedLeaf] = field(default_factory=list)
+    open_gaps: list[OpenGap] = field(default_factory=list)
+    leaves: list[_GuessedLeaf] = field(default_factory=list)
     boxes_left: float = np.inf
     """An estimate of what the proof still needs, where only boxes are missing."""
 
@@ -69,20 +94,20 @@ class Guessing:
         guess = self._node(region, components, DEEPEST)
         if guess is None:
             return None
-        proved = prove_leaves(self.findings, self.counted, self.leaves)
+        proved = _prove_leaves(self.findings, self.budget, self.leaves)
         self.boxes_left = sum(leaf.boxes_left for leaf in self.leaves)
         return _proved(guess) if proved else None
 
     def _node(
         self, region: Region, components: list[Component], depth: int
-    ) -> _Guess | GuessedLeaf | None:
+    ) -> _Guess | _GuessedLeaf | None:
         """The cuts of a region, proved, above leaves that are not; None where there are none."""
         inside = [c for c in components if region.inside(c.q).any()]
         cover = np.zeros(len(self.findings.arrays.points), dtype=bool)
         for component in inside:
             cover |= component.cover
         if not cover.all():
-            leaf = guessed_leaf(self.findings, region, cover)
+            leaf = _guessed_leaf(self.findings, region, cover)
             self.leaves.append(leaf)
             return leaf if leaf.cell is not None or leaf.open else None
         line = self._cut(region, inside) if depth > 0 and len(inside) > 1 else None
@@ -103,9 +128,9 @@ class Guessing:
                 if line is not None:
                     self.findings.cuts.append(ProvedCut(region, *line))
                     return line
-                if len(self.findings.samples) == before or self.counted.left <= 0:
+                if len(self.findings.samples) == before or self.budget.left <= 0:
                     break  # no point has made the gaps smaller: they would be the same
-        self._note_blocked(region, inside)
+        self._note_open_gaps(region, inside)
         return None
 
     def _through(self, region: Region, found: list[Gap]) -> Line | None:
@@ -113,9 +138,9 @@ class Guessing:
         candidates = (
             (gap.weights, gap.middle, region.on(gap.weights, gap.middle)) for gap in found
         )
-        return first_proved(self.findings, self.counted, candidates)
+        return first_proved(self.findings, self.budget, candidates)
 
-    def _samples(self, region: Region) -> NDArray[np.float64]:
+    def _samples(self, region: Region) -> Array:
         return self.findings.samples_in(region, self.opened)
 
     def _known(self, region: Region, inside: list[Component]) -> Line | None:
@@ -127,8 +152,8 @@ class Guessing:
                     return known.weights, known.value
         return None
 
-    def _note_blocked(self, region: Region, inside: list[Component]) -> None:
-        """Say which gaps of a region stayed open."""
+    def _note_open_gaps(self, region: Region, inside: list[Component]) -> None:
+        """Keep the gaps of a region through which no cut was proved."""
         samples = self._samples(region)
         seen = set()
         for gap in gaps(self.joints, inside, samples):
@@ -137,22 +162,20 @@ class Guessing:
             key = (*gap.weights.tolist(), low)
             if key not in seen:
                 points = int(((along > low) & (along < high)).sum())
-                self.blocked.append(Blocked(gap.weights, low, high, points))
+                self.open_gaps.append(OpenGap(gap.weights, low, high, points))
             seen.add(key)
 
 
 def first_proved(
     findings: Findings,
-    counted: Counted,
-    candidates: Iterable[tuple[NDArray[np.float64], float, Region]],
+    budget: Budget,
+    candidates: Iterable[tuple[Array, float, Region]],
 ) -> Line | None:
     """The first of some cuts on which the tool is proved to be nowhere.
 
-    Branch and bound goes on with the likeliest of those without a known point of the motion set.
+    Branch and bound works on those without a known point of the motion set.
 
-    Args:
-        findings, counted: what is known, and may be spent.
-        candidates: w, t, and the region where w . q = t.
+    Candidates are w, t, and the region where w . q = t.
     """
     statements: list[tuple[Line, Statement]] = []
     for weights, value, on in candidates:
@@ -165,16 +188,65 @@ def first_proved(
         line = next(proved, None)
         if line is not None:
             return line
-        settled = counted.settle_one([s for _, s in statements], counted.left)
+        settled = budget.settle_one([s for _, s in statements], budget.left)
         if settled is None:
             return None
         if settled.ruling is not Ruling.PROVED:
             findings.keep(settled.found[None])  # or nearly so, where the ruling is UNKNOWN
 
 
-def _proved(guess: _Guess | GuessedLeaf) -> Cut | Leaf:
+def _guessed_leaf(findings: Findings, region: Region, cover: NDArray[np.bool_]) -> _GuessedLeaf:
+    """The leaf of a region whose components cover `cover` (N,) and no more.
+
+    Its cells are those that Newton does not reach either, the furthest from `cover` first.
+    """
+    leaf = _GuessedLeaf(region, cell=findings.known_leaf(region, ~cover))
+    if leaf.cell is None:
+        for cell in _furthest(findings.arrays.points, cover)[:CELLS]:
+            if not findings.covers(region, cell):
+                leaf.statements[cell] = findings.statement(region, cell)
+    return leaf
+
+
+def _prove_leaves(findings: Findings, budget: Budget, leaves: list[_GuessedLeaf]) -> bool:
+    """Prove one cell of each leaf, in turns; False when one cannot be, or the budget is spent."""
+    for most in TURNS:
+        left = [leaf for leaf in leaves if leaf.cell is None]
+        for leaf in left:
+            _go_on(findings, budget, leaf, most)
+            if leaf.cell is None and not leaf.open:
+                return False
+        if not left:
+            return True
+    return False
+
+
+def _go_on(findings: Findings, budget: Budget, leaf: _GuessedLeaf, most: int) -> None:
+    """Go on with the cells of one leaf; a configuration that refutes one is a seed."""
+    statements, end = list(leaf.statements.values()), budget.spent + most
+    while True:
+        settled = budget.settle_one(statements, end - budget.spent)
+        if settled is None:
+            return
+        cell = next(cell for cell, s in leaf.statements.items() if s is settled)
+        if settled.ruling is Ruling.PROVED:
+            leaf.cell = cell
+            findings.leaves.append(ProvedLeaf(leaf.region, cell))
+            return
+        findings.keep(settled.found[None], cell)  # or nearly so, where the ruling is UNKNOWN
+
+
+def _furthest(points: Array, cover: NDArray[np.bool_]) -> list[int]:
+    """Cells beyond `cover` (N,), the furthest from what it holds first."""
+    missed = np.flatnonzero(~cover)
+    kept = points[cover] if cover.any() else points.mean(axis=0)[None]
+    away = np.linalg.norm(points[missed, None] - kept[None], axis=2).min(axis=1)
+    return [int(cell) for cell in missed[np.argsort(-away, kind="stable")]]
+
+
+def _proved(guess: _Guess | _GuessedLeaf) -> Cut | Leaf:
     """A guess as a tree; every leaf of it is proved."""
-    if isinstance(guess, GuessedLeaf):
+    if isinstance(guess, _GuessedLeaf):
         return Leaf(-1 if guess.cell is None else guess.cell)
     weights, value = guess.line
     return Cut(tuple(weights.tolist()), value, _proved(guess.below), _proved(guess.above))

@@ -82,9 +82,9 @@ def _toward(surface: Surface, task: Task, parts: SurfaceParts) -> tuple[Array, A
         about = -(along / np.sqrt(1.0 - along * along))[:, None] * (g * s[:, None]).sum(
             axis=2, keepdims=True
         )
-        turning = np.cross(b[:, None], g) + about * b[:, None]
+        rates = np.cross(b[:, None], g) + about * b[:, None]
         middle = toward_middle(b, t, task.roll.middle)
-        change = np.cross(turning, middle[:, None])
+        change = np.cross(rates, middle[:, None])
         radius = speed**2 / h + (speed / h) ** 2 + deviation / h
     known = (ends > 0.5) & (speed < 1.0) & (h > LEAST) & (deviation < 0.5)
     return (

@@ -15,19 +15,18 @@ from numpy.typing import NDArray
 
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.roadmap.branch_and_bound import Places
-from feasibility.roadmap.cuts.counting import Counted
 from feasibility.roadmap.cuts.findings import Findings
-from feasibility.roadmap.cuts.gaps import Component
-from feasibility.roadmap.cuts.guess import Blocked, Guessing, first_proved
-from feasibility.roadmap.cuts.opening import openings
+from feasibility.roadmap.cuts.gaps import Component, openings
+from feasibility.roadmap.cuts.guess import Guessing, OpenGap, first_proved
 from feasibility.roadmap.cuts.regions import Region, folded, limits_of, turn_from, wide_joints
+from feasibility.roadmap.cuts.statements import Budget
 from feasibility.roadmap.motions import SearchArrays
 
 MOST_SEEDS = 12  # handed back by an attempt
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Attempt:
+class ProofAttempt:
     """What came of an attempt."""
 
     tree: CutTree | None
@@ -37,8 +36,9 @@ class Attempt:
     seeds: tuple[tuple[int, NDArray[np.float64]], ...]
     """(cell, (n,) configuration) that no component of the search explains; the cell is the nearest
     one where it is not covered. Joints of more than a turn may be at another winding."""
-    blocked: tuple[Blocked, ...]
-    """What kept it, where there is no proof: the gaps of the region that stayed open."""
+    open_gaps: tuple[OpenGap, ...]
+    """What prevented it, where there is no proof: gaps in which there are points of the motion
+    set, or not enough boxes were left."""
     boxes_left: float
     """An estimate of the boxes that the proof still needs, where its cuts are found and none of its
     leaves is refuted; inf where that is not so, 0 where there is a proof."""
@@ -61,34 +61,36 @@ class Prover:
         self.findings = Findings(self.arrays, self.places, self.rng, self.newton)
 
     def attempt(
-        self, components: list[Component], budget: int, tick: Callable[[], None]
-    ) -> Attempt:
+        self, components: list[Component], boxes: int, tick: Callable[[], None]
+    ) -> ProofAttempt:
         """Try to prove that no motion covers every cell.
 
         Args:
             components: what the search knows, each with samples of its motions and its cells.
-            budget: boxes that may be examined.
+            boxes: how many may be examined.
             tick: called between batches of boxes; may raise, and then the next attempt goes on
                 with what is proved so far.
         """
-        counted = Counted(self.arrays, self.findings.work, budget, tick)
+        budget = Budget(self.arrays, self.findings.work, boxes, tick)
         limits = limits_of(self.arrays, self.places)
         self.findings.forget_seeds()
-        blocked: list[Blocked] = []
+        open_gaps: list[OpenGap] = []
         boxes_left = np.inf
         if limits.over_one_turn().is_finite:
             self.findings.look_around(limits)
-            for opened, joints in self._plans(counted, limits, components):
-                guess = Guessing(self.findings, counted, joints, opened)
+            for opened, joints in self._plans(budget, limits, components):
+                guess = Guessing(self.findings, budget, joints, opened)
                 root = self._root(guess, limits, components)
                 if root is not None:
-                    return Attempt(CutTree(root, tuple(opened.items())), counted.spent, (), (), 0.0)
-                blocked += guess.blocked
+                    return ProofAttempt(
+                        CutTree(root, tuple(opened.items())), budget.spent, (), (), 0.0
+                    )
+                open_gaps += guess.open_gaps
                 boxes_left = min(boxes_left, guess.boxes_left)
                 if self.findings.uncovered:
                     break  # what is known of the components is wrong
         seeds = (*self.findings.uncovered, *self.findings.on_cuts)[:MOST_SEEDS]
-        return Attempt(None, counted.spent, seeds, tuple(blocked), float(boxes_left))
+        return ProofAttempt(None, budget.spent, seeds, tuple(open_gaps), float(boxes_left))
 
     def _root(
         self, guess: Guessing, limits: Region, components: list[Component]
@@ -100,7 +102,7 @@ class Prover:
         return guess.tree(region, [c._replace(q=folded(c.q, guess.opened)) for c in components])
 
     def _plans(
-        self, counted: Counted, limits: Region, components: list[Component]
+        self, budget: Budget, limits: Region, components: list[Component]
     ) -> Iterator[tuple[dict[int, float], tuple[int, ...]]]:
         """Which joints to open, at which t, and which ones cuts may go through.
 
@@ -112,11 +114,11 @@ class Prover:
         if not wide:
             yield {}, narrow
             return
-        saved = counted.left // 2
-        counted.left -= saved
+        saved = budget.left // 2
+        budget.left -= saved
         yield {}, narrow
-        counted.left += saved
-        self._open(counted, limits, components, wide)
+        budget.left += saved
+        self._open(budget, limits, components, wide)
         if self.opened:
             yield dict(self.opened), (*narrow, *self.opened)
         bounded = [j for j in wide if np.isfinite(limits.high[j] - limits.low[j])]
@@ -125,7 +127,7 @@ class Prover:
             yield free, (*narrow, *bounded, *free)
 
     def _open(
-        self, counted: Counted, limits: Region, components: list[Component], wide: list[int]
+        self, budget: Budget, limits: Region, components: list[Component], wide: list[int]
     ) -> None:
         """Open wide joints where that is possible."""
         for joint in wide:
@@ -134,7 +136,7 @@ class Prover:
             weights = np.eye(len(limits.low))[joint]
             line = first_proved(
                 self.findings,
-                counted,
+                budget,
                 (
                     (weights, t, turn_from(limits, joint, t).on(weights, t))
                     for t in openings(joint, components, self.findings.samples)

@@ -1,7 +1,7 @@
 """Regions of the joint space: an interval for each joint, and what cuts along several joints leave.
 
 The region of a tree's root has the limits (see `feasibility.cut_tree`), and for an opened joint one
-turn from t, which stands for every winding. A slide without ends is bounded by what it can reach:
+turn from t, for all windings alike. A slide without ends is bounded by what it can reach:
 were it further out than all targets, the tolerance and all other links, the tool would be too.
 
 A statement that the tool is nowhere in a region is proved over one turn of each joint that has a
@@ -19,22 +19,24 @@ from numpy.typing import NDArray
 from feasibility.roadmap.branch_and_bound import Boxes, Places, Slabs, box_of, no_slabs
 from feasibility.roadmap.motions import SearchArrays
 
+Array = NDArray[np.float64]
+
 TURN = 2.0 * np.pi
-WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they tell
+WIDE = 1.5 * TURN  # [rad] range from which on windings cost more than they gain
 
 
 class Region(NamedTuple):
     """Configurations low <= q <= high inside some slabs."""
 
-    low: NDArray[np.float64]
+    low: Array
     """(n,) rad or m"""
-    high: NDArray[np.float64]
+    high: Array
     """(n,) rad or m"""
-    turning: NDArray[np.bool_]
+    revolute: NDArray[np.bool_]
     """(n,) joints that turn, rather than slide."""
     slabs: Slabs
 
-    def sides(self, weights: NDArray[np.float64], value: float) -> tuple[Region, Region]:
+    def sides(self, weights: Array, value: float) -> tuple[Region, Region]:
         """What a cut weights . q = value leaves on either side: w . q <= t, and w . q >= t."""
         weighted = np.flatnonzero(weights)
         if len(weighted) == 1 and weights[weighted[0]] == 1.0:
@@ -44,14 +46,14 @@ class Region(NamedTuple):
             return self._replace(high=high), self._replace(low=low)
         return self._bounded(weights, -np.inf, value), self._bounded(weights, value, np.inf)
 
-    def on(self, weights: NDArray[np.float64], value: float) -> Region:
+    def on(self, weights: Array, value: float) -> Region:
         """The part of the region with weights . q = value."""
         below, above = self.sides(weights, value)
         if below.slabs is self.slabs:
             return above._replace(high=below.high)
         return self._bounded(weights, value, value)
 
-    def _bounded(self, weights: NDArray[np.float64], low: float, high: float) -> Region:
+    def _bounded(self, weights: Array, low: float, high: float) -> Region:
         slabs = Slabs(
             np.vstack([self.slabs.weights, weights]),
             np.append(self.slabs.low, low),
@@ -59,7 +61,7 @@ class Region(NamedTuple):
         )
         return self._replace(slabs=slabs)
 
-    def inside(self, q: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def inside(self, q: Array) -> NDArray[np.bool_]:
         """(k,) which configurations (k, n) lie in the region."""
         along = q @ self.slabs.weights.T
         apart = np.maximum(self.slabs.low - along, along - self.slabs.high)
@@ -80,7 +82,7 @@ class Region(NamedTuple):
 
     def over_one_turn(self) -> Region:
         """The region with no more than one turn of any joint: what the tool can do is the same."""
-        wide = self.turning & (self.high - self.low >= TURN) & ~self.slabs.weights.any(axis=0)
+        wide = self.revolute & (self.high - self.low >= TURN) & ~self.slabs.weights.any(axis=0)
         start = np.where(np.isfinite(self.low), self.low, -np.pi)
         low = np.where(wide, start, self.low)
         return self._replace(low=low, high=np.where(wide, start + TURN, self.high))
@@ -127,7 +129,7 @@ def turn_from(region: Region, joint: int, t: float) -> Region:
     return region._replace(low=low, high=high)
 
 
-def folded(q: NDArray[np.float64], opened: dict[int, float]) -> NDArray[np.float64]:
+def folded(q: Array, opened: dict[int, float]) -> Array:
     """Configurations (k, n) with opened joints j inside their turn t_j .. t_j + 2 pi."""
     q = np.array(q)
     for joint, t in opened.items():

@@ -1,6 +1,6 @@
 """Points of the motion set: configurations that hold the tool on the surface, found by Newton.
 
-Nothing that is proved rests on them. They tell where a cut cannot be, and show the search motions
+Nothing that is proved rests on them. They show where a cut cannot be, and give the search motions
 that it does not know.
 """
 
@@ -21,6 +21,8 @@ from feasibility.roadmap.motions import (
     project,
     stand_still,
 )
+
+Array = NDArray[np.float64]
 
 NEWTON_STEPS = np.int64(16)  # of a try: most that succeed need fewer, and the rest are many
 
@@ -48,10 +50,10 @@ def projected(
     arrays: SearchArrays,
     work: Work,
     region: Region,
-    targets: NDArray[np.float64],
+    targets: Array,
     enough: int,
     rng: np.random.Generator,
-) -> NDArray[np.float64]:
+) -> Array:
     """Random configurations of a region, projected onto targets, one each.
 
     Args:
@@ -73,7 +75,7 @@ def projected(
     return q[region.inside(q)]
 
 
-def random_targets(places: Places, k: int, rng: np.random.Generator) -> NDArray[np.float64]:
+def random_targets(places: Places, k: int, rng: np.random.Generator) -> Array:
     """(k, 9) targets at random places of the surface, up to the radius of the finest parts."""
     finest = np.flatnonzero(places.children[:, 0] < 0)
     part = rng.choice(finest, k)

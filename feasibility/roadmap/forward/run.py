@@ -24,19 +24,20 @@ from feasibility.roadmap.graph import (
     WAYPOINTS,
     add_edge,
     add_node,
+    nodes_over,
     root_of,
     unite,
 )
-from feasibility.roadmap.motions import MOST_STEPS, OVERFLOW, connect, look_at, track
+from feasibility.roadmap.motions import MOST_STEPS, connect, look_at, track
 from feasibility.roadmap.walk import route_walk
 from feasibility.verdict import Cause, CauseKind, Walk
 from robots import Kinematics, Robot
 
-DRY_ROUNDS = 8  # rounds without gain after which no run is found
+IDLE_ROUNDS = 8  # rounds without gain after which no run is found
 MOST_ROUNDS = 60
 BACK = (0, 1, 2, 4, 8, 16, 32, 64)  # poses before the furthest over which is looked in a round
 SEEDS = 8  # guesses over the first pose, each round
-MEETINGS = 2  # nodes over each pose that a motion ahead tries to join
+JOINED = 2  # nodes over each pose that a motion ahead tries to join
 
 
 class Run(NamedTuple):
@@ -79,12 +80,12 @@ def run_in_order(exploration: Exploration) -> Run:
         OutOfTime: the deadline passed.
     """
     last = len(exploration.cells) - 1
-    best, rounds, dry = _layers(exploration), 0, 0
-    while best.furthest < last and dry < DRY_ROUNDS and rounds < MOST_ROUNDS:
+    best, rounds, idle = _layers(exploration), 0, 0
+    while best.furthest < last and idle < IDLE_ROUNDS and rounds < MOST_ROUNDS:
         rounds += 1
         _try_more(exploration, best)
         found = _layers(exploration)
-        dry = 0 if found.furthest > best.furthest else dry + 1
+        idle = 0 if found.furthest > best.furthest else idle + 1
         best = found
     walk = None
     if best.furthest == last:
@@ -93,12 +94,11 @@ def run_in_order(exploration: Exploration) -> Run:
 
 
 def changes_in_place(robot: Robot, targets: NDArray[np.float64], walk: Walk, near: float) -> int:
-    """How often a motion changes its posture over a pose.
+    """How often a motion, marked at the poses, changes its posture over a pose.
 
     Args:
-        robot: the arm.
+        robot, walk: the arm and its motion.
         targets: (N, 3) m, of the poses.
-        walk: the motion, marked at the poses.
         near: m, how near to a target the tool point is over it.
     """
     marks = np.flatnonzero(walk.cell >= 0)
@@ -133,48 +133,32 @@ def _try_more(exploration: Exploration, best: Layers) -> None:
 
 
 def _follow(exploration: Exploration, node: int, poses: int) -> None:
-    """Lead a node ahead from pose to pose, as far as it goes or until it meets what is known."""
+    """Lead a node ahead from pose to pose, as far as it goes or until it joins what is known."""
     while exploration.roadmap.cell[node] < poses - 1:
         cell = int(exploration.roadmap.cell[node]) + 1
         q = exploration.roadmap.q[node].copy()
-        rows = _tracked(exploration, cell, q)
+        roadmap, curve = exploration.reserve(MOST_STEPS + 1), exploration.curve(cell - 1, cell)
+        rows = track(
+            exploration.arrays, exploration.work, curve, 0.0, 1.0, q, q, False,
+            roadmap.waypoints, roadmap.counters[WAYPOINTS],
+        )  # fmt: skip
         if rows < 0:
             return
-        roadmap = exploration.roadmap
-        over = _nodes_over(exploration, cell)
+        over = nodes_over(roadmap, cell)
         component = int(root_of(roadmap, roadmap.component[node]))
         new = int(add_node(exploration.arrays, exploration.work, roadmap, cell, q, component))
         add_edge(roadmap, node, new, rows)
         # It need not be spread: it is followed here.
         roadmap.counters[HEAD] = roadmap.counters[TAIL] = 0
-        _meet(exploration, new, over)
+        _join(exploration, new, over)
         node = new
 
 
-def _tracked(exploration: Exploration, cell: int, q: NDArray[np.float64]) -> int:
-    """Follow the curve to a pose from the one before; the rows of waypoints, or less than 0."""
-    roadmap = exploration.reserve(MOST_STEPS + 1)
-    rows = track(
-        exploration.arrays, exploration.work, exploration.curve(cell - 1, cell), 0.0, 1.0, q, q,
-        False, roadmap.waypoints, roadmap.counters[WAYPOINTS],
-    )  # fmt: skip
-    return OVERFLOW if rows == OVERFLOW else int(rows)
-
-
-def _nodes_over(exploration: Exploration, cell: int) -> list[int]:
-    """Nodes over a pose."""
-    found, node = list[int](), int(exploration.roadmap.first_node[cell])
-    while node >= 0:
-        found.append(node)
-        node = int(exploration.roadmap.following[node])
-    return found
-
-
-def _meet(exploration: Exploration, new: int, over: list[int]) -> None:
+def _join(exploration: Exploration, new: int, over: list[int]) -> None:
     """Join a new node with the nearest known ones over its pose, where a self-motion does."""
     q = exploration.roadmap.q[new].copy()
     over = sorted(over, key=lambda x: float(np.abs(exploration.roadmap.q[x] - q).sum()))
-    for other in over[:MEETINGS]:
+    for other in over[:JOINED]:
         roadmap = exploration.reserve(int(CONNECT_STEPS) + 1)
         arrays, cell = exploration.arrays, roadmap.cell[new]
         here = q.copy()

@@ -2,4 +2,3 @@ from .over_cells import Blockers as Blockers
 from .over_cells import blockers_of as blockers_of
 from .prover import ArmBlocked as ArmBlocked
 from .prover import JointBoxes as JointBoxes
-from .prover import joint_boxes_of as joint_boxes_of

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.roadmap.branch_and_bound import DIRECTIONS
 from feasibility.roadmap.joint_boxes.frames import Boxes, Frames, moves
 from robots import Chain
 
@@ -27,10 +28,6 @@ Array = NDArray[np.float64]
 
 ROUNDING = 1e-9  # [m], [1] by which every bound is widened
 FLATTEST = 1e-6  # [m], [1] a joint of less effect is not contracted
-DIRECTIONS = np.array(
-    [[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1], [1, 1, -1], [1, -1, 1], [-1, 1, 1]], dtype=float
-)
-DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1)[:, None]
 
 
 class Direction(NamedTuple):
@@ -38,7 +35,7 @@ class Direction(NamedTuple):
 
     own: Array
     """(3,) unit vector in the frame of the last joint, as `robots.Chain` has it."""
-    wanted: Array
+    aim: Array
     """(3,) unit vector"""
     chord: float
     """The largest |difference|; 2 or more where any will do."""
@@ -64,13 +61,13 @@ class Left(NamedTuple):
     boxes: Boxes
     """m boxes, contracted."""
     effect: Array
-    """(m, n) [1] by how much each joint can change what is asked, about."""
+    """(m, n) [1] about how much each joint can change these vectors."""
     held: NDArray[np.bool_]
     """(m,) boxes with the tool at its target in their middle."""
 
 
-class _Held(NamedTuple):
-    """One vector of the tool, which has to be near to a given one."""
+class _Deviation(NamedTuple):
+    """By how much a vector of the tool may be off a given one."""
 
     gap: Array
     """(m, 3) the given one less the tool's at the middle."""
@@ -98,9 +95,9 @@ def at_target(chain: Chain, frames: Frames, boxes: Boxes, target: Target, scale:
     low, high = -half, half.copy()
     kept = held = np.ones(len(half), dtype=bool)
     effect = np.zeros_like(half)
-    asked = [one for one in target.directions if one.chord < 2.0]
     vectors = [_point(chain, frames, half, target)]
-    vectors += [_direction(chain, frames, half, one) for one in asked]
+    limited = [direction for direction in target.directions if direction.chord < 2.0]
+    vectors += [_direction(chain, frames, half, direction) for direction in limited]
     for k, one in enumerate(vectors):
         distance = np.sqrt((one.gap**2).sum(axis=1))
         kept = kept & (distance <= one.radius + one.moved + ROUNDING)
@@ -116,7 +113,7 @@ def at_target(chain: Chain, frames: Frames, boxes: Boxes, target: Target, scale:
     return Left(kept, Boxes(boxes.centre + low, boxes.centre + high), effect, held)
 
 
-def _point(chain: Chain, frames: Frames, half: Array, target: Target) -> _Held:
+def _point(chain: Chain, frames: Frames, half: Array, target: Target) -> _Deviation:
     """The tool point against its target."""
     n = half.shape[1]
     point = frames.carried(n, chain.translations[n][None])
@@ -125,12 +122,12 @@ def _point(chain: Chain, frames: Frames, half: Array, target: Target) -> _Held:
     rows = np.where(chain.prismatic[:, None], z, np.cross(z, point - frames.points[:, 1:]))
     gap = target.point - point[:, 0]
     most = moved.by_joint[:, 0].sum(axis=1)
-    return _Held(gap, rows.transpose(0, 2, 1), moved.levers[:, 0], most, target.tolerance)
+    return _Deviation(gap, rows.transpose(0, 2, 1), moved.levers[:, 0], most, target.tolerance)
 
 
-def _direction(chain: Chain, frames: Frames, half: Array, asked: Direction) -> _Held:
+def _direction(chain: Chain, frames: Frames, half: Array, direction: Direction) -> _Deviation:
     """A direction of the tool against where it has to point."""
-    own = frames.rotations[:, -1] @ asked.own
+    own = frames.rotations[:, -1] @ direction.own
     rows = np.cross(frames.rotations[:, 1:, :, 2], own[:, None])
     rows = np.where(chain.prismatic[:, None], 0.0, rows)
     sines, behind = np.sqrt((rows**2).sum(axis=2)), np.zeros(len(half))
@@ -138,7 +135,7 @@ def _direction(chain: Chain, frames: Frames, half: Array, asked: Direction) -> _
         if not chain.prismatic[j]:
             sines[:, j] = np.minimum(sines[:, j] + behind, 1.0)
             behind = behind + sines[:, j] * np.minimum(half[:, j], 2.0)
-    return _Held(asked.wanted - own, rows.transpose(0, 2, 1), sines, behind, asked.chord)
+    return _Deviation(direction.aim - own, rows.transpose(0, 2, 1), sines, behind, direction.chord)
 
 
 def _second(chain: Chain, levers: Array, half: Array) -> Array:

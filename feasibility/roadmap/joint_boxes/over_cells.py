@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,52 +12,46 @@ from feasibility.collisions import gather
 from feasibility.roadmap.branch_and_bound import root_box
 from feasibility.roadmap.joint_boxes.prover import ALL_BOXES, ArmBlocked, JointBoxes
 from feasibility.roadmap.motions import PROJECTION_STEPS, SearchArrays, Work, project_near_cell
-from feasibility.roadmap.tool_alone import Blocking, ToolAlone
+from feasibility.roadmap.tool_alone import ToolAlone, ToolBlocked
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Surface
 
 Array = NDArray[np.float64]
 
-LANDINGS = 30  # guesses at a configuration over the cell, of which none may be seen to be clear
+GUESSES = 30  # guesses at a configuration over the cell, of which none may be seen to be clear
 
 
+@dataclass(eq=False)
 class Blockers:
-    """What is proved to keep an arm from the cells of one problem, by cell."""
+    """Proofs that collisions keep an arm from cells of one problem."""
 
-    def __init__(self, alone: ToolAlone, arm: JointBoxes) -> None:
-        """Ask nothing yet."""
-        self._alone, self._arm = alone, arm
-        self.tool: dict[int, Blocking | None] = {}
-        """What keeps the tool from a cell in every pose; None where that is not proved."""
-        self.arm: dict[int, ArmBlocked | None] = {}
-        """What keeps the whole arm from it."""
+    alone: ToolAlone
+    boxes: JointBoxes
+    tool: dict[int, ToolBlocked | None] = field(default_factory=dict)
+    """By cell: what keeps the tool from it in every pose; None where that is not proved."""
+    arm: dict[int, ArmBlocked | None] = field(default_factory=dict)
+    """The same of all of the arm."""
 
     @property
     def left(self) -> int:
         """Boxes of joint values that may still be looked at."""
-        return max(self._arm.left, 0)
+        return max(self.boxes.left, 0)
 
-    def over(
-        self,
-        arrays: SearchArrays,
-        work: Work,
-        cell: int,
-        tick: Callable[[], object] | None = None,
+    def tool_collides(self, arrays: SearchArrays, cell: int) -> bool:
+        """Is it proved that the tool collides in every pose over a cell, whatever the arm does?"""
+        if cell not in self.tool:
+            point, approach = arrays.points[cell], arrays.approaches[cell]
+            self.tool[cell] = self.alone.blocking(point, approach)
+        return self.tool[cell] is not None
+
+    def arm_collides(
+        self, arrays: SearchArrays, work: Work, cell: int, tick: Callable[[], object]
     ) -> bool:
-        """Is it proved that collisions keep the arm from a cell?
+        """Is it proved that something of the arm collides wherever the tool is over a cell?
 
-        Args:
-            arrays, work: the search.
-            cell: the cell.
-            tick: asks about all of the arm, and is called now and then meanwhile; may raise. None
-                asks about the tool alone: does it collide in every pose, whatever the arm does?
+        `tick` is called now and then; it may raise.
         """
-        if tick is None:
-            if cell not in self.tool:
-                place = arrays.points[cell], arrays.approaches[cell]
-                self.tool[cell] = self._alone.blocking(*place)
-            return self.tool[cell] is not None
         if cell not in self.arm:
             self.arm[cell] = self._blocking(arrays, work, cell, tick)
         return self.arm[cell] is not None
@@ -66,16 +61,16 @@ class Blockers:
     ) -> ArmBlocked | None:
         boxes = root_box(arrays)
         low, high = boxes.low[0], boxes.high[0]
-        if not np.isfinite(high - low).all() or not self._arm.way:
+        if not np.isfinite(high - low).all() or not self.boxes.tests:
             return None
         # Random numbers of its own: whether it is tried does not change the search.
-        guesses = np.random.default_rng(cell).uniform(low, high, (LANDINGS, len(low)))
-        landed = [q for q in guesses if project_near_cell(arrays, work, cell, q, PROJECTION_STEPS)]
-        if not landed or self._arm.hopeless(np.array(landed)):
+        guesses = np.random.default_rng(cell).uniform(low, high, (GUESSES, len(low)))
+        found = [q for q in guesses if project_near_cell(arrays, work, cell, q, PROJECTION_STEPS)]
+        if not found or self.boxes.any_clear(np.array(found)):
             return None
         reference = arrays.references[cell] if arrays.roll[1] < np.inf else None
-        target = self._arm.target(arrays.points[cell], arrays.approaches[cell], reference)
-        return self._arm.blocking(target, low, high, tick)
+        target = self.boxes.target(arrays.points[cell], arrays.approaches[cell], reference)
+        return self.boxes.blocking(target, low, high, tick)
 
 
 def blockers_of(

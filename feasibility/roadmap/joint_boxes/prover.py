@@ -1,26 +1,27 @@
 """Does the arm collide wherever its tool is at a target? Branch and bound over boxes of joints.
 
 Boxes are contracted to what may have the tool there (`at_target`), and dropped where two bodies
-collide all over them (`in_the_way`); what is left is halved. Where no box is left, no configuration
+collide all over them (`ball_tests`); what is left is halved. Where no box is left, no configuration
 has the tool at the target without a collision.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.collisions import Bodies, gather
+from feasibility.collisions import Bodies
 from feasibility.roadmap.branch_and_bound import toward_middle
 from feasibility.roadmap.joint_boxes.at_target import Direction, Target, at_target
+from feasibility.roadmap.joint_boxes.ball_tests import BallTests
 from feasibility.roadmap.joint_boxes.frames import Boxes, frames_at
-from feasibility.roadmap.joint_boxes.in_the_way import InTheWay
 from feasibility.task import Task
 from robots import Robot
-from surfaces import Surface
 
 Array = NDArray[np.float64]
 
@@ -43,28 +44,22 @@ class ArmBlocked(NamedTuple):
     """How many were looked at."""
 
 
+@dataclass(eq=False)
 class JointBoxes:
-    """What keeps the whole arm from targets, of one problem."""
+    """Proofs that some pair of bodies collides wherever the tool is at a target."""
 
-    def __init__(self, robot: Robot, bodies: Bodies, task: Task, boxes: int = ALL_BOXES) -> None:
-        """Ask nothing yet.
+    robot: Robot
+    bodies: Bodies
+    """Everything that can collide, and the pairs that have to stay clear."""
+    task: Task
+    """Its tolerance, cone and roll are used."""
+    left: int = ALL_BOXES
+    """Boxes that may still be looked at, for all targets."""
 
-        Args:
-            robot: the arm.
-            bodies: everything that can collide, and the pairs that are asked for.
-            task: its tolerance, cone and roll are used.
-            boxes: that may be looked at for all targets.
-        """
-        self._robot, self._bodies, self._task = robot, bodies, task
-        self._way: InTheWay | None = None
-        self.left = boxes
-
-    @property
-    def way(self) -> InTheWay:
-        """What may be in the way; balls are laid when they are first needed."""
-        if self._way is None:
-            self._way = InTheWay(self._robot, self._bodies)
-        return self._way
+    @cached_property
+    def tests(self) -> BallTests:
+        """What may collide; balls are placed when they are first needed."""
+        return BallTests(self.robot, self.bodies)
 
     def target(self, point: Array, approach: Array, reference: Array | None = None) -> Target:
         """Where the tool has to be over a cell.
@@ -74,19 +69,16 @@ class JointBoxes:
             approach: (3,) unit vector, the approach direction there.
             reference: (3,) unit vector, the reference direction, where roll is limited.
         """
-        task, chain = self._task, self._robot.chain
-        asked = [Direction(chain.approach, approach, task.cone_chord)]
+        task, chain = self.task, self.robot.chain
+        directions = [Direction(chain.approach, approach, task.cone_chord)]
         if task.roll is not None and reference is not None:
             middle = toward_middle(approach, reference, task.roll.middle)
-            asked.append(Direction(chain.reference, middle, _roll_chord(task)))
-        return Target(point, chain.translations[-1], task.effective_tolerance, tuple(asked))
+            directions.append(Direction(chain.reference, middle, _roll_chord(task)))
+        return Target(point, chain.translations[-1], task.effective_tolerance, tuple(directions))
 
-    def hopeless(self, landings: Array) -> bool:
-        """Is one of some configurations (k, n) over a target not seen to collide?
-
-        Then no proof about it can be had.
-        """
-        return bool((self.way.spare(frames_at(self._robot.chain, landings)) >= 0.0).any())
+    def any_clear(self, q: Array) -> bool:
+        """Does one of some configurations (k, n) pass all tests? Then no proof can be had there."""
+        return bool((self.tests.spare(frames_at(self.robot.chain, q)) >= 0.0).any())
 
     def blocking(
         self,
@@ -104,7 +96,7 @@ class JointBoxes:
             tick: called between batches; may raise.
             most: boxes that may be looked at.
         """
-        chain, scale = self._robot.chain, TYPICAL * self._robot.reach
+        chain, scale = self.robot.chain, TYPICAL * self.robot.reach
         waiting, used, looked = [Boxes(low[None], high[None])], set[int](), 0
         while sum(len(boxes.low) for boxes in waiting):
             boxes = _next(waiting)
@@ -119,28 +111,20 @@ class JointBoxes:
             much = kept & (((left.high - left.low) / width).min(axis=1) < MUCH)
             waiting.append(left.some(much))
             (rest,) = np.nonzero(kept & ~much)
-            found = self.way.deepest(frames.some(rest), boxes.half[rest], target)
+            found = self.tests.deepest(frames.some(rest), boxes.half[rest], target)
             open_ = found.ratio >= 1.0
             if (held[rest] & np.isinf(found.ratio)).any():
-                return None  # nothing speaks against this configuration, nor will it later
+                return None  # this configuration is clear, in smaller boxes too
             used |= set(found.pair[~open_].tolist())
-            # (Around what is hardly deep there would be no end of ever smaller boxes.)
+            # (Around shallow overlaps there would be no end of ever smaller boxes.)
             near = (found.ratio < NEAR) & (found.effect.sum(axis=1) > found.ratio * DEEP * scale)
             by = np.where(near[:, None], found.effect, effect[rest])[open_]
             rest = rest[open_]
             if len(rest) and (boxes.half[rest].max(axis=1) < THINNEST).any():
                 return None
             waiting.append(_halves(left.some(rest), by))
-        names = dict.fromkeys((self.way.pairs[k].first, self.way.pairs[k].second) for k in used)
+        names = dict.fromkeys((self.tests.pairs[k].first, self.tests.pairs[k].second) for k in used)
         return ArmBlocked(tuple(names), looked)
-
-
-def joint_boxes_of(robot: Robot, surface: Surface, task: Task) -> JointBoxes | None:
-    """What keeps the whole arm from targets; None where collisions are not checked."""
-    bodies = gather(robot, surface, task.collision, task.standoff)
-    if bodies is None:
-        return None
-    return JointBoxes(robot, bodies, task)
 
 
 def _roll_chord(task: Task) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from feasibility.compiled import kernel
 from feasibility.roadmap.motions.arrays import NEAR_COST
-from feasibility.roadmap.motions.roll import frame_turning, level
+from feasibility.roadmap.motions.roll import frame_rates, level
 
 # [1] share of a piece by which the curve's point closest to a waypoint may lie off the one aimed at
 BESIDE = 0.05
@@ -118,7 +118,7 @@ def _frames_between(arrays, work, curve, t0, t1, low, high):  # type: ignore[no-
     x, y, z = work.target[1, 0], work.target[1, 1], work.target[1, 2]
     aim(arrays, work, curve, t1)
     x, y, z = work.target[1, 0] - x, work.target[1, 1] - y, work.target[1, 2] - z
-    speed, turn, bend = frame_turning(
+    speed, turn, second = frame_rates(
         np.sqrt(x * x + y * y + z * z),
         work.derivative_bound[1],
         slope,
@@ -128,7 +128,7 @@ def _frames_between(arrays, work, curve, t0, t1, low, high):  # type: ignore[no-
     )
     work.derivative_bound[5] = speed
     work.derivative_bound[6] = turn
-    work.derivative_bound[7] = bend
+    work.derivative_bound[7] = second
     work.derivative_bound[8] = rate
     lost = max(arrays.roll_lost, arrays.frame_deviations[curve, 1] + NEAR_COST * rate * arrays.near)
     work.allowance[2] = max(arrays.roll[1] - lost, 0.0)

@@ -13,9 +13,11 @@ from feasibility.task import Task
 from robots import Chain, Robot
 from surfaces import Cells, Surface
 
+Array = NDArray[np.float64]
+
 NEWTON = 0.02  # [1] share of the tolerance that the Newton iteration leaves at a waypoint
 # [1] share of the cone chord, and of the roll's half range, that this may cost, by how the
-# surface bends and the frame turns along it
+# surface curves and the frame turns along it
 NEWTON_CONE = 1e-4
 ORDINARY = 0.01  # [1] share of the same that an ordinary curve may deviate by
 # The replay matches a waypoint to the curve's closest point, up to twice `near` from the one aimed
@@ -34,38 +36,38 @@ class SearchArrays(NamedTuple):
     """Everything the compiled search reads: arm, surface and task as plain arrays."""
 
     chain: Chain
-    lower: NDArray[np.float64]
+    lower: Array
     """(n,) rad or m, -inf where free."""
-    upper: NDArray[np.float64]
+    upper: Array
     """(n,) rad or m, +inf where free."""
-    points: NDArray[np.float64]
+    points: Array
     """(N, 3) target points of the cell centres."""
-    approaches: NDArray[np.float64]
+    approaches: Array
     """(N, 3) approach directions of the cell centres."""
-    references: NDArray[np.float64]
+    references: Array
     """(N, 3) the directions that roll is measured from, across these; (0, 3) where it is free."""
     first_piece: NDArray[np.int64]
     """(M + 1,) where the pieces of each curve begin, see `surfaces.cell_curves`."""
-    targets: NDArray[np.float64]
+    targets: Array
     """(P, 4, 6) cubics of target point and approach direction along each piece."""
-    derivative_bounds: NDArray[np.float64]
+    derivative_bounds: Array
     """(P, 3) largest second derivatives of both (m, 1) by t, inf where the offset folds; and the
     curvature of the target surface (1/m): how fast the approach direction turns along it."""
-    deviations: NDArray[np.float64]
+    deviations: Array
     """(M, 2) bounds on how far both deviate from the surface's own on each curve (m, 1)."""
-    frames: NDArray[np.float64]
+    frames: Array
     """(P, 4, 3) cubics of the reference direction along each piece; (0, 4, 3) where roll is free,
     and so the next two."""
-    frame_bounds: NDArray[np.float64]
+    frame_bounds: Array
     """(P, 3) largest first and second derivative of the same by t; and how much roll may change for
     each metre that the tool point is off its target (rad/m), inf at a pole."""
-    frame_deviations: NDArray[np.float64]
+    frame_deviations: Array
     """(M, 2) bounds on how far the reference direction deviates (1), and roll by that (rad)."""
     cone_chord: float
     """2 sin(alpha / 2): the largest |a - b|; inf when every direction is allowed."""
     tolerance: float
     """m."""
-    roll: NDArray[np.float64]
+    roll: Array
     """(2,) rad, middle and half width of the range of roll; the half is inf where it is free."""
     inner_cone_chord: float
     """The part of the cone chord that self-motions over a cell's centre may use: less what
@@ -81,10 +83,10 @@ class SearchArrays(NamedTuple):
     off_target_cost: float
     """[1], times the curvature: what a tool point off its target costs of the cone chord for each
     metre. NEAR_COST where the cone is to hold at its closest point on the surface too, 0 where only
-    at its target, which is all that the task asks."""
+    at its target, which is all that the task requires."""
     scale: float
     """m, the length that makes metres comparable to radians (the arm's reach)."""
-    collisions: NDArray[np.float64]
+    collisions: Array
     """Bodies and pairs with the bounds between them, see `feasibility.collisions.buffer`; empty
     where collisions are not checked."""
 
@@ -144,8 +146,8 @@ def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     return view
 
 
-def _ordinary(deviations: NDArray[np.float64], most: float) -> float:
-    """The largest deviation (M,) of ordinary curves, see ORDINARY; 0 where nothing is asked."""
+def _ordinary(deviations: Array, most: float) -> float:
+    """The largest deviation (M,) of ordinary curves, see ORDINARY; 0 where any will do."""
     if not most < np.inf:
         return 0.0
     return float(deviations[deviations <= ORDINARY * most].max(initial=0.0))
@@ -154,13 +156,13 @@ def _ordinary(deviations: NDArray[np.float64], most: float) -> float:
 class _Frames(NamedTuple):
     """What roll is measured from along curves, see the fields of `SearchArrays`."""
 
-    cubics: NDArray[np.float64]
-    bounds: NDArray[np.float64]
-    deviations: NDArray[np.float64]
+    cubics: Array
+    bounds: Array
+    deviations: Array
     rate: float
 
 
-def _frames(curves: FrameCurves | None, tilts: NDArray[np.float64], cone_chord: float) -> _Frames:
+def _frames(curves: FrameCurves | None, tilts: Array, cone_chord: float) -> _Frames:
     """Frames along curves as arrays, of length 0 where roll is free.
 
     Frames that differ by a small angle e differ in roll by e / cos(theta / 2) at a tilt theta.
@@ -181,7 +183,7 @@ def _frames(curves: FrameCurves | None, tilts: NDArray[np.float64], cone_chord: 
     )
 
 
-def collisions_of(robot: Robot, surface: Surface, task: Task) -> NDArray[np.float64]:
+def collisions_of(robot: Robot, surface: Surface, task: Task) -> Array:
     """Bodies and pairs as the compiled search reads them; empty where they are not checked."""
     bodies = gather(robot, surface, task.collision, task.standoff)
     return np.zeros(0) if bodies is None else collision_buffer(bodies, robot)

@@ -122,7 +122,7 @@ def enough_left(work, m):  # type: ignore[no-untyped-def]
 
 @kernel
 def bounded_step(arrays, work, q, cone, roll, goal, roll_goal):  # type: ignore[no-untyped-def]
-    """`least_step` with cone and roll, where they are asked for.
+    """`least_step` with rows of cone and roll, where they are to be corrected.
 
     The cone by both tilts where it is narrow, as long as joints suffice.
     """

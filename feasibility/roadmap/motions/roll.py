@@ -47,14 +47,9 @@ def roll_off_middle(target, axis, reference, middle):  # type: ignore[no-untyped
 
 @kernel
 def roll_gradient(target, axis, axes, prismatic, out):  # type: ignore[no-untyped-def]
-    """The derivative of roll by each joint.
+    """The derivative of roll by each joint, into `out` (n,).
 
-    Args:
-        target: as in `roll_off_middle`.
-        axis: (3,) a.
-        axes: (n, 3) axes of the joints.
-        prismatic: (n,)
-        out: (n,)
+    `target` and `axis` are those of `roll_off_middle`, `axes` (n, 3) those of the joints.
     """
     bx, by, bz = target[1, 0], target[1, 1], target[1, 2]
     along = 1.0 / (1.0 + axis[0] * bx + axis[1] * by + axis[2] * bz)
@@ -80,7 +75,7 @@ def level(target):  # type: ignore[no-untyped-def]
 
 
 @kernel
-def frame_turning(change, bend, slope, curl, off, lateral):  # type: ignore[no-untyped-def]
+def frame_rates(change, second, slope, curl, off, lateral):  # type: ignore[no-untyped-def]
     """How fast a frame turns, at most, whose b and t are nearly unit vectors at right angles.
 
     With b^ = b / |b|, P = 1 - b^ b^T, and t^ = P t / |P t|: the frame t^, b^ x t^, b^ turns with
@@ -89,7 +84,7 @@ def frame_turning(change, bend, slope, curl, off, lateral):  # type: ignore[no-u
 
     Args:
         change: |b(1) - b(0)|.
-        bend: largest |b''|.
+        second: largest |b''|.
         slope, curl: largest |t'| and |t''|.
         off, lateral: how far b and t are from such unit vectors, at most.
 
@@ -101,15 +96,15 @@ def frame_turning(change, bend, slope, curl, off, lateral):  # type: ignore[no-u
     if not (m > 0.0 and lateral < 1.0 and square > 0.0):
         return np.inf, np.inf, np.inf
     h, e = np.sqrt(square), e / m
-    speed = (change + 0.5 * bend) / m  # |b'| is within |b''| / 2 of its mean
-    bend = bend / m + 2.0 * speed * speed
+    speed = (change + 0.5 * second) / m  # |b'| is within |b''| / 2 of its mean
+    second = second / m + 2.0 * speed * speed
     turn = (slope + e * speed) / h
-    whole = np.sqrt(speed * speed + turn * turn)
+    rate = np.sqrt(speed * speed + turn * turn)
     about = (
         curl
-        + slope * whole
+        + slope * rate
         + (slope + (1.0 + lateral) * speed) * speed
-        + e * (bend + speed * whole)
+        + e * (second + speed * rate)
         + (slope + e * speed) * turn
     ) / h
-    return speed, whole, np.sqrt((bend + turn * speed) ** 2 + about * about)
+    return speed, rate, np.sqrt((second + turn * speed) ** 2 + about * about)

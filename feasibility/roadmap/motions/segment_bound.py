@@ -40,7 +40,7 @@ s_j, |om' . (a + b)| <= 2 G + W |a - b|; and c = a . b has |c'| <= (A + |b'|) si
 
 with the peak of |a - b| for the tilt theta: 1 + c = 2 - |a - b|^2 / 2. Both ends of the range are
 tested with the signed values of psi, that of the frame at the tool point's closest point included.
-They are principal values: a whole turn between them is ruled out by its own test, that roll changes
+They are principal values: a full turn between them is ruled out by its own test, that roll changes
 by less than is left of a turn, (turn + |Om|) / cos(theta / 2) < 2 pi - |psi1 - psi0|.
 """
 
@@ -59,7 +59,7 @@ from feasibility.roadmap.motions.working_memory import HERE, NEXT, cone_used, ro
 def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     """D and Da of the module's bound for the segment from q0 (slot 0) to q1 (slot 1).
 
-    `work.turning` receives turn, A, G and W.
+    `work.roll_terms` receives turn, A, G and W.
     """
     n = q0.shape[0]
     behind = 0.0  # how far the tool point moves by the joints behind j
@@ -94,8 +94,8 @@ def spread(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
         mixed += d * before
         behind += r * d
         behind_axis += s * d
-    work.turning[0], work.turning[1] = turn, behind_axis
-    work.turning[2], work.turning[3] = paired, mixed
+    work.roll_terms[0], work.roll_terms[1] = turn, behind_axis
+    work.roll_terms[2], work.roll_terms[3] = paired, mixed
     return total, total_axis
 
 
@@ -117,13 +117,14 @@ def roll_spread(work, chord, longer):  # type: ignore[no-untyped-def]
         chord: the peak of |a - b|.
         longer: how much further the frame may run, see `segment_holds`.
     """
-    turn, axis, paired, mixed = work.turning[0], work.turning[1], work.turning[2], work.turning[3]
+    turn, axis = work.roll_terms[0], work.roll_terms[1]
+    paired, mixed = work.roll_terms[2], work.roll_terms[3]
     approach, frame = longer * work.derivative_bound[5], longer * work.derivative_bound[6]
-    bend = longer * longer * work.derivative_bound[7]
+    second = longer * longer * work.derivative_bound[7]
     along = 2.0 - 0.5 * chord * chord  # 1 + c
     cosine = np.sqrt(0.5 * along)
     rate = (turn + frame) / cosine
-    most = (2.0 * paired + mixed * chord) / along + (bend + frame * turn) / cosine
+    most = (2.0 * paired + mixed * chord) / along + (second + frame * turn) / cosine
     return rate, most + rate * (axis + approach) * 0.5 * chord / cosine
 
 
@@ -154,7 +155,7 @@ def segment_holds(arrays, work, q0, q1):  # type: ignore[no-untyped-def]
     Returns the position bound over the allowance of the tolerance, and the larger one of the cone's
     bound and the roll's, each over its allowance: both must be at most 1. NaN compares false, so it
     never certifies. The second is inf where roll does not hold, or the arm is not certified clear.
-    Where the position holds, `work.stop_reason` is told which one does not.
+    Where the position holds, `work.stop_reason` receives which one does not.
     """
     total, total_axis = spread(arrays, work, q0, q1)
     # The replay matches the ends to the curve's closest points, up to twice the errors from those

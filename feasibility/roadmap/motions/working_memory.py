@@ -14,6 +14,8 @@ from feasibility.compiled import kernel
 from feasibility.roadmap.motions.roll import roll_off_middle
 from robots import frames
 
+Array = NDArray[np.float64]
+
 HERE, NEXT = np.int64(0), np.int64(1)  # slots of `Work`: where the arm is, where it tries to go
 OF_CONE, OF_ROLL = np.int64(0), np.int64(1)  # rows of `Work.gradients`
 
@@ -21,52 +23,52 @@ OF_CONE, OF_ROLL = np.int64(0), np.int64(1)  # rows of `Work.gradients`
 class Work(NamedTuple):
     """Working memory of one thread; slot 0 is where the arm is, slot 1 where it tries to go."""
 
-    origins: NDArray[np.float64]
+    origins: Array
     """(2, n, 3)"""
-    axes: NDArray[np.float64]
+    axes: Array
     """(2, n, 3)"""
-    point: NDArray[np.float64]
+    point: Array
     """(2, 3)"""
-    axis: NDArray[np.float64]
+    axis: Array
     """(2, 3)"""
-    reference: NDArray[np.float64]
+    reference: Array
     """(2, 3) the tool's reference axis, across its axis."""
-    error: NDArray[np.float64]
+    error: Array
     """(2, 3) distance of the tool point from its target, |a - b|, and roll less the middle of its
     range (0 where it is free), in each slot."""
-    point_rows: NDArray[np.float64]
+    point_rows: Array
     """(3, n)"""
-    axis_rows: NDArray[np.float64]
+    axis_rows: Array
     """(3, n)"""
-    gradients: NDArray[np.float64]
+    gradients: Array
     """(2, n) of |a - b|, and of roll."""
-    rows: NDArray[np.float64]
+    rows: Array
     """(6, n) constraint rows of the step."""
-    rhs: NDArray[np.float64]
+    rhs: Array
     """(6,)"""
-    secondary_step: NDArray[np.float64]
-    """(n,) the step that the secondary objective asks for, to be taken in the free directions."""
-    step: NDArray[np.float64]
+    secondary_step: Array
+    """(n,) the step of the secondary objective, to be taken in the free directions."""
+    step: Array
     """(n,)"""
     held: NDArray[np.bool_]
     """(n,) joints that the step holds at a limit."""
-    trial: NDArray[np.float64]
+    trial: Array
     """(n,)"""
-    kept: NDArray[np.float64]
+    kept: Array
     """(n,) the best configuration of a projection off the target."""
-    target: NDArray[np.float64]
+    target: Array
     """(3, 3) target point, approach direction, and the direction that roll is measured from."""
-    derivative_bound: NDArray[np.float64]
+    derivative_bound: Array
     """(9,) largest second derivatives of target point and approach direction over the present
     step, by its own parameter in 0..1, zero while the target is at rest; the curvature of the
     target surface there (1/m); the target's speed by that parameter at both ends (m); and, where
     roll is limited, how fast the approach direction changes (1), the frame that roll is measured in
-    turns (rad), and this turning changes (rad), at most; and rad of roll for each metre off the
+    turns (rad), and that rate changes (rad), at most; and rad of roll for each metre off the
     target."""
-    allowance: NDArray[np.float64]
+    allowance: Array
     """(3,) what the present step may use of the tolerance (m), of the cone chord, and of the roll's
     half range (rad); 0 where nothing is left."""
-    turning: NDArray[np.float64]
+    roll_terms: Array
     """(4,) turn, A, G and W of the last segment, see `segment_bound`."""
     counts: NDArray[np.int64]
     """(1,) forward kinematics evaluated."""
@@ -96,7 +98,7 @@ def work_for(n: int) -> Work:
         target=np.zeros((3, 3)),
         derivative_bound=np.zeros(9),
         allowance=np.zeros(3),
-        turning=np.zeros(4),
+        roll_terms=np.zeros(4),
         counts=np.zeros(1, dtype=np.int64),
         stop_reason=np.zeros(2, dtype=np.int64),
     )

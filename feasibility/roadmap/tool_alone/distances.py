@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.collisions import HalfSpace
-from feasibility.roadmap.tool_alone.mesh_insides import FLUSH, balls_in, face_planes
+from feasibility.roadmap.tool_alone.balls_inside import FLUSH, balls_in, face_planes
 from robots.shapes import Triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 
@@ -125,9 +125,9 @@ def distance_from_triangles(triangles: Array, deviation: float = 0.0) -> Distanc
     def distance(points: Array) -> Array:
         flat = points.reshape(-1, 3)
         _, which = tree.query(flat, k=count)
-        asked = np.repeat(flat, count, axis=0)
-        nearest = closest_point(triangles[np.ravel(which)], asked)
-        away = np.linalg.norm(nearest - asked, axis=1).reshape(-1, count).min(axis=1)
+        queries = np.repeat(flat, count, axis=0)
+        nearest = closest_point(triangles[np.ravel(which)], queries)
+        away = np.linalg.norm(nearest - queries, axis=1).reshape(-1, count).min(axis=1)
         return np.asarray(away.reshape(points.shape[:-1]) + deviation)
 
     return distance

@@ -14,14 +14,14 @@ does to bring the tool there, and whether it can, does not matter.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.collisions import Bodies, Pair, gather
+from feasibility.collisions import Bodies, Pair
 from feasibility.roadmap.tool_alone.balls_inside import balls_inside
 from feasibility.roadmap.tool_alone.distances import (
     Distance,
@@ -29,9 +29,7 @@ from feasibility.roadmap.tool_alone.distances import (
     distance_from,
     distance_from_triangles,
 )
-from feasibility.task import Task
 from robots import Robot
-from surfaces import Surface
 
 Array = NDArray[np.float64]
 
@@ -42,20 +40,19 @@ SURE = 1e-6  # [m] deeper than needed
 POSES = 12  # directions of tilt, and rolls, that a distance is measured in
 
 
-class Blocking(NamedTuple):
+class ToolBlocked(NamedTuple):
     """What keeps the tool from a cell in every pose."""
 
     pairs: tuple[tuple[str, str], ...]
     """In every pose one of them collides; the first is that of `distance`."""
     distance: float
-    """m, of that pair in the pose with most room among some all over the cone; negative where they
-    overlap."""
+    """m, of that pair in the best of some poses all over the cone; negative where they overlap."""
     boxes: int
     """How many were looked at."""
 
 
-class _Held(NamedTuple):
-    """Balls of the tool against a body at rest."""
+class _BallTest(NamedTuple):
+    """Balls of the tool that have to stay clear of a body at rest."""
 
     pair: Pair
     distance: Distance
@@ -94,7 +91,7 @@ def _at_rest(geometry: object, placement: Array) -> _Still:
 
 
 @lru_cache(maxsize=KEPT)
-def _held_by(robot: Robot, bodies: Bodies) -> tuple[_Held, ...]:
+def _tests_of(robot: Robot, bodies: Bodies) -> tuple[_BallTest, ...]:
     """Balls in what moves with the tool, against all that is at rest."""
     tool_frame = robot.model.frames[robot.tool_frame_id]
     carrier, tip = int(tool_frame.parentJoint), tool_frame.placement.translation
@@ -116,14 +113,16 @@ def _held_by(robot: Robot, bodies: Bodies) -> tuple[_Held, ...]:
             centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
             radius = float(np.linalg.norm(corners - centre, axis=1).max()) + soup.deviation
             still[soup.owner] = [(sheet, (centre, radius))]
-    held: list[_Held] = []
+    found: list[_BallTest] = []
     for pair in bodies.pairs:
         names = (pair.first, pair.second)
         tool, rest = names if pair.first in moved else names[::-1]
         if tool in moved and rest in still:
             balls = np.concatenate(moved[tool])
-            held += [_Held(pair, d, balls[:, :3], balls[:, 3], ball) for d, ball in still[rest]]
-    return tuple(held)
+            found += [
+                _BallTest(pair, d, balls[:, :3], balls[:, 3], ball) for d, ball in still[rest]
+            ]
+    return tuple(found)
 
 
 class ToolAlone:
@@ -133,11 +132,10 @@ class ToolAlone:
     """
 
     def __init__(self, robot: Robot, bodies: Bodies, cone: float, tolerance: float) -> None:
-        """Ask nothing yet.
+        """Nothing is examined yet.
 
         Args:
-            robot: the arm.
-            bodies: everything that can collide, and the pairs that are asked for.
+            robot, bodies: the arm, everything that can collide, and the pairs to stay clear.
             cone: rad, largest angle between tool axis and approach direction.
             tolerance: m, of the tool point.
         """
@@ -147,7 +145,7 @@ class ToolAlone:
         self._cone, self._tolerance = min(cone, np.pi), tolerance
         self._left = ALL_BOXES
 
-    def blocking(self, point: Array, approach: Array) -> Blocking | None:
+    def blocking(self, point: Array, approach: Array) -> ToolBlocked | None:
         """What keeps the tool from a target in every pose; None where that is not proved.
 
         Args:
@@ -156,85 +154,74 @@ class ToolAlone:
         """
         boxes = np.array([[0.0, 0.0, self._cone, 0.0, np.pi]])  # w_1, w_2, half, roll, half
         frame = _Frame(self._axis, approach)
-        held = self._near(boxes, point, frame)
-        if not held:
+        tests = self._near(boxes, point, frame)
+        if not tests:
             return None
-        owners = np.repeat(np.arange(len(held)), [len(one.radii) for one in held])
+        owners = np.repeat(np.arange(len(tests)), [len(test.radii) for test in tests])
         used, looked = set[int](), 0
         while len(boxes):
             looked += len(boxes)
             self._left -= len(boxes)
             if looked > MOST_BOXES or self._left < 0:
                 return None
-            found = self._measured(boxes, held, point, frame)
+            found = self._measured(boxes, tests, point, frame)
             rows = np.arange(len(boxes))
             inside = np.hypot(boxes[:, 0], boxes[:, 1]) <= self._cone
             if (inside & (found.spare.min(axis=1) + self._tolerance >= 0.0)).any():
-                return None  # nothing speaks against this pose, nor will it in smaller boxes
+                return None  # this pose is clear, in smaller boxes too
             deep = np.maximum(-found.spare - self._tolerance - SURE, 0.0)
             moved = found.by_tilt + found.by_roll
-            # By which ball a box is, or will be, ruled out: it tells how the box is to be cut.
+            # The ball that rules a box out, or will: it decides how the box is cut.
             times = np.where(deep > 0.0, moved / np.maximum(deep, SURE), np.inf)
             best = times.argmin(axis=1)
             left = moved[rows, best] >= deep[rows, best]
             used |= set(owners[best[~left]].tolist())
             tilts = (found.by_tilt >= found.by_roll)[rows, best]
             boxes = _parts(boxes[left], tilts[left], self._cone)
-        some = self._measured(_all_over(self._cone), held, point, frame).spare
+        some = self._measured(_all_over(self._cone), tests, point, frame).spare
         best = int(some.min(axis=1).argmax())
         first = int(owners[some[best].argmin()])
-        pairs = [held[k].pair for k in (first, *sorted(used))]
+        pairs = [tests[k].pair for k in (first, *sorted(used))]
         named = dict.fromkeys((pair.first, pair.second) for pair in pairs)
-        return Blocking(tuple(named), float(some[best].min()) + pairs[0].clearance, looked)
+        return ToolBlocked(tuple(named), float(some[best].min()) + pairs[0].clearance, looked)
 
-    def _near(self, root: Array, point: Array, frame: _Frame) -> list[_Held]:
-        """The balls that collide in some pose, as far as can be told from the whole box.
+    def _near(self, root: Array, point: Array, frame: _Frame) -> list[_BallTest]:
+        """The balls that may collide in some pose of the first box.
 
-        None of them where nothing speaks against the pose at its middle.
+        None of them where the pose at its middle is not seen to collide.
         """
-        held = [
-            one
-            for one in _held_by(self._robot, self._bodies)
-            if one.in_reach(point, self._tolerance)
-        ]
-        if not held:
+        known = _tests_of(self._robot, self._bodies)
+        tests = [test for test in known if test.in_reach(point, self._tolerance)]
+        if not tests:
             return []
-        found = self._measured(root, held, point, frame)
+        found = self._measured(root, tests, point, frame)
         if found.spare.min() + self._tolerance >= 0.0:
             return []
         close = (found.spare - found.by_tilt - found.by_roll)[0] < 0.0
-        parts = np.split(close, np.cumsum([len(one.radii) for one in held])[:-1])
+        parts = np.split(close, np.cumsum([len(test.radii) for test in tests])[:-1])
         return [
-            one._replace(centres=one.centres[some], radii=one.radii[some])
-            for one, some in zip(held, parts, strict=True)
+            test._replace(centres=test.centres[some], radii=test.radii[some])
+            for test, some in zip(tests, parts, strict=True)
             if some.any()
         ]
 
     def _measured(
-        self, boxes: Array, held: Sequence[_Held], point: Array, frame: _Frame
+        self, boxes: Array, tests: Iterable[_BallTest], point: Array, frame: _Frame
     ) -> _Measured:
         """Distances at the middles of boxes (k, 5), and how far balls are moved within them."""
         turns = frame.rotations(boxes)
         spare, reach, lateral = [], [], []
-        for one in held:
-            places = point + np.einsum("kij,bj->kbi", turns, one.centres)
-            spare.append(one.distance(places) - one.radii - one.pair.clearance)
-            reach.append(np.linalg.norm(one.centres, axis=1))
-            across = one.centres - np.outer(one.centres @ self._axis, self._axis)
+        for test in tests:
+            places = point + np.einsum("kij,bj->kbi", turns, test.centres)
+            spare.append(test.distance(places) - test.radii - test.pair.clearance)
+            reach.append(np.linalg.norm(test.centres, axis=1))
+            across = test.centres - np.outer(test.centres @ self._axis, self._axis)
             lateral.append(np.linalg.norm(across, axis=1))
         return _Measured(
             np.concatenate(spare, axis=1),
             np.outer(np.sqrt(2.0) * boxes[:, 2], np.concatenate(reach)),
             np.outer(boxes[:, 4], np.concatenate(lateral)),
         )
-
-
-def tool_alone_of(robot: Robot, surface: Surface, task: Task) -> ToolAlone | None:
-    """What the tool may hit by itself; None where collisions are not checked."""
-    bodies = gather(robot, surface, task.collision, task.standoff)
-    if bodies is None:
-        return None
-    return ToolAlone(robot, bodies, task.cone, task.effective_tolerance)
 
 
 class _Frame:
@@ -265,10 +252,9 @@ def _across(direction: Array) -> tuple[Array, Array]:
 
 def _all_over(cone: float) -> Array:
     """(k, 5) poses all over the cone, as boxes of no size."""
-    ways, turns = (2.0 * np.pi * np.arange(POSES) / POSES for _ in range(2))
-    tilts = [np.zeros((1, 2))]
-    tilts += [share * cone * np.column_stack([np.cos(ways), np.sin(ways)]) for share in (0.5, 1.0)]
-    both = np.concatenate(tilts)
+    turns = 2.0 * np.pi * np.arange(POSES) / POSES
+    ring = cone * np.column_stack([np.cos(turns), np.sin(turns)])
+    both = np.concatenate([np.zeros((1, 2)), 0.5 * ring, ring])
     poses = np.zeros((len(both) * POSES, 5))
     poses[:, :2], poses[:, 3] = np.repeat(both, POSES, axis=0), np.tile(turns, len(both))
     return poses

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from feasibility import Search, Task, check
 from feasibility.certification import replay_over_surface
 from feasibility.problem import Problem
 from feasibility.roadmap import Exploration, arrays_of, edge_motion, explore
-from feasibility.roadmap.between_rounds import between_rounds
+from feasibility.roadmap.complete import between_rounds
 from feasibility.roadmap.graph import EDGES, NODES, root_of
 from feasibility.roadmap.outcome import unfinished_words
 from feasibility.roadmap.proving import Proving
@@ -44,7 +46,7 @@ def searched(seed, between=False):
     robot, cells, task = between_curves()
     exploration = Exploration(robot, cells, arrays_of(robot, cells, task), seed)
     proving = Proving(exploration, task)
-    explore(exploration, between_rounds(exploration, proving, task) if between else None)
+    explore(exploration, partial(between_rounds, exploration, proving, task) if between else None)
     return exploration, proving, task
 
 

@@ -35,10 +35,10 @@ def test_all_of_a_component_is_on_the_way_of_its_posture(number: int) -> None:
     assert proof is not None
     roadmap = exploration.roadmap
     for root in exploration.roots():
-        way = proof.way(exploration.posture(root))
+        path = proof.path_to(exploration.posture(root))
         for node in range(int(roadmap.counters[NODES])):
             if root_of(roadmap, roadmap.component[node]) == root:
-                assert proof.way(roadmap.q[node]) == way
+                assert proof.path_to(roadmap.q[node]) == path
 
 
 def test_what_no_cut_parts_is_not_called_proved() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.boxes import place_at_rest
 from feasibility.roadmap.cuts import Prover, components_of, places_on
-from feasibility.roadmap.cuts.counting import Counted, Statement
 from feasibility.roadmap.cuts.regions import limits_of, turn_from
+from feasibility.roadmap.cuts.statements import Budget, Statement
 from feasibility.roadmap.exploration import Exploration, wound
 from feasibility.roadmap.motions import arrays_of
 from feasibility.roadmap.search import improve, seed_middle
@@ -82,5 +82,5 @@ def statement_of(prover, region, node):
 
 def ruling(prover, statement, most=200_000):
     """The ruling on a statement."""
-    Counted(prover.arrays, prover.findings.work, most, nothing).examine(statement, most)
+    Budget(prover.arrays, prover.findings.work, most, nothing).examine(statement, most)
     return statement.ruling

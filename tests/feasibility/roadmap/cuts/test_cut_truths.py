@@ -9,8 +9,8 @@ from random_arms import robot_of
 from feasibility import Task
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.roadmap.branch_and_bound.branching import Ruling
-from feasibility.roadmap.cuts.counting import Statement
 from feasibility.roadmap.cuts.regions import limits_of
+from feasibility.roadmap.cuts.statements import Statement
 from surfaces import cylinder, piecewise, plane
 
 ANY_AXIS = Task(0.0, 180.0, 1e-3)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from feasibility import Task
 from feasibility.roadmap.motions.arrays import arrays_of
 from feasibility.roadmap.motions.roll import (
-    frame_turning,
+    frame_rates,
     level,
     roll_gradient,
     roll_off_middle,
@@ -108,7 +108,7 @@ def made_right(b, t):
 
 
 def bounds_of(cubics):
-    """The arguments of `frame_turning` for cubics of b and t, by 400 samples."""
+    """The arguments of `frame_rates` for cubics of b and t, by 400 samples."""
     s = np.linspace(0.0, 1.0, 401)
     (b, t), powers = (along(c, s) for c in cubics), s[:, None] ** np.arange(3)
     slope = np.linalg.norm(powers @ (cubics[1, 1:] * [[1], [2], [3]]), axis=1).max()
@@ -124,7 +124,7 @@ def test_the_turning_of_a_frame_is_bounded():
     s, used = np.linspace(0.0, 1.0, 201), []
     for _ in range(400):
         cubics = random_frame(rng, 10.0 ** rng.uniform(-2.5, -0.6))
-        bounds = frame_turning(*bounds_of(cubics))
+        bounds = frame_rates(*bounds_of(cubics))
         if not bounds[0] < np.inf:
             continue
         b, t = made_right(along(cubics[0], s), along(cubics[1], s))
@@ -170,7 +170,7 @@ def test_second_derivatives_bound_the_sag_of_roll(name):
         place(arrays, work, 0, q0)
         place(arrays, work, 1, q1)
         spread(arrays, work, q0, q1)
-        work.derivative_bound[5:8] = frame_turning(*bounds_of(cubics))
+        work.derivative_bound[5:8] = frame_rates(*bounds_of(cubics))
         rate, most = roll_spread(work, chord, 1.0)
         if not (chord < 1.3 and most < np.inf):
             continue

@@ -13,8 +13,8 @@ from feasibility.certification.collisions import piece_of
 from feasibility.certification.collisions.inside import winding
 from feasibility.collisions import HalfSpace
 from feasibility.roadmap.tool_alone import balls_inside, distance_from
+from feasibility.roadmap.tool_alone.balls_inside import balls_in, face_planes
 from feasibility.roadmap.tool_alone.distances import distance_from_triangles
-from feasibility.roadmap.tool_alone.mesh_insides import balls_in, face_planes
 from robots.shapes import Triangles, checked_triangles
 from robots.urdf import Box, Capsule, Cylinder, Sphere
 

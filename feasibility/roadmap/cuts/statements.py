@@ -1,4 +1,7 @@
-"""Branch and bound under a budget of boxes, in batches short enough for Ctrl-C and time limits."""
+"""Statements to be proved by branch and bound, under a budget of boxes.
+
+Batches of boxes are short enough for Ctrl-C and time limits.
+"""
 
 from __future__ import annotations
 
@@ -18,8 +21,8 @@ MORE = 0.5  # [1] of its boxes so far that a statement is given at a time
 
 
 @dataclass(eq=False)
-class Counted:
-    """What an attempt may still spend, and on what arm."""
+class Budget:
+    """What an attempt may still spend, and on which arm."""
 
     arrays: SearchArrays
     work: Work
@@ -45,9 +48,9 @@ class Counted:
             self.tick()
 
     def settle_one(self, statements: list[Statement], most: int) -> Statement | None:
-        """Go on until one of some statements is newly settled, always with the likeliest one.
+        """Go on until one of some statements is newly settled.
 
-        That is the one which, after a first look at each, has fewest boxes left to examine.
+        After a first look at each, always with the one that has fewest boxes left to examine.
 
         Args:
             statements: settled ones are left alone.
@@ -81,7 +84,7 @@ class Statement:
     boxes: Boxes = field(init=False)
 
     def __post_init__(self) -> None:
-        """Start with the whole region."""
+        """Start with all of the region."""
         self.boxes = self.region.boxes(self.parameters)
         if self.region.empty:
             self.boxes.counts[0] = 0

@@ -20,18 +20,13 @@ from numpy.typing import NDArray
 from feasibility.collisions import Bodies, Pair
 from feasibility.roadmap.joint_boxes.at_target import Target
 from feasibility.roadmap.joint_boxes.frames import Frames, moves, moves_from_tool
-from feasibility.roadmap.tool_alone import (
-    Distance,
-    balls_inside,
-    distance_from,
-    is_convex,
-)
+from feasibility.roadmap.tool_alone import Distance, balls_inside, distance_from, is_convex
 from robots import Chain, Robot, joint_alignments
 from robots.shapes import Triangles
 
 Array = NDArray[np.float64]
 
-FINEST = 12  # parts of the widest side of a mesh, between whose corners points are laid
+FINEST = 12  # parts of the widest side of a mesh, between whose corners points are placed
 MOST_BALLS = 40  # of a link
 SURE = 1e-6  # [m] deeper than needed
 
@@ -54,7 +49,7 @@ class Balls(NamedTuple):
         return middle, float(wide.max())
 
 
-class _Meeting(NamedTuple):
+class _BallTest(NamedTuple):
     """Balls that have to stay clear of a body at rest, or of the balls of another link."""
 
     pair: Pair
@@ -74,55 +69,50 @@ class Deepest(NamedTuple):
     """(m,) which pair it is; -1 for none."""
 
 
-class InTheWay:
-    """What may keep the whole arm from a target, of one problem."""
+class BallTests:
+    """All tests of one problem."""
 
     def __init__(self, robot: Robot, bodies: Bodies) -> None:
-        """Lay balls into the bodies of all pairs that are asked for."""
+        """Place balls in the bodies of all pairs that have to stay clear."""
         self._chain, self.pairs = robot.chain, bodies.pairs
-        self._meetings = _meetings(robot, bodies)
+        self._tests = _tests_of(robot, bodies)
 
     def __bool__(self) -> bool:
         """Is there anything to collide with?"""
-        return bool(self._meetings)
+        return bool(self._tests)
 
     def deepest(self, frames: Frames, half: Array, target: Target) -> Deepest:
-        """What is nearest to ruling boxes out.
-
-        Args:
-            frames: at the middles of m boxes.
-            half: (m, n) their half widths.
-            target: where the tool has to be in them.
-        """
+        """What is nearest to ruling out m boxes: frames at their middles, half widths (m, n)."""
         m, n = half.shape
         found = Deepest(np.full(m, np.inf), np.zeros((m, n)), np.full(m, -1))
-        useful = np.zeros(len(self._meetings), dtype=int)
+        useful = np.zeros(len(self._tests), dtype=int)
         left = np.arange(m)
-        for k, meeting in enumerate(self._meetings):
-            rows = _near(meeting, frames, left, target)
+        for k, test in enumerate(self._tests):
+            rows = _near(test, frames, left, target)
             if not len(rows):
                 continue
-            placed = _placed(self._chain, meeting, frames.some(rows), half[rows], target)
-            ratio, effect = _ratios(meeting, frames.some(rows), placed)
+            placed = _placed(self._chain, test, frames.some(rows), half[rows], target)
+            ratio, effect = _ratios(test, frames.some(rows), placed)
             better = ratio < found.ratio[rows]
             rows = rows[better]
             found.ratio[rows], found.effect[rows] = ratio[better], effect[better]
-            found.pair[rows] = self.pairs.index(meeting.pair)
+            found.pair[rows] = self.pairs.index(test.pair)
             useful[k] = int((found.ratio[rows] < 1.0).sum())
             left = left[found.ratio[left] >= 1.0]
         # What ruled out most comes first: the next boxes are often alike.
         order = np.argsort(-useful, kind="stable")
-        self._meetings = [self._meetings[k] for k in order]
+        self._tests = [self._tests[k] for k in order]
         return found
 
     def spare(self, frames: Frames) -> Array:
-        """(m,) m, the least room of any ball at configurations; where it is positive, no box
-        around one can be ruled out."""
-        m = len(frames.points)
-        least = np.full(m, np.inf)
-        for meeting in self._meetings:
-            balls = meeting.balls
-            spare = _spare(meeting, frames, frames.carried(balls.joint, balls.centres))
+        """(m,) m, the least distance beyond the clearance of any ball at some configurations.
+
+        Where it is positive, no box around one can be ruled out.
+        """
+        least = np.full(len(frames.points), np.inf)
+        for test in self._tests:
+            balls = test.balls
+            spare = _spare(test, frames, frames.carried(balls.joint, balls.centres))
             least = np.minimum(least, spare.min(axis=1))
         return least
 
@@ -135,34 +125,32 @@ class _Placed(NamedTuple):
     by_joint: Array
     """(m, k, n) m, by how far each joint moves them."""
     off: Array
-    """(m, k) m, how far they may be from there besides."""
+    """(m, k) m, how far else they may be from there."""
 
 
 def _near(
-    meeting: _Meeting, frames: Frames, rows: NDArray[np.int64], target: Target
+    test: _BallTest, frames: Frames, rows: NDArray[np.int64], target: Target
 ) -> NDArray[np.int64]:
-    """Those of some boxes in which a ball may be deep, where it is looked for; about."""
-    if isinstance(meeting.other, Balls):
+    """Those of some boxes (rows) in which a ball may be deep, as far as their middles show."""
+    if isinstance(test.other, Balls):
         return rows
-    middle, wide = meeting.balls.around
+    middle, wide = test.balls.around
     some = frames.some(rows)
-    at = some.carried(meeting.balls.joint, middle[None])[:, 0]
+    at = some.carried(test.balls.joint, middle[None])[:, 0]
     tool = some.carried(frames.points.shape[1] - 1, target.tip[None])[:, 0]
-    least = np.minimum(meeting.other(at), meeting.other(at + target.point - tool))
-    return rows[least < wide + meeting.pair.clearance]
+    least = np.minimum(test.other(at), test.other(at + target.point - tool))
+    return rows[least < wide + test.pair.clearance]
 
 
-def _placed(
-    chain: Chain, meeting: _Meeting, frames: Frames, half: Array, target: Target
-) -> _Placed:
-    """The balls of a meeting as they are known best: from the root, or from the target."""
-    n, joint = half.shape[1], meeting.balls.joint
-    x = frames.carried(joint, meeting.balls.centres)
+def _placed(chain: Chain, test: _BallTest, frames: Frames, half: Array, target: Target) -> _Placed:
+    """Balls as they are known best: from the root, or from the target."""
+    n, joint = half.shape[1], test.balls.joint
+    x = frames.carried(joint, test.balls.centres)
     by_joint = np.zeros((*x.shape[:2], n))
     by_joint[..., :joint] = moves(chain, frames, half, x, joint).by_joint
     off = np.zeros(x.shape[:2])
-    if isinstance(meeting.other, Balls):
-        by_joint[..., : meeting.other.joint] = 0.0
+    if isinstance(test.other, Balls):
+        by_joint[..., : test.other.joint] = 0.0
         return _Placed(x, by_joint, off)
     tool, from_tool = moves_from_tool(chain, frames, half, x, joint)
     better = from_tool.sum(axis=2) + target.tolerance < by_joint.sum(axis=2)
@@ -174,19 +162,19 @@ def _placed(
     )
 
 
-def _spare(meeting: _Meeting, frames: Frames, x: Array) -> Array:
+def _spare(test: _BallTest, frames: Frames, x: Array) -> Array:
     """(m, k) m, distances beyond the clearance of balls with their centres at x (m, k, 3)."""
-    balls, other = meeting.balls, meeting.other
+    balls, other = test.balls, test.other
     if isinstance(other, Balls):
         y = frames.carried(other.joint, other.centres)
         away = np.linalg.norm(x[:, :, None] - y[:, None], axis=3) - other.radii
-        return np.asarray(away.min(axis=2) - balls.radii - meeting.pair.clearance)
-    return other(x) - balls.radii - meeting.pair.clearance
+        return np.asarray(away.min(axis=2) - balls.radii - test.pair.clearance)
+    return other(x) - balls.radii - test.pair.clearance
 
 
-def _ratios(meeting: _Meeting, frames: Frames, placed: _Placed) -> tuple[Array, Array]:
+def _ratios(test: _BallTest, frames: Frames, placed: _Placed) -> tuple[Array, Array]:
     """Of the ball that is nearest to ruling out each box: the ratio (m,), and (m, n) m."""
-    spare = _spare(meeting, frames, placed.centres) + placed.off
+    spare = _spare(test, frames, placed.centres) + placed.off
     deep = np.maximum(-spare - SURE, 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(deep > 0.0, placed.by_joint.sum(axis=2) / deep, np.inf)
@@ -194,20 +182,20 @@ def _ratios(meeting: _Meeting, frames: Frames, placed: _Placed) -> tuple[Array, 
     return ratio[rows, best], placed.by_joint[rows, best]
 
 
-def _meetings(robot: Robot, bodies: Bodies) -> list[_Meeting]:
+def _tests_of(robot: Robot, bodies: Bodies) -> list[_BallTest]:
     """All pairs of which something can be shown."""
     moving, still = _links(robot, bodies), _at_rest(bodies)
-    found: list[_Meeting] = []
+    found: list[_BallTest] = []
     for pair in bodies.pairs:
         names = (pair.first, pair.second)
         if pair.first in moving and pair.second in moving:
             inner, outer = sorted((moving[name] for name in names), key=lambda balls: balls.joint)
             if (inner.radii > 0.0).any() or (outer.radii > 0.0).any():
-                found.append(_Meeting(pair, outer, inner))
+                found.append(_BallTest(pair, outer, inner))
             continue
         mover, rest = names if pair.first in moving else names[::-1]
         if mover in moving:
-            found += [_Meeting(pair, moving[mover], one) for one in still.get(rest, ())]
+            found += [_BallTest(pair, moving[mover], one) for one in still.get(rest, ())]
     return found
 
 
