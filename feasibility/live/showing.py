@@ -6,7 +6,6 @@ import base64
 import html
 import json
 import os
-import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -16,14 +15,14 @@ from feasibility.cases import Case, Setup, load_case
 from feasibility.live import picture
 from feasibility.live.answers import Answers
 from feasibility.live.controls import Controls
-from feasibility.live.server import File, PageServer
+from feasibility.live.server import PageServer
 from feasibility.live.sessions import Sessions
 from feasibility.live.workbench import Workbench
-from feasibility.viewer import View, in_notebook, meshcat_program
+from feasibility.viewer import HTML, File, Served, View, in_notebook, meshcat_program
 
 FILES = Path(__file__).with_name("page")
 KINDS = {
-    ".html": "text/html; charset=utf-8",
+    ".html": HTML,
     ".js": "text/javascript; charset=utf-8",
     ".css": "text/css; charset=utf-8",
 }
@@ -31,7 +30,7 @@ MOST_CELLS = 20_000  # that a page paints anew with each answer
 TOO_FINE = "has {:,} cells; a live page takes at most {:,}: cut the surface more coarsely for it"
 
 
-class Live:
+class Live(Served):
     """A live page of one case, served on this machine until it is closed or the program ends.
 
     Example:
@@ -57,39 +56,10 @@ class Live:
             text = TOO_FINE.format(len(bench.setup.cells), MOST_CELLS)
             raise CoverableError(text, case.name)
         self.case = case
-        self._controls = Controls(case, bench.setup.robot)
         self._view = picture.first_view(bench.setup, case.name)
-        self._server = PageServer(
-            _files(bench.setup, self._controls, self._view),
-            Sessions(Answers(self._controls, bench)),
-            self._controls,
-        )
-        self.url = self._server.url
-        """The address to open in a browser on this machine."""
-        self.port = self._server.port
-
-    def open(self) -> bool:
-        """Open the page in the default browser; False where there is none."""
-        import webbrowser
-
-        return webbrowser.open(self.url)
-
-    def wait(self) -> None:
-        """Serve until `close` is called from elsewhere or the user interrupts."""
-        while self._server.thread.is_alive():
-            self._server.thread.join(0.2)
-
-    def close(self) -> None:
-        """Stop serving and free the port."""
-        self._server.close()
-
-    def __enter__(self) -> Live:
-        """Serve inside a `with` block."""
-        return self
-
-    def __exit__(self, *exception: object) -> None:
-        """Stop serving."""
-        self.close()
+        controls = Controls(case, bench.setup.robot)
+        files = _files(bench.setup, controls, self._view)
+        super().__init__(PageServer(files, Sessions(Answers(controls, bench)), controls))
 
     def _repr_mimebundle_(self, include: Any = None, exclude: Any = None) -> dict[str, str]:
         """The page inside a notebook's output; the case as a picture where nobody serves it."""
@@ -144,11 +114,7 @@ def live(
         return page
     if open_browser:
         page.open()
-    if block or (block is None and not hasattr(sys, "ps1")):
-        try:
-            page.wait()
-        except KeyboardInterrupt:
-            page.close()
+    page.wait_in_script(block)
     return page
 
 

@@ -7,6 +7,11 @@ from .figures import plot_sides as plot_sides
 from .figures import plot_transition as plot_transition
 from .figures import unrolled_edges as unrolled_edges
 from .html_page import meshcat_program as meshcat_program
+from .live_server import HTML as HTML
+from .live_server import File as File
+from .live_server import Handler as Handler
+from .live_server import LocalServer as LocalServer
+from .live_server import Served as Served
 from .obstacles import HULLS as HULLS
 from .path_and_division import view_division as view_division
 from .path_and_division import view_path as view_path

@@ -15,6 +15,7 @@ from feasibility.viewer.cell_meshes import marks
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Motion, key_times
+from feasibility.viewer.robot import extent
 from feasibility.viewer.scene import Layer
 from feasibility.viewer.threejs import Colour, Command
 from robots import Robot
@@ -55,7 +56,7 @@ def draw_nearest(
         return None
     shown = found.which[max(int(np.searchsorted(times, start, side="right")) - 1, 0)]
     commands, tracks = list[Command](), list[dict[str, Any]]()
-    size = robot.reach if np.isfinite(robot.reach) else 1.0
+    size = extent(robot)
     for number, pair in enumerate(found.pairs):
         path = f"{ROOT}/{number} {threejs.safe_name(' and '.join(pair.names))}"
         commands += _drawn(path, size)

@@ -19,7 +19,7 @@ from feasibility.viewer.areas import certified_layer
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
-from feasibility.viewer.playback import LONGEST, Motion, paced
+from feasibility.viewer.playback import Motion, paced, timed
 from feasibility.viewer.scene import (
     PATCHES,
     TRAIL,
@@ -50,7 +50,6 @@ SHADE = 0.6  # [1] of a patch's colour: of what is certified of it
 STROKES = 160  # pieces of the trail that appear one after the other
 DENSE = 24  # points drawn of one move between patches
 FEW = 2  # joints of a move that the legend names
-FRAMES = 3_000  # samples of a trajectory that are drawn, at most
 
 
 def view_path(
@@ -75,7 +74,7 @@ def view_path(
         motion = paced(robot, path.walk.q, False, "coverage path")
         speed = "not timed"
     else:
-        motion = _timed(robot, trajectory)
+        motion = timed(robot, trajectory, "coverage path")
         speed = f"{trajectory.duration:.1f} s"
     times, use = painting(trajectory, motion, limits if path.task.speed is not None else None)
     strokes, tracks = trail_pieces(motion, 0.06 * cell_size(cells), times, use)
@@ -139,16 +138,6 @@ def view_division(
     )  # fmt: skip
 
 
-def _timed(robot: Robot, trajectory: Trajectory) -> Motion:
-    """A trajectory as what a view plays."""
-    kept = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), FRAMES)).astype(int))
-    q, time = trajectory.q[kept], trajectory.time[kept] - trajectory.time[0]
-    if time[-1] > LONGEST:
-        time = time * (LONGEST / time[-1])
-    points, _ = Kinematics(robot).tools(q)
-    return Motion(q, time, points, False, "coverage path")
-
-
 def painting(
     trajectory: Trajectory | None, motion: Motion, limits: MotionLimits | None
 ) -> tuple[tuple[float, float], NDArray[np.float64] | None]:
@@ -193,8 +182,7 @@ def trail_pieces(
     for k, (start, stop) in enumerate(pairwise(edges)):
         inside = (motion.seconds > start) & (motion.seconds < stop)
         times = np.concatenate([[start], motion.seconds[inside], [stop]])
-        line = np.column_stack([np.interp(times, motion.seconds, row) for row in motion.points.T])
-        vertices, faces = tubes([line], radius)
+        vertices, faces = tubes([motion.tool_at(times)], radius)
         if len(faces) == 0:
             continue
         most = 0.0 if use is None else float(np.interp(times, motion.seconds, use).max())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 import numpy as np
@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 from coverable_errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import ROOT, joint_paths, joint_placements
+from feasibility.viewer.robot import ROOT, extent, joint_paths, joint_placements
 from robots import Kinematics, Robot
 
+if TYPE_CHECKING:
+    from feasibility.timing import Trajectory
+
 KEY_FRAMES = 400
+SAMPLES = 3_000  # of a trajectory that are drawn, at most
 SHORTEST, LONGEST = 6.0, 60.0  # [s]
 JOINED = 1e-6  # [rad] or [m]: largest gap between the end of one motion and the start of the next
 
@@ -39,6 +43,10 @@ class Motion:
     def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
         """Configurations (k, n) at the given times (k,) s."""
         return np.column_stack([np.interp(times, self.seconds, row) for row in self.walk.T])
+
+    def tool_at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Tool points (k, 3) m at the given times (k,) s."""
+        return np.column_stack([np.interp(times, self.seconds, row) for row in self.points.T])
 
 
 def motion_of(verdict: Verdict) -> Motion | None:
@@ -100,7 +108,7 @@ def paced(robot: Robot, walk: NDArray[np.float64], there_and_back: bool, label: 
     the arm's reach, so that nothing jumps.
     """
     points, _ = Kinematics(robot).tools(walk)
-    reach = robot.reach if np.isfinite(robot.reach) else 1.0
+    reach = extent(robot)
     lever = np.where(robot.prismatic, 1.0, reach / 20.0)  # [m] or [m/rad]
     travel = np.hypot(
         np.linalg.norm(np.diff(points, axis=0), axis=1),
@@ -110,6 +118,15 @@ def paced(robot: Robot, walk: NDArray[np.float64], there_and_back: bool, label: 
     duration = float(np.clip(travelled[-1] / (0.3 * reach), SHORTEST, LONGEST))
     scale = duration / travelled[-1] if travelled[-1] > 0.0 else 0.0
     return Motion(np.asarray(walk), travelled * scale, points, there_and_back, label)
+
+
+def timed(robot: Robot, trajectory: Trajectory, label: str) -> Motion:
+    """A trajectory as it is timed, or in `LONGEST` seconds if it takes longer."""
+    kept = np.unique(np.linspace(0, len(trajectory) - 1, min(len(trajectory), SAMPLES)).astype(int))
+    q, time = trajectory.q[kept], trajectory.time[kept] - trajectory.time[0]
+    if time[-1] > LONGEST:
+        time = time * (LONGEST / time[-1])
+    return Motion(q, time, Kinematics(robot).tools(q)[0], False, label)
 
 
 def key_times(motion: Motion) -> NDArray[np.float64]:

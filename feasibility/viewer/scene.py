@@ -312,9 +312,8 @@ def trail(cells: Cells, motion: Motion) -> Layer:
     """
     path = f"/motion/tool path, {motion.label}"
     even = np.linspace(0.0, motion.seconds[-1], TRAIL_POINTS)
-    line = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
     label = f"tool path: {motion.label}"
-    layer = drawn_lines([line], 0.035 * cell_size(cells), TRAIL, path, label)
+    layer = drawn_lines([motion.tool_at(even)], 0.035 * cell_size(cells), TRAIL, path, label)
     return layer if motion.there_and_back else hidden(layer)
 
 

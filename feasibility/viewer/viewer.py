@@ -249,11 +249,7 @@ def show(
     if in_notebook():
         return drawn
     live = drawn.show()
-    if block or (block is None and not hasattr(sys, "ps1")):
-        try:
-            live.wait()
-        except KeyboardInterrupt:
-            live.close()
+    live.wait_in_script(block)
     return live
 
 

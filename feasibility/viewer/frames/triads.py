@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.viewer import threejs
-from feasibility.viewer.robot import joint_paths
+from feasibility.viewer.robot import extent, joint_paths
 from robots import Robot
 
 AXES = ((0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9))
@@ -30,7 +30,6 @@ def triads(robot: Robot) -> list[threejs.Command]:
     """The frames of the TCP, of the arm's base, and of the link that carries the surface."""
     import pinocchio as pin
 
-    reach = robot.reach if np.isfinite(robot.reach) else 1.0
     model, body = robot.model, pin.FrameType.BODY
     base = model.getFrameId(robot.root_link or robot.link_names[0], body)
     shown = {"TCP": robot.tool_frame_id, "base": base}
@@ -41,5 +40,5 @@ def triads(robot: Robot) -> list[threejs.Command]:
     for name, number in shown.items():
         frame = model.frames[number]
         path = f"{paths[int(frame.parentJoint)]}/frame of the {name}"
-        drawn.append(triad(path, frame.placement.homogeneous, SMALL * max(reach, 0.2)))
+        drawn.append(triad(path, frame.placement.homogeneous, SMALL * max(extent(robot), 0.2)))
     return drawn

@@ -19,16 +19,15 @@ from feasibility.treated import TreatedArea, share_words
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
-from feasibility.viewer.playback import LONGEST, Motion, paced
+from feasibility.viewer.playback import Motion, paced, timed
 from feasibility.viewer.scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
 from feasibility.viewer.treated import painted_layers, surface_layer
 from feasibility.viewer.viewer import View, compose, titled
-from robots import Kinematics, Robot
+from robots import Robot
 from surfaces.passes import Pass, working_mesh
 
 Floats = NDArray[np.float64]
 
-FRAMES = 3_000  # samples of a trajectory that are drawn, at most
 THIN = 0.03  # [1] of the distance between passes: radius of their lines
 TALL = 0.5  # [1] of it: height of their numbers
 BEFORE = 0.15  # [1] of it: from a number to its pass
@@ -90,11 +89,7 @@ def _motion(
     if trajectory is None:
         walks = [path.walk.q for path in paths]
         return paced(robot, np.concatenate(walks), False, "passes") if walks else None
-    kept = np.linspace(0, len(trajectory) - 1, min(len(trajectory), FRAMES)).astype(int)
-    kept = np.unique(kept)
-    q, time = trajectory.q[kept], trajectory.time[kept] - trajectory.time[0]
-    time = time * min(1.0, LONGEST / max(float(time[-1]), 1e-9))
-    return Motion(q, time, Kinematics(robot).tools(q)[0], False, "passes")
+    return timed(robot, trajectory, "passes")
 
 
 def _pass_layers(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[Layer]:

@@ -68,7 +68,7 @@ def painted_layers(found: TreatedArea, side: float, motion: Motion, height: floa
     reach = float(np.hypot(0.5 * max(found.footprint), height))
     end = float(motion.seconds[-1])
     even = np.linspace(0.0, end, STROKES * 12 + 1)
-    points = np.column_stack([np.interp(even, motion.seconds, row) for row in motion.points.T])
+    points = motion.tool_at(even)
     first = np.full(len(middles), STROKES - 1)
     for number in reversed(range(STROKES)):  # the earliest one is written last
         near, _ = KDTree(points[12 * number : 12 * number + 13]).query(

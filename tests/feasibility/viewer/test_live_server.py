@@ -66,8 +66,9 @@ def test_a_browser_that_goes_away_is_no_fault(capfd):
             browser.sendall(f"GET {live.url} HTTP/1.1\r\n".encode())
         with socket.create_connection(("127.0.0.1", live.port), timeout=120) as browser:
             path = live.url.split(str(live.port))[1]
-            browser.sendall(f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n".encode())
-            assert browser.recv(15) == b"HTTP/1.0 200 OK"
+            host = f"127.0.0.1:{live.port}"
+            browser.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
+            assert browser.recv(15) == b"HTTP/1.1 200 OK"
         with urllib.request.urlopen(live.url) as answer:
             assert len(answer.read()) == 40_000_000
     assert capfd.readouterr().err == ""
