@@ -312,6 +312,16 @@ def close_matches(
     return [options_by_lower[word] for word in found]
 
 
+def counted(number: int, one: str, several: str = "") -> str:
+    """A number of things.
+
+    Example:
+        >>> counted(1, "cell"), counted(1200, "cell"), counted(2, "pass", "passes")
+        ('1 cell', '1,200 cells', '2 passes')
+    """
+    return f"{number:,} {one if number == 1 else several or one + 's'}"
+
+
 def alternatives(options: Sequence[str]) -> str:
     """'a, b or c'."""
     *front, last = options

@@ -97,12 +97,11 @@ feasibility.viewer: threejs html_page meshes robot playback
 feasibility.viewer.frames
 feasibility.viewer: cell_meshes cut_sides scene
 feasibility.viewer.areas
-feasibility.viewer.treated
 feasibility.viewer: figures live_server nearest obstacles painter path_and_division placements poses readout stage view_figures viewer
 feasibility.viewer.passes
 feasibility.reports
 feasibility.live
-feasibility.cli: case_commands command console listing live main passes path path_outputs place study_compare verify
+feasibility.cli: case_commands command console listing main passes path path_outputs place study_compare verify
 coverable_command
 feasibility.cli: __main__
 coverable

@@ -1,4 +1,4 @@
-"""Commands on one case: `coverable check`, `show`, `divide` and `explain`."""
+"""Commands on one case: `coverable check`, `show`, `live`, `divide` and `explain`."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
     from feasibility.sensitivity import Explanation
     from feasibility.verdict import Walk
+    from feasibility.viewer import Served
 
 INSIDE = "-"  # in place of a file: in the object that is printed
 STATUSES = "exit status: 0 feasible, 1 infeasible, 3 undecided, 2 bad input, 130 interrupted"
@@ -69,10 +70,18 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=show)
     parser.add_argument("result", metavar="RESULT", help="a file that `check --save` wrote")
     add_html(parser, "the view to a file instead")
-    parser.add_argument(
-        "--no-browser", dest="browser", action="store_false",
-        help="only print the address of the view",
-    )  # fmt: skip
+    _add_browser(parser)
+    parser = subcommands.add_parser(
+        "live",
+        help="move the part, turn the limits, and see the verdict follow",
+        description="Open a page with controls for placement, cone, standoff and joint limits, "
+        "which decides anew at each change; Ctrl-C ends it. 'Save as case' downloads what is "
+        "shown as a case file.",
+        allow_abbrev=False,
+    )
+    parser.set_defaults(run=live, json=False)
+    add_case(parser)
+    _add_browser(parser)
     parser = add_command(
         subcommands, "divide", divide, add_case, add_html,
         help="the fewest sub-patches, each covered by one continuous motion",
@@ -94,6 +103,14 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     parser.add_argument(
         "--witness", metavar="FOLDER",
         help="write the covering motion at each threshold as CSV, for `check --seeds` and `verify`",
+    )  # fmt: skip
+
+
+def _add_browser(parser: argparse.ArgumentParser) -> None:
+    """Whether a browser is opened."""
+    parser.add_argument(
+        "--no-browser", dest="browser", action="store_false",
+        help="only print the address of the page",
     )  # fmt: skip
 
 
@@ -170,10 +187,26 @@ def show(args: argparse.Namespace, began: float) -> int:
     if args.html is not None:
         write_text(args.html, drawn.html(), "view")
         return 0
-    with drawn.show(open_browser=args.browser) as live:
-        print_err(f"view: {live.url} (served until Ctrl-C)")
+    return _serve("view", drawn.show(open_browser=False), args.browser)
+
+
+def live(args: argparse.Namespace, began: float) -> int:
+    """`coverable live CASE`: a page where one moves the part, until Ctrl-C."""
+    with open_case(args, began, {}) as opened:
+        from feasibility.live import Live
+
+        page = Live(opened.case, opened.setup)
+    return _serve("live", page, args.browser)
+
+
+def _serve(name: str, page: Served, in_browser: bool) -> int:
+    """Serve a page until Ctrl-C; returns the exit status."""
+    with page:
+        if in_browser:
+            page.open()
+        print_err(f"{name}: {page.url} (served until Ctrl-C)")
         try:
-            live.wait()
+            page.wait()
         except KeyboardInterrupt:
             forgive()
             print_err("")

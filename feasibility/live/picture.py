@@ -7,7 +7,7 @@ with a number each, which the page paints.
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import networkx as nx
@@ -21,14 +21,15 @@ from feasibility.viewer import (
     ROOT,
     Colour,
     Command,
+    Entry,
     View,
     animate,
     hex_colour,
     layers,
     missed_groups,
     motion_of,
-    pack,
     pose,
+    stream_of,
     trail,
     view,
 )
@@ -80,22 +81,22 @@ def group_of(robot: Robot) -> str:
 def scene_bytes(drawn: View) -> bytes:
     """The drawing commands of a view without its cells, each behind its length in four bytes."""
     cells = group_of(drawn.robot) + CELLS
-    return _joined(one for one in drawn.commands if not one["path"].startswith(cells))
+    return stream_of(one for one in drawn.commands if not one["path"].startswith(cells))
 
 
 def entries_of(drawn: View) -> list[dict[str, Any]]:
     """The lines of the legend that stay."""
     cells = group_of(drawn.robot) + CELLS
     return [
-        {
-            "label": entry.label,
-            "colour": f"#{hex_colour(entry.colour):06x}",
-            "path": entry.path,
-            "shown": entry.shown,
-        }
+        _line(entry)
         for entry in drawn.legend.entries
         if entry.path is None or not entry.path.startswith(cells)
     ]
+
+
+def _line(entry: Entry) -> dict[str, Any]:
+    """A line of the legend, with the part of the scene that it switches."""
+    return {**_entry(entry.label, entry.colour), "path": entry.path, "shown": entry.shown}
 
 
 def cell_triangles(cells: Cells) -> dict[str, str]:
@@ -180,25 +181,13 @@ def certified_parts(verdict: Verdict) -> Parts:
         [part.entry for part in parts],
         np.zeros(robot.n) if q is None else q,
     )
-    lines = [
-        {
-            "label": e.label,
-            "colour": f"#{hex_colour(e.colour):06x}",
-            "path": e.path,
-            "shown": e.shown,
-        }
-        for e in entries
-    ]
-    return Parts(shown, [str(e.path) for e in entries if e.path is not None], lines, seconds)
+    paths = [entry.path for entry in entries if entry.path is not None]
+    return Parts(shown, paths, [*map(_line, entries)], seconds)
 
 
-def packed(commands: Sequence[Command]) -> str:
+def packed(commands: Iterable[Command]) -> str:
     """Commands as base64, each behind its length in four bytes."""
-    return _base64(_joined(commands))
-
-
-def _joined(commands: Iterable[Command]) -> bytes:
-    return b"".join(len(one).to_bytes(4, "little") + one for one in pack(commands))
+    return _base64(stream_of(commands))
 
 
 def _base64(data: bytes) -> str:

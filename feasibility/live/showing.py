@@ -18,7 +18,7 @@ from feasibility.live.controls import Controls
 from feasibility.live.server import PageServer
 from feasibility.live.sessions import Sessions
 from feasibility.live.workbench import Workbench
-from feasibility.viewer import HTML, File, Served, View, in_notebook, meshcat_program
+from feasibility.viewer import HTML, PAGE, File, Served, View, in_notebook, meshcat_program
 
 FILES = Path(__file__).with_name("page")
 KINDS = {
@@ -120,9 +120,8 @@ def live(
 
 def _files(setup: Setup, controls: Controls, drawn: View) -> dict[str, File]:
     """Everything that a page loads."""
-    files = {
-        path.name: File(KINDS[path.suffix], path.read_bytes()) for path in sorted(FILES.iterdir())
-    }
+    paths = [*sorted(FILES.iterdir()), PAGE / "picture.css", PAGE / "picture.js"]
+    files = {path.name: File(KINDS[path.suffix], path.read_bytes()) for path in paths}
     described = {
         "name": controls.case.name,
         "robot": setup.robot.name,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from coverable_errors import counted
 from feasibility.area import percent_down
 from feasibility.collisions import checked
 from feasibility.cut_words import lines as proof_lines
@@ -17,7 +18,6 @@ from feasibility.reports.parts import (
     certificate_json,
     clearance_json,
     clearance_text,
-    counted,
     filled,
     seconds,
     seconds_text,
@@ -70,9 +70,7 @@ def as_json(
         "ended": division.ended,
         **_plan_json(fewest, division),
         "proved_at_least": division.at_least,
-        "proof": None
-        if division.proof is None
-        else proof_json(division.proof, division.robot, cells),
+        "proof": proof_json(division.proof, division.robot, cells),
         "apart": [_apart_json(apart, division) for apart in division.apart],
         "connected": None if connected is fewest else _plan_json(connected, division),
         "left_out": causes_json(division.left_out, cells),

@@ -23,7 +23,7 @@ from feasibility.reports.explanation_words import (
     sentence,
     what_it_opens,
 )
-from feasibility.reports.parts import aligned, csv_text, filled, framed, page, table
+from feasibility.reports.parts import aligned, filled, framed, page, table, walk_csv
 from feasibility.reports.rates import rates_object, rates_sentence
 from feasibility.sensitivity import Change, Dropped, Explanation, Finding, Quantity, Threshold
 from feasibility.verdict import Answer, Verdict, Walk
@@ -173,15 +173,8 @@ def witnesses(explanation: Explanation) -> dict[str, str]:
             plain = name.replace("+", "plus ").replace("-", "minus ")
             slug = re.sub(r"[^a-z0-9_]+", "-", plain.lower()).strip("-")
             slug += f"-{len(found)}" if not slug or f"{slug}.csv" in found else ""
-            found[f"{slug}.csv"] = _as_csv(explanation.verdict, walk)
+            found[f"{slug}.csv"] = walk_csv(explanation.verdict.robot, walk)
     return found
-
-
-def _as_csv(verdict: Verdict, walk: Walk) -> str:
-    """A motion as CSV."""
-    rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
-    lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
-    return csv_text([["cell", *verdict.robot.joint_names], *lines])
 
 
 def _unknown(explanation: Explanation) -> str:

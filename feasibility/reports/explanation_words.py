@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from coverable_errors import counted
 from feasibility.cut_words import what_opens
 from feasibility.reports.changes import LIMITS, label, shown, worded
-from feasibility.reports.parts import counted
 from feasibility.sensitivity import Change, Explanation, Finding, Kind, Quantity, Threshold
 from feasibility.verdict import Evidence, Verdict
 

@@ -13,11 +13,15 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from feasibility.collisions import Asked, LeftOut, checked_words
 from feasibility.results import plain
 from feasibility.task import Task
-from feasibility.verdict import Cause, Certificate
+from feasibility.verdict import Cause, Certificate, Walk
 from feasibility.version import version
+from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
@@ -71,16 +75,6 @@ def aligned(table: Sequence[Sequence[str]], justify: str = "<") -> list[str]:
     ]
 
 
-def counted(number: int, noun: str) -> str:
-    """A number of things.
-
-    Example:
-        >>> counted(1, "cell"), counted(1200, "cell")
-        ('1 cell', '1,200 cells')
-    """
-    return f"{number:,} {noun}{'' if number == 1 else 's'}"
-
-
 def percent(share: float) -> str:
     """A share, 0 to 1, in percent."""
     return f"{100.0 * share:.1f} %"
@@ -91,6 +85,16 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue()
+
+
+def walk_csv(robot: Robot, walk: Walk) -> str:
+    """A motion as CSV: `cell`, empty between centres, then one column per joint, rad or m.
+
+    Floats are written so that they read back as the same numbers.
+    """
+    rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
+    lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
+    return csv_text([["cell", *robot.joint_names], *lines])
 
 
 def causes_json(causes: Iterable[Cause], cells: Cells) -> list[dict[str, Any]]:
@@ -137,6 +141,36 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
     if certificate.min_singular_value is not None:
         found["min_singular_value"] = plain(float(certificate.min_singular_value))
     return found
+
+
+def measured_json(
+    robot: Robot, certificate: Certificate | None, q: NDArray[np.float64] | None
+) -> dict[str, Any] | None:
+    """What the replay of a motion q (m, n) measured, with limits and clearance; null without one.
+
+    The margins of prismatic joints are not among it.
+    """
+    if certificate is None:
+        return None
+    margin = plain(limit_margin_deg(robot, certificate, q))
+    found = {**certificate_json(certificate), "min_limit_margin_deg": margin}
+    return found | clearance_json(certificate)
+
+
+def limit_margin_deg(
+    robot: Robot, certificate: Certificate, q: NDArray[np.float64] | None
+) -> float:
+    """Least distance of a revolute joint from its limits, degrees; inf without such limits.
+
+    The certificate's own margin mixes radians and metres where an arm has prismatic joints. Limits
+    are convex, so the waypoints q (m, n) decide.
+    """
+    if not robot.prismatic.any() and not math.isnan(certificate.min_limit_margin):
+        return math.degrees(certificate.min_limit_margin)
+    if q is None or q.ndim != 2 or q.shape[1] != robot.n:
+        return math.inf
+    margins = np.minimum(q - robot.lower, robot.upper - q)[:, ~robot.prismatic]
+    return math.degrees(float(margins.min(initial=np.inf)))
 
 
 def rates_text(certificate: Certificate, task: Task) -> str:

@@ -6,14 +6,15 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from coverable_errors import counted
 from feasibility.collisions import checked
-from feasibility.reports.parts import aligned, certificate_json, clearance_json, counted, summary
-from feasibility.reports.path import passes_json, passes_text
-from feasibility.reports.proof import proof_json
+from feasibility.reports.parts import aligned, certificate_json, clearance_json, summary
+from feasibility.reports.proof import tree_json
 from feasibility.runs import Cut, PassRuns, PlannedPasses
 from feasibility.timing import Trajectory
 from feasibility.treated import TreatedArea, treated_json, treated_words
 from feasibility.version import version
+from surfaces.passes import Passes
 
 FEWEST = "no fewer with the configurations found"
 LISTED = 3  # gaps that are named
@@ -68,6 +69,34 @@ def as_json(
     }
 
 
+def passes_json(laid: Passes) -> dict[str, Any]:
+    """Passes as they were laid."""
+    return {
+        "count": laid.count,
+        "stretches": len(laid.stretches),
+        "by": laid.by,
+        "pitch_m": laid.pitch,
+        "spacing_m": laid.spacing,
+        "widest_m": laid.widest,
+        "length_m": laid.length,
+        "dropped_m": laid.dropped,
+        "notes": list(laid.notes),
+    }
+
+
+def passes_text(laid: Passes) -> str:
+    """Passes in words."""
+    words = f"{laid.count}, {1e3 * laid.spacing:.4g} mm apart"
+    if laid.widest > 1.001 * laid.spacing:
+        words += f" ({1e3 * laid.widest:.4g} mm where the surface slopes)"
+    if len(laid.stretches) > laid.count:
+        words += f", in {len(laid.stretches)} stretches"
+    words += f", {laid.length:.4g} m together"
+    if laid.dropped > 0.0:
+        words += f"; {laid.dropped:.3g} m left out in pieces too short to run"
+    return "; ".join([words, *laid.notes])
+
+
 def _bound_json(along: PlannedPasses, found: PassRuns) -> dict[str, Any]:
     """How many interruptions there are at least, and the proofs, each with the poses it is about.
 
@@ -76,7 +105,7 @@ def _bound_json(along: PlannedPasses, found: PassRuns) -> dict[str, Any]:
     return {
         "interruptions": len(found.parted),
         "proofs": [
-            {"poses": [one.first, one.last], **proof_json(one.proof, found.robot, along.cells)}
+            {"poses": [one.first, one.last], **tree_json(one.proof, found.robot, along.cells)}
             for one in found.parted
         ],
     }
@@ -107,7 +136,7 @@ def as_text(
     stops = max(count - 1, 0)
     head = f"{along.verdict.answer}: no single motion along these passes is known; "
     head += (
-        f"{count} runs with {stops} interruption{'' if stops == 1 else 's'} work on them."
+        f"{count} runs with {counted(stops, 'interruption')} work on them."
         if count > 1
         else "one run works on a part of them."
         if count

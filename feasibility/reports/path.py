@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from coverable_errors import counted
 from feasibility.certification.rates import RateReplay
 from feasibility.collisions import checked
 from feasibility.entry import Ends
@@ -16,11 +17,10 @@ from feasibility.reports.parts import (
     certificate_json,
     clearance_json,
     clearance_text,
-    counted,
     roll_text,
     summary,
 )
-from feasibility.reports.path_ends import ends_json, ends_words, rates_json, rates_words
+from feasibility.reports.pass_runs import passes_json, passes_text
 from feasibility.reports.verdict import as_json as verdict_json
 from feasibility.results import plain
 from feasibility.timing import MotionLimits, Trajectory, used
@@ -29,6 +29,9 @@ from feasibility.verdict import Verdict
 from feasibility.version import version
 from robots import Robot
 from surfaces.passes import Passes
+
+FEW = 5  # cells that are named
+HARDLY_LESS = 0.9  # [1] of the speed asked for
 
 
 def as_json(
@@ -164,34 +167,6 @@ def _timing(
     return found
 
 
-def passes_json(laid: Passes) -> dict[str, Any]:
-    """Passes as they were laid."""
-    return {
-        "count": laid.count,
-        "stretches": len(laid.stretches),
-        "by": laid.by,
-        "pitch_m": laid.pitch,
-        "spacing_m": laid.spacing,
-        "widest_m": laid.widest,
-        "length_m": laid.length,
-        "dropped_m": laid.dropped,
-        "notes": list(laid.notes),
-    }
-
-
-def passes_text(laid: Passes) -> str:
-    """Passes in words."""
-    words = f"{laid.count}, {1e3 * laid.spacing:.4g} mm apart"
-    if laid.widest > 1.001 * laid.spacing:
-        words += f" ({1e3 * laid.widest:.4g} mm where the surface slopes)"
-    if len(laid.stretches) > laid.count:
-        words += f", in {len(laid.stretches)} stretches"
-    words += f", {laid.length:.4g} m together"
-    if laid.dropped > 0.0:
-        words += f"; {laid.dropped:.3g} m left out in pieces too short to run"
-    return "; ".join([words, *laid.notes])
-
-
 def as_text(
     path: CoveragePath,
     trajectory: Trajectory | None = None,
@@ -233,9 +208,7 @@ def as_text(
     head = f"path: one continuous motion over {over}."
     if laid is not None:
         rows[:2] = [("passes", passes_text(laid)), ("length", f"{figures.length:.4g} m in all")]
-        head = (
-            f"path: one continuous motion along {laid.count} pass{'' if laid.count == 1 else 'es'}."
-        )
+        head = f"path: one continuous motion along {counted(laid.count, 'pass', 'passes')}."
     return "\n".join(summary(head, rows, path.task.collision, 14))
 
 
@@ -287,3 +260,76 @@ def _limits_text(robot: Robot, trajectory: Trajectory, limits: MotionLimits | No
         f"{at_most(100 * most.tool_speed, 3)} % of the tool's {limits.tool_speed:g} m/s, "
         "between samples too, as quintics or cubics"
     )
+
+
+def share_at_speed(trajectory: Trajectory, speed: float) -> float:
+    """Share of the tool's way over the surface at the speed asked for, or hardly less.
+
+    The rest is where the joints' accelerations do not allow it, at stops above all.
+    """
+    over = np.flatnonzero(trajectory.cell >= 0)
+    if len(over) < 2:
+        return 0.0
+    inside = slice(int(over[0]), int(over[-1]) + 1)
+    speeds, time = trajectory.tool_speed[inside], trajectory.time[inside]
+    way = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)
+    fast = np.minimum(speeds[1:], speeds[:-1]) >= HARDLY_LESS * speed
+    return float(way[fast].sum() / max(float(way.sum()), 1e-300))
+
+
+def rates_json(
+    path: CoveragePath, rates: RateReplay | None, trajectory: Trajectory | None = None
+) -> dict[str, Any]:
+    """The judge's figures; no key where nothing was asked."""
+    if rates is None:
+        return {}
+    stops = [{"why": stop.why, "cell": list(path.cells.unravel(stop.cell))} for stop in rates.stops]
+    found: dict[str, Any] = {"holds": rates.accepted, "why_not": list(rates.refusals)}
+    if path.task.speed is not None:
+        found |= {"speed_m_per_s": path.task.speed, "stops": stops, "waiting_s": rates.waiting}
+        if trajectory is not None:
+            found["share_at_speed"] = share_at_speed(trajectory, path.task.speed)
+    if path.task.min_manipulability is not None:
+        found["min_singular_value"] = plain(rates.sigma)
+    return {"rates": found}
+
+
+def rates_words(
+    path: CoveragePath, rates: RateReplay | None, trajectory: Trajectory | None = None
+) -> str:
+    """The same in words; empty where nothing was asked."""
+    if rates is None:
+        return ""
+    parts = list(rates.refusals)
+    if path.task.speed is not None:
+        where = [stop.cell for stop in rates.stops if stop.why == "in place"]
+        names = ", ".join(str(list(path.cells.unravel(c))) for c in dict.fromkeys(where[:FEW]))
+        at = f" at {names}{', ...' if len(where) > FEW else ''}" if where else ""
+        corners = len(rates.stops) - len(where)
+        able = "inside the joints' velocities all along" if rates.accepted else "not all along"
+        parts.insert(
+            0,
+            f"{path.task.speed:g} m/s {able}; {len(where)} waits in place{at}, {corners} corners",
+        )
+        if trajectory is not None:
+            share = 100.0 * share_at_speed(trajectory, path.task.speed)
+            parts.append(f"with accelerations {share:.0f} % of the way at that speed")
+    if path.task.min_manipulability is not None and rates.accepted:
+        parts.append(f"singular values of at least {path.task.min_manipulability:g}")
+    return "; ".join(parts)
+
+
+def ends_json(ends: Ends | None) -> dict[str, Any]:
+    """Entry and exit; no key where there are none."""
+    if ends is None:
+        return {}
+    rows = {"entry": ends.entry.tolist(), "exit": ends.exit.tolist()}
+    return {"ends": {"approach_m": ends.approach, "from_home": ends.from_home, **rows}}
+
+
+def ends_words(ends: Ends | None) -> str:
+    """The same in words; empty where there are none."""
+    if ends is None:
+        return ""
+    words = f"in and out along the approach direction, {1e3 * ends.approach:g} mm each"
+    return f"{words}, from and to home" if ends.from_home else words

@@ -7,6 +7,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from coverable_errors import counted
 from feasibility.collisions import checked
 from feasibility.placement import (
     AXES,
@@ -19,7 +20,7 @@ from feasibility.placement import (
     Trial,
     trial_table,
 )
-from feasibility.reports.parts import aligned, counted, csv_text, percent, summary
+from feasibility.reports.parts import aligned, csv_text, percent, summary
 from feasibility.reports.verdict import CAUSES, EVIDENCE
 from feasibility.verdict import Answer, CauseKind, Evidence
 from feasibility.version import version

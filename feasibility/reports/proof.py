@@ -10,13 +10,18 @@ from robots import Robot
 from surfaces import Cells
 
 
-def proof_json(tree: CutTree, robot: Robot, cells: Cells) -> dict[str, Any]:
-    """The tree as CONTRACT words it.
+def proof_json(tree: CutTree | None, robot: Robot, cells: Cells) -> dict[str, Any] | None:
+    """The tree as JSON; null where there is none.
 
     A cut has its joint and `value_deg` (`value_m` of one that slides), or `weights` of several
     joints and the `value` of their weighted sum, rad or m; and what is below and above it. A leaf
     names its cell.
     """
+    return None if tree is None else tree_json(tree, robot, cells)
+
+
+def tree_json(tree: CutTree, robot: Robot, cells: Cells) -> dict[str, Any]:
+    """The same of a tree that there is."""
     return {
         "kind": tree.kind,
         "opened": {robot.joint_names[joint]: float(value) for joint, value in tree.opened},

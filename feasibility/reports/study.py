@@ -8,13 +8,13 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from coverable_errors import counted
 from feasibility.cases import CollisionPart, ObjectPart
 from feasibility.collisions import CHECKABLE, UNCHECKED, checked, checked_words
 from feasibility.reports.parts import (
     COLOURS,
     MARGINS,
     aligned,
-    counted,
     csv_text,
     framed,
     page,

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
+from coverable_errors import counted
 from feasibility.area import area_json, area_words
 from feasibility.cases import OWN_KEYS, Case
 from feasibility.collisions import checked
@@ -15,21 +13,18 @@ from feasibility.cut_words import lines as proof_lines
 from feasibility.paper import tree_walk
 from feasibility.reports.parts import (
     causes_json,
-    certificate_json,
-    clearance_json,
     clearance_text,
-    counted,
-    csv_text,
     left_out_json,
     left_out_text,
+    measured_json,
     rates_text,
     roll_text,
     seconds,
     seconds_text,
     summary,
+    walk_csv,
 )
 from feasibility.reports.proof import proof_json
-from feasibility.results import plain
 from feasibility.treated import treated_json, treated_words
 from feasibility.verdict import Answer, Cause, CauseKind, Evidence, Verdict, Walk
 from feasibility.version import version
@@ -86,9 +81,7 @@ def as_json(
         "collisions": checked(verdict.task.collision),
         "unchecked_links": list(verdict.unchecked_links),
         "pairs_left_out": [left_out_json(one) for one in verdict.pairs_left_out],
-        "proof": None
-        if verdict.proof is None
-        else proof_json(verdict.proof, verdict.robot, verdict.cells),
+        "proof": proof_json(verdict.proof, verdict.robot, verdict.cells),
         "treated": treated_json(verdict.treated),
         **({} if area is None else area_json(area)),
         "timing": seconds(verdict.timing, PHASES, before_s),
@@ -111,28 +104,8 @@ def _message(verdict: Verdict) -> str:
 
 def _certificate(verdict: Verdict) -> dict[str, Any] | None:
     """What the replay measured, with angles in degrees; null where it measured nothing."""
-    if verdict.certificate is None:
-        return None
-    margin = plain(_revolute_margin(verdict))
-    clear = clearance_json(verdict.certificate)
-    return {**certificate_json(verdict.certificate), "min_limit_margin_deg": margin, **clear}
-
-
-def _revolute_margin(verdict: Verdict) -> float:
-    """Distance of the revolute joints from their limits, degrees; inf without such limits.
-
-    The certificate's own margin mixes radians and metres where an arm has prismatic joints. Limits
-    are convex, so the waypoints of the walk decide.
-    """
-    robot, certificate = verdict.robot, verdict.certificate
-    revolute = ~robot.prismatic
-    if certificate is None or (robot.prismatic.any() and verdict.witness is None):
-        return math.inf
-    if revolute.all() or verdict.witness is None:
-        return math.degrees(certificate.min_limit_margin)
-    q = verdict.witness.q
-    margins = np.minimum(q - robot.lower, robot.upper - q)[:, revolute]
-    return math.degrees(float(margins.min(initial=np.inf)))
+    q = None if verdict.witness is None else verdict.witness.q
+    return measured_json(verdict.robot, verdict.certificate, q)
 
 
 def as_text(
@@ -155,12 +128,7 @@ def as_text(
         head = GREEDY_NO
     rows = [
         title,
-        ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
-        ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
-        ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
-        ("found", _message(verdict)),
-        ("certificate", _certificate_text(verdict)),
-        ("treated", _treated_text(verdict)),
+        *rows_of(verdict),
         ("certified", "" if area is None else area_words(area)),
         ("no shape", ", ".join(verdict.unchecked_links)),
         ("left out", left_out_text(verdict.pairs_left_out)),
@@ -185,7 +153,7 @@ def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
         ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
         ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
         ("evidence", f"{verdict.evidence}: {_evidence(verdict)}"),
-        ("found", verdict.message),
+        ("found", _message(verdict)),
         ("certificate", _certificate_text(verdict)),
         ("treated", _treated_text(verdict)),
     ]
@@ -334,14 +302,10 @@ def _walk(verdict: Verdict) -> Walk | None:
 
 
 def as_csv(verdict: Verdict) -> str | None:
-    """The covering motion as CSV: `cell`, then one column per joint; None where there is none.
+    """The covering motion as CSV, see `walk_csv`; None where there is none.
 
-    Floats are written so that they read back as the same numbers. The motion of a greedy search
-    follows its tree, which enters the cells but need not pass their centres, see `tree_walk`.
+    That of a greedy search follows its tree, which enters the cells but need not pass their
+    centres, see `tree_walk`.
     """
     walk = _walk(verdict)
-    if walk is None:
-        return None
-    rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
-    lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
-    return csv_text([["cell", *verdict.robot.joint_names], *lines])
+    return None if walk is None else walk_csv(verdict.robot, walk)

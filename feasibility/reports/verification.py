@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from coverable_errors import counted
 from feasibility.collisions import checked
 from feasibility.reports.parts import (
     certificate_json,
-    clearance_json,
     clearance_text,
-    counted,
+    limit_margin_deg,
+    measured_json,
     roll_text,
     summary,
 )
 from feasibility.reports.proof import proof_json
-from feasibility.results import plain
 from feasibility.verifying import Verification
 from feasibility.version import version
 
@@ -44,11 +44,6 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
         notes: what was not used of the file.
     """
     missed = () if found.reached is None else np.flatnonzero(~found.reached)
-    certificate = None
-    if found.certificate is not None:
-        margin = plain(_margin_deg(found))
-        certificate = {**certificate_json(found.certificate), "min_limit_margin_deg": margin}
-        certificate |= clearance_json(found.certificate)
     return {
         "verdict": "holds" if found.holds else "does not hold",
         "claim": found.claim,
@@ -63,25 +58,14 @@ def as_json(found: Verification, notes: Sequence[str] = ()) -> dict[str, Any]:
             }
             for fault in found.faults
         ],
-        "certificate": certificate,
-        "proof": None if found.proof is None else proof_json(found.proof, found.robot, found.cells),
+        "certificate": measured_json(found.robot, found.certificate, found.q),
+        "proof": proof_json(found.proof, found.robot, found.cells),
         "boxes": found.boxes if found.proof is not None else None,
         "collisions": checked(found.task.collision),
         "notes": list(notes),
         "robot": found.robot.name,
         "version": version(),
     }
-
-
-def _margin_deg(found: Verification) -> float:
-    """Smallest distance of a revolute joint from its limits, degrees; inf where there are none."""
-    robot = found.robot
-    if found.q is None and found.certificate is not None and not robot.prismatic.any():
-        return math.degrees(found.certificate.min_limit_margin)
-    if found.q is None or found.q.ndim != 2 or found.q.shape[1] != robot.n:
-        return math.inf
-    margins = np.minimum(found.q - robot.lower, robot.upper - found.q)[:, ~robot.prismatic]
-    return math.degrees(float(margins.min(initial=np.inf)))
 
 
 def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = ()) -> str:
@@ -122,7 +106,7 @@ def _measured(found: Verification) -> str:
         f"tool axis within {figures['max_angle_deg']:.4g} deg (allowed {found.task.cone_deg:g})",
         roll_text(found.certificate, found.task),
     ]
-    margin = _margin_deg(found)
+    margin = limit_margin_deg(found.robot, found.certificate, found.q)
     if math.isfinite(margin) and margin >= 0.0:
         parts.append(f"joints at least {margin:.3g} deg from their limits")
     return "; ".join(filter(None, [*parts, clearance_text(found.certificate)]))

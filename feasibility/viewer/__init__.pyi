@@ -6,6 +6,8 @@ from .figures import plot_map as plot_map
 from .figures import plot_sides as plot_sides
 from .figures import plot_transition as plot_transition
 from .figures import unrolled_edges as unrolled_edges
+from .html_page import PAGE as PAGE
+from .html_page import Entry as Entry
 from .html_page import meshcat_program as meshcat_program
 from .live_server import HTML as HTML
 from .live_server import File as File
@@ -28,7 +30,7 @@ from .scene import trail as trail
 from .threejs import Colour as Colour
 from .threejs import Command as Command
 from .threejs import hex_colour as hex_colour
-from .threejs import pack as pack
+from .threejs import stream_of as stream_of
 from .view_figures import plot_view as plot_view
 from .view_figures import plot_views as plot_views
 from .viewer import View as View

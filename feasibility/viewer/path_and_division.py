@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import counted
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
 from feasibility.viewer.areas import certified_layer
@@ -25,7 +26,6 @@ from feasibility.viewer.scene import (
     TRAIL,
     Layer,
     cells_layers,
-    counted,
     drawn_lines,
     missed_groups,
     missed_layer,
@@ -80,10 +80,10 @@ def view_path(
     strokes, tracks = trail_pieces(motion, 0.06 * cell_size(cells), times, use)
     again = f", {figures.revisited:.2g} m of it revisited" if figures.revisited > 0.0 else ""
     text = (
-        f"{robot.name}: {counted(count)} in order {path.order}, "
+        f"{robot.name}: {counted(count, 'cell')} in order {path.order}, "
         f"{figures.length:.2f} m{again}, {speed}"
     )
-    title = titled(f"feasible, one path over {counted(count)}", case)
+    title = titled(f"feasible, one path over {counted(count, 'cell')}", case)
     drawn = compose(
         robot, cells, title, text, [*cells_layers(cells), *strokes], motion,
         resting=path.walk.q[0], tracks=tracks, task=path.task,
@@ -104,7 +104,10 @@ def view_division(
         areas: the certified area of each patch, to be tinted too.
     """
     robot, cells, plan = division.robot, division.cells, division.fewest
-    names = [f"patch {k + 1} ({counted(len(patch.cells))})" for k, patch in enumerate(plan.patches)]
+    names = [
+        f"patch {k + 1} ({counted(len(patch.cells), 'cell')})"
+        for k, patch in enumerate(plan.patches)
+    ]
     parts = [*cells_layers(cells), *patch_layers(cells, plan.patch_of(len(cells)), names)]
     parts += _left_out(division)
     for k, area in enumerate(() if areas is None else areas.patches):
@@ -123,8 +126,8 @@ def view_division(
         size = cell_size(cells)
         for k, move in enumerate(plan.moves):
             parts.append(_move(robot, move, f"{k + 1} to {k + 2}", size))
-    patches = f"{len(plan.patches)} patch{'' if len(plan.patches) == 1 else 'es'}"
-    title = f"{division.n_covered} of {counted(len(cells))}: {patches}"
+    patches = counted(len(plan.patches), "patch", "patches")
+    title = f"{division.n_covered} of {counted(len(cells), 'cell')}: {patches}"
     if division.n_covered < len(cells):
         title += f", {len(cells) - division.n_covered} left out"
     text = f"{robot.name}; " + "; ".join(

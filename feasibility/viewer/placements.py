@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from coverable_errors import ArgumentError
+from coverable_errors import ArgumentError, counted
 from feasibility.cases import Setup
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.search import Progress, Search
@@ -31,7 +31,7 @@ from feasibility.viewer.poses import (
     placed,
     station_layers,
 )
-from feasibility.viewer.scene import Layer, cells_layers, counted
+from feasibility.viewer.scene import Layer, cells_layers
 from feasibility.viewer.stage import framing, joint_points
 from feasibility.viewer.viewer import View, compose, titled
 from robots import Robot
@@ -81,7 +81,7 @@ def view_placements(
         stations = list(zip(layers, [trial.pose for trial in plan.trials], strict=True))
         left_out = len(plan.stations.left_out)
         text += f"; {len(layers)} station{' covers ' if len(layers) == 1 else 's cover '}"
-        text += f"{len(placements.cells) - left_out} of {counted(len(placements.cells))}"
+        text += f"{len(placements.cells) - left_out} of {counted(len(placements.cells), 'cell')}"
     return _view(setup, tried, title, text, stations, progress, play=play, at=at)
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import counted
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks, patch
@@ -24,7 +25,6 @@ from feasibility.viewer.scene import (
     PATCHES,
     Layer,
     cells_layers,
-    counted,
     filled,
     hidden,
     trail,
@@ -132,7 +132,7 @@ def best_layers(cells: Cells, best: Tried, motion: Motion | None) -> list[Layer]
             ("not covered there", MISSED, np.flatnonzero(~best.cover)),
         ):
             if len(which):
-                label = f"{words} ({counted(len(which))})"
+                label = f"{words} ({counted(len(which), 'cell')})"
                 parts.append(filled(cells, which, colour, f"/best/{words}", label))
     if motion is not None:
         parts.append(trail(cells, motion))
@@ -146,7 +146,7 @@ def station_layers(cells: Cells, plan: StationPlan) -> list[Layer]:
         colour = PATCHES[k % len(PATCHES)]
         root = f"/stations/station {k + 1}"
         there = moved_cells(cells, trial.pose)
-        label = f"station {k + 1} ({counted(len(station.cells))})"
+        label = f"station {k + 1} ({counted(len(station.cells), 'cell')})"
         part = filled(there, station.cells, colour, f"{root}/cells", label)
         ends = placed(lines, trial.pose).reshape(-1, 3)
         border = threejs.segments(f"{root}/outline", ends, colour)

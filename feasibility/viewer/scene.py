@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import counted
 from feasibility.verdict import Cause, CauseKind, Verdict
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import FULL_DETAIL, borders, cell_size, marks, patch
@@ -123,7 +124,7 @@ def cells_layers(cells: Cells) -> list[Layer]:
     path = "/surface/cell outlines"
     lines = threejs.segments(path, borders(cells).reshape(-1, 3), OUTLINES)
     grid = f" ({' x '.join(map(str, cells.shape))})" if len(cells.shape) > 1 else ""
-    parts.append(Layer((lines,), Entry(counted(count) + grid, OUTLINES, path), count))
+    parts.append(Layer((lines,), Entry(counted(count, "cell") + grid, OUTLINES, path), count))
     if count <= FULL_DETAIL:
         path = "/surface/cell centres"
         vertices, faces = marks(cells.centres, 0.035 * cell_size(cells))
@@ -287,8 +288,8 @@ def _start(verdict: Verdict) -> Iterator[Layer]:
 def missed_layer(cells: Cells, group: Missed) -> Layer:
     """Some cells in the colour of what they are missed for."""
     words = "not covered" if group.kind is None else f"not covered: {group.words}"
-    number = f"({len(group.which)})" if group.pair is None else f"({counted(len(group.which))})"
-    label = f"{words} {number}"
+    number = len(group.which)
+    label = f"{words} ({number if group.pair is None else counted(number, 'cell')})"
     path = f"/cells/{label}"
     if group.pair is not None:  # names of any length: the first cell tells two groups apart
         path = f"/cells/{group.which[0]} {threejs.safe_name(label)}"
@@ -315,8 +316,3 @@ def trail(cells: Cells, motion: Motion) -> Layer:
     label = f"tool path: {motion.label}"
     layer = drawn_lines([motion.tool_at(even)], 0.035 * cell_size(cells), TRAIL, path, label)
     return layer if motion.there_and_back else hidden(layer)
-
-
-def counted(number: int) -> str:
-    """'1 cell', '2 cells'."""
-    return f"{number} cell{'' if number == 1 else 's'}"

@@ -163,11 +163,12 @@ def animation(tracks: Sequence[dict[str, Any]], *, play: bool, there_and_back: b
     return {"type": "set_animation", "animations": list(tracks), "options": options, "path": ""}
 
 
-def pack(commands: Iterable[Command]) -> list[bytes]:
-    """Each command as the bytes that the page reads."""
+def stream_of(commands: Iterable[Command]) -> bytes:
+    """Commands as the bytes that the page reads, each behind its length in four bytes."""
     import umsgpack  # type: ignore[import-untyped]
 
-    return [umsgpack.packb(command) for command in commands]
+    packed = map(umsgpack.packb, commands)
+    return b"".join(len(one).to_bytes(4, "little") + one for one in packed)
 
 
 def numbers_of(attribute: dict[str, Any]) -> Array:

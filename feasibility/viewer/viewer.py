@@ -20,13 +20,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import counted
 from feasibility.collisions import checked_words, gather
 from feasibility.cut_words import sentence
 from feasibility.task import Task
 from feasibility.verdict import Verdict
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
-from feasibility.viewer.areas import certified_layer, with_certified_share
+from feasibility.viewer.areas import area_layers, certified_layer, with_certified_share
 from feasibility.viewer.frames import carried, root_in_world, triads, world_tracks
 from feasibility.viewer.html_page import Camera, Entry, Legend, Readout, page
 from feasibility.viewer.live_server import LiveView
@@ -34,10 +35,9 @@ from feasibility.viewer.nearest import draw_nearest
 from feasibility.viewer.obstacles import HULLS, hull_layers, points_of, scene_layers, tool_layers
 from feasibility.viewer.playback import Motion, animate, key_times, motion_of
 from feasibility.viewer.readout import readout_of, with_nearest
-from feasibility.viewer.scene import Layer, counted, layers, trail
+from feasibility.viewer.scene import Layer, layers, trail
 from feasibility.viewer.stage import camera_on, ground
 from feasibility.viewer.threejs import Command
-from feasibility.viewer.treated import area_layers
 from robots import Robot
 from surfaces import Cells
 
@@ -138,7 +138,7 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
         parts.append(certified_layer(area))
     if motion is not None:
         parts.append(trail(verdict.cells, motion))
-    covered = f"{verdict.n_covered} of {counted(len(verdict.cells))}"
+    covered = f"{verdict.n_covered} of {counted(len(verdict.cells), 'cell')}"
     text = f"{verdict.robot.name}: {covered} in one continuous motion ({verdict.method} search)"
     if verdict.proof is not None:
         said = sentence(verdict.proof, verdict.robot, verdict.cells)

@@ -1,4 +1,5 @@
-// The picture: meshcat's viewer, the cells that change colour, and the motion.
+// The picture: meshcat's viewer, the cells that change colour, and the motion. `run`, `look`,
+// `names`, `show` and `seek` are those of every page, in picture.js.
 
 import {Handle} from "./handle.js";
 
@@ -6,10 +7,6 @@ const {THREE} = MeshCat;
 
 function bytes(text) {
   return Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
-}
-
-function parts(path) {
-  return path.split("/").filter((name) => name.length > 0);
 }
 
 // A frame at a position (m) with fixed-axis roll, pitch and yaw (degrees).
@@ -24,17 +21,7 @@ export class Scene {
     this.viewer = new MeshCat.Viewer(pane);
     this.described = described;
     this.run(commands);
-    // The page's own y axis points up.
-    const up = ([x, y, z]) => [x, z, -y];
-    this.viewer.camera.position.set(...up(described.camera.eye));
-    this.viewer.controls.target.set(...up(described.camera.target));
-    const fit = () => {
-      const [width, height] = [pane.clientWidth, pane.clientHeight];
-      this.viewer.camera.zoom = described.camera.zoom * Math.min(1, width / height);
-      this.viewer.set_3d_pane_size(width, height);
-    };
-    window.addEventListener("resize", fit);
-    fit();
+    look(this.viewer, described.camera);
     const rows = described.rotation;
     this.first = new THREE.Matrix4().set(...rows[0], 0, ...rows[1], 0, ...rows[2], 0, 0, 0, 0, 1);
     this.first.setPosition(...described.position);
@@ -47,17 +34,11 @@ export class Scene {
   }
 
   group(path) {
-    return this.viewer.scene_tree.find(parts(this.described.group + path)).object;
+    return this.viewer.scene_tree.find(names(this.described.group + path)).object;
   }
 
-  // Run drawing commands, each behind its length in four bytes.
-  run(data) {
-    const view = new DataView(data.buffer, data.byteOffset, data.byteLength);
-    for (let at = 0; at < data.byteLength; ) {
-      const length = view.getUint32(at, true);
-      this.viewer.handle_command_bytearray(data.subarray(at + 4, at + 4 + length));
-      at += 4 + length;
-    }
+  run(commands) {
+    run(this.viewer, commands);
     this.lighten();
   }
 
@@ -132,7 +113,7 @@ export class Scene {
     this.pause();
     if (this.end > 0) this.viewer.animator.clear();
     this.end = 0;
-    for (const path of this.extra) this.viewer.delete_path(parts(path));
+    for (const path of this.extra) this.viewer.delete_path(names(path));
     this.extra = [];
     this.viewer.set_dirty();
   }
@@ -148,9 +129,7 @@ export class Scene {
   }
 
   show(path, visible) {
-    if (path === null) return;
-    this.viewer.set_property(parts(path), "visible", visible);
-    this.viewer.set_dirty();
+    if (path !== null) show(this.viewer, path, visible);
   }
 
   // -- the motion ------------------------------------------------------------------------------
@@ -164,8 +143,7 @@ export class Scene {
   }
 
   seek(time) {
-    for (const action of this.viewer.animator.actions) action.reset().play();
-    this.viewer.animator.seek(time);
+    seek(this.viewer.animator, time);
   }
 
   get time() {

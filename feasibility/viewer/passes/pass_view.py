@@ -12,16 +12,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import counted
 from feasibility.paths import CoveragePath
 from feasibility.runs import PlannedPasses
 from feasibility.timing import MotionLimits, Trajectory
 from feasibility.treated import TreatedArea, share_words
 from feasibility.viewer import robot as robot_visuals
+from feasibility.viewer.areas import painted_layers, surface_layer
 from feasibility.viewer.passes.digits import GAP, WIDTH, digit_lines
 from feasibility.viewer.path_and_division import painting, trail_pieces
 from feasibility.viewer.playback import Motion, paced, timed
 from feasibility.viewer.scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lines
-from feasibility.viewer.treated import painted_layers, surface_layer
 from feasibility.viewer.viewer import View, compose, titled
 from robots import Robot
 from surfaces.passes import Pass, working_mesh
@@ -67,7 +68,7 @@ def view_passes(
         )
         parts, tracks = [*parts, *trail], [*tracks, *more]
     parts += _pass_layers(along, paths)
-    count = f"{laid.count} pass{'' if laid.count == 1 else 'es'}"
+    count = counted(laid.count, "pass", "passes")
     runs = "one motion" if len(paths) == 1 else f"{len(paths)} motions"
     runs += " over a part" if _left_out(along, paths) else ""
     text = f"{robot.name}: {count}, {1e3 * laid.spacing:.4g} mm apart, {laid.length:.4g} m"

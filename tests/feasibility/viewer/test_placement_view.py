@@ -45,7 +45,7 @@ from feasibility.viewer.poses import (
     outline,
 )
 from feasibility.viewer.stage import FRAMED
-from feasibility.viewer.threejs import hex_colour, pack
+from feasibility.viewer.threejs import hex_colour, stream_of
 from robots import load_robot
 from surfaces import cylinder, mesh, plane, sphere, torus
 
@@ -445,12 +445,7 @@ def test_the_page_holds_the_view_and_nothing_of_a_hostile_name(tmp_path):
     assert Tags(text).tags == plain.tags
     assert HOSTILE not in text
     assert "&lt;script&gt;alert" in text
-    framed, at = unpacked(text, "commands"), 0
-    for message in pack(view.commands):
-        size = int.from_bytes(framed[at : at + 4], "little")
-        assert framed[at + 4 : at + 4 + size] == message
-        at += 4 + size
-    assert at == len(framed)
+    assert unpacked(text, "commands") == stream_of(view.commands)
     outside = text.replace(text.split('id="program">')[1].split("<")[0], "")
     assert not re.search(r"https?://", outside)
     assert len(
