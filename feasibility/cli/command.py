@@ -130,7 +130,7 @@ def open_case(
     began: float,
     outputs: Mapping[str, str | None],
     only_complete: str = "",
-    judge: Callable[[Case], None] = lambda case: None,
+    check_case: Callable[[Case], None] = lambda case: None,
     time_limit: float | None = None,
 ) -> Iterator[OpenCase]:
     """Load `args.case` with `args.settings`, print its notes, and show progress meanwhile.
@@ -140,7 +140,7 @@ def open_case(
         began: `time.perf_counter()` when the command began.
         outputs: files by their flag, see `check_outputs`; checked before anything is built.
         only_complete: why the command refuses the greedy search; empty where it does not.
-        judge: called with the case before anything is built; raises to refuse it.
+        check_case: called with the case before anything is built; raises to refuse it.
         time_limit: seconds, in place of the case's.
 
     Raises:
@@ -159,7 +159,7 @@ def open_case(
         check_outputs(outputs, args.case)
         if only_complete and case.search.method != "complete":
             raise CaseError(Fault("search.method", only_complete), case.name)
-        judge(case)
+        check_case(case)
         limit = case.search.time_limit if time_limit is None else time_limit
         clock = Clock(limit, progress).begin(time.monotonic() - (time.perf_counter() - began))
         doing = "the arm was loaded and the surface cut into cells"

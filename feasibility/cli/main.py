@@ -149,7 +149,7 @@ def run() -> NoReturn:
     """
     leave_at_once()
     if not _with_traceback():
-        # Nobody can do anything about the half-made objects of a Ctrl-C, taken apart.
+        # Messages about objects that a Ctrl-C left half made help nobody.
         sys.unraisablehook = lambda _: None
     status = main()
     for stream in (sys.stdout, sys.stderr):

@@ -102,35 +102,35 @@ def direction_of(text: str) -> Any:
     raise CoverableError(Fault("--passes", f"got {text!r:.60}", expected=wanted))
 
 
-def _lay(args: argparse.Namespace, surface: Surface, direction: Any) -> Passes:
-    """The passes that the arguments ask for, in one direction."""
+def _passes(args: argparse.Namespace, surface: Surface, direction: Any) -> Passes:
+    """The passes that the arguments describe, in one direction."""
     from surfaces.passes import crossed, parallel_passes
 
-    laid = [
+    found = [
         parallel_passes(
             surface, args.pitch, direction + turn if turn else direction,
             by=args.by, overrun=args.overrun, one_way=args.one_way,
         )
         for turn in (0.0, SQUARE)[: 1 + args.cross]
     ]  # fmt: skip
-    return crossed(*laid) if args.cross else laid[0]
+    return crossed(*found) if args.cross else found[0]
 
 
 def passes_asked(args: argparse.Namespace, opened: OpenCase) -> PlannedPasses:
-    """Lay the passes that the arguments ask for, and look for one motion along all of them."""
+    """Plan the passes that the arguments describe, and look for one motion along all of them."""
     from feasibility.runs import plan_best_passes, plan_passes
 
     robot, cells, task, search = opened.setup
-    opened.progress(0, None, "laying passes")
+    opened.progress(0, None, "planning passes")
     if args.passes.strip() != BEST:
-        laid = _lay(args, cells.surface, direction_of(args.passes))
-        return plan_passes(robot, laid, task, args.retract, search, opened.clock)
+        passes = _passes(args, cells.surface, direction_of(args.passes))
+        return plan_passes(robot, passes, task, args.retract, search, opened.clock)
 
-    def lay(angle: float) -> Passes:
-        return _lay(args, cells.surface, angle)
+    def passes_at(angle: float) -> Passes:
+        return _passes(args, cells.surface, angle)
 
     return plan_best_passes(
-        robot, cells.surface, task, args.pitch, lay, args.retract, search, opened.clock
+        robot, cells.surface, task, args.pitch, passes_at, args.retract, search, opened.clock
     )
 
 

@@ -91,14 +91,14 @@ def path(args: argparse.Namespace, began: float) -> int:
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
     outputs |= {f"--program[{k}]": file for k, file in enumerate(args.program)}
 
-    def judge(case: Case) -> None:
+    def check_case(case: Case) -> None:
         from feasibility.paths import check_order
 
         check_passes(args)
         if args.order is not None:
             check_order(args.order, case.surface.kind, case.surface.is_grid)
 
-    with open_case(args, began, outputs, WHY_COMPLETE, judge) as opened:
+    with open_case(args, began, outputs, WHY_COMPLETE, check_case) as opened:
         from feasibility.checking import check
         from feasibility.clock import OutOfTime
         from feasibility.entry import ends_of, entered
@@ -139,10 +139,12 @@ def path(args: argparse.Namespace, began: float) -> int:
             late = f"The time limit of {opened.clock.limit:g} s ran out before the path was timed."
             verdict = replace(verdict, answer=Answer.UNDECIDED, message=f"{verdict.message} {late}")
             return _no_path(args, opened.case.name, verdict, loaded)
-    laid = None if along is None else along.passes
+    more = report.Details(None if along is None else along.passes, treated, rates, ends)
+    if args.json:
+        print_out(json_text(report.as_json(found, run, limits, more)))
+    else:
+        print_out(report.as_text(found, run, limits, more))
     short = report.short_words(treated, opened.setup.task.coverage)
-    told = (found, run, limits, laid, treated, rates, ends)
-    print_out(json_text(report.as_json(*told)) if args.json else report.as_text(*told))
     write_path(args, robot, run, opened.case.name)
     if args.html is not None:
         write_text(args.html, _view(opened, along, found, treated, run, limits).html(), "view")
@@ -171,7 +173,7 @@ def _view(
 def _treated(
     opened: OpenCase, along: PlannedPasses | None, found: CoveragePath
 ) -> TreatedArea | None:
-    """What the path treats; None where no footprint is asked for."""
+    """What the path treats; None where the task has no footprint."""
     from feasibility.treated import treated_by_walk
 
     if along is not None:

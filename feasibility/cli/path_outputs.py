@@ -20,7 +20,7 @@ APPROACH = 0.05  # [m] of entry and exit, where there is a home
 
 
 def add_ends(parser: argparse.ArgumentParser) -> None:
-    """How the surface is come to, and left."""
+    """How the surface is approached, and left."""
     parser.add_argument(
         "--approach", type=positive, metavar="M",
         help="begin and end with a straight move of this length along the approach direction, "
@@ -86,7 +86,7 @@ def check_programs(args: argparse.Namespace, robot: Robot) -> float:
 
 
 def write_path(args: argparse.Namespace, robot: Robot, run: Trajectory, name: str) -> None:
-    """Write trajectories and programs that were asked for, and say so on stderr.
+    """Write the wanted trajectories and programs, and report them on stderr.
 
     Raises:
         FileError: a file cannot be written.

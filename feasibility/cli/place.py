@@ -125,7 +125,7 @@ def _further(
     evaluator: Evaluator,
     count: int,
 ) -> tuple[StationPlan | None, PlacementMap | None]:
-    """Stations and map, where they are wanted; what there is no time for is said."""
+    """Stations and map, where they are wanted; reports what there was no time for."""
     from feasibility.clock import OutOfTime
     from feasibility.placement import map_around_best, station_plan
 

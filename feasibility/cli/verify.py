@@ -1,4 +1,4 @@
-"""`coverable verify`: a motion, or a saved result, judged without searching."""
+"""`coverable verify`: a motion, or a saved result, checked without searching."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     parser = add_command(
         subcommands, "verify", verify, add_case,
-        help="judge a motion that anybody made, or a saved result, without searching",
+        help="check a motion from anywhere, or a saved result, without searching",
         usage="coverable verify [--json] [--set KEY=VALUE] CASE MOTION\n"
         "       coverable verify [--json] RESULT",
-        description="Judge a joint motion against a case by the independent replay alone: limits, "
+        description="Check a joint motion against a case by the independent replay alone: limits, "
         "tool point and tool axis at every instant, between rows too, and every cell reached. Or "
-        "judge the witness or the proof of a result that `check --save` wrote.",
+        "check the witness or the proof of a result that `check --save` wrote.",
         epilog="MOTION is CSV: a first line of joint names in any order, then a row a waypoint, in "
         "rad (NAME_deg: degrees) or m, unwrapped; rows are joined by straight lines in joint "
         "space, and counted from 1. exit status: 0 holds, 1 does not, 2 bad input, 130 interrupted",
@@ -40,7 +40,7 @@ def verify(args: argparse.Namespace, began: float) -> int:
 
 
 def _motion(args: argparse.Namespace, began: float) -> int:
-    """Judge a motion file against a case."""
+    """Check a motion file against a case."""
     with open_case(args, began, {}) as opened:
         from feasibility.results import load_motion
         from feasibility.verifying import verify as run
@@ -53,7 +53,7 @@ def _motion(args: argparse.Namespace, began: float) -> int:
 
 
 def _result(args: argparse.Namespace) -> int:
-    """Judge a saved result."""
+    """Check a saved result."""
     with progress_bar() as progress:
         from coverable_errors import CoverableError
         from feasibility.results import ResultError, load_result
@@ -64,7 +64,7 @@ def _result(args: argparse.Namespace) -> int:
         try:
             result = load_result(args.case)
         except ResultError as error:
-            hint = "a motion is judged by `coverable verify CASE MOTION`"
+            hint = "a motion is checked by `coverable verify CASE MOTION`"
             raise ResultError(f"{error}; {hint}") from error
         progress(0, None, "verifying")
         found = run(result, tick=lambda: progress(0, None, "verifying"))

@@ -46,7 +46,7 @@ class Watch(Clock):
         self._job, self._left = job, steps
 
     def report(self, done: int, total: int | None, text: str) -> None:
-        """Tell whoever waits."""
+        """Keep it for the page that waits."""
         cells = f"{done} of {total} cells" if total else f"{done} cells"
         self._job.said = f"{cells} so far; {text}"
 

@@ -21,8 +21,8 @@ from robots import Robot
 DIGITS = 9  # of a number of the page, which hides what conversions leave behind
 STEP = 0.5  # mm or degrees, of one press of an arrow key
 FURTHEST = 1e3  # [mm] that a surface can be moved by sliders where the arm has no bounded reach
-ROOM = 90.0  # [deg] by which a limit can be widened with its slider
-ROOM_MM = 500.0
+WIDENED = 90.0  # [deg] by which a limit can be widened with its slider
+WIDENED_MM = 500.0
 LONGEST_STANDOFF = 100.0  # [mm]
 
 Values = dict[str, Any]
@@ -73,8 +73,8 @@ class Controls:
         joints = []
         for name, slides in zip(robot.joint_names, robot.prismatic, strict=True):
             low, up = values["limits"][name] or (-360.0, 360.0)
-            room = ROOM_MM if slides else ROOM
-            ends = [10.0 * math.floor((low - room) / 10.0), 10.0 * math.ceil((up + room) / 10.0)]
+            by = WIDENED_MM if slides else WIDENED
+            ends = [10.0 * math.floor((low - by) / 10.0), 10.0 * math.ceil((up + by) / 10.0)]
             joints.append({"name": name, "unit": "mm" if slides else "deg", "range": ends})
         return {
             "values": values,

@@ -37,7 +37,7 @@ class Job:
         self.session, self.number, self.final, self.values = session, number, final, values
         self.answer: Answer | None = None
         self.said = ""
-        """What is going on, for whoever waits."""
+        """How far it is, for the page that waits."""
         self._heard = time.monotonic()
         self._dropped = threading.Event()
         self._ended = threading.Event()

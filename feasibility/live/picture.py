@@ -1,6 +1,6 @@
 """What a live page draws: the picture that a view has, and what each answer changes in it.
 
-The surface is drawn once, where it stands at first, and its group is moved. Its cells are triangles
+The surface is drawn once, at its first pose, and its group is moved. Its cells are triangles
 with a number each, which the page paints.
 """
 
@@ -47,7 +47,7 @@ INSET = 0.06  # [1] of a cell's width that its triangles are smaller by
 
 
 class Paint(NamedTuple):
-    """The colours of the cells, and what they stand for."""
+    """The colours of the cells, and what they mean."""
 
     classes: list[int]
     """(N,) which entry each cell is of."""
@@ -74,7 +74,7 @@ def first_view(setup: Setup, name: str) -> View:
 
 
 def group_of(robot: Robot) -> str:
-    """Where in the scene tree all stands that is drawn in the root frame."""
+    """The group of the scene tree for all that is drawn in the root frame."""
     return "" if robot.surface_link is None else GROUP
 
 

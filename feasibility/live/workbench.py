@@ -1,4 +1,4 @@
-"""From a changed case to what is decided, without making anew what has not changed.
+"""What a changed case builds, without building again what has not changed.
 
 An arm takes 5 ms to load and a mesh seconds to cut; a slider that is dragged waits for neither.
 """
@@ -111,5 +111,5 @@ def _key(part: Any) -> str:
 
 
 def _pose_key(case: Case) -> str:
-    """Where the surface stands, as text."""
+    """The pose of the surface, as text."""
     return json.dumps([case.surface.position, case.surface.rpy_deg])

@@ -39,9 +39,7 @@ SENTENCES = {
     "partial": "divided in part: the patches cover all cells that can be covered.",
     "undecided": "undecided: this division is the best one found, or could not be certified.",
 }
-PARTLY_FAST = (
-    "divided in part: at what is asked no motion was found to the cells that are left out."
-)
+PARTLY_FAST = "divided in part: no motion to the other cells is as fast or as regular as required."
 NOTHING = "not divided: no cell can be covered."
 
 
@@ -59,8 +57,8 @@ def as_json(
 
     Args:
         division: the division.
-        before_s: seconds of imports and files before it was asked for; they count as loading.
-        areas: the certified areas of the patches, or why there are none; None where nobody asked.
+        before_s: seconds of imports and files before it began; they count as loading.
+        areas: the certified areas of the patches, or why there are none; None without.
     """
     cells, fewest, connected = division.cells, division.fewest, division.connected
     return {
@@ -156,8 +154,7 @@ def as_text(
     """The division for people: the answer, the patches and moves in order, what is left out."""
     answer = answer_of(division)
     head = SENTENCES[answer]
-    asked = division.task.speed, division.task.min_manipulability
-    if answer == "partial" and any(asked):
+    if answer == "partial" and (division.task.speed or division.task.min_manipulability):
         head = PARTLY_FAST
     if division.decided and not division.patches and len(division.cells):
         head = NOTHING
@@ -177,8 +174,8 @@ def as_text(
         lines += _steps(division.connected, division)
     if division.proof is not None:
         lines += ["", "Why one motion is not enough:"]
-        said = proof_lines(division.proof, division.robot, division.cells)
-        lines += [filled(_indented(line), line.strip()) for line in said]
+        steps = proof_lines(division.proof, division.robot, division.cells)
+        lines += [filled(_indented(line), line.strip()) for line in steps]
     if division.apart:
         lines += ["", filled("", _never_together(division))]
     if division.left_out:
@@ -242,10 +239,10 @@ def _steps(plan: Plan, division: Division) -> Iterator[str]:
 
 
 def _move_text(move: Reconfiguration) -> str:
-    """Where the joints go, by which way, and how near bodies come; or why it is refused."""
+    """Where the joints go, along which path, and how near bodies come; or why it is refused."""
     parts = [move.described()]
     if len(move.via):
-        parts.append(f"by way of {counted(len(move.via), 'configuration')} (--json has them)")
+        parts.append(f"through {counted(len(move.via), 'configuration')} (--json has them)")
     if move.refusal:
         parts.append(f"refused: {move.refusal}")
     elif move.replayed is not None:

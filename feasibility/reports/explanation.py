@@ -106,11 +106,11 @@ def _findings(explanation: Explanation) -> list[str]:
 
 
 def _remarks(explanation: Explanation) -> list[str]:
-    """What stands below the tables, an empty text before each."""
+    """What is written below the tables, an empty text before each."""
     verdict = explanation.verdict
     helps = helpful(explanation)
     opens = [(row_of(t).change, what_it_opens(t, verdict)) for t in helps]
-    texts = [f"{change}: {said}." for change, said in opens if said]
+    texts = [f"{change}: {text}." for change, text in opens if text]
     texts.append(idle_limits(explanation))
     texts.append(rates_sentence(explanation))
     texts += in_the_way(explanation)
@@ -146,7 +146,7 @@ def _seeded(alone: Verdict) -> str:
 
 
 def _from_nearby(verdict: Verdict) -> str:
-    """What the mark behind a threshold stands for."""
+    """What the mark behind a threshold means."""
     return (
         "from a motion nearby, replayed; the search of `check` alone, with seed "
         f"{verdict.seed}, did not find one there."

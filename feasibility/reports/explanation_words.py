@@ -97,8 +97,8 @@ def _spare(threshold: Threshold) -> str:
     row, quantity = row_of(threshold), threshold.quantity
     if quantity.kind is Kind.SHIFT:
         return f"{row.change} by {row.value}"
-    way = "up" if quantity.end > quantity.given else "down"
-    return f"{row.change} {way} to {row.value} ({row.now} now)"
+    side = "up" if quantity.end > quantity.given else "down"
+    return f"{row.change} {side} to {row.value} ({row.now} now)"
 
 
 def row_of(threshold: Threshold) -> Row:
@@ -171,8 +171,8 @@ def _in_short(verdict: Verdict, group: Sequence[Threshold]) -> Iterator[str]:
         yield f"wider limits of {', '.join(_joints(verdict, limits))}"
     shifts = [t.quantity for t in group if t.quantity.kind is Kind.SHIFT]
     if shifts:
-        ways = ", ".join(q.name.removeprefix("shift along ") for q in shifts)
-        yield f"surface.position {ways} by up to {shown(shifts[0], shifts[0].end)}"
+        axes = ", ".join(q.name.removeprefix("shift along ") for q in shifts)
+        yield f"surface.position {axes} by up to {shown(shifts[0], shifts[0].end)}"
 
 
 def _joints(verdict: Verdict, limits: Iterable[Quantity]) -> list[str]:

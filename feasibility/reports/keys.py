@@ -24,7 +24,7 @@ Groups = dict[str, list[Key]]
 
 
 def title_of(key: Key) -> str:
-    """The heading that a key stands under.
+    """The heading of a key.
 
     Example:
         >>> [title_of(key) for key in all_keys() if key.name in ("standoff", "tube")]

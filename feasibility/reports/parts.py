@@ -11,11 +11,12 @@ import re
 import textwrap
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_errors import counted
 from feasibility.collisions import Asked, LeftOut, checked_words
 from feasibility.results import plain
 from feasibility.task import Task
@@ -25,6 +26,7 @@ from robots import Robot
 from surfaces import Cells
 
 if TYPE_CHECKING:
+    from feasibility.certification.collisions import CollisionReplay
     from feasibility.viewer import View
 
 WIDTH = 100  # columns
@@ -113,13 +115,13 @@ def causes_json(causes: Iterable[Cause], cells: Cells) -> list[dict[str, Any]]:
 
 
 def left_out_json(one: LeftOut) -> dict[str, Any]:
-    """A pair that is not asked for."""
+    """A pair that is not checked."""
     found: dict[str, Any] = {"pair": [one.first, one.second], "why": one.why}
     return found if one.rate is None else {**found, "rate": float(one.rate)}
 
 
 def left_out_text(pairs: Sequence[LeftOut]) -> str:
-    """Pairs that are not asked for in one line: those of the arm's build counted, others named."""
+    """Pairs that are not checked in one line: those of the arm's build counted, others named."""
     built = Counter(one.why for one in pairs if one.why in BUILT)
     parts = [f"{number} {why}" for why, number in built.items()]
     parts += [f"{one.first} and {one.second} ({one.why})" for one in pairs if one.why not in BUILT]
@@ -173,14 +175,50 @@ def limit_margin_deg(
     return math.degrees(float(margins.min(initial=np.inf)))
 
 
+def certificate_text(
+    robot: Robot,
+    certificate: Certificate,
+    q: NDArray[np.float64] | None,
+    task: Task,
+    tolerance: float | None,
+    noun: str = "waypoint",
+) -> str:
+    """What the replay of a motion q (m, n) measured in one line; empty where it measured nothing.
+
+    Args:
+        robot: the arm.
+        certificate: of the replay.
+        q: the motion; None where it is not stored.
+        task: with what is allowed.
+        tolerance: m, allowed of the tool point; None where that is not mentioned.
+        noun: what a row of the motion is called.
+    """
+    if not math.isfinite(certificate.max_position_error):
+        return ""
+    allowed = "" if tolerance is None else f" (allowed {1e3 * tolerance:.3g})"
+    angle = math.degrees(certificate.max_angle)
+    margin = limit_margin_deg(robot, certificate, q)
+    limits = f"joints at least {margin:.3g} deg from their limits"
+    parts = [
+        counted(certificate.waypoints, noun),
+        f"tool point within {1e3 * certificate.max_position_error:.3g} mm of its surface{allowed}",
+        f"tool axis within {angle:.4g} deg (allowed {task.cone_deg:g})",
+        roll_text(certificate, task),
+        limits if 0.0 <= margin < math.inf else "",
+        rates_text(certificate, task),
+        clearance_text(certificate),
+    ]
+    return "; ".join(filter(None, parts))
+
+
 def rates_text(certificate: Certificate, task: Task) -> str:
-    """The largest speed, and the smallest singular value; empty where neither is asked for."""
+    """The largest speed, and the smallest singular value; empty where neither is required."""
     parts = []
     if task.speed is not None and certificate.max_speed is not None:
-        parts.append(f"tool speeds up to {certificate.max_speed:.3g} m/s (asked {task.speed:g})")
+        parts.append(f"tool speeds up to {certificate.max_speed:.3g} m/s (required {task.speed:g})")
     if task.min_manipulability is not None and certificate.min_singular_value is not None:
         least = f"singular values of at least {certificate.min_singular_value:.3g}"
-        parts.append(f"{least} (asked {task.min_manipulability:g})")
+        parts.append(f"{least} (required {task.min_manipulability:g})")
     return "; ".join(parts)
 
 
@@ -193,19 +231,7 @@ def roll_text(certificate: Certificate, task: Task) -> str:
     return f"roll within {most:.4g} deg of {middle:.4g} deg (allowed {half:g})"
 
 
-class Clearance(Protocol):
-    """How near bodies came along a motion: a `Certificate` or a `CollisionReplay`."""
-
-    @property
-    def min_clearance(self) -> float | None:
-        """m, between the nearest pair; None where there is none."""
-
-    @property
-    def nearest_pair(self) -> tuple[str, str] | None:
-        """The two."""
-
-
-def clearance_json(certificate: Clearance) -> dict[str, Any]:
+def clearance_json(certificate: Certificate | CollisionReplay) -> dict[str, Any]:
     """How near which pair came along a motion; no keys where collisions were not checked.
 
     `min_clearance_m` is a lower bound: certified, and up to a third below the truth.
@@ -219,7 +245,7 @@ def clearance_json(certificate: Clearance) -> dict[str, Any]:
     }
 
 
-def clearance_text(certificate: Clearance) -> str:
+def clearance_text(certificate: Certificate | CollisionReplay) -> str:
     """How near which pair came along a motion; empty where that was not looked at."""
     if certificate.min_clearance is None or certificate.nearest_pair is None:
         return ""
@@ -230,7 +256,7 @@ def clearance_text(certificate: Clearance) -> str:
 def seconds(
     timing: Mapping[str, float], middle: Iterable[str], before_s: float
 ) -> dict[str, float]:
-    """The times of an answer to microseconds; what passed before it was asked for is loading.
+    """The times of an answer to microseconds; what passed before it began is loading.
 
     Args:
         timing: in seconds, by key.
@@ -256,12 +282,12 @@ def page(title: str, body: str, note: str, collision: Asked | str | None) -> str
         title: plain text.
         body: HTML.
         note: plain text at the end; the program's version follows.
-        collision: what was checked; or the sentence that says it.
+        collision: what was checked, or a sentence about it.
     """
-    said = collision if isinstance(collision, str) else checked_words(collision)
+    checked = collision if isinstance(collision, str) else checked_words(collision)
     return _PAGE.format(
         title=html.escape(title),
-        unchecked=html.escape(said),
+        unchecked=html.escape(checked),
         body=body,
         note=html.escape(f"{note} coverable {version()}"),
     )

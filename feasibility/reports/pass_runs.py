@@ -69,32 +69,32 @@ def as_json(
     }
 
 
-def passes_json(laid: Passes) -> dict[str, Any]:
-    """Passes as they were laid."""
+def passes_json(passes: Passes) -> dict[str, Any]:
+    """How passes are laid out."""
     return {
-        "count": laid.count,
-        "stretches": len(laid.stretches),
-        "by": laid.by,
-        "pitch_m": laid.pitch,
-        "spacing_m": laid.spacing,
-        "widest_m": laid.widest,
-        "length_m": laid.length,
-        "dropped_m": laid.dropped,
-        "notes": list(laid.notes),
+        "count": passes.count,
+        "stretches": len(passes.stretches),
+        "by": passes.by,
+        "pitch_m": passes.pitch,
+        "spacing_m": passes.spacing,
+        "widest_m": passes.widest,
+        "length_m": passes.length,
+        "dropped_m": passes.dropped,
+        "notes": list(passes.notes),
     }
 
 
-def passes_text(laid: Passes) -> str:
+def passes_text(passes: Passes) -> str:
     """Passes in words."""
-    words = f"{laid.count}, {1e3 * laid.spacing:.4g} mm apart"
-    if laid.widest > 1.001 * laid.spacing:
-        words += f" ({1e3 * laid.widest:.4g} mm where the surface slopes)"
-    if len(laid.stretches) > laid.count:
-        words += f", in {len(laid.stretches)} stretches"
-    words += f", {laid.length:.4g} m together"
-    if laid.dropped > 0.0:
-        words += f"; {laid.dropped:.3g} m left out in pieces too short to run"
-    return "; ".join([words, *laid.notes])
+    words = f"{passes.count}, {1e3 * passes.spacing:.4g} mm apart"
+    if passes.widest > 1.001 * passes.spacing:
+        words += f" ({1e3 * passes.widest:.4g} mm where the surface slopes)"
+    if len(passes.stretches) > passes.count:
+        words += f", in {len(passes.stretches)} stretches"
+    words += f", {passes.length:.4g} m together"
+    if passes.dropped > 0.0:
+        words += f"; {passes.dropped:.3g} m left out in pieces too short to run"
+    return "; ".join([words, *passes.notes])
 
 
 def _bound_json(along: PlannedPasses, found: PassRuns) -> dict[str, Any]:

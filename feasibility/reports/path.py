@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context, Decimal
 from typing import Any
 
@@ -31,17 +32,31 @@ from robots import Robot
 from surfaces.passes import Passes
 
 FEW = 5  # cells that are named
-HARDLY_LESS = 0.9  # [1] of the speed asked for
+HARDLY_LESS = 0.9  # [1] of the required speed
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Details:
+    """What else may be known of a path."""
+
+    passes: Passes | None = None
+    """Those that it runs."""
+    treated: TreatedArea | None = None
+    """Where the task has a footprint."""
+    rates: RateReplay | None = None
+    """Where the task has a speed or a least singular value."""
+    ends: Ends | None = None
+    """How it is entered and left."""
+
+
+PLAIN = Details()
 
 
 def as_json(
     path: CoveragePath,
     trajectory: Trajectory | None = None,
     limits: MotionLimits | None = None,
-    laid: Passes | None = None,
-    treated: TreatedArea | None = None,
-    rates: RateReplay | None = None,
-    ends: Ends | None = None,
+    more: Details = PLAIN,
 ) -> dict[str, Any]:
     """The object that `coverable path --json` prints, without NaN.
 
@@ -49,12 +64,9 @@ def as_json(
 
     Args:
         path: the path.
-        trajectory: its timing, if it was asked for.
+        trajectory: its timing, if it is timed.
         limits: of the timing.
-        laid: the passes that it runs, if it does.
-        treated: what it treats, where a footprint is asked for.
-        rates: what its motion allows, if the task asks.
-        ends: how it is entered and left, if it is.
+        more: what else is known of it.
     """
     figures = path.figures
     sliding = path.robot.prismatic
@@ -82,11 +94,11 @@ def as_json(
             "singular_value": plain(figures.singular_value),
         },
         "certificate": certificate_json(path.certificate) | clearance_json(path.certificate),
-        "treated": treated_json(treated),
-        "passes": None if laid is None else passes_json(laid),
+        "treated": treated_json(more.treated),
+        "passes": None if more.passes is None else passes_json(more.passes),
         "trajectory": None if trajectory is None else _timing(path, trajectory, limits),
-        **rates_json(path, rates, trajectory),
-        **ends_json(ends),
+        **rates_json(path, more.rates, trajectory),
+        **ends_json(more.ends),
         "collisions": checked(path.task.collision),
         "robot": path.robot.name,
         "version": version(),
@@ -99,12 +111,12 @@ def no_path_json(verdict: Verdict, reason: str, before_s: float = 0.0) -> dict[s
 
 
 def short_words(treated: TreatedArea | None, coverage: float | None) -> str:
-    """That a path treats less of the area than is asked for; empty where that is not so."""
+    """That a path treats less of the area than is required; empty where it treats enough."""
     if treated is None or coverage is None or treated.lower >= coverage:
         return ""
     return (
         f"undecided: the path treats {share_words(treated)} of the area, and "
-        f"{100.0 * coverage:g} % is asked; passes or cells that are closer treat more."
+        f"{100.0 * coverage:g} % is required; passes or cells that are closer treat more."
     )
 
 
@@ -171,17 +183,14 @@ def as_text(
     path: CoveragePath,
     trajectory: Trajectory | None = None,
     limits: MotionLimits | None = None,
-    laid: Passes | None = None,
-    treated: TreatedArea | None = None,
-    rates: RateReplay | None = None,
-    ends: Ends | None = None,
+    more: Details = PLAIN,
 ) -> str:
     """The path for people: its length compared with the least possible, margins, and times.
 
     The arguments are those of `as_json`.
     """
-    count, figures = int(path.needed.sum()), path.figures
-    over = counted(count, "cell" if laid is None else "place")
+    count, figures, passes = int(path.needed.sum()), path.figures, more.passes
+    over = counted(count, "cell" if passes is None else "place")
     rows = [
         ("order", f"{path.order}, {over}, {len(path.visits):,} centres passed"),
         ("length", _length_text(figures)),
@@ -195,7 +204,7 @@ def as_text(
         ),
         ("roll", roll_text(path.certificate, path.task)),
         ("clearance", clearance_text(path.certificate)),
-        ("treated", "" if treated is None else treated_words(treated)),
+        ("treated", "" if more.treated is None else treated_words(more.treated)),
     ]
     if trajectory is not None:
         speed = at_most(float(trajectory.tool_speed.max()), 4)
@@ -204,11 +213,11 @@ def as_text(
             ("time", f"{trajectory.duration:.4g} s in {samples}, tool at up to {speed} m/s"),
             ("limits", _limits_text(path.robot, trajectory, limits)),
         ]
-    rows += [("speed", rates_words(path, rates, trajectory)), ("ends", ends_words(ends))]
+    rows += [("speed", rates_words(path, more.rates, trajectory)), ("ends", ends_words(more.ends))]
     head = f"path: one continuous motion over {over}."
-    if laid is not None:
-        rows[:2] = [("passes", passes_text(laid)), ("length", f"{figures.length:.4g} m in all")]
-        head = f"path: one continuous motion along {counted(laid.count, 'pass', 'passes')}."
+    if passes is not None:
+        rows[:2] = [("passes", passes_text(passes)), ("length", f"{figures.length:.4g} m in all")]
+        head = f"path: one continuous motion along {counted(passes.count, 'pass', 'passes')}."
     return "\n".join(summary(head, rows, path.task.collision, 14))
 
 
@@ -263,7 +272,7 @@ def _limits_text(robot: Robot, trajectory: Trajectory, limits: MotionLimits | No
 
 
 def share_at_speed(trajectory: Trajectory, speed: float) -> float:
-    """Share of the tool's way over the surface at the speed asked for, or hardly less.
+    """Share of the tool's path over the surface at the required speed, or hardly less.
 
     The rest is where the joints' accelerations do not allow it, at stops above all.
     """
@@ -272,15 +281,15 @@ def share_at_speed(trajectory: Trajectory, speed: float) -> float:
         return 0.0
     inside = slice(int(over[0]), int(over[-1]) + 1)
     speeds, time = trajectory.tool_speed[inside], trajectory.time[inside]
-    way = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)
+    lengths = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)
     fast = np.minimum(speeds[1:], speeds[:-1]) >= HARDLY_LESS * speed
-    return float(way[fast].sum() / max(float(way.sum()), 1e-300))
+    return float(lengths[fast].sum() / max(float(lengths.sum()), 1e-300))
 
 
 def rates_json(
     path: CoveragePath, rates: RateReplay | None, trajectory: Trajectory | None = None
 ) -> dict[str, Any]:
-    """The judge's figures; no key where nothing was asked."""
+    """What the replay of rates measured; no key where there was none."""
     if rates is None:
         return {}
     stops = [{"why": stop.why, "cell": list(path.cells.unravel(stop.cell))} for stop in rates.stops]
@@ -297,7 +306,7 @@ def rates_json(
 def rates_words(
     path: CoveragePath, rates: RateReplay | None, trajectory: Trajectory | None = None
 ) -> str:
-    """The same in words; empty where nothing was asked."""
+    """The same in words; empty where there was none."""
     if rates is None:
         return ""
     parts = list(rates.refusals)
@@ -313,7 +322,7 @@ def rates_words(
         )
         if trajectory is not None:
             share = 100.0 * share_at_speed(trajectory, path.task.speed)
-            parts.append(f"with accelerations {share:.0f} % of the way at that speed")
+            parts.append(f"with accelerations {share:.0f} % of the path at that speed")
     if path.task.min_manipulability is not None and rates.accepted:
         parts.append(f"singular values of at least {path.task.min_manipulability:g}")
     return "; ".join(parts)

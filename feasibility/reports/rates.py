@@ -24,8 +24,8 @@ def rates_sentence(explanation: Explanation) -> str:
             f"{rates.largest:.3g} m/s all along, but for stops in place and at corners"
         )
         if asked is not None and asked.speed is not None:
-            enough = "as asked" if rates.largest >= asked.speed else "too little"
-            text += f" ({asked.speed:g} m/s is asked: {enough}; no threshold above asks for it)"
+            enough = "enough" if rates.largest >= asked.speed else "too little"
+            text += f" ({asked.speed:g} m/s is required: {enough}; no threshold above requires it)"
         if rates.witness.speed < rates.largest:
             text += f"; the covering motion above {rates.witness.speed:.3g} m/s"
         text += ". "

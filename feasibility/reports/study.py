@@ -100,7 +100,7 @@ def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str
     """One page that fetches nothing.
 
     Args:
-        study: what was asked.
+        study: the question.
         rows: their outcomes.
         poses: a view of the surface's poses, where they vary; see `viewer.view_study`.
     """
@@ -132,20 +132,21 @@ def as_html(study: Study, rows: Sequence[Row], poses: View | None = None) -> str
 
 def checked_in_all(study: Study) -> list[str]:
     """What every case of a study checks, in the words of JSON."""
-    every = [checked(_asked(task)) for task in study.tasks]
+    every = [checked(_settings(task)) for task in study.tasks]
     return [name for name in CHECKABLE if every and all(name in one for one in every)]
 
 
 def collision_words(study: Study) -> str:
     """The sentence that says what is checked, of all cases or of how many."""
-    said = Counter(checked_words(_asked(task)) for task in study.tasks)
-    if len(said) <= 1:
-        return next(iter(said), UNCHECKED)
-    return "; ".join(f"in {number} of {said.total()} cases {text}" for text, number in said.items())
+    found = Counter(checked_words(_settings(task)) for task in study.tasks)
+    total = found.total()
+    if len(found) <= 1:
+        return next(iter(found), UNCHECKED)
+    return "; ".join(f"in {number} of {total} cases {text}" for text, number in found.items())
 
 
-def _asked(task: StudyTask) -> CollisionPart | None:
-    """What a checked case asks for: enough of it to say what is checked."""
+def _settings(task: StudyTask) -> CollisionPart | None:
+    """The collisions of a checked case: enough to say what is checked."""
     table = task.tables.get("collision")
     if not table:
         return None

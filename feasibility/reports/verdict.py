@@ -13,12 +13,10 @@ from feasibility.cut_words import lines as proof_lines
 from feasibility.paper import tree_walk
 from feasibility.reports.parts import (
     causes_json,
-    clearance_text,
+    certificate_text,
     left_out_json,
     left_out_text,
     measured_json,
-    rates_text,
-    roll_text,
     seconds,
     seconds_text,
     summary,
@@ -54,7 +52,7 @@ SHORT = "a motion visits every cell, but it is not shown to treat enough of the 
 CAUSES = {
     CauseKind.OUT_OF_REACH: "out of reach",
     CauseKind.JOINT_LIMITS: "joint limits",
-    CauseKind.ORIENTATION: "orientation (the tool cannot be held as asked)",
+    CauseKind.ORIENTATION: "orientation (the tool cannot be held as required)",
     CauseKind.COLLISION: "collision",
     CauseKind.DISCONNECTED: "reachable, but not by the motion that covers the rest",
 }
@@ -68,8 +66,9 @@ def as_json(
     Args:
         verdict: of either method.
         before_s: seconds of imports and files before the check began; they count as loading.
-        area: the certified area, or why there is none; None where nobody asked for it.
+        area: the certified area, or why there is none; None where it was not wanted.
     """
+    q = None if verdict.witness is None else verdict.witness.q
     return {
         "verdict": str(verdict.answer),
         "evidence": str(verdict.evidence),
@@ -77,7 +76,7 @@ def as_json(
         "covered": verdict.n_covered,
         "edges": verdict.n_edges,
         "uncovered": causes_json(verdict.causes, verdict.cells),
-        "certificate": _certificate(verdict),
+        "certificate": measured_json(verdict.robot, verdict.certificate, q),
         "collisions": checked(verdict.task.collision),
         "unchecked_links": list(verdict.unchecked_links),
         "pairs_left_out": [left_out_json(one) for one in verdict.pairs_left_out],
@@ -100,12 +99,6 @@ def _message(verdict: Verdict) -> str:
         return verdict.message
     why = "a cell is" if missed == 1 else f"{missed:,} cells are"
     return f"{verdict.message} Why {why} missed was not looked into: the time limit ran out."
-
-
-def _certificate(verdict: Verdict) -> dict[str, Any] | None:
-    """What the replay measured, with angles in degrees; null where it measured nothing."""
-    q = None if verdict.witness is None else verdict.witness.q
-    return measured_json(verdict.robot, verdict.certificate, q)
 
 
 def as_text(
@@ -148,7 +141,7 @@ def as_text(
 
 
 def rows_of(verdict: Verdict) -> list[tuple[str, str]]:
-    """What is said of any verdict: names, and a text each that may be empty."""
+    """What every report of a verdict has: names, and a text each that may be empty."""
     return [
         ("covered", f"{verdict.n_covered:,} of {len(verdict.cells):,} cells in one motion"),
         ("edges", f"{verdict.n_edges:,} of {len(verdict.cells.pairs):,}"),
@@ -175,21 +168,10 @@ def _falls_short(verdict: Verdict) -> bool:
 
 def _certificate_text(verdict: Verdict) -> str:
     """The certificate in one line."""
-    found = _certificate(verdict)
-    if found is None or verdict.certificate is None:
+    if verdict.certificate is None:
         return ""
-    error, tolerance = verdict.certificate.max_position_error, verdict.task.tolerance
-    allowed = "" if tolerance is None else f" (allowed {1e3 * tolerance:.3g})"
-    parts = [
-        f"{found['waypoints']:,} waypoints",
-        f"tool point within {1e3 * error:.3g} mm of its surface{allowed}",
-        f"tool axis within {found['max_angle_deg']:.4g} deg (allowed {verdict.task.cone_deg:g})",
-        roll_text(verdict.certificate, verdict.task),
-    ]
-    if found["min_limit_margin_deg"] is not None:
-        parts.append(f"joints at least {found['min_limit_margin_deg']:.3g} deg from their limits")
-    parts.append(rates_text(verdict.certificate, verdict.task))
-    return "; ".join(filter(None, [*parts, clearance_text(verdict.certificate)]))
+    task, q = verdict.task, None if verdict.witness is None else verdict.witness.q
+    return certificate_text(verdict.robot, verdict.certificate, q, task, task.tolerance)
 
 
 def _treated_text(verdict: Verdict) -> str:

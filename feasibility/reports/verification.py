@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,11 +10,8 @@ import numpy as np
 from coverable_errors import counted
 from feasibility.collisions import checked
 from feasibility.reports.parts import (
-    certificate_json,
-    clearance_text,
-    limit_margin_deg,
+    certificate_text,
     measured_json,
-    roll_text,
     summary,
 )
 from feasibility.reports.proof import proof_json
@@ -23,7 +19,10 @@ from feasibility.verifying import Verification
 from feasibility.version import version
 
 WORDS = {
-    "motion": ("the motion covers the whole surface", "the motion does not do what is asked"),
+    "motion": (
+        "the motion covers the whole surface",
+        "the motion is refused",
+    ),
     "witness": ("the stored motion covers the whole surface", "the stored motion is refused"),
     "tree": (
         "the tree of the greedy search enters every cell, by the paper's definitions",
@@ -74,7 +73,7 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
     Args:
         found: what became of the claim.
         case: what the case is called.
-        source: the file that was judged.
+        source: the file that was checked.
         notes: what was not used of it.
     """
     head = "holds" if found.holds else "does not hold"
@@ -85,28 +84,17 @@ def as_text(found: Verification, case: str, source: str, notes: Sequence[str] = 
         rows.append(("cells", reached))
     rows += [("certificate" if found.holds else "measured", _measured(found))]
     if found.proof is not None and found.holds:
-        boxes = "1 box" if found.boxes == 1 else f"{found.boxes:,} boxes"
-        rows.append(("checked", boxes))
+        rows.append(("checked", counted(found.boxes, "box", "boxes")))
     rows += [("note", note) for note in notes]
-    said = f"{head}: {WORDS[found.claim][not found.holds]}."
-    return "\n".join(summary(said, rows, found.task.collision))
+    answer = f"{head}: {WORDS[found.claim][not found.holds]}."
+    return "\n".join(summary(answer, rows, found.task.collision))
 
 
 def _measured(found: Verification) -> str:
     """The figures of a motion in one line; empty where there are none."""
-    if found.certificate is None or not math.isfinite(found.certificate.max_position_error):
+    if found.certificate is None:
         return ""
-    figures = certificate_json(found.certificate)
     # A greedy search without a tolerance in its task has one of its own.
     own = found.claim == "tree" and found.task.tolerance is None
-    allowed = "" if own else f" (allowed {1e3 * found.task.effective_tolerance:.3g})"
-    parts = [
-        counted(figures["waypoints"], "row"),
-        f"tool point within {1e3 * figures['max_position_error_m']:.3g} mm of its surface{allowed}",
-        f"tool axis within {figures['max_angle_deg']:.4g} deg (allowed {found.task.cone_deg:g})",
-        roll_text(found.certificate, found.task),
-    ]
-    margin = limit_margin_deg(found.robot, found.certificate, found.q)
-    if math.isfinite(margin) and margin >= 0.0:
-        parts.append(f"joints at least {margin:.3g} deg from their limits")
-    return "; ".join(filter(None, [*parts, clearance_text(found.certificate)]))
+    allowed = None if own else found.task.effective_tolerance
+    return certificate_text(found.robot, found.certificate, found.q, found.task, allowed, "row")

@@ -1,8 +1,8 @@
 """Shapes for drawing E-cells: filled patches, borders, and marks at their centres.
 
 The triangles of a mesh are joined at their corners, and thinned if too many. Thinning merges
-vertices that lie close together, but only where they touch the same cells: so the
-drawn cells still meet in the same order, and their borders are lines between corners of the mesh.
+vertices that lie close together, but only where they touch the same cells: so the drawn cells keep
+their neighbours, and their borders are lines between corners of the mesh.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ class DisplayMesh:
             getattr(self, field.name).flags.writeable = False
 
     def fill(self, which: Ints, centres: Array, inset: float = 0.0) -> Triangles:
-        """The triangles of some cells (k,), drawn towards their centres by a share of the way."""
+        """The triangles of some cells (k,), shrunk towards their centres by a share `inset`."""
         mine = np.isin(self.labels, which)
         labels = np.repeat(self.labels[mine], 3)
         corner = self.faces[mine].ravel()

@@ -27,7 +27,7 @@ class Sides:
     lost: tuple[int, ...]
     """Cells that are proved uncoverable in one of the proof's regions each."""
     names: tuple[str, str, str]
-    """What the labels stand for, with the number of cells."""
+    """What the labels mean, with the number of cells."""
     lost_name: str
     """The same for `lost`."""
 

@@ -85,7 +85,7 @@ def _seen(points: Array, camera: Camera, width: int, height: int) -> Array:
 
 
 def _clipped(seen: Array, colours: Array) -> tuple[Array, Array]:
-    """The segments that lie before the camera as a whole."""
+    """The segments that lie entirely before the camera."""
     ahead = (seen[:, 2] > NEAR).reshape(-1, 2).all(axis=1).repeat(2)
     return np.ascontiguousarray(seen[ahead]), np.ascontiguousarray(colours[ahead])
 
@@ -113,7 +113,7 @@ def _parts(commands: Iterable[Command]) -> list[_Part]:
 
 
 def _part(scene: dict[str, Any], places: Sequence[Array]) -> _Part:
-    """One object, moved by the frames that it stands in."""
+    """One object, moved by the frames that it belongs to."""
     place = np.eye(4)
     for matrix in places:
         place = place @ matrix

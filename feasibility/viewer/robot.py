@@ -53,7 +53,7 @@ def joint_paths(robot: Robot, root: str = ROOT) -> tuple[str, ...]:
 
 
 def home(robot: Robot) -> NDArray[np.float64]:
-    """(n,) where an arm without work stands: at zero, or at the limit next to it."""
+    """(n,) of an arm without work: at zero, or at the limit next to it."""
     return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
 
 

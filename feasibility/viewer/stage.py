@@ -1,4 +1,4 @@
-"""What a picture stands on, and where it is seen from: ground, root frame, camera."""
+"""Ground, root frame and camera of a picture."""
 
 from __future__ import annotations
 

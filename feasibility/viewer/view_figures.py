@@ -32,8 +32,8 @@ def plot_view(view: Drawn) -> Plot:
     axes = figure.add_subplot()
     axes.imshow(view.image(), interpolation="lanczos")
     axes.set_axis_off()
-    said = [textwrap.fill(line, WIDTH) for line in (view.legend.title, view.legend.checked)]
-    figure.suptitle(plain("\n".join(said)), fontsize=11)
+    lines = [textwrap.fill(line, WIDTH) for line in (view.legend.title, view.legend.checked)]
+    figure.suptitle(plain("\n".join(lines)), fontsize=11)
     shown = [entry for entry in view.legend.entries if entry.shown]
     handles = [Patch(color=entry.colour, label=plain(entry.label)) for entry in shown]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)

@@ -141,8 +141,7 @@ def view(verdict: Verdict, case: str | None = None, *, play: bool = True, at: fl
     covered = f"{verdict.n_covered} of {counted(len(verdict.cells), 'cell')}"
     text = f"{verdict.robot.name}: {covered} in one continuous motion ({verdict.method} search)"
     if verdict.proof is not None:
-        said = sentence(verdict.proof, verdict.robot, verdict.cells)
-        text += f". Proved: {said}."
+        text += f". Proved: {sentence(verdict.proof, verdict.robot, verdict.cells)}."
     drawn = compose(
         verdict.robot,
         verdict.cells,
@@ -188,14 +187,14 @@ def compose(
         tracks: what else moves with it, see `threejs.track`.
         play: start the motion when the page opens.
         at: share of the motion, 0 to 1, at which the arm waits when `play` is False.
-        task: what was asked, for what the arm had to stay clear of.
+        task: with what the arm had to stay clear of.
     """
     drawing, roots = robot_visuals.draw(robot), [robot_visuals.ROOT]
     q, readout, start, around = resting, None, 0.0, None
     moving = list[Command]()
     parts, tracks = list(parts), list(tracks)
-    asked = None if task is None else task.collision
-    bodies = None if task is None else gather(robot, cells.surface, asked, task.standoff)
+    collision = None if task is None else task.collision
+    bodies = None if task is None else gather(robot, cells.surface, collision, task.standoff)
     if bodies is not None:
         parts += tool_layers(bodies, robot) + scene_layers(bodies, robot)
         parts += hull_layers(bodies, robot)
@@ -221,7 +220,7 @@ def compose(
         robot=robot,
         commands=(*ground(robot, cells, drawing.lowest, place), *seen),
         legend=Legend(
-            title, " · ".join([text, *drawing.notes]), tuple(entries), checked_words(asked)
+            title, " · ".join([text, *drawing.notes]), tuple(entries), checked_words(collision)
         ),
         camera=camera_on(robot, cells, q, drawing.lowest, around, place),
         motion=motion,

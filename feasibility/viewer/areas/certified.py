@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 CERTIFIED: Colour = (0.00, 0.62, 0.45)
 ABOVE = 0.012  # [1] of a cell's width, so that tiles lie over the surface
-PIECES = 3  # of a tile's side: a large one is bent
+PIECES = 3  # of a tile's side: a large one is curved
 
 
 def certified_layer(
@@ -38,7 +38,7 @@ def certified_layer(
     Args:
         area: the tiles.
         name: in the legend.
-        share: 0 to 1, told beside it; that of all cells' area by default.
+        share: 0 to 1, written beside it; that of all cells' area by default.
         colour: of the tint.
     """
     share = area.share if share is None else share

@@ -18,7 +18,7 @@ def triad(path: str, place: NDArray[np.float64], length: float) -> threejs.Comma
 
     Args:
         path: where in the scene tree.
-        place: (4, 4) m, the frame in the group that it stands in.
+        place: (4, 4) m, the frame in the group that it belongs to.
         length: m, of an axis.
     """
     ends = place[:3, 3] + length * place[:3, :3].T

@@ -54,24 +54,24 @@ def view_passes(
         limits: of the timing: where the task has a speed, the tool's trail is coloured by how much
             of them the joints use.
     """
-    robot, laid = along.verdict.robot, along.passes
+    robot, passes = along.verdict.robot, along.passes
     motion = _motion(robot, paths, trajectory)
-    mesh = working_mesh(laid.surface, laid.spacing) if treated is None else treated.mesh
+    mesh = working_mesh(passes.surface, passes.spacing) if treated is None else treated.mesh
     parts, tracks = [surface_layer(mesh)], list[dict[str, Any]]()
     if treated is not None and motion is not None:
-        side, height = laid.surface.side_sign, along.task.standoff
+        side, height = passes.surface.side_sign, along.task.standoff
         painted = painted_layers(treated, side, motion, height)
         parts, tracks = [*parts, *painted.layers], painted.tracks
     if trajectory is not None and motion is not None and limits and along.task.speed is not None:
         trail, more = trail_pieces(
-            motion, 2.0 * THIN * laid.spacing, *painting(trajectory, motion, limits)
+            motion, 2.0 * THIN * passes.spacing, *painting(trajectory, motion, limits)
         )
         parts, tracks = [*parts, *trail], [*tracks, *more]
     parts += _pass_layers(along, paths)
-    count = counted(laid.count, "pass", "passes")
+    count = counted(passes.count, "pass", "passes")
     runs = "one motion" if len(paths) == 1 else f"{len(paths)} motions"
     runs += " over a part" if _left_out(along, paths) else ""
-    text = f"{robot.name}: {count}, {1e3 * laid.spacing:.4g} mm apart, {laid.length:.4g} m"
+    text = f"{robot.name}: {count}, {1e3 * passes.spacing:.4g} mm apart, {passes.length:.4g} m"
     if treated is not None:
         text += f"; treated {share_words(treated)} of the area"
     if trajectory is not None:
