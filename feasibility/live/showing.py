@@ -21,6 +21,7 @@ from feasibility.live.workbench import Workbench
 from feasibility.viewer import HTML, PAGE, File, Served, View, in_notebook, meshcat_program
 
 FILES = Path(__file__).with_name("page")
+SHARED = (PAGE / "picture.css", PAGE / "picture.js")  # with the page of a view
 KINDS = {
     ".html": HTML,
     ".js": "text/javascript; charset=utf-8",
@@ -120,8 +121,10 @@ def live(
 
 def _files(setup: Setup, controls: Controls, drawn: View) -> dict[str, File]:
     """Everything that a page loads."""
-    paths = [*sorted(FILES.iterdir()), PAGE / "picture.css", PAGE / "picture.js"]
-    files = {path.name: File(KINDS[path.suffix], path.read_bytes()) for path in paths}
+    files = {
+        path.name: File(KINDS[path.suffix], path.read_bytes())
+        for path in (*sorted(FILES.iterdir()), *SHARED)
+    }
     described = {
         "name": controls.case.name,
         "robot": setup.robot.name,

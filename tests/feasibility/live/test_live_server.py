@@ -249,7 +249,8 @@ def test_two_pages_have_answers_of_their_own(page, client):
 
 
 def test_the_page_is_whole_and_fetches_nothing_from_elsewhere(page):
-    names = [path.name for path in showing.FILES.iterdir() if path.suffix != ".html"]
+    paths = (*showing.FILES.iterdir(), *showing.SHARED)
+    names = [path.name for path in paths if path.suffix != ".html"]
     texts = {}
     for name in ("", *names, "meshcat.js", "scene", "case.json"):
         with urllib.request.urlopen(page.url + name, timeout=GUARD_S) as reply:
