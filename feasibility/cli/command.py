@@ -88,13 +88,19 @@ def positive(text: str) -> float:
     Raises:
         ArgumentTypeError: the text is something else.
     """
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not (math.isfinite(number) and number > 0.0):
+    found = numbers(text)
+    if len(found) != 1 or not found[0] > 0.0:
         raise argparse.ArgumentTypeError(f"must be a finite number > 0, got {text!r}")
-    return number
+    return found[0]
+
+
+def numbers(text: str) -> list[float]:
+    """Finite numbers with commas between them; none where the text is something else."""
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        return []
+    return found if all(map(math.isfinite, found)) else []
 
 
 @dataclass(frozen=True, slots=True)

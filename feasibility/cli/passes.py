@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from coverable_errors import CoverableError, Fault
-from feasibility.cli.command import STATUS, json_text, positive, write_text
+from feasibility.cli.command import STATUS, json_text, numbers, positive, write_text
 from feasibility.cli.console import print_err, print_out
 from feasibility.safe_files import shown_path
 
@@ -70,13 +70,8 @@ def check_passes(args: argparse.Namespace) -> None:
         missing = "--pitch" if args.pitch is None else "--passes"
         faults.append(Fault(missing, "is missing", expected="--passes and --pitch go together"))
     if args.passes is not None and args.order is not None:
-        faults.append(
-            Fault(
-                "--order",
-                f"got {args.order!r}, but passes have an order of their own",
-                expected="leave it out",
-            )
-        )
+        given = f"got {args.order!r}, but passes have an order of their own"
+        faults.append(Fault("--order", given, expected="leave it out"))
     if args.cross and (args.passes is None or "," in args.passes):
         wanted = "give --passes an angle in degrees, or best"
         faults.append(Fault("--cross", "needs a direction that can be turned", expected=wanted))
@@ -90,14 +85,11 @@ def direction_of(text: str) -> Any:
     Raises:
         CoverableError: the text is neither.
     """
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) == 1 and math.isfinite(numbers[0]):
-        return math.radians(numbers[0])
-    if len(numbers) == 3 and all(map(math.isfinite, numbers)):
-        return numbers
+    found = numbers(text)
+    if len(found) == 1:
+        return math.radians(found[0])
+    if len(found) == 3:
+        return found
     wanted = "must be degrees, or an axis as 1,0,0, or best"
     raise CoverableError(Fault("--passes", f"got {text!r:.60}", expected=wanted))
 

@@ -12,19 +12,13 @@ from feasibility.cli.command import (
     add_command,
     add_html,
     json_text,
+    numbers,
     open_case,
     positive,
     write_text,
 )
 from feasibility.cli.console import print_err, print_out
 from feasibility.cli.passes import add_passes, check_passes, in_runs, passes_asked
-from feasibility.cli.path_outputs import (
-    add_ends,
-    add_programs,
-    approach_of,
-    check_programs,
-    write_path,
-)
 from feasibility.safe_files import shown_path
 
 if TYPE_CHECKING:
@@ -32,22 +26,26 @@ if TYPE_CHECKING:
     from feasibility.cli.command import OpenCase
     from feasibility.paths import CoveragePath
     from feasibility.runs import PlannedPasses
+    from feasibility.task import Task
     from feasibility.timing import MotionLimits, Trajectory
     from feasibility.treated import TreatedArea
     from feasibility.verdict import Verdict
     from feasibility.viewer import View
+    from robots import Robot
 
 ORDERS = ("rows", "columns", "spiral", "shortest", "given")
 STATUSES = "exit status: as of `coverable check`"
 WHY_COMPLETE = "a path needs 'complete': the greedy search does not visit the cells' centres"
 SPEED = 0.1  # [m/s] of the tool point
+PERIOD = 0.02  # [s] between samples
+APPROACH = 0.05  # [m] of entry and exit, where there is a home
 
 
 def add(subcommands: argparse._SubParsersAction) -> None:
     """Add the command."""
     add_command(
         subcommands, "path", path, add_case, add_html, add_passes, _add_timing,
-        add_programs, add_ends,
+        _add_programs, _add_ends,
         help="a coverage motion that an arm can run",
         description="Plan a path over every cell in a chosen order, time it within the limits of "
         "joints and tool, and write it as a trajectory.",
@@ -86,6 +84,45 @@ def _add_timing(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def _add_ends(parser: argparse.ArgumentParser) -> None:
+    """How the surface is approached, and left."""
+    parser.add_argument(
+        "--approach", type=positive, metavar="M",
+        help="begin and end with a straight move of this length along the approach direction, "
+        "from and to task.home_deg where there is one (default 0.05 with a home, else none)",
+    )  # fmt: skip
+
+
+def _add_programs(parser: argparse.ArgumentParser) -> None:
+    """Programs of robot controllers."""
+    parser.add_argument(
+        "--program", metavar="FILE", action="append", default=[],
+        help="write the trajectory as a program: .script (URScript), .mod (ABB RAPID) or .src "
+        "(KUKA KRL); can be repeated",
+    )  # fmt: skip
+    parser.add_argument(
+        "--axis-signs", metavar="S1,..,S6", type=_six,
+        help="of a program: 1 or -1 for each axis of the controller, where its sense is not that "
+        "of the URDF's joint; write --axis-signs=-1,1,1,1,1,1",
+    )  # fmt: skip
+    parser.add_argument(
+        "--axis-offsets-deg", metavar="D1,..,D6", type=_six,
+        help="of a program: degrees that are added to each axis, where its zero is another",
+    )  # fmt: skip
+
+
+def _six(text: str) -> list[float]:
+    """Six finite numbers with commas between them.
+
+    Raises:
+        ArgumentTypeError: the text is something else.
+    """
+    found = numbers(text)
+    if len(found) != 6:
+        raise argparse.ArgumentTypeError(f"must be six numbers with commas, got {text!r:.60}")
+    return found
+
+
 def path(args: argparse.Namespace, began: float) -> int:
     """`coverable path CASE`: a coverage motion in a chosen order, timed and written to files."""
     outputs = {"--html": args.html} | {f"--out[{k}]": out for k, out in enumerate(args.out)}
@@ -112,7 +149,7 @@ def path(args: argparse.Namespace, began: float) -> int:
         for out in args.out:
             check_ending(out)
         robot, loaded = opened.setup.robot, opened.so_far()
-        period = check_programs(args, robot)
+        period = _check_programs(args, robot)
         speed = args.speed = args.speed or opened.setup.task.speed or SPEED
         limits = motion_limits(robot, speed, args.velocity, args.acceleration)
         along = None if args.passes is None else passes_asked(args, opened)
@@ -126,7 +163,7 @@ def path(args: argparse.Namespace, began: float) -> int:
                 opened.progress(0, None, "planning the path")
                 found = coverage_path(verdict, args.order)
                 treated = _treated(opened, along, found)
-                approach, rates = approach_of(args, found.task), path_rates(found)
+                approach, rates = _approach(args, found.task), path_rates(found)
                 ends = None if approach is None else ends_of(found, approach)
                 opened.progress(0, None, "timing the path")
                 run = trajectory(
@@ -145,7 +182,7 @@ def path(args: argparse.Namespace, began: float) -> int:
     else:
         print_out(report.as_text(found, run, limits, more))
     short = report.short_words(treated, opened.setup.task.coverage)
-    write_path(args, robot, run, opened.case.name)
+    _write(args, robot, run, opened.case.name)
     if args.html is not None:
         write_text(args.html, _view(opened, along, found, treated, run, limits).html(), "view")
     if short:
@@ -198,3 +235,45 @@ def _no_path(args: argparse.Namespace, name: str, verdict: Verdict, loaded: floa
     if args.json:
         print_out(json_text(report.no_path_json(verdict, reason, loaded)))
     return STATUS[str(verdict.answer)]
+
+
+def _approach(args: argparse.Namespace, task: Task) -> float | None:
+    """m, length of the moves along the approach direction; None where there are none."""
+    if args.approach is not None or task.home_deg is None:
+        return None if args.approach is None else float(args.approach)
+    return APPROACH
+
+
+def _check_programs(args: argparse.Namespace, robot: Robot) -> float:
+    """Refuse programs that this arm has not, before the search; s between samples.
+
+    Raises:
+        CoverableError: a file's ending is that of no program, or the arm has none of that kind.
+    """
+    from feasibility.programs import check_program, language_of
+
+    languages = [language_of(file) for file in args.program]
+    for language in languages:
+        check_program(language, robot, args.axis_signs, args.axis_offsets_deg)
+    if args.period is not None:
+        return float(args.period)
+    slow = [language.period for language in languages]
+    return PERIOD if args.out or not slow else min(slow)
+
+
+def _write(args: argparse.Namespace, robot: Robot, run: Trajectory, name: str) -> None:
+    """Write the wanted trajectories and programs, and report them on stderr.
+
+    Raises:
+        FileError: a file cannot be written.
+    """
+    for out in args.out:
+        from feasibility.results import save_trajectory
+
+        save_trajectory(out, run)
+        print_err(f"trajectory: {shown_path(out)}")
+    for file in args.program:
+        from feasibility.programs import save_program
+
+        save_program(file, robot, run, name, args.axis_signs, args.axis_offsets_deg)
+        print_err(f"program: {shown_path(file)}")

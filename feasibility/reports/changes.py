@@ -26,9 +26,8 @@ def key(quantity: Quantity) -> str:
     Such as 'task.cone_deg', 'robot.limits_deg.joint1', 'surface.position'.
     """
     if quantity.kind in LIMITS:
-        return (
-            f"robot.limits_{'deg' if quantity.unit == 'rad' else 'm'}.{toml_key(joint(quantity))}"
-        )
+        unit = "deg" if quantity.unit == "rad" else "m"
+        return f"robot.limits_{unit}.{toml_key(joint(quantity))}"
     return {
         Kind.CONE: "task.cone_deg",
         Kind.ROLL: "task.roll_deg",
@@ -48,19 +47,17 @@ def joint(quantity: Quantity) -> str:
 
 def label(quantity: Quantity) -> str:
     """The key, and which of its numbers: 'robot.limits_deg.joint1 (upper)', '... (-y)'."""
-    if quantity.kind in LIMITS:
-        return f"{key(quantity)} ({'lower' if quantity.kind is Kind.LOWER else 'upper'})"
-    if quantity.kind is Kind.SHIFT:
-        return f"{key(quantity)} ({quantity.name.removeprefix('shift along ')})"
-    if quantity.kind is Kind.ROLL:
-        return f"{key(quantity)} (half its range)"
-    if quantity.kind is Kind.TILT:
-        return f"{key(quantity)} ({quantity.name.removeprefix('approach ')})"
-    if quantity.kind is Kind.STANDOFF:
-        return f"{key(quantity)} ({quantity.name.removesuffix(' standoff')})"
     if quantity.kind is Kind.WITHOUT:
         return f"{key(quantity)} {quantity.name}" if quantity.obstacle else quantity.name
-    return key(quantity)
+    which = {
+        Kind.LOWER: "lower",
+        Kind.UPPER: "upper",
+        Kind.SHIFT: quantity.name.removeprefix("shift along "),
+        Kind.ROLL: "half its range",
+        Kind.TILT: quantity.name.removeprefix("approach "),
+        Kind.STANDOFF: quantity.name.removesuffix(" standoff"),
+    }.get(quantity.kind)
+    return f"{key(quantity)} ({which})" if which else key(quantity)
 
 
 def shown(quantity: Quantity, value: float, feasible: bool | None = None) -> str:

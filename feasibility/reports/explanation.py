@@ -6,6 +6,7 @@ import html
 import math
 import re
 import shlex
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from feasibility.collisions import checked, checked_words
@@ -19,13 +20,22 @@ from feasibility.reports.explanation_words import (
     idle_limits,
     in_the_way,
     joint_rows,
+    rates_sentence,
     row_of,
     sentence,
     what_it_opens,
 )
 from feasibility.reports.parts import aligned, filled, framed, page, table, walk_csv
-from feasibility.reports.rates import rates_object, rates_sentence
-from feasibility.sensitivity import Change, Dropped, Explanation, Finding, Quantity, Threshold
+from feasibility.results import plain
+from feasibility.sensitivity import (
+    Change,
+    Dropped,
+    Explanation,
+    Finding,
+    Pair,
+    Quantity,
+    Threshold,
+)
 from feasibility.verdict import Answer, Verdict, Walk
 from feasibility.version import version
 
@@ -53,36 +63,25 @@ def as_text(explanation: Explanation, case_name: str, case: Case | None = None) 
     command = to_try(explanation, case_name, case)
     lines += [f"  try  {command}"] if command else []
     lines += ["", *(filled("  ", text) for text in _findings(explanation))]
-    rows = [row_of(threshold) for threshold in helpful(explanation)]
-    if rows:
-        lines += ["", *_table([FEASIBLE_HEADS if verdict.feasible else HEADS, *rows])]
-    what, joints = joint_rows(explanation)
-    if joints:
-        lines += ["", *_table([(*JOINTS[:2], f"used by {what}"), *joints])]
-    lines += [filled("  ", text) for text in _remarks(explanation)]
+    for heads, rows in _tables(explanation):
+        lines += ["", *_aligned([heads, *rows])]
+    for text in _remarks(explanation):
+        lines += ["", filled("  ", text)]
     return "\n".join([*lines, "", f"  {checked_words(verdict.task.collision)}"])
 
 
 def as_html(explanation: Explanation, case_name: str, view: View, case: Case | None = None) -> str:
     """One page: the most useful change, and tables beside the view of the case as given."""
-    verdict = explanation.verdict
     command = to_try(explanation, case_name, case)
     parts = [f"<p>To try: <code>{html.escape(command)}</code></p>"] if command else []
     parts += [f"<p>{html.escape(text)}</p>" for text in _findings(explanation)]
-    rows = [row_of(threshold) for threshold in helpful(explanation)]
-    if rows:
-        heads = FEASIBLE_HEADS if verdict.feasible else HEADS
+    for heads, rows in _tables(explanation):
         parts.append(table(heads, [map(html.escape, row) for row in rows]))
-    what, joints = joint_rows(explanation)
-    if joints:
-        uses = (*JOINTS[:2], f"used by {what}")
-        parts.append(table(uses, [map(html.escape, row) for row in joints]))
-    parts += [f"<p>{html.escape(text)}</p>" for text in _remarks(explanation) if text]
+    parts += [f"<p>{html.escape(text)}</p>" for text in _remarks(explanation)]
     frame = framed(view, "the case as given")
     body = f'<div class="beside">{frame}<div>{"".join(parts)}</div></div>\n'
-    return page(
-        f"{case_name}: {headline(explanation)}", body, "", explanation.verdict.task.collision
-    )
+    title = f"{case_name}: {headline(explanation)}"
+    return page(title, body, "", explanation.verdict.task.collision)
 
 
 def to_try(explanation: Explanation, case_name: str, case: Case | None = None) -> str:
@@ -92,7 +91,16 @@ def to_try(explanation: Explanation, case_name: str, case: Case | None = None) -
     return shlex.join(["coverable", "check", case_name, *words]) if values else ""
 
 
-def _table(rows: list[Any]) -> list[str]:
+def _tables(explanation: Explanation) -> list[tuple[Sequence[str], list[Sequence[str]]]]:
+    """Headings and rows of each table that is not empty: thresholds, and joints."""
+    heads = FEASIBLE_HEADS if explanation.verdict.feasible else HEADS
+    rows: list[Sequence[str]] = [row_of(threshold) for threshold in helpful(explanation)]
+    what, joints = joint_rows(explanation)
+    tables = [(heads, rows), ((*JOINTS[:2], f"used by {what}"), list[Sequence[str]](joints))]
+    return [(heads, rows) for heads, rows in tables if rows]
+
+
+def _aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Rows with columns of equal width; the last one may be long, and is wrapped."""
     last = [row[-1] for row in rows]
     starts = aligned([tuple(row[:-1]) for row in rows])
@@ -106,7 +114,7 @@ def _findings(explanation: Explanation) -> list[str]:
 
 
 def _remarks(explanation: Explanation) -> list[str]:
-    """What is written below the tables, an empty text before each."""
+    """What is written below the tables."""
     verdict = explanation.verdict
     helps = helpful(explanation)
     opens = [(row_of(t).change, what_it_opens(t, verdict)) for t in helps]
@@ -117,23 +125,24 @@ def _remarks(explanation: Explanation) -> list[str]:
     if not helps and not best_changes(explanation) and explanation.thresholds:
         texts.append("No single change that was tried was found to make it feasible.")
     if explanation.pair is not None:
-        texts.append(_pair(explanation))
+        texts.append(_pair(explanation.pair))
     texts += helpless(explanation)
     if any(t.feasible is not None and t.feasible.unaided is False for t in helps):
-        texts.append(f"{SEEDED} {_from_nearby(verdict)}")
+        texts.append(
+            f"{SEEDED} from a motion nearby, replayed; the search of `check` alone, with seed "
+            f"{verdict.seed}, did not find one there."
+        )
     if explanation.dropped is not None:
         texts.append(_dropped(verdict, explanation.dropped))
     if explanation.left_out:
         texts.append(_unknown(explanation))
-    return [line for text in texts if text for line in ("", text)]
+    return [text for text in texts if text]
 
 
-def _pair(explanation: Explanation) -> str:
+def _pair(pair: Pair) -> str:
     """The two changes that do it together."""
-    if explanation.pair is None:
-        return ""
-    both = " and ".join(map(worded, explanation.pair.changes))
-    waypoints = len(explanation.pair.witness.q)
+    both = " and ".join(map(worded, pair.changes))
+    waypoints = len(pair.witness.q)
     return f"Two changes together make it feasible: {both}; {waypoints:,} waypoints, replayed."
 
 
@@ -142,14 +151,6 @@ def _seeded(alone: Verdict) -> str:
     return (
         f"The motion was found beside the case as given; `check` alone, with seed {alone.seed}, "
         f"says: {alone.answer} ({alone.evidence})."
-    )
-
-
-def _from_nearby(verdict: Verdict) -> str:
-    """What the mark behind a threshold means."""
-    return (
-        "from a motion nearby, replayed; the search of `check` alone, with seed "
-        f"{verdict.seed}, did not find one there."
     )
 
 
@@ -170,8 +171,8 @@ def witnesses(explanation: Explanation) -> dict[str, str]:
     found: dict[str, str] = {}
     for name, walk in walks:
         if walk is not None:
-            plain = name.replace("+", "plus ").replace("-", "minus ")
-            slug = re.sub(r"[^a-z0-9_]+", "-", plain.lower()).strip("-")
+            words = name.replace("+", "plus ").replace("-", "minus ")
+            slug = re.sub(r"[^a-z0-9_]+", "-", words.lower()).strip("-")
             slug += f"-{len(found)}" if not slug or f"{slug}.csv" in found else ""
             found[f"{slug}.csv"] = walk_csv(explanation.verdict.robot, walk)
     return found
@@ -219,8 +220,8 @@ def as_json(explanation: Explanation, case_name: str, case: Case | None = None) 
             "set": settings(best_changes(explanation), verdict, case),
         },
         "pair": explanation.pair and [_change(change) for change in explanation.pair.changes],
-        "joints": _joints(explanation),
-        "rates": rates_object(explanation),
+        "joints": [dict(zip(JOINTS, row, strict=True)) for row in joint_rows(explanation)[1]],
+        "rates": _rates(explanation),
         "not_looked_at": list(explanation.left_out),
         "dropped": dropped
         and {
@@ -241,18 +242,27 @@ def as_json(explanation: Explanation, case_name: str, case: Case | None = None) 
 def _change(change: Change) -> dict[str, Any]:
     """One of two changes as an object; keys say the unit."""
     quantity = change.quantity
-    given = _number(quantity, "given", quantity.given)
     return {
         "quantity": quantity.name,
         "key": key(quantity),
-        **given,
+        **_number(quantity, "given", quantity.given),
         **_number(quantity, "value", change.value),
     }
 
 
-def _joints(explanation: Explanation) -> list[dict[str, str]]:
-    """The limits of each joint, and the range that the motion uses, in words."""
-    return [dict(zip(JOINTS, row, strict=True)) for row in joint_rows(explanation)[1]]
+def _rates(explanation: Explanation) -> dict[str, Any] | None:
+    """Largest speed and smallest singular value; null where they are not known."""
+    rates = explanation.rates
+    if rates is None:
+        return None
+    places = [stop.why for stop in rates.witness.stops]
+    return {
+        "largest_speed_m_per_s": plain(rates.largest),
+        "witness_speed_m_per_s": plain(rates.witness.speed),
+        "min_singular_value": plain(rates.witness.sigma),
+        "stops_in_place": places.count("in place"),
+        "corners": places.count("corner"),
+    }
 
 
 def _threshold(threshold: Threshold, verdict: Verdict) -> dict[str, Any]:

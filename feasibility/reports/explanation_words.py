@@ -13,6 +13,7 @@ from feasibility.cut_words import what_opens
 from feasibility.reports.changes import LIMITS, label, shown, worded
 from feasibility.sensitivity import Change, Explanation, Finding, Kind, Quantity, Threshold
 from feasibility.verdict import Evidence, Verdict
+from robots import Kinematics
 
 SEEDED = "[1]"  # behind thresholds that a search without known motions did not find
 SPARE = 1.0 / 3.0  # [1] of a joint's range: a limit that may tighten by more does not matter
@@ -126,6 +127,38 @@ def idle_limits(explanation: Explanation) -> str:
     ]
     names = _joints(explanation.verdict, idle)
     return f"Limits that do not matter: {', '.join(names)}." if names else ""
+
+
+def rates_sentence(explanation: Explanation) -> str:
+    """How fast the tool may be, and how near singularities the motion comes; empty if not known."""
+    rates, asked = explanation.rates, explanation.asked
+    if rates is None:
+        return ""
+    text = ""
+    if math.isfinite(rates.largest):
+        text = (
+            f"Inside the joints' velocities a motion over all cells may have up to "
+            f"{rates.largest:.3g} m/s all along, but for stops in place and at corners"
+        )
+        if asked is not None and asked.speed is not None:
+            enough = "enough" if rates.largest >= asked.speed else "too little"
+            text += f" ({asked.speed:g} m/s is required: {enough}; no threshold above requires it)"
+        if rates.witness.speed < rates.largest:
+            text += f"; the covering motion above {rates.witness.speed:.3g} m/s"
+        text += ". "
+    least = f"smallest singular value is at least {rates.witness.sigma:.3g}, near cell"
+    return f"{text}The covering motion's {least} {_nearest_singular(explanation)}."
+
+
+def _nearest_singular(explanation: Explanation) -> str:
+    """The cell at which the covering motion is nearest to a singularity."""
+    verdict, rates = explanation.verdict, explanation.rates
+    if verdict.witness is None or rates is None or not len(rates.witness.segment.sampled_sigma):
+        return str(list(verdict.cells.unravel(0)))
+    row = int(np.argmin(rates.witness.segment.sampled_sigma))
+    point, _ = Kinematics(verdict.robot).tool(verdict.witness.q[row])
+    off = np.linalg.norm(verdict.task.targets(verdict.cells).points - point, axis=1)
+    return str(list(verdict.cells.unravel(int(off.argmin()))))
 
 
 def in_the_way(explanation: Explanation) -> list[str]:

@@ -21,7 +21,6 @@ LOST: Colour = (0.84, 0.12, 0.12)
 class Sides:
     """Where the cells are reached."""
 
-    cut: Cut
     labels: NDArray[np.int64]
     """(N,) `BELOW`, `ABOVE`, `BOTH`; -1 where no motion was found that reaches the cell."""
     lost: tuple[int, ...]
@@ -57,7 +56,7 @@ def sides_of(verdict: Verdict) -> Sides | None:
     words = (f"below {place} only", upper, "on both sides")
     named = [f"{word} ({count})" for word, count in zip(words, counts, strict=True)]
     lost = tuple(dict.fromkeys(leaf.cell for leaf in proof.leaves()))
-    return Sides(cut, labels, lost, (named[0], named[1], named[2]), _lost_name(verdict, cut, lost))
+    return Sides(labels, lost, (named[0], named[1], named[2]), _lost_name(verdict, cut, lost))
 
 
 def _lost_name(verdict: Verdict, cut: Cut, lost: tuple[int, ...]) -> str:

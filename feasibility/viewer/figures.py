@@ -7,6 +7,7 @@ without a display and beside whatever else a notebook draws. `figure.savefig("g.
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -18,11 +19,13 @@ from feasibility.placement import AXES, PlacementMap, Placements
 from feasibility.verdict import Verdict
 from feasibility.viewer.cut_sides import COLOURS, LOST, sides_of
 from feasibility.viewer.scene import CENTRES, EDGES, MISSED, START, missed_groups
+from feasibility.viewer.threejs import Colour
 from robots import Kinematics
 from surfaces import Cells
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
 
 Array = NDArray[np.float64]
 
@@ -77,9 +80,6 @@ def plot_causes(verdict: Verdict, title: str | None = None) -> Plot:
         verdict: of either method.
         title: above the figure, before the verdict; default names the arm and the surface.
     """
-    from matplotlib.collections import PolyCollection
-    from matplotlib.patches import Patch
-
     figure, axes = _over_parameters(verdict, title)
     outlines = verdict.cells.unrolled().outlines
     groups = [("covered", COVERED, np.flatnonzero(verdict.covered))]
@@ -87,9 +87,7 @@ def plot_causes(verdict: Verdict, title: str | None = None) -> Plot:
         groups.append((missed.words, missed.colour, missed.which))
     handles = []
     for words, colour, cells in groups:
-        shapes = [outlines[k] for k in cells]
-        axes.add_collection(PolyCollection(shapes, facecolors=[colour], edgecolors="w"))
-        handles.append(Patch(color=colour, label=f"{words} ({len(cells)})"))
+        handles.append(_fill(axes, outlines, cells, colour, f"{words} ({len(cells)})"))
     _mark_start(axes, verdict)
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False)
     return figure
@@ -105,9 +103,6 @@ def plot_sides(verdict: Verdict, title: str | None = None) -> Plot:
     Raises:
         ArgumentError: its proof is no cut.
     """
-    from matplotlib.collections import PolyCollection
-    from matplotlib.patches import Patch
-
     sides = sides_of(verdict)
     if sides is None:
         raise ArgumentError("sides are drawn of a verdict whose proof is a cut")
@@ -120,9 +115,7 @@ def plot_sides(verdict: Verdict, title: str | None = None) -> Plot:
         label, colour = k if k < len(COLOURS) else -1, colours[k]
         which = np.flatnonzero(sides.labels == label)
         if len(which):
-            shapes = [outlines[k] for k in which]
-            axes.add_collection(PolyCollection(shapes, facecolors=[colour], edgecolors="w"))
-            handles.append(Patch(color=colour, label=words))
+            handles.append(_fill(axes, outlines, which, colour, words))
     x, y = centres[list(sides.lost)].T
     handles.append(axes.scatter(x, y, s=40, marker="D", color=[LOST], label=sides.lost_name))
     figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
@@ -224,6 +217,18 @@ def in_short(verdict: Verdict) -> str:
     """The verdict in a few words: 'infeasible, 60 of 90 cells, 194 edges'."""
     covered = f"{verdict.n_covered} of {len(verdict.cells)} cells"
     return f"{verdict.answer}, {covered}, {verdict.n_edges} edges"
+
+
+def _fill(
+    axes: Axes, outlines: Sequence[Array], cells: NDArray[np.int64], colour: Colour, label: str
+) -> Patch:
+    """Fill some cells (k,); returns their line of the legend."""
+    from matplotlib.collections import PolyCollection
+    from matplotlib.patches import Patch
+
+    shapes = [outlines[k] for k in cells]
+    axes.add_collection(PolyCollection(shapes, facecolors=[colour], edgecolors="w"))
+    return Patch(color=colour, label=label)
 
 
 def _mark_start(axes: Axes, verdict: Verdict) -> None:

@@ -66,7 +66,7 @@ def draw_nearest(
         tracks.append(threejs.shown(path, times, found.which == number))
     names = tuple(" and ".join(found.pairs[k].names) for k in found.which)
     entry = Entry("nearest pair of bodies, and the line between them", LINE, ROOT)
-    layer = Layer(tuple(commands), entry, len(found.pairs))
+    layer = Layer(tuple(commands), entry)
     return NearestDrawn(layer, tracks, np.round(1e3 * found.distances, 2).tolist(), names)
 
 

@@ -44,11 +44,11 @@ def scene_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
         path = f"{groups[seat.joint] if seat.joint else ''}/scene/{number} {name}"
         lines = threejs.segments(f"{path}/edges", _edges(mesh), EDGES)
         drawn = (_command(f"{path}/body", mesh), lines)
-        parts.append(Layer(drawn, Entry(seat.obstacle.name, SCENE, path), 1))
+        parts.append(Layer(drawn, Entry(seat.obstacle.name, SCENE, path)))
     if len(parts) <= MOST_ENTRIES:
         return parts
     every = tuple(command for part in parts for command in part.commands)
-    return [Layer(every, Entry(f"scene ({len(parts)} objects)", SCENE, "/scene"), len(parts))]
+    return [Layer(every, Entry(f"scene ({len(parts)} objects)", SCENE, "/scene"))]
 
 
 def tool_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
@@ -61,7 +61,7 @@ def tool_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
         _command(f"{path}/{number}", moved(_shape(solid.geometry, TOOLS, 1.0), solid.placement))
         for number, solid in enumerate(solids)
     )
-    return [Layer(commands, Entry("mounted tool", TOOLS, path), len(solids))]
+    return [Layer(commands, Entry("mounted tool", TOOLS, path))]
 
 
 def hull_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
@@ -77,7 +77,7 @@ def hull_layers(bodies: Bodies, robot: Robot) -> list[Layer]:
     if not commands:
         return []
     label = f"convex bodies of the search ({len(commands)})"
-    return [hidden(Layer(tuple(commands), Entry(label, CONVEX, HULLS), len(commands)))]
+    return [hidden(Layer(tuple(commands), Entry(label, CONVEX, HULLS)))]
 
 
 def points_of(scene: Sequence[Obstacle], robot: Robot) -> Array:

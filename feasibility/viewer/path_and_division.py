@@ -194,7 +194,7 @@ def trail_pieces(
         commands[band].append(threejs.mesh(path, vertices, faces, bands[band][1], lit=False))
         tracks.append(threejs.appearing(path, stop, end))
     layers = [
-        Layer(tuple(made), Entry(name, colour, path), len(made))
+        Layer(tuple(made), Entry(name, colour, path))
         for made, (_, colour, name, path) in zip(commands, bands, strict=True)
         if made
     ]

@@ -17,7 +17,6 @@ from coverable_errors import counted
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import marks, patch
-from feasibility.viewer.html_page import Entry
 from feasibility.viewer.meshes import tubes
 from feasibility.viewer.playback import Motion
 from feasibility.viewer.scene import (
@@ -27,6 +26,7 @@ from feasibility.viewer.scene import (
     cells_layers,
     filled,
     hidden,
+    mesh_layer,
     trail,
 )
 from feasibility.viewer.threejs import Colour
@@ -174,12 +174,12 @@ def class_layers(lines: Array, tried: Sequence[Tried]) -> list[Layer]:
             some = _spread(poses)
             if len(some) < len(poses):
                 number = f"{len(some)} of {len(poses)} drawn"
-            command = _thick(path, lines, some, COLOURS[kind])
+            shape = _thick(lines, some)
         else:
             middle = (lines.min(axis=(0, 1)) + lines.max(axis=(0, 1))) / 2.0
             dots = np.array([placed(middle, pose) for pose in poses])
-            command = threejs.mesh(path, *marks(dots, DOT * _size(lines)), COLOURS[kind], lit=False)
-        layer = Layer((command,), Entry(f"{kind} ({number})", COLOURS[kind], path), len(poses))
+            shape = marks(dots, DOT * _size(lines))
+        layer = mesh_layer(f"{kind} ({number})", COLOURS[kind], path, *shape, lit=False)
         parts.append(layer if kind is Class.FEASIBLE else hidden(layer))
     return parts
 
@@ -190,13 +190,12 @@ def _spread(poses: Sequence[Pose]) -> list[Pose]:
     return [poses[int(k)] for k in chosen]
 
 
-def _thick(path: str, lines: Array, poses: Sequence[Pose], colour: Colour) -> threejs.Command:
-    """Segments (k, 2, 3) m as tubes, at every pose."""
-    size = float(np.linalg.norm(np.ptp(lines.reshape(-1, 3), axis=0)))
-    vertices, faces = tubes(list(lines), THICK * size, sides=4)
+def _thick(lines: Array, poses: Sequence[Pose]) -> tuple[Array, NDArray[np.int64]]:
+    """Segments (k, 2, 3) m as tubes, at every pose: vertices and faces."""
+    vertices, faces = tubes(list(lines), THICK * _size(lines.reshape(-1, 3)), sides=4)
     every = np.concatenate([placed(vertices, pose) for pose in poses])
     first = len(vertices) * np.arange(len(poses))[:, None, None]
-    return threejs.mesh(path, every, (faces + first).reshape(-1, 3), colour, lit=False)
+    return every, (faces + first).reshape(-1, 3)
 
 
 def outline(cells: Cells) -> Array:

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from coverable_errors import counted
 from feasibility.verdict import Cause, CauseKind, Verdict
@@ -70,8 +71,20 @@ class Layer:
 
     commands: tuple[Command, ...]
     entry: Entry
-    count: int
-    """Cells or edges in it."""
+
+
+def mesh_layer(
+    label: str, colour: Colour, path: str, vertices: ArrayLike, faces: ArrayLike, **looks: Any
+) -> Layer:
+    """Triangles of one colour with a line of the legend; `looks` as in `threejs.mesh`."""
+    command = threejs.mesh(path, vertices, faces, colour, **looks)
+    return Layer((command,), Entry(label, colour, path))
+
+
+def lines_layer(label: str, colour: Colour, path: str, ends: NDArray[np.float64]) -> Layer:
+    """Line segments (..., 2, 3) m with a line of the legend."""
+    command = threejs.segments(path, ends.reshape(-1, 3), colour)
+    return Layer((command,), Entry(label, colour, path))
 
 
 def layers(verdict: Verdict) -> list[Layer]:
@@ -105,31 +118,27 @@ def side_layers(cells: Cells, sides: Sides) -> list[Layer]:
         if len(which):
             path = f"/cut/{threejs.safe_name(name)}"
             parts.append(filled(cells, which, colour, path, name))
-    path = "/cut/proved"
     lost = np.array(sides.lost, dtype=np.int64)
-    vertices, faces = marks(cells.centres[lost], LOST_SIZE * cell_size(cells))
-    dots = threejs.mesh(path, vertices, faces, LOST, lit=False)
-    parts.append(Layer((dots,), Entry(sides.lost_name, LOST, path), len(lost)))
-    return parts
+    dots = marks(cells.centres[lost], LOST_SIZE * cell_size(cells))
+    return [*parts, mesh_layer(sides.lost_name, LOST, "/cut/proved", *dots, lit=False)]
 
 
 def cells_layers(cells: Cells) -> list[Layer]:
     """The surface, shaded and half transparent, the borders of its cells, and their centres."""
     count, path = len(cells), "/surface/patch"
     if count == 0:
-        return [Layer((), Entry("surface", SURFACE, path), 0)]
+        return [Layer((), Entry("surface", SURFACE, path))]
     vertices, faces, normals = patch(cells, np.arange(count))
-    shape = threejs.mesh(path, vertices, faces, SURFACE, normals=normals, opacity=0.45)
-    parts = [Layer((shape,), Entry("surface", SURFACE, path), count)]
-    path = "/surface/cell outlines"
-    lines = threejs.segments(path, borders(cells).reshape(-1, 3), OUTLINES)
+    looks = {"normals": normals, "opacity": 0.45}
     grid = f" ({' x '.join(map(str, cells.shape))})" if len(cells.shape) > 1 else ""
-    parts.append(Layer((lines,), Entry(counted(count, "cell") + grid, OUTLINES, path), count))
+    label, path_of_lines = counted(count, "cell") + grid, "/surface/cell outlines"
+    parts = [
+        mesh_layer("surface", SURFACE, path, vertices, faces, **looks),
+        lines_layer(label, OUTLINES, path_of_lines, borders(cells)),
+    ]
     if count <= FULL_DETAIL:
-        path = "/surface/cell centres"
-        vertices, faces = marks(cells.centres, 0.035 * cell_size(cells))
-        dots = threejs.mesh(path, vertices, faces, CENTRES, lit=False)
-        parts.append(Layer((dots,), Entry("cell centres", CENTRES, path), count))
+        dots, path = marks(cells.centres, 0.035 * cell_size(cells)), "/surface/cell centres"
+        parts.append(mesh_layer("cell centres", CENTRES, path, *dots, lit=False))
     return parts
 
 
@@ -143,15 +152,13 @@ def _frames(verdict: Verdict) -> Iterator[Layer]:
     length, path = ARROW * cell_size(cells), "/surface/approach directions"
     if references is not None or not task.along_normals(cells):
         # It ends at the target, and comes from where the tool is.
-        ends = np.stack([points - length * approaches, points], axis=1).reshape(-1, 3)
-        lines = threejs.segments(path, ends, APPROACH)
-        yield Layer((lines,), Entry("approach directions", APPROACH, path), len(cells))
+        ends = np.stack([points - length * approaches, points], axis=1)
+        yield lines_layer("approach directions", APPROACH, path, ends)
     if references is not None and task.roll_deg is not None:
         path = "/surface/roll references"
-        ends = np.stack([points, points + length * references], axis=1).reshape(-1, 3)
+        ends = np.stack([points, points + length * references], axis=1)
         label = "roll 0 (allowed {:g} to {:g} deg)".format(*task.roll_deg)
-        lines = threejs.segments(path, ends, REFERENCE)
-        yield Layer((lines,), Entry(label, REFERENCE, path), len(cells))
+        yield lines_layer(label, REFERENCE, path, ends)
 
 
 def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) -> list[Layer]:
@@ -182,17 +189,14 @@ def filled(
 ) -> Layer:
     """Some cells filled with a colour, smaller by `inset` of their size."""
     vertices, faces, _ = patch(cells, which, inset=inset)
-    command = threejs.mesh(path, vertices, faces, colour, opacity=0.85, lit=False)
-    return Layer((command,), Entry(label, colour, path), len(which))
+    return mesh_layer(label, colour, path, vertices, faces, opacity=0.85, lit=False)
 
 
 def drawn_lines(
     lines: Sequence[NDArray[np.float64]], radius: float, colour: Colour, path: str, label: str
 ) -> Layer:
     """Polylines, (k, 3) m each, as tubes."""
-    vertices, faces = tubes(lines, radius)
-    command = threejs.mesh(path, vertices, faces, colour, lit=False)
-    return Layer((command,), Entry(label, colour, path), len(lines))
+    return mesh_layer(label, colour, path, *tubes(lines, radius), lit=False)
 
 
 def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
@@ -268,8 +272,7 @@ def _graph(verdict: Verdict) -> Iterator[Layer]:
         yield drawn_lines(list(lines), 0.022 * cell_size(verdict.cells), EDGES, path, label)
     else:
         ends = np.stack([lines[:, :-1], lines[:, 1:]], axis=2)
-        command = threejs.segments(path, ends.reshape(-1, 3), EDGES)
-        yield Layer((command,), Entry(label, EDGES, path), len(lines))
+        yield lines_layer(label, EDGES, path, ends)
 
 
 def _start(verdict: Verdict) -> Iterator[Layer]:
@@ -281,8 +284,7 @@ def _start(verdict: Verdict) -> Iterator[Layer]:
     path = f"/graph/start, cell {verdict.start}"
     ball = trimesh.creation.icosphere(subdivisions=2, radius=0.1 * cell_size(verdict.cells))
     centre = verdict.task.targets(verdict.cells).points[verdict.start]
-    command = threejs.mesh(path, ball.vertices + centre, ball.faces, START)
-    yield Layer((command,), Entry("start cell", START, path), 1)
+    yield mesh_layer("start cell", START, path, ball.vertices + centre, ball.faces)
 
 
 def missed_layer(cells: Cells, group: Missed) -> Layer:

@@ -2,7 +2,7 @@
 
 const AXES = ["x", "y", "z"];
 const ANGLES = ["roll", "pitch", "yaw"];
-const FREE = 360; // degrees at which the sliders of a joint without limits stand
+const FREE = 360; // degrees that the sliders of a joint without limits show
 
 function made(kind, properties, parent) {
   const element = document.createElement(kind);
@@ -25,12 +25,12 @@ class Dial {
     this.number = made("input", {type: "number", id: `${id}-number`, ...common}, row);
     // Arrow keys go by whole steps from wherever the value is.
     this.slider.addEventListener("keydown", (event) => {
-      const ways = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10,
+      const counts = {ArrowLeft: -1, ArrowDown: -1, ArrowRight: 1, ArrowUp: 1, PageDown: -10,
         PageUp: 10};
-      const way = ways[event.key];
-      if (way === undefined) return;
+      const count = counts[event.key];
+      if (count === undefined) return;
       event.preventDefault();
-      const next = Number(this.slider.value) + way * step * (event.shiftKey ? 10 : 1);
+      const next = Number(this.slider.value) + count * step * (event.shiftKey ? 10 : 1);
       moved(Math.min(Math.max(next, low), high), !event.repeat);
       this.pressed = true;
     });
@@ -111,7 +111,7 @@ export class Panel {
     });
   }
 
-  // Change some values, and tell whoever listens.
+  // Change some values, and report them.
   change(write, done) {
     const values = structuredClone(this.values);
     write(values);

@@ -52,12 +52,8 @@ export class Handle {
     const rod = new THREE.CylinderGeometry(0.025, 0.025, 0.8, 12).translate(0, 0.4, 0);
     const tip = new THREE.ConeGeometry(0.085, 0.25, 20).translate(0, 0.92, 0);
     const wide = new THREE.CylinderGeometry(0.11, 0.11, 0.9, 8).translate(0, 0.62, 0);
-    for (const geometry of [rod, tip]) {
-      this.add(name, geometry.applyQuaternion(turn), null, COLOURS[k]);
-    }
-    const hold = grip(name, wide.applyQuaternion(turn));
-    this.grips.push(hold);
-    this.body.add(hold);
+    this.add(name, rod.applyQuaternion(turn), wide.applyQuaternion(turn), COLOURS[k]);
+    this.add(name, tip.applyQuaternion(turn), null, COLOURS[k]);
   }
 
   add(name, seen, wide, colour) {
@@ -104,7 +100,7 @@ export class Handle {
     return hits.find((name) => name !== "yaw") || hits[0] || null;
   }
 
-  // Where the pointer is as a number or a point, in the way that the held part moves.
+  // Where the pointer is as a number or a point, as the held part moves.
   measure(event) {
     const ray = this.ray(event), {centre, name} = this.held;
     if (name === "level" || name === "yaw") {
@@ -118,9 +114,9 @@ export class Handle {
     // The point of the axis that is nearest to the ray.
     const axis = AXES[["x", "y", "z"].indexOf(name)];
     const between = centre.clone().sub(ray.origin), b = axis.dot(ray.direction);
-    const bent = 1 - b * b;
-    if (bent < 1e-4) return null; // along the line of sight
-    const along = (b * between.dot(ray.direction) - between.dot(axis)) / bent;
+    const apart = 1 - b * b;
+    if (apart < 1e-4) return null; // along the line of sight
+    const along = (b * between.dot(ray.direction) - between.dot(axis)) / apart;
     return axis.clone().multiplyScalar(along);
   }
 

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.area import percent_down
-from feasibility.viewer import threejs
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry, Readout
 from feasibility.viewer.playback import Motion
-from feasibility.viewer.scene import Layer
+from feasibility.viewer.scene import Layer, mesh_layer
 from feasibility.viewer.threejs import Colour
 from robots import Kinematics, Robot
 from surfaces.cell_tiles import cell_tiles
@@ -47,13 +46,12 @@ def certified_layer(
     cut = cell_tiles(cells, height)
     count, label = len(area.areas), f"{name} ({percent_down(share)})"
     if cut is None or not count:
-        return Layer((), Entry(label, colour, path), 0)
+        return Layer((), Entry(label, colour, path))
     weights, faces = _triangle() if area.tiles.corners.shape[1] == 3 else _square()
     x = np.einsum("wc,kci->kwi", weights, area.tiles.corners).reshape(-1, 2)
     vertices, normals = cut.offset.at(Places(np.repeat(area.tiles.chart, len(weights)), x))
     every = (faces + len(weights) * np.arange(count)[:, None, None]).reshape(-1, 3)
-    command = threejs.mesh(path, vertices, every, colour, normals=normals, opacity=0.55)
-    return Layer((command,), Entry(label, colour, path), count)
+    return mesh_layer(label, colour, path, vertices, every, normals=normals, opacity=0.55)
 
 
 def _triangle() -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -12,7 +12,7 @@ from feasibility.treated import TreatedArea
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from feasibility.viewer.playback import Motion
-from feasibility.viewer.scene import SURFACE, Layer
+from feasibility.viewer.scene import SURFACE, Layer, mesh_layer
 from feasibility.viewer.threejs import Colour, Command
 from surfaces.passes import WorkingMesh
 
@@ -38,9 +38,7 @@ class Painted(NamedTuple):
 
 def surface_layer(mesh: WorkingMesh) -> Layer:
     """The surface itself."""
-    path = "/surface/itself"
-    command = threejs.mesh(path, mesh.vertices, mesh.faces, SURFACE, opacity=0.6)
-    return Layer((command,), Entry("surface", SURFACE, path), 1)
+    return mesh_layer("surface", SURFACE, "/surface/itself", mesh.vertices, mesh.faces, opacity=0.6)
 
 
 def area_layers(found: TreatedArea, side: float) -> list[Layer]:
@@ -100,12 +98,12 @@ def _layers(
                 commands.append(_faces(mesh, group[own], lift, colour, path))
                 paths.append((path, k))
         if commands:
-            layers.append(Layer(tuple(commands), Entry(name, colour, root), len(commands)))
+            layers.append(Layer(tuple(commands), Entry(name, colour, root)))
     missed = np.flatnonzero(times == 0)
     if len(missed):
         path, name = "/treated/untreated", f"untreated ({100.0 * (1.0 - found.lower):.2g} %)"
         command = _faces(mesh, missed, lift, UNTREATED, path)
-        layers.append(Layer((command,), Entry(name, UNTREATED, path), 1))
+        layers.append(Layer((command,), Entry(name, UNTREATED, path)))
     return layers, paths
 
 

@@ -6,14 +6,24 @@ import numpy as np
 import pytest
 from cut_verdicts import ONE_CUT, TWO_CUTS, cut_verdict, explored
 from fabricated import DOME, verdict_on
+from numpy.typing import NDArray
 
 from feasibility.cut_tree import CutTree, Leaf
 from feasibility.cut_words import sentence
 from feasibility.roadmap.graph import NODES
 from feasibility.viewer import plot_sides, view
 from feasibility.viewer.cut_sides import ABOVE, BELOW, BOTH, COLOURS, sides_of
-from feasibility.viewer.scene import layers
+from feasibility.viewer.scene import Layer, layers
+from feasibility.viewer.threejs import numbers_of
 from robots import load_robot
+
+
+def drawn(layer: Layer) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """The vertices (V, 3) m and faces (F, 3) of a layer of one object."""
+    (command,) = layer.commands
+    data = command["object"]["geometries"][0]["data"]
+    points = numbers_of(data["attributes"]["position"]).reshape(-1, 3)
+    return points, numbers_of(data["index"]).reshape(-1, 3).astype(np.int64)
 
 
 @pytest.mark.parametrize("number", [ONE_CUT, TWO_CUTS])
@@ -52,8 +62,14 @@ def test_the_view_has_both_sides_with_a_legend() -> None:
     for k, (name, colour) in enumerate(zip(sides.names, COLOURS, strict=True)):
         assert parts[name].entry.colour == colour
         assert parts[name].entry.shown
-        assert parts[name].count == (sides.labels == k).sum() > 0
-    assert parts[sides.lost_name].count == 2
+        points, faces = drawn(parts[name])
+        shown = verdict.cells.locate(points[faces].mean(axis=1))
+        assert set(shown.tolist()) == set(np.flatnonzero(sides.labels == k).tolist())
+        assert len(shown)
+    marks, _ = drawn(parts[sides.lost_name])
+    lost = verdict.cells.centres[list(sides.lost)]
+    assert len(lost) == 2
+    np.testing.assert_allclose(marks.reshape(2, 6, 3).mean(axis=1), lost, atol=1e-4)
     (missed,) = [layer for name, layer in parts.items() if name.startswith("not covered")]
     assert not missed.entry.shown  # these cells are in the colour of their side
     page = view(verdict, "apart").html()
