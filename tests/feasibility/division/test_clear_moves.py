@@ -181,7 +181,7 @@ def test_the_reports_follow_the_move() -> None:
     assert said["nearest_pair"] == list(move.replayed.nearest_pair or ())
     assert found["patches"][0]["certificate"]["min_clearance_m"] >= 0.0
     text = " ".join(as_text(division, "behind").split())
-    assert f"by way of {len(move.via)} configuration" in text
+    assert f"through {len(move.via)} configuration" in text
     assert f"bodies at least {1e3 * (move.replayed.min_clearance or 0):.3g} mm apart" in text
 
 

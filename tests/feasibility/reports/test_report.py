@@ -138,7 +138,7 @@ def test_text_groups_the_causes():
         "    [0, 1] detail 1",
         "    [0, 2] detail 2",
         "    ... and 2 more (--json lists all)",
-        "  1 cell: orientation (the tool cannot be held as asked)",
+        "  1 cell: orientation (the tool cannot be held as required)",
         "    [1, 3] detail 7",
     ]
     hints = text[text.index("To try next:") :]

@@ -103,7 +103,7 @@ def test_a_case_says_it(tmp_path, capsys):
     assert main(["check", "paper/4a", *settings, "--save", saved]) == 0
     said = " ".join(capsys.readouterr().out.split())
     assert "The tool can have 0.25 m/s all along it" in said
-    assert "(asked 0.25)" in said
+    assert "(required 0.25)" in said
     assert load_result(saved).verdict.certificate.max_speed > 0.25
     assert main(["verify", saved]) == 0
     assert main(["check", "paper/4a", "--set", "task.speed=1e4"]) == 2
