@@ -80,7 +80,7 @@ class JSpace:
         search: Search | None = None,
         steps: Steps | None = None,
     ) -> None:
-        """Lay the grid of J-cells through `start` (n,).
+        """The grid of J-cells through `start` (n,).
 
         Args:
             robot: the arm.
@@ -101,11 +101,11 @@ class JSpace:
         size, triangles = self.steps.size, self.steps.triangles
         self._chain, self._cells = robot.chain, cells
         self._place: tuple[PatchKernel | None, TriangleKernel | None] = (
-            None if triangles is not None else _patch_kernel(cells),
+            cells.patch_kernel if triangles is None and isinstance(cells, GridCells) else None,
             None if triangles is None else triangles.kernel,
         )
         approach, reference = task.fixed_approach(cells), task.fixed_reference(cells)
-        room, cosine = self.steps.tolerance - self.steps.sag, self.steps.cone_cosine
+        margin, cosine = self.steps.tolerance - self.steps.sag, self.steps.cone_cosine
         self._points = task.targets(cells).points
         cap = search.cap or round(CAP * max(1.0, CAP_STEP_DEG / search.step_deg))
         self._cap = min(cap, MOST_JCELLS)
@@ -119,7 +119,7 @@ class JSpace:
             moves_all=search.moves == "all",
             side=float(cells.surface.side_sign),
             height=float(cells.surface.side_sign) * task.standoff,
-            tolerance=_least(room) if triangles is None else np.append(room, _least(room)),
+            tolerance=_least(margin) if triangles is None else np.append(margin, _least(margin)),
             cone_cosine=-_least(-cosine)
             if triangles is None
             else np.append(cosine, -_least(-cosine)),
@@ -201,11 +201,6 @@ class JSpace:
             checked=int(counters[jcells.NODES]) - 1,
             fk=float(counters[jcells.PLACED]) / memory.nodes.shape[1],
         )
-
-
-def _patch_kernel(cells: Cells) -> PatchKernel | None:
-    """The closed form of a grid."""
-    return cells.patch_kernel if isinstance(cells, GridCells) else None
 
 
 def _least(values: NDArray[np.float64]) -> float:

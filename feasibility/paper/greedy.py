@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock
@@ -24,7 +24,6 @@ from feasibility.paper.tree_replay import Path, replay_tree
 from feasibility.problem import Problem
 from feasibility.search import Search
 from feasibility.verdict import Cause, CauseKind, Replay
-from robots import Robot
 
 KNOWS_NO_COLLISIONS = (
     "the greedy search, which is the paper's, knows no collisions: leave out [collision], or take "
@@ -111,7 +110,7 @@ def greedy_search(
 
 
 def _found(problem: Problem, search: Search, steps: Steps, run: _Run) -> Found:
-    """The best tree, and what is to be said of it."""
+    """The best tree, and its wording."""
     cells, best, count = problem.cells, run.best, len(problem.cells)
     settings = (
         f"{search.moves} moves of {search.step_deg:g} degrees, tolerance "
@@ -179,8 +178,8 @@ def _why_not(run: _Run, steps: Steps, count: int) -> str:
     words, closed = _touched(run, count), count - int(usable.sum())
     if closed:
         words += (
-            f"; over {closed} of them, where the surface is creased or bends most, the step is too "
-            f"coarse for {steps.allowed}"
+            f"; over {closed} of them, where the surface is creased or most curved, the step is "
+            f"too coarse for {steps.allowed}"
         )
     if steps.barred:
         words += (
@@ -190,15 +189,10 @@ def _why_not(run: _Run, steps: Steps, count: int) -> str:
     return words
 
 
-def _beyond(robot: Robot, points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """How far (k,) m points (k, 3) lie beyond the arm's reach; negative inside it."""
-    return robot.distance_from_base(points) - robot.reach
-
-
 def _causes(problem: Problem, steps: Steps, run: _Run) -> tuple[Cause, ...]:
-    """Why each cell outside the best tree is missed, as far as this search can tell."""
-    targets = problem.task.targets(problem.cells)
-    beyond = _beyond(problem.robot, targets.points) - steps.tolerance
+    """Why each cell outside the best tree is missed, as far as this search knows."""
+    robot, points = problem.robot, problem.task.targets(problem.cells).points
+    beyond = robot.distance_from_base(points) - robot.reach - steps.tolerance
     causes = []
     for cell in sorted(set(range(len(problem.cells))) - set(run.best.jcell)):
         if beyond[cell] > 0.0:

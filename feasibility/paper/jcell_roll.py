@@ -1,6 +1,6 @@
 """Whether a J-cell has the roll that the task asks for: eq. (6) of the paper, with a range.
 
-It is asked of J-cells that satisfy all else, so these alone need the frame of the tool.
+It is checked last, so only J-cells that satisfy all else need the frame of the tool.
 """
 
 from __future__ import annotations

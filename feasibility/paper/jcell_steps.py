@@ -21,7 +21,7 @@ normal that turns by at most k L leaves the straight line between its ends by ha
 turn = Da / 8 + k L / 2. (Where the approach is one direction, turn = Da / 8.) On a mesh with edges
 of length e the height has a kink over each: its slope changes by k (L + e) at most along a step,
 and never by more than 2, so sag = D / 8 + L / 4 times that. There k is what the triangles of each
-cell have, which is not proved; the replay of the tree judges what comes of it between J-cells.
+cell have, which is not proved; the replay of the tree checks what comes of it between J-cells.
 Besides, these surfaces are searched on triangles (`surfaces.triangle_kernel`), and how far these
 may be off is taken off too.
 
@@ -90,9 +90,9 @@ class Steps:
 
     @property
     def usable(self) -> NDArray[np.bool_]:
-        """(N,) cells over which some J-cell may be feasible: step and surface leave room."""
-        room = (self.sag < self.tolerance) & (self.cone_cosine < 1.0)
-        return np.asarray(room & bool(self.roll[1] > 0.0))
+        """(N,) cells over which some J-cell may be feasible: the step is not too coarse there."""
+        fine = (self.sag < self.tolerance) & (self.cone_cosine < 1.0)
+        return np.asarray(fine & bool(self.roll[1] > 0.0))
 
     @staticmethod
     def of(robot: Robot, cells: Cells, task: Task, search: Search) -> Steps:
@@ -105,36 +105,36 @@ class Steps:
         reach = _extent(robot)
         size = np.where(robot.prismatic, step * reach, step)
         tolerance = TOLERANCE_STEPS * step * reach if task.tolerance is None else task.tolerance
-        bends = _bends(robot, size, search.moves == "all")
+        bounds = _step_bounds(robot, size, search.moves == "all")
         height = cells.surface.side_sign * task.standoff
         triangles = None
         if isinstance(cells, GridCells) and isinstance(cells.surface, ClosedFormPatch):
-            both = _margins_of_patch(cells.surface, bends, height, tolerance)
+            both = _margins_of_patch(cells.surface, bounds, height, tolerance)
             sags, turns = (np.full(len(cells), margin) for margin in both)
         else:
             by_u = task.roll is not None and task.roll_reference is None
             triangles = triangulation(cells, height, tolerance, tangents=by_u)
-            sags, turns = _margins_of_triangles(triangles, bends)
-        jump, bend, barred = _creases(cells, task, tolerance)
-        sags, turns = sags + jump, turns + bend
+            sags, turns = _margins_of_triangles(triangles, bounds)
+        jump, kink, barred = _creases(cells, task, tolerance)
+        sags, turns = sags + jump, turns + kink
         if task.fixed_approach(cells) is not None:
-            turns = np.full(len(cells), bends.axis / 8.0)
+            turns = np.full(len(cells), bounds.axis / 8.0)
         chord = chord_of(task.cone) - turns
         cosine = np.where(chord > 0.0, 1.0 - 0.5 * np.minimum(chord, 4.0) ** 2, 2.0)
         if task.cone_deg >= 180.0:
             cosine = np.full(len(cells), -2.0)
         off = 0.0 if triangles is None else 2.0 * (triangles.turn + triangles.swerve)
-        roll = _roll(cells, task, bends, off)
+        roll = _roll(cells, task, bounds, off)
         return Steps(size, search.moves, tolerance, sags, turns, cosine, roll, triangles, barred)
 
 
-class _Bends(NamedTuple):
-    """Bounds along a step: |p''|, |a''| and |p'|, and by how much the tool turns."""
+class _StepBounds(NamedTuple):
+    """Bounds along a step: D (m), Da, L (m) and W of the module's docstring."""
 
     point: float
     axis: float
     length: float
-    turning: float
+    rotation: float
 
 
 def _extent(robot: Robot) -> float:
@@ -144,8 +144,8 @@ def _extent(robot: Robot) -> float:
     return float(np.linalg.norm(robot.chain.translations[1:], axis=1).sum())
 
 
-def _bends(robot: Robot, size: Array, together: bool) -> _Bends:
-    """D (m), Da, L (m) and W of the module's docstring; inf on a rail without end."""
+def _step_bounds(robot: Robot, size: Array, together: bool) -> _StepBounds:
+    """The bounds along a step of sizes (n,); inf on a rail without end."""
     prismatic = robot.prismatic
     stroke = np.where(prismatic, np.maximum(np.abs(robot.lower), np.abs(robot.upper)), 0.0)
     links = np.linalg.norm(robot.chain.translations[1:], axis=1)
@@ -157,14 +157,14 @@ def _bends(robot: Robot, size: Array, together: bool) -> _Bends:
     point = size * np.where(prismatic, 2.0 * before, lever * (size + 2.0 * before))
     axis = angle * (angle + 2.0 * before)
     total = np.sum if together else np.max
-    return _Bends(*(float(total(part)) for part in (point, axis, reach * size, angle)))
+    return _StepBounds(*(float(total(part)) for part in (point, axis, reach * size, angle)))
 
 
 def _margins_of_patch(
-    surface: ClosedFormPatch, bends: _Bends, height: float, tolerance: float
+    surface: ClosedFormPatch, step: _StepBounds, height: float, tolerance: float
 ) -> tuple[float, float]:
     """Sag (m) and turn between J-cells over a closed form."""
-    d, da, length, _ = bends
+    d, da, length, _ = step
     bounds = surface.bounds(height, tolerance)
     if not math.isfinite(d + bounds.curvature + bounds.second_derivative):
         return math.inf, math.inf  # the offset surface folds, or a rail has no end
@@ -174,29 +174,27 @@ def _margins_of_patch(
     )
 
 
-def _margins_of_triangles(triangles: Triangulation, bends: _Bends) -> tuple[Array, Array]:
+def _margins_of_triangles(triangles: Triangulation, step: _StepBounds) -> tuple[Array, Array]:
     """(N,) sag (m) and turn between J-cells over triangles, and what these may be off."""
-    d, da, length, _ = bends
+    d, da, length, _ = step
     k, edge = triangles.curvature, triangles.edge
     if not math.isfinite(d):
         return np.full(len(k), math.inf), np.full(len(k), math.inf)
-    bent = k * length**2 / 8.0
+    curved = k * length**2 / 8.0
     if edge > 0.0:
-        bent = np.minimum(k * (length + edge), 2.0) * length / 4.0
-    return (
-        d / 8.0 + bent + triangles.off,
-        da / 8.0 + k * length / 2.0 + triangles.turn,
-    )
+        curved = np.minimum(k * (length + edge), 2.0) * length / 4.0
+    sags = d / 8.0 + curved + triangles.off
+    return sags, da / 8.0 + k * length / 2.0 + triangles.turn
 
 
-def _roll(cells: Cells, task: Task, bends: _Bends, off: float) -> Array:
+def _roll(cells: Cells, task: Task, step: _StepBounds, off: float) -> Array:
     """(2,) rad, see `Steps.roll`; `off` is how far the roll may be by normals and frames."""
     if task.roll is None:
         return np.array([0.0, np.inf])
     frames = target_curves(cells, task).frames
-    turning = np.zeros(0) if frames is None else frames.curvature
-    by_metre = float(turning[np.isfinite(turning)].max(initial=0.0))
-    rate = (bends.turning + by_metre * bends.length) / math.cos(0.5 * task.cone)
+    curvature = np.zeros(0) if frames is None else frames.curvature
+    by_metre = float(curvature[np.isfinite(curvature)].max(initial=0.0))
+    rate = (step.rotation + by_metre * step.length) / math.cos(0.5 * task.cone)
     return np.array([task.roll.middle, task.roll.half - 0.5 * rate - off])
 
 

@@ -4,7 +4,7 @@ To be read with the paper in hand. The names are its own: q, jc, ec, p, T, G, CO
 Nothing is compiled and nothing is kept between calls, so it is slow: a reference for small cases,
 which the compiled search of `algorithm_1.py` and `algorithm_2.py` agrees with, call by call.
 
-Where the paper's text leaves room, it is read like this:
+Where the paper's text is not definite, it is read like this:
 
 - Eq. (5) is never met exactly on a grid of joint values, so it holds within a tolerance.
 - Eqs. (3), (4) and (7) say "a.b = 0" and "a.b <= cos alpha"; its prose says "within a small angle
@@ -38,7 +38,7 @@ JCell = tuple[int, ...]
 
 
 @dataclass(slots=True)
-class Continuity:
+class TreeAndGraph:
     """What Algorithm 2 has found: tree T and graph G, by E-cells."""
 
     T: dict[int, int | None] = field(default_factory=dict)
@@ -71,7 +71,7 @@ class LiteralSearch:
     def __init__(
         self, robot: Robot, cells: Cells, task: Task, start: ArrayLike, steps: Steps
     ) -> None:
-        """Lay the grid of J-cells through a configuration.
+        """The grid of J-cells through a configuration.
 
         Args:
             robot: the arm; n joints.
@@ -85,7 +85,7 @@ class LiteralSearch:
         self.robot, self.cells, self.task, self.steps = robot, cells, task, steps
         self.targets, self.b = task.targets(cells).points, task.fixed_approach(cells)
         self.kinematics = Kinematics(robot)
-        self.found = Continuity()
+        self.found = TreeAndGraph()
 
     @staticmethod
     def of(
@@ -107,7 +107,7 @@ class LiteralSearch:
         for q in found:
             literal = LiteralSearch(robot, cells, task, q, steps)
             if start is not None or literal.ecell((0,) * robot.n)[0] >= 0:
-                literal.found = Continuity()
+                literal.found = TreeAndGraph()
                 return literal
         raise ArgumentError("no start was found over any cell; give one")
 
@@ -185,7 +185,7 @@ class LiteralSearch:
                     return (jc, *path)
         return ()
 
-    def algorithm_2(self) -> Continuity:
+    def algorithm_2(self) -> TreeAndGraph:
         """Continuity check on manifold E, from the J-cell at the start.
 
         Raises:

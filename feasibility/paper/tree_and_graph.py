@@ -86,7 +86,7 @@ def tree_walk(verdict: Verdict) -> Walk | None:
     """One continuous motion that enters every cell that a greedy search touched.
 
     The replay has been over each of its straight lines, because they are those of the tree. The
-    greedy search touches cells without visiting their centres, so few rows stand at one.
+    greedy search touches cells without visiting their centres, so few rows are at one.
 
     Args:
         verdict: of the method "greedy".

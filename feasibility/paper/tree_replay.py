@@ -50,8 +50,8 @@ def replay_tree(
     - a path begins in its cell, where and how that cell was first entered, and ends in the
       neighbour.
 
-    Between J-cells, closed forms have a margin that makes this true; any other surface is judged
-    by the replay of motions over a surface.
+    Between J-cells, closed forms have a margin that makes this true; any other surface is left to
+    the replay of motions over a surface.
 
     The `paths` are the edges of a tree, each after the edge that enters its cell.
     """

@@ -14,7 +14,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.division import undominated
+from feasibility.certification import replay
+from feasibility.checking import check
 from feasibility.placement.quick_search import (
     MOST_COVERS,
     covers_of,
@@ -25,10 +26,17 @@ from feasibility.placement.quick_search import (
 )
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.region import Array, Pose, moved_cells
-from feasibility.roadmap import Exploration, SearchArrays, arrays_of, collisions_of
+from feasibility.roadmap import (
+    Exploration,
+    SearchArrays,
+    arrays_of,
+    collisions_of,
+    covering_walk,
+    explore,
+)
 from feasibility.roadmap.joint_boxes import blockers_of
 from feasibility.search import Search
-from feasibility.studies import cause_counts
+from feasibility.studies import cause_counts, component_covers
 from feasibility.task import Task
 from feasibility.verdict import Answer, Evidence
 from robots import Robot
@@ -60,7 +68,7 @@ class Margins:
 
     @property
     def least(self) -> float:
-        """The measure of a placement."""
+        """By which placements are compared."""
         return min(self.limits, self.cone, self.reach)
 
 
@@ -188,9 +196,6 @@ class LocalEvaluator:
             Empty where the independent replay accepts one continuous motion over these cells;
             otherwise why it does not.
         """
-        from feasibility.certification import replay
-        from feasibility.roadmap import covering_walk
-
         cells = moved_cells(self.cells, trial.pose)
         if trial.stage is Stage.CHECK:
             exploration = self._explored(cells)
@@ -214,18 +219,12 @@ class LocalEvaluator:
             pose: where the surface's frame stands.
             causes: whether to determine the causes of missed cells.
         """
-        from feasibility.checking import check
-
         cells = moved_cells(self.cells, pose)
         verdict = check(self.robot, cells, self.task, self.search)
         tried = self.try_at(pose, early=False) if verdict.feasible else None
         if tried is not None and not tried.complete:
             # The search of `check` again, for the margins that its motion leaves.
             tried = self.trial_of(self._explored(cells), pose, 1.0, 1.0)
-        covers = np.zeros((len(verdict.components), len(cells)), dtype=bool)
-        for row, component in zip(covers, verdict.components, strict=True):
-            row[component] = True
-        covers = covers[undominated(covers)][:MOST_COVERS]
         return Trial(
             pose=pose,
             stage=Stage.CHECK,
@@ -233,7 +232,7 @@ class LocalEvaluator:
             probed=1.0 if verdict.feasible else 0.0,
             share=self.share_of(verdict.covered),
             margins=None if tried is None else tried.margins,
-            covers=covers,
+            covers=component_covers(verdict)[:MOST_COVERS],
             answer=verdict.answer,
             evidence=verdict.evidence,
             message=verdict.message,
@@ -243,8 +242,6 @@ class LocalEvaluator:
 
     def _explored(self, cells: Cells) -> Exploration:
         """The search of `check` for cells at their place."""
-        from feasibility.roadmap import explore
-
         problem = arrays_of(self.robot, cells, self.task)
         blockers = blockers_of(self.robot, cells.surface, self.task)
         exploration = Exploration(self.robot, cells, problem, self.search.seed, blockers=blockers)

@@ -95,8 +95,8 @@ class Placements:
 
     def __repr__(self) -> str:
         """One line."""
-        said = f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
-        return f"{said} {checked_words(self.task.collision).capitalize()}."
+        line = f"{self.answer} ({self.evidence}): {len(self.found)} placements. {self.message}"
+        return f"{line} {checked_words(self.task.collision).capitalize()}."
 
 
 def place(

@@ -39,6 +39,7 @@ from feasibility.roadmap import (
     seed_middle,
     segment_holds,
 )
+from feasibility.sensitivity import apart
 from surfaces import Cells
 
 PROBES = 8  # cells that represent the surface, besides the furthest and the nearest
@@ -120,12 +121,7 @@ def spread_cells(cells: Cells) -> list[int]:
     """Some cells that differ most in place and normal, the middle one first."""
     size = float(np.linalg.norm(np.ptp(cells.centres, axis=0))) or 1.0
     features = np.hstack([cells.centres / size, 0.5 * cells.normals])
-    chosen = [cells.middle]
-    nearest = np.linalg.norm(features - features[chosen[0]], axis=1)
-    while len(chosen) < min(PROBES, len(cells)):
-        chosen.append(int(nearest.argmax()))
-        nearest = np.minimum(nearest, np.linalg.norm(features - features[chosen[-1]], axis=1))
-    return chosen
+    return apart(features, PROBES, cells.middle, same=0.0)
 
 
 def covers_of(exploration: Exploration) -> NDArray[np.bool_]:

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from coverable_errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.division import set_cover
 from feasibility.placement.evaluator import LocalEvaluator, Trial
@@ -37,7 +36,7 @@ class Station:
     covers: NDArray[np.bool_]
     """(N,) cells that its motion can cover."""
     cells: NDArray[np.int64]
-    """(k,) cells given to it: each needed cell to one station, to the one that covers most."""
+    """(k,) cells given to it: each cell to one station, to the one that covers most."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -47,7 +46,7 @@ class Stations:
     stations: tuple[Station, ...]
     """The one given most cells first."""
     left_out: NDArray[np.int64]
-    """(k,) needed cells that no component covers."""
+    """(k,) cells that no component covers."""
     bound: int
     """No fewer stations cover what these cover."""
 
@@ -107,9 +106,8 @@ def station_plan(
     values = values[reach.share(values) > 0.0]
     trials = [trial for trial in placements.trials if len(trial.covers)]
     trials += search_all(evaluator, values, progress, "searching for stations")
-    needed = np.ones(len(placements.cells), dtype=bool)
     limit = TIME_LIMIT if clock is None else min(TIME_LIMIT, max(clock.left, 0.0))
-    stations = fewest_stations([trial.covers for trial in trials], needed, limit)
+    stations = fewest_stations([trial.covers for trial in trials], len(placements.cells), limit)
     local = LocalEvaluator(placements.robot, placements.cells, placements.task, search)
     chosen = [(trials[station.placement], station.component) for station in stations.stations]
     refusals = tuple(local.replayed(*motion) for motion in chosen)
@@ -117,42 +115,27 @@ def station_plan(
 
 
 def fewest_stations(
-    covers: Sequence[NDArray[np.bool_]],
-    needed: ArrayLike | None = None,
-    time_limit: float = TIME_LIMIT,
+    covers: Sequence[NDArray[np.bool_]], n: int, time_limit: float = TIME_LIMIT
 ) -> Stations:
     """The fewest motions that together cover what all motions found cover.
 
     Args:
-        covers: for each placement (K, N) the cells that its K components cover; placements without
+        covers: for each placement (K, n) the cells that its K components cover; placements without
             components count as covering nothing.
-        needed: (N,) cells to cover; default all.
+        n: number of cells of the surface.
         time_limit: s, for the proof of the optimum.
-
-    Raises:
-        ArgumentError: the placements are of surfaces with different numbers of cells.
 
     Example:
         >>> covers = np.array([[1, 1, 0, 0], [0, 0, 1, 0]]), np.array([[0, 1, 1, 1]])
-        >>> found = fewest_stations([table.astype(bool) for table in covers])
+        >>> found = fewest_stations([table.astype(bool) for table in covers], 4)
         >>> [(s.placement, s.cells.tolist()) for s in found.stations], found.optimal
         ([(1, [1, 2, 3]), (0, [0])], True)
     """
-    counts = {table.shape[1] for table in covers if len(table)}
-    if len(counts) > 1:
-        listed = ", ".join(str(count) for count in sorted(counts))
-        raise ArgumentError(f"the placements are of different surfaces: they have {listed} cells")
-    n = counts.pop() if counts else (0 if needed is None else len(np.asarray(needed)))
-    wanted = np.ones(n, dtype=bool) if needed is None else np.asarray(needed, dtype=bool)
-    if wanted.shape != (n,):
-        raise ArgumentError(
-            f"needed must have shape ({n},) as covers has cells, got {wanted.shape}"
-        )
     motions = [(k, component) for k, table in enumerate(covers) for component in range(len(table))]
     table = np.vstack([np.zeros((0, n), dtype=bool), *(table for table in covers if len(table))])
-    can = wanted & table.any(axis=0)
+    can = table.any(axis=0)
     found = set_cover(table[:, can], time_limit)
-    rows = sorted(found.rows, key=lambda row: (-int((table[row] & can).sum()), row))
+    rows = sorted(found.rows, key=lambda row: (-int(table[row].sum()), row))
     # Each cell to the first of them that covers it.
     owner = np.where(can, np.argmax(table[rows], axis=0) if rows else 0, -1)
     stations = [
@@ -162,4 +145,4 @@ def fewest_stations(
     stations.sort(key=lambda station: (-len(station.cells), station.placement, station.component))
     for station in stations:
         station.covers.flags.writeable = station.cells.flags.writeable = False
-    return Stations(tuple(stations), np.flatnonzero(wanted & ~can), found.bound)
+    return Stations(tuple(stations), np.flatnonzero(~can), found.bound)

@@ -1,3 +1,4 @@
+from .explanation import apart as apart
 from .explanation import explain as explain
 from .quantities import LEAST_CONE_DEG as LEAST_CONE_DEG
 from .quantities import Kind as Kind

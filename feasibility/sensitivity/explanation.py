@@ -34,7 +34,7 @@ EXTRA = 3  # the same, for margins that are still wide once the others have had 
 ALL_IN_ALL = 35  # verdicts of the case itself: all, with what `check` alone finds at thresholds
 LEAST = 20_000  # evaluations that they may always take
 PAIRS = 24  # verdicts' worth of evaluations that the search for two changes may take
-CHECKED = 0.75  # [1] of that, spent at most before `check` itself is asked about a threshold
+CHECKED = 0.75  # [1] of that, spent at most before `check` itself looks at a threshold
 GUESSES = 64  # configurations from which other covering motions may begin
 POSTURES = 6  # of these, as far apart as can be
 SAME = 0.05  # [1], postures nearer than that are taken for one, see `_posture`
@@ -158,9 +158,9 @@ def _explained(
 
 
 def _alone(made: ThresholdSearch, found: Threshold, most: float) -> Threshold:
-    """The same threshold; its feasible side tells whether `check` alone finds it, if that is known.
+    """The same threshold; its feasible side says whether `check` alone finds it, if known.
 
-    What a short search misses, `check` itself is asked about, up to `most` evaluations in all.
+    What a short search misses, `check` itself looks for, up to `most` evaluations in all.
     """
     found, prober = made.alone(found, most), made.prober
     if found.feasible is None or found.feasible.unaided is not False or made.good is None:
@@ -273,12 +273,17 @@ def _posture(prober: Prober, q: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
 
 
-def apart(features: NDArray[np.float64], most: int) -> list[int]:
-    """Rows of (k, m) features, each as far as can be from those chosen before it; up to `most`."""
-    chosen = [0] if len(features) else []
+def apart(
+    features: NDArray[np.float64], most: int, first: int = 0, same: float = SAME
+) -> list[int]:
+    """Rows of (k, m) features, each as far as can be from those chosen before it; up to `most`.
+
+    Rows nearer than `same` to a chosen one are left out.
+    """
+    chosen = [first] if len(features) else []
     while chosen and len(chosen) < min(most, len(features)):
         away = np.linalg.norm(features[:, None] - features[chosen], axis=2).min(axis=1)
-        if away.max() < SAME:
+        if away.max() < same:
             break
         chosen.append(int(away.argmax()))
     return chosen

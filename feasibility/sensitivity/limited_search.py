@@ -1,4 +1,4 @@
-"""Searches with a limited number of evaluations, what they found, and what is quicker than one.
+"""Searches and proofs with a limited effort, what they found, and what is quicker than a search.
 
 Configurations from a case nearby are projected onto the cells of this one by Newton steps, a few
 evaluations a cell.
@@ -22,11 +22,17 @@ from feasibility.roadmap import (
     roots_of_nodes,
     within,
 )
+from feasibility.roadmap.joint_boxes import Blockers, blockers_of
+from feasibility.sensitivity.quantities import Quantity, Variant
 from feasibility.verdict import Answer, Evidence, Walk
 
 LEAST = 100  # evaluations between two checks of the limit
+MOST_BOXES = 10_000  # of joint values, for all proofs with collisions of one explanation
 NEARBY_STEPS = np.int64(15)  # Newton steps from the configuration of a case nearby
 NO_CELL = -1
+
+Steps = tuple[Quantity, int]
+"""A quantity, and how many steps from the value given."""
 
 
 @dataclass
@@ -75,6 +81,31 @@ class Attempt:
     def found(self) -> bool:
         """True with a covering motion."""
         return self.walk is not None
+
+
+class CollisionProofs:
+    """Proofs that the arm collides over a cell, of the case given and of those nearby."""
+
+    def __init__(self, given: Variant) -> None:
+        """Prepare the case as given."""
+        self._given = given
+        self._left = MOST_BOXES
+        self._key: tuple[str, int] | None = None
+        self._latest: Blockers | None = None
+
+    def at(self, steps: Steps | None) -> Blockers | None:
+        """Those of a case nearby, or of the one given; None where collisions are not checked."""
+        if self._given.task.collision is None:
+            return None
+        key = ("", 0) if steps is None else (steps[0].name, steps[1])
+        if self._key != key:
+            variant = self._given if steps is None else steps[0].applied(self._given, steps[1])
+            robot, cells, task = variant
+            if self._latest is not None:
+                self._left = self._latest.left
+            self._key = key
+            self._latest = blockers_of(robot, cells.surface, task, self._left)
+        return self._latest
 
 
 def configurations(exploration: Exploration) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ Step = tuple[Quantity, int]
 SHIFTS = (0.2, 0.5, 1.0)  # [1] of the largest shift: sizes that are tried
 NARROWING = 3  # verdicts' worth of evaluations for each side of a pair
 LAST_PUT_BACK = (Kind.ROLL, Kind.CONE, Kind.CLEARANCE, Kind.TOOL_CLEARANCE)
-RULED = 3  # cells that are asked for a proof before a search
+RULED = 3  # cells for which a proof is attempted before a search
 
 
 @dataclass

@@ -32,11 +32,12 @@ from feasibility.roadmap import (
     wound,
 )
 from feasibility.roadmap.forward import run_in_order
-from feasibility.sensitivity.collision_proofs import CollisionProofs, Steps
 from feasibility.sensitivity.limited_search import (
     NO_CELL,
     Attempt,
+    CollisionProofs,
     LimitedExploration,
+    Steps,
     certifiable,
     configurations,
     project_all,
@@ -51,7 +52,7 @@ MOST_SUSPECTS = 12  # cells that are taken for hard
 AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
 GUESSES = 16  # random configurations that are projected onto a cell that no known one covers
 GUESS_STEPS = np.int64(20)  # Newton steps of each
-KEPT = 2_000_000  # numbers in arrays of values nearby, which are asked for again and again
+KEPT = 2_000_000  # numbers in arrays of values nearby, which are needed again and again
 LEAST_BOXES = 120  # for one cell, however expensive proofs have been
 
 
@@ -183,8 +184,8 @@ class Prober:
     ) -> tuple[Ruling, Floats | None]:
         """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
 
-        Where the tool collides over the cell in every pose no arm is asked; where the arm can be
-        there, but no configuration was found to be clear, the arm's collisions are looked into.
+        Where the tool collides over the cell in every pose, the arm does not matter; where the arm
+        can be there, but no configuration was found to be clear, its collisions are looked into.
 
         Args:
             arrays: see `arrays_at`.

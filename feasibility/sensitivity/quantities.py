@@ -16,9 +16,9 @@ from surfaces import Cells
 
 ANGLE_STEP_DEG = 0.1  # resolution of cone and revolute joints
 LENGTH_STEP = 1e-3  # [m], resolution of standoff, shifts and prismatic joints
-LEAST_ROLL_DEG = 1.0  # cap on tightening half the range of the roll, likewise
 MOST_TILT_DEG = 60.0  # cap on tilting an approach direction
 LEAST_CONE_DEG = 3.0  # cap on tightening the cone: narrower ones take many times the waypoints
+LEAST_ROLL_DEG = 1.0  # cap on tightening half the range of the roll, likewise
 FURTHEST = 0.5  # [m], cap on shifts, on the standoff's growth and on the widening of a slide
 MOST_CLEARANCE = 0.1  # [m], cap on clearances of a feasible case
 MOST_OBJECTS = 12  # objects of the scene that are left out, one at a time
@@ -120,14 +120,14 @@ class Quantity:
 
     def _avoided(self, task: Task, value: float) -> Collision | None:
         """What the arm stays clear of with this quantity at a value."""
-        asked = task.collision
-        if asked is None or (self.kind is Kind.WITHOUT and not self.obstacle):
+        settings = task.collision
+        if settings is None or (self.kind is Kind.WITHOUT and not self.obstacle):
             return None
         if self.kind is Kind.CLEARANCE:
-            return replace(asked, clearance=value)
+            return replace(settings, clearance=value)
         if self.kind is Kind.TOOL_CLEARANCE:
-            return replace(asked, tool_clearance=value)
-        return without(asked, self.obstacle)
+            return replace(settings, tool_clearance=value)
+        return without(settings, self.obstacle)
 
 
 def range_of(task: Task, half: float) -> tuple[float, float]:
@@ -148,13 +148,13 @@ def tilted(
     return float(x), float(y), float(z)
 
 
-def without(asked: Collision, name: str) -> Collision:
-    """The same without one object of the scene, and without what is said of it."""
+def without(settings: Collision, name: str) -> Collision:
+    """The same without one object of the scene, and without the pairs that name it."""
     return replace(
-        asked,
-        scene=tuple(one for one in asked.scene if one.name != name),
-        allow=tuple(pair for pair in asked.allow if name not in pair),
-        clearances=tuple(row for row in asked.clearances if name not in row[:2]),
+        settings,
+        scene=tuple(one for one in settings.scene if one.name != name),
+        allow=tuple(pair for pair in settings.allow if name not in pair),
+        clearances=tuple(row for row in settings.clearances if name not in row[:2]),
     )
 
 
@@ -162,11 +162,8 @@ def shifted(cells: Cells, translation: np.ndarray) -> Cells:
     """The same cells on the surface moved by a translation (3,) m of the root frame."""
     surface = cells.surface.moved(np.eye(3), translation)
     moved = replace(cells, surface=surface, centres=cells.centres + translation)
-    # What is derived from the cells is moved too: deriving the curves again takes longer than a
-    # search along them.
-    cubics = cells.curves.cubics.copy()
-    cubics[:, 0, :3] += translation  # the constant coefficients of the closest points
-    vars(moved)["curves"] = replace(cells.curves, cubics=cubics)
+    # Deriving the curves again takes longer than a search along them.
+    vars(moved)["curves"] = cells.curves.moved(np.eye(3), translation)
     vars(moved)["neighbours"] = cells.neighbours
     return moved
 
@@ -242,21 +239,21 @@ def _of_collisions(task: Task, widen: bool) -> list[Quantity]:
     The tool may not come nearer to the surface than its point does, so the standoff is the largest
     clearance of the tool that is tried.
     """
-    asked = task.collision
-    if asked is None or not asked.checked:
+    settings = task.collision
+    if settings is None or not settings.checked:
         return []
-    most = max(asked.clearance, MOST_CLEARANCE), max(asked.tool_clearance, task.standoff)
-    ends = (0.0, 0.0) if widen else most
-    given = (asked.clearance, asked.tool_clearance)
-    names = ("clearance", "tool clearance")
-    found = [
-        Quantity(kind, names[k], "m", given[k], ends[k], LENGTH_STEP, True)
-        for k, kind in enumerate((Kind.CLEARANCE, Kind.TOOL_CLEARANCE))
-        if kind is Kind.CLEARANCE or (asked.surface and task.standoff > 0.0)
-    ]
+    given = settings.clearance
+    end = 0.0 if widen else max(given, MOST_CLEARANCE)
+    found = [Quantity(Kind.CLEARANCE, "clearance", "m", given, end, LENGTH_STEP, True)]
+    if settings.surface and task.standoff > 0.0:
+        given = settings.tool_clearance
+        end = 0.0 if widen else max(given, task.standoff)
+        found.append(
+            Quantity(Kind.TOOL_CLEARANCE, "tool clearance", "m", given, end, LENGTH_STEP, True)
+        )
     if widen:
         left_out = [("without collisions", "")]
-        left_out += [(f"without {one.name}", one.name) for one in asked.scene[:MOST_OBJECTS]]
+        left_out += [(f"without {one.name}", one.name) for one in settings.scene[:MOST_OBJECTS]]
         found += [
             Quantity(Kind.WITHOUT, name, "", 0.0, 1.0, 1.0, True, obstacle=obstacle)
             for name, obstacle in left_out

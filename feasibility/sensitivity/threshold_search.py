@@ -105,7 +105,7 @@ class ThresholdSearch:
         return Threshold(self.quantity, reported, beyond)
 
     def alone(self, found: Threshold, stop: float) -> Threshold:
-        """The same threshold; its feasible side tells whether a search without seeds finds it.
+        """The same threshold; its feasible side says whether a search without seeds finds it.
 
         Args:
             found: what this search found.
@@ -131,7 +131,7 @@ class ThresholdSearch:
                 attempt = self._search(end, q)
                 if attempt.found:
                     return Probe(end, attempt), None
-                return self._narrow(here, end, self._finding(Probe(end, attempt)))
+                return self._narrow(here, end, self._finding(end, attempt))
         return self._narrow(here, end + 1)
 
     # -- a case that is not ----------------------------------------------------------------------
@@ -195,7 +195,7 @@ class ThresholdSearch:
             seeds[cell] = q
         nowhere = not np.isfinite(seeds).any()
         attempt = self._search(k, seeds, deep=self.quantity.monotone or nowhere)
-        return attempt if attempt.found else self._finding(Probe(k, attempt))
+        return attempt if attempt.found else self._finding(k, attempt)
 
     # -- between the two -------------------------------------------------------------------------
 
@@ -240,7 +240,7 @@ class ThresholdSearch:
                     continue
                 backs = []
             else:
-                bad, other = reached.k, self._finding(Probe(reached.k, attempt))
+                bad, other = reached.k, self._finding(reached.k, attempt)
             searches += 1
             enough = SEARCHES if good.k != begun else MORE_SEARCHES
             if searches > enough and self.prober.spent >= self.stop:
@@ -308,7 +308,7 @@ class ThresholdSearch:
         # This motion goes no further. Another one may, so the search begins afresh.
         hard = [bracket.failed, *self.prober.suspects][bracket.failed == NO_CELL :][:1]
         attempt = self._search(k, seeds, deep=True, hard=hard[0] if hard else NO_CELL)
-        return Probe(k, attempt) if attempt.found else self._finding(Probe(k, attempt))
+        return Probe(k, attempt) if attempt.found else self._finding(k, attempt)
 
     def _proof_beyond(self, bracket: Bracket, far: int) -> tuple[Finding | None, Floats | None]:
         """A proof of the cell that failed, as near as one is found; or what covers that cell."""
@@ -333,14 +333,12 @@ class ThresholdSearch:
     def _reported(self, probe: Probe) -> Finding:
         """A feasible probe as a finding, once its motion is replayed."""
         variant = self.quantity.applied(self.prober.given, probe.k)
-        return self._finding(Probe(probe.k, self.prober.confirmed(variant, probe.attempt)))
+        return self._finding(probe.k, self.prober.confirmed(variant, probe.attempt))
 
-    def _finding(self, probe: Probe) -> Finding:
-        """A probe as a finding."""
-        value, attempt = self.quantity.value(probe.k), probe.attempt
-        return Finding(
-            value, attempt.answer, attempt.evidence, attempt.detail, witness=attempt.walk
-        )
+    def _finding(self, k: int, found: Attempt) -> Finding:
+        """What was found at k steps."""
+        value = self.quantity.value(k)
+        return Finding(value, found.answer, found.evidence, found.detail, witness=found.walk)
 
     def _proof(self, k: int, cell: int) -> Finding:
         """A cell that is proved uncoverable at k steps."""

@@ -1,13 +1,14 @@
+from .built_cases import arm_of as arm_of
+from .built_cases import case_of as case_of
+from .built_cases import cut_of as cut_of
 from .file import Study as Study
 from .file import load_study as load_study
 from .file import read_study as read_study
-from .outcome import arm_of as arm_of
 from .outcome import bits_of as bits_of
 from .outcome import cause_counts as cause_counts
 from .outcome import cells_of as cells_of
-from .outcome import cut_of as cut_of
+from .outcome import component_covers as component_covers
 from .outcome import merit as merit
-from .placed_cases import case_of as case_of
 from .robot_comparison import Arm as Arm
 from .robot_comparison import Comparison as Comparison
 from .robot_comparison import compare as compare

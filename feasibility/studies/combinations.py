@@ -20,21 +20,24 @@ from feasibility.cases import (
     in_robot_table,
     parse_toml,
     read_surface,
-    toml_document,
 )
 from feasibility.studies.axes import POSES, Variation
-from feasibility.studies.outcome import arm_of, mounted_as, mounting_fault
-from feasibility.studies.placed_cases import HOME, case_of
+from feasibility.studies.built_cases import (
+    arm_of,
+    case_of,
+    mounted_as,
+    mounting_fault,
+    surface_at_home,
+)
 from feasibility.studies.run import StudyTask
+from feasibility.studies.scheduling import Tables
 
 ORIGIN = (0.0, 0.0, 0.0)
 POSED = [[key] for key in POSES]
 
-Tables = dict[str, Any]
-
 
 def put(tables: Tables, path: Sequence[str | int], value: Any) -> None:
-    """Replace what stands at a path; arrays of three are made where there are none."""
+    """Replace what is at a path; arrays of three are made where there are none."""
     table: Any = tables
     for step, following in itertools.pairwise(path):
         if isinstance(following, int):
@@ -154,8 +157,7 @@ def faults_of(tables: Tables) -> list[Fault]:
     except RobotError as error:
         found += in_robot_table(error)
     if "file" in case.surface.values:
-        table = {key: value for key, value in case.surface.table().items() if value is not None}
-        found += _faults_of_file(toml_document({"surface": {**table, **HOME}}))
+        found += _faults_of_file(surface_at_home(case))
     return found
 
 

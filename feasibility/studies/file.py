@@ -44,13 +44,12 @@ from feasibility.safe_files import shown_path
 from feasibility.studies.axes import Axis, Range, Variation, read_variation
 from feasibility.studies.combinations import cause_of, faults_of, put, tasks_of
 from feasibility.studies.run import StudyTask
+from feasibility.studies.scheduling import Tables
 
 MOST_TASKS = 1_000_000
 MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are reported one by one
 MOST_INDICES = 8  # of the others
 MOST_FRAMES = 10_000  # combinations of everything but the surface's pose: each is checked by itself
-
-Tables = dict[str, Any]
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -3,32 +3,22 @@
 from __future__ import annotations
 
 import math
-import os
-import time
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import replace
-from functools import lru_cache
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.cases import Case, parse_toml, read_robot, read_surface, toml_document
-from feasibility.clock import Clock
 from feasibility.collisions import gather
 from feasibility.division import undominated
-from feasibility.studies.placed_cases import HOME, case_of
+from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
+from feasibility.studies.scheduling import Tables
 from feasibility.verdict import CauseKind, Verdict
-from robots import flange_axis
-
-if TYPE_CHECKING:
-    from feasibility.verdict import Verdict
-    from robots import Robot
-    from surfaces import Cells
-    from surfaces.meshes.cells import MeshCells
 
 EXAMINED = 6  # missed cells whose causes are determined; the others take that of the nearest one
+
+Outcome = dict[str, Any]
 
 
 class CauseCounts(NamedTuple):
@@ -56,25 +46,22 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
     from feasibility.roadmap.causes import cause_of
     from feasibility.roadmap.joint_boxes import blockers_of
 
-    reached = np.zeros(len(verdict.cells), dtype=bool)
-    for cells in verdict.components:
-        reached[cells] = True
+    robot, cells, task = verdict.robot, verdict.cells, verdict.task
+    reached = np.isin(np.arange(len(cells)), np.concatenate([[], *verdict.components]))
     kinds = [str(CauseKind.DISCONNECTED)] * int(reached[missed].sum())
     lost = missed[~reached[missed]]
     if len(lost) == 0:
         return CauseCounts(_counted(kinds), 0)
     # A new exploration: its Newton's method, its random starts, and proofs by the tool are used.
-    case = verdict.robot, verdict.cells.surface, verdict.task
-    arrays = arrays_of(verdict.robot, verdict.cells, verdict.task)
-    blockers, bodies = blockers_of(*case), gather(*case[:2], case[2].collision, case[2].standoff)
-    exploration = Exploration(verdict.robot, verdict.cells, arrays, verdict.seed, blockers=blockers)
+    arrays, blockers = arrays_of(robot, cells, task), blockers_of(robot, cells.surface, task)
+    exploration = Exploration(robot, cells, arrays, verdict.seed, blockers=blockers)
+    bodies = gather(robot, cells.surface, task.collision, task.standoff)
     pairs = () if bodies is None else bodies.pairs
     few = lost[np.unique(np.linspace(0, len(lost) - 1, EXAMINED).round().astype(np.int64))]
     for cell in few.tolist():
         exploration.tool_collides(cell)
     examined = [cause_of(exploration, cell, pairs) for cell in few.tolist()]
-    centres = verdict.cells.centres
-    away = np.linalg.norm(centres[lost][:, None] - centres[few][None], axis=2)  # (L, E)
+    away = np.linalg.norm(cells.centres[lost][:, None] - cells.centres[few], axis=2)  # (L, E)
     kinds += [str(examined[int(k)].kind) for k in away.argmin(axis=1)]
     return CauseCounts(_counted(kinds), len(examined))
 
@@ -82,13 +69,6 @@ def cause_counts(verdict: Verdict) -> CauseCounts:
 def _counted(kinds: list[str]) -> dict[str, int]:
     """Causes with their number of cells, the most frequent first."""
     return dict(sorted(Counter(kinds).items(), key=lambda entry: (-entry[1], entry[0])))
-
-
-ROBOTS_KEPT = 32  # arms that one worker keeps
-MESHES_KEPT = 4
-
-Tables = dict[str, Any]
-Outcome = dict[str, Any]
 
 
 def evaluate(tables: Tables) -> Outcome:
@@ -115,101 +95,6 @@ def evaluate(tables: Tables) -> Outcome:
     )
 
 
-def clock_of(case: Case) -> Clock:
-    """The time limit of a case, from now on; kernels are loaded before, like everywhere."""
-    return Clock(case.search.time_limit).begin(time.monotonic())
-
-
-def arm_of(case: Case) -> Robot:
-    """The arm of a case, loaded once.
-
-    Raises:
-        RobotError: it cannot be loaded so.
-    """
-    return _load(toml_document({"robot": case.robot.table()}), case.surface.frame)
-
-
-@lru_cache(maxsize=ROBOTS_KEPT)
-def _load(table: str, surface_link: str | None) -> Robot:
-    """The arm of a [robot] table, written as a document; a link of it may carry the surface."""
-    part = read_robot(parse_toml(table)["robot"], [])
-    if part is None:
-        raise ValueError("the table of a robot that was read before cannot be read again")
-    return part.build(surface_link)
-
-
-TOOL = ("tcp", "approach_axis", "reference_axis")
-
-
-def mounted_as(robot: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
-    """The [robot] table of an arm that stands where another one does, unless it says otherwise.
-
-    The base, and the axes that carry it or the surface, belong to the cell, and so does a tool
-    whose centre point is given (see `mounting_fault`); limits and locked joints belong to the arm.
-
-    Example:
-        >>> mounted_as({"name": "ur5"}, {"name": "panda", "base": {"position": [0, 0, 1]}})
-        {'base': {'position': [0, 0, 1]}, 'name': 'ur5'}
-    """
-    tool = TOOL if given.get("tcp") is not None and "tcp" not in robot else ()
-    kept = {key: given[key] for key in ("base", "axis", *tool) if given.get(key) is not None}
-    return {**kept, **robot}
-
-
-def mounting_fault(robot: Mapping[str, Any], given: Mapping[str, Any]) -> str | None:
-    """Why the other arm's tool cannot be mounted on this one as it stands; None where it can.
-
-    A tool centre point is given from the tool frame. Where the flanges of the two arms point along
-    different axes of that frame, the same numbers would be a tool that points elsewhere.
-    """
-    if given.get("tcp") is None or "tcp" in robot:
-        return None
-    ours, theirs = flange_axis(**_named(robot)), flange_axis(**_named(given))
-    if ours == theirs:
-        return None
-    return (
-        f"has a tool frame whose flange points along {list(ours)}, that of the case along "
-        f"{list(theirs)}, so robot.tcp does not fit it; expected a [robot] table with a tcp of its "
-        "own (in a study)"
-    )
-
-
-def _named(table: Mapping[str, Any]) -> dict[str, Any]:
-    """What a [robot] table says of which arm it is."""
-    return {"name": table.get("name"), "tool_frame": table.get("tool_frame")}
-
-
-def cut_of(case: Case) -> Cells:
-    """The cells of a case; a mesh or STEP faces are read and cut once, and then placed.
-
-    Raises:
-        CaseError: there is no such surface, or it cannot be cut so.
-    """
-    from surfaces import rotation_from_rpy
-    from surfaces.meshes.cells import MeshCells
-
-    if case.surface.kind not in ("mesh", "step"):
-        return case.surface.cut()
-    table = {key: value for key, value in case.surface.table().items() if value is not None}
-    file = os.stat(table["file"])
-    home = _cut(toml_document({"surface": table | HOME}), file.st_mtime_ns, file.st_size)
-    placed = replace(
-        home.surface,
-        rotation=rotation_from_rpy(*np.radians(case.surface.rpy_deg)),
-        position=np.array(case.surface.position),
-    )
-    return MeshCells.of(placed, home.labels)
-
-
-@lru_cache(maxsize=MESHES_KEPT)
-def _cut(table: str, changed: int, size: int) -> MeshCells:
-    """The cells of the mesh of a [surface] table, written as a document."""
-    part = read_surface(parse_toml(table)["surface"], [])
-    if part is None:
-        raise ValueError("the table of a surface that was read before cannot be read again")
-    return cast("MeshCells", part.cut())
-
-
 def outcome_of(verdict: Verdict) -> Outcome:
     """A verdict as JSON values; no timing, so that the same case always has the same outcome.
 
@@ -220,20 +105,15 @@ def outcome_of(verdict: Verdict) -> Outcome:
         edges, pairs: neighbouring cells that a motion joins, and all of them.
         causes: missed cells by cause, the most frequent first; `examined` says how many of them
             were examined, the others counting as the nearest of these.
-        components: the sets of cells that single motions cover, none within another, the best
-            first, as hexadecimal bits (see `cells_of`).
+        components: see `component_covers`, as hexadecimal bits (see `cells_of`).
         margins: what the covering motion leaves (see `margins_of`), None unless feasible.
         certificate: what the replay measured, None unless feasible.
         fk: evaluations of the arm.
     """
     areas = np.asarray(verdict.cells.areas)
-    whole = float(areas.sum())
+    total = float(areas.sum())
     causes, examined = cause_counts(verdict)
     measured = verdict.certificate
-    components = sorted(verdict.components, key=len, reverse=True)
-    covers = np.zeros((len(components), len(areas)), dtype=bool)
-    for row, cells in zip(covers, components, strict=True):
-        row[cells] = True
     return {
         "verdict": str(verdict.answer),
         "evidence": str(verdict.evidence),
@@ -242,12 +122,12 @@ def outcome_of(verdict: Verdict) -> Outcome:
         "seed": int(verdict.seed),
         "cells": len(verdict.cells),
         "covered": verdict.n_covered,
-        "share": float(areas[verdict.covered].sum()) / whole if whole > 0.0 else 1.0,
+        "share": float(areas[verdict.covered].sum()) / total if total > 0.0 else 1.0,
         "edges": int(verdict.n_edges),
         "pairs": len(verdict.cells.pairs),
         "causes": causes,
         "examined": examined,
-        "components": [bits_of(cover) for cover in covers[undominated(covers)]],
+        "components": [bits_of(cover) for cover in component_covers(verdict)],
         "margins": margins_of(verdict),
         "certificate": None
         if measured is None
@@ -258,6 +138,14 @@ def outcome_of(verdict: Verdict) -> Outcome:
         },
         "fk": int(verdict.statistics.get("fk", 0)),
     }
+
+
+def component_covers(verdict: Verdict) -> NDArray[np.bool_]:
+    """(K, N) the cells that single motions cover, none inside another, the best first."""
+    covers = np.zeros((len(verdict.components), len(verdict.cells)), dtype=bool)
+    for row, cells in zip(covers, verdict.components, strict=True):
+        row[cells] = True
+    return np.asarray(covers[undominated(covers)])
 
 
 def merit(outcome: Mapping[str, Any]) -> tuple[bool, float, float]:
@@ -277,7 +165,7 @@ def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
     """What the covering motion keeps from every bound; None where no motion is certified.
 
     Returns:
-        limit_deg, limit_m: least distance of a turning (a sliding) joint from its limits, None
+        limit_deg, limit_m: least distance of a revolute (a prismatic) joint from its limits, None
             where no such joint has one.
         cone_deg: by how much the tool axis stays inside the cone.
         reach_m: by how much the furthest target is nearer than the arm's reach; None without one.
@@ -285,17 +173,17 @@ def margins_of(verdict: Verdict) -> dict[str, float | None] | None:
     certificate, robot, task = verdict.certificate, verdict.robot, verdict.task
     if certificate is None or not verdict.feasible or len(verdict.cells) == 0:
         return None
-    turning = sliding = math.inf
+    revolute = prismatic = math.inf
     if verdict.witness is not None:
         q = verdict.witness.q
         least = np.minimum(q - robot.lower, robot.upper - q).min(axis=0, initial=np.inf)
-        turning = math.degrees(float(least[~robot.prismatic].min(initial=np.inf)))
-        sliding = float(least[robot.prismatic].min(initial=np.inf))
+        revolute = math.degrees(float(least[~robot.prismatic].min(initial=np.inf)))
+        prismatic = float(least[robot.prismatic].min(initial=np.inf))
     points = task.targets(verdict.cells).points
     away = float(robot.distance_from_base(points).max())
     return {
-        "limit_deg": finite(turning),
-        "limit_m": finite(sliding),
+        "limit_deg": finite(revolute),
+        "limit_m": finite(prismatic),
         "cone_deg": task.cone_deg - math.degrees(float(certificate.max_angle)),
         "reach_m": finite(robot.reach - away),
     }

@@ -12,22 +12,20 @@ from feasibility.cases import Case, CaseError, CollisionPart, as_read
 from feasibility.clock import Clock, OutOfTime
 from feasibility.search import Progress
 from feasibility.sensitivity import LEAST_CONE_DEG
-from feasibility.studies.outcome import (
+from feasibility.studies.built_cases import (
     arm_of,
     case_of,
     clock_of,
     cut_of,
-    finite,
-    merit,
     mounted_as,
     mounting_fault,
-    outcome_of,
 )
+from feasibility.studies.outcome import finite, merit, outcome_of
 from feasibility.studies.run import StudyTask, run_tasks
+from feasibility.studies.scheduling import Tables, Workers
 from feasibility.studies.stored import arm_fault
 
 if TYPE_CHECKING:
-    from feasibility.studies.scheduling import Workers
     from feasibility.studies.store import Store
     from feasibility.task import Task
     from robots import Robot
@@ -35,8 +33,6 @@ if TYPE_CHECKING:
 
 MOST_DIVIDED = 400  # cells of a surface that is divided: a division takes several verdicts
 CONE_STEP_DEG = 0.5  # resolution of the critical cone
-
-Tables = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,8 +219,8 @@ def _patches(
     except OutOfTime:
         return None, None
     accepted = [patch for patch in division.patches if patch.accepted]
-    whole = float(cells.areas.sum())
-    return len(accepted), sum(patch.area for patch in accepted) / whole if whole > 0.0 else 1.0
+    total = float(cells.areas.sum())
+    return len(accepted), sum(patch.area for patch in accepted) / total if total > 0.0 else 1.0
 
 
 def critical_cone(

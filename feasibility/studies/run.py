@@ -13,7 +13,7 @@ from typing import Any
 
 from feasibility.search import Progress
 from feasibility.studies.outcome import evaluate
-from feasibility.studies.scheduling import Answer, Tables, Work, Workers, schedule
+from feasibility.studies.scheduling import Reply, Tables, Work, Workers, schedule
 from feasibility.studies.store import Record, Status, Store
 from feasibility.studies.stored import outcome_fault
 from feasibility.version import version
@@ -40,7 +40,7 @@ class StudyTask:
     """What is done with the tables, in a worker: a function of a module, returning JSON values."""
     fault: Callable[[Mapping[str, Any]], str] | None = None
     """What is wrong with a result that a store holds, in words; empty where nothing is. Verdicts
-    are always judged, what other works return only where this is given."""
+    are always checked, what other works return only where this is given."""
     key: str = field(init=False)
     """The same for the same work on the same tables, files and version of the program."""
 
@@ -49,13 +49,13 @@ class StudyTask:
         if self.fault is None and self.work is evaluate:
             object.__setattr__(self, "fault", outcome_fault)
         package = self.work.__module__.partition(".")[0]
-        says = {
+        identity = {
             "work": f"{package}.{self.work.__qualname__}",
             "version": version(),
             "tables": self.tables,
             "files": [digest(*file) for file in _files_of(self.tables)],
         }
-        text = json.dumps(says, sort_keys=True, allow_nan=False, separators=(",", ":"))
+        text = json.dumps(identity, sort_keys=True, allow_nan=False, separators=(",", ":"))
         object.__setattr__(self, "key", hashlib.sha256(text.encode()).hexdigest())
 
 
@@ -84,7 +84,7 @@ def run_tasks(
 
     Args:
         tasks: in the order of the table.
-        workers: where to, see `feasibility.study_workers.open_workers`.
+        workers: where to, see `open_workers`.
         store: where finished tasks are kept.
         progress: called as progress(done, total, text) several times a second; what it raises
             ends the run.
@@ -120,7 +120,7 @@ def run_tasks(
 
 
 def _finished(store: Store, tasks: Sequence[StudyTask]) -> dict[str, Record]:
-    """The records of the tasks that were done before, each judged."""
+    """The records of the tasks that were done before, each checked."""
     kept = store.find(task.key for task in tasks)
     found = {key: record for key, record in kept.items() if record.status == "done"}
     for task in {task.key: task for task in tasks if task.key in found}.values():
@@ -132,7 +132,7 @@ def _finished(store: Store, tasks: Sequence[StudyTask]) -> dict[str, Record]:
 
 @dataclass(slots=True)
 class _Keeper:
-    """Collects answers in `found`, and writes them to the store some times a second."""
+    """Collects replies in `found`, and writes them to the store some times a second."""
 
     store: Store | None
     found: dict[str, Record]
@@ -141,10 +141,10 @@ class _Keeper:
     waiting: list[Record] = field(default_factory=list)
     written: float = 0.0
 
-    def receive(self, tasks: Sequence[StudyTask], answers: list[Answer]) -> None:
-        """Take in answers to some of `tasks`."""
-        for answer in answers:
-            record = _record(tasks[answer.index], answer)
+    def receive(self, tasks: Sequence[StudyTask], replies: list[Reply]) -> None:
+        """Take in replies to some of `tasks`."""
+        for reply in replies:
+            record = _record(tasks[reply.index], reply)
             self.waiting.append(record)
             self.found[record.key] = record
         now = time.monotonic()
@@ -161,12 +161,12 @@ class _Keeper:
             self.store.keep(waiting)
 
 
-def _record(task: StudyTask, answer: Answer) -> Record:
-    """An answer as the store keeps it."""
-    if answer.result is not None:
-        return Record(task.key, task.parameters, "done", answer.result, answer.seconds)
-    result = {"verdict": "undecided", "evidence": "budget", "message": answer.failure}
-    return Record(task.key, task.parameters, "failed", result, answer.seconds)
+def _record(task: StudyTask, reply: Reply) -> Record:
+    """A reply as the store keeps it."""
+    if reply.result is not None:
+        return Record(task.key, task.parameters, "done", reply.result, reply.seconds)
+    result = {"verdict": "undecided", "evidence": "budget", "message": reply.failure}
+    return Record(task.key, task.parameters, "failed", result, reply.seconds)
 
 
 def _files_of(tables: Mapping[str, Any]) -> list[tuple[str, float, int]]:

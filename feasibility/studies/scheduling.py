@@ -58,7 +58,7 @@ class Workers(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Reply:
     """What came of one task."""
 
     index: int
@@ -95,7 +95,7 @@ def schedule(
     work: Work,
     tables: Sequence[Tables],
     workers: Workers,
-    receive: Callable[[list[Answer]], None],
+    receive: Callable[[list[Reply]], None],
 ) -> None:
     """Have all tasks done.
 
@@ -106,7 +106,7 @@ def schedule(
         work: called with one of `tables`, in a worker; a function of a module.
         tables: of each task.
         workers: where they run.
-        receive: called here with answers as they come, in any order, and with none several times
+        receive: called here with replies as they come, in any order, and with none several times
             a second; what it raises ends the work.
 
     Raises:
@@ -122,7 +122,7 @@ class _Schedule:
     work: Work
     tables: Sequence[Tables]
     workers: Workers
-    receive: Callable[[list[Answer]], None]
+    receive: Callable[[list[Reply]], None]
     waiting: deque[int] = field(init=False)
     suspects: deque[int] = field(default_factory=deque)
     """Were in flight when the pool broke."""
@@ -177,19 +177,19 @@ class _Schedule:
 
     def _collect(self, futures: set[Future[Any]]) -> BaseException | None:
         """Take in what has come back; returns what a broken pool raised."""
-        answers: list[Answer] = []
+        replies: list[Reply] = []
         broke = None
         try:
             for future in futures:
-                error = self._take(future, answers)
+                error = self._take(future, replies)
                 broke = error or broke
         finally:
-            self.breaks = 0 if answers else self.breaks
-            self.receive(answers)
+            self.breaks = 0 if replies else self.breaks
+            self.receive(replies)
         return broke
 
-    def _take(self, future: Future[Any], answers: list[Answer]) -> BaseException | None:
-        """Add the answer of one task; without one, the task is done again."""
+    def _take(self, future: Future[Any], replies: list[Reply]) -> BaseException | None:
+        """Add the reply of one task; without one, the task is done again."""
         index = self.flying.pop(future)
         broken, deaths = self.workers.breaks, self.workers.deaths
         try:
@@ -202,15 +202,15 @@ class _Schedule:
             if times == self.workers.patience:
                 often = f"{times} time{'s' if times > 1 else ''}"
                 failure = f"its worker died, {often} with this task alone"
-                answers.append(Answer(index, None, failure, 0.0))
+                replies.append(Reply(index, None, failure, 0.0))
             else:
                 self.suspects.appendleft(index)
             return error if isinstance(error, broken) else None
-        except Exception as error:  # what the tasks themselves raise comes as an answer
+        except Exception as error:  # what the tasks themselves raise comes as a reply
             raise WorkersError(
                 f"the workers cannot run the tasks ({one_line(error)}); what was finished is "
                 "kept: see that they have the same coverable installed"
             ) from error
         result = None if text is None else json.loads(text)
-        answers.append(Answer(index, result, failure, seconds))
+        replies.append(Reply(index, result, failure, seconds))
         return None

@@ -151,7 +151,7 @@ class Store(AbstractContextManager["Store"]):
                 raise self._refused(f"{shown_path(beside)} is not a regular file; remove it")
 
     def _prepare(self, fresh: bool) -> None:
-        """Make the table, or see that it is there and whole."""
+        """Make the table, or see that it is there and undamaged."""
         if not fresh:
             # In one transaction: another run may be making the table right now.
             with self._transaction("DEFERRED"):
@@ -166,7 +166,7 @@ class Store(AbstractContextManager["Store"]):
                 self._base.execute(f"PRAGMA user_version = {FORMAT}")
 
     def _refuse_strangers(self) -> None:
-        """See that the file is a whole study file; another program's file stays as it is."""
+        """See that the file is an undamaged study file; another program's file is not changed."""
         (application,) = self._base.execute("PRAGMA application_id").fetchone()
         (written,) = self._base.execute("PRAGMA user_version").fetchone()
         empty = application == 0 and written == 0 and not self._tables()

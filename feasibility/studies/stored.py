@@ -1,4 +1,4 @@
-"""What the results of a store must look like, judged when they are read: files are not trusted."""
+"""What the results of a store must look like: files are not trusted, so they are checked."""
 
 from __future__ import annotations
 

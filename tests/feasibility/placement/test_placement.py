@@ -598,7 +598,7 @@ def test_stations_where_no_single_placement_will_do() -> None:
     lying = Trial(checked.pose, Stage.SEARCH, 1.0, covers=np.ones((1, len(shell)), dtype=bool))
     assert "did not find" in evaluator.replayed(lying, 0)
     # From any table of motions, no fewer.
-    fewer = fewest_stations([trial.covers for trial in placements.trials])
+    fewer = fewest_stations([trial.covers for trial in placements.trials], len(shell))
     assert len(fewer.left_out) >= len(stations.left_out)
     text = as_text(placements, "", plan)
     assert f"{len(stations)} stations" in text

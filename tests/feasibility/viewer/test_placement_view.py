@@ -321,7 +321,7 @@ def test_stations_are_drawn_where_they_stand():
         Trial(pose, Stage.SEARCH, 1.0, 1.0, 0.5, covers=mask[None])
         for pose, mask in zip(where, masks, strict=True)
     )
-    stations = fewest_stations([mask[None] for mask in masks])
+    stations = fewest_stations([mask[None] for mask in masks], 6)
     plan = StationPlan(stations, tuple(trials[s.placement] for s in stations.stations), ("", ""))
     asked = fabricated(*trials)
     view = view_placements(asked, plan=plan)

@@ -1,0 +1,153 @@
+"""Cases as tables, checked and built: what many of them share is made once in each worker."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from feasibility.cases import TABLES, Case, parse_toml, read_robot, read_surface, toml_document
+from feasibility.clock import Clock
+from feasibility.studies.scheduling import Tables
+from robots import Robot, flange_axis
+from surfaces import Cells, SurfaceError, check_pose, rotation_from_rpy
+
+if TYPE_CHECKING:
+    from surfaces.meshes.cells import MeshCells
+
+HOME = {"position": (0.0, 0.0, 0.0), "rpy_deg": (0.0, 0.0, 0.0)}
+CASES_KEPT = 32  # that one worker keeps, with the surface at home
+ROBOTS_KEPT = 32
+MESHES_KEPT = 4
+TOOL = ("tcp", "approach_axis", "reference_axis")
+
+
+def case_of(tables: Tables) -> Case:
+    """The case of some tables, checked; tables that belong to no case are left out.
+
+    Raises:
+        CaseError: with everything that is wrong.
+    """
+    chosen = {title: tables[title] for title in TABLES if title in tables}
+    surface = chosen.get("surface")
+    pose = _pose(surface) if isinstance(surface, Mapping) else None
+    if not isinstance(surface, Mapping) or pose is None:
+        return Case.from_toml(toml_document(chosen))
+    home = _at_home(json.dumps({**chosen, "surface": {**surface, **HOME}}, default=str))
+    return replace(home, surface=replace(home.surface, **pose))
+
+
+def _pose(surface: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Where the surface stands; None where that is not said, or wrong."""
+    pose = {key: surface[key] for key in HOME if surface.get(key) is not None}
+    try:
+        check_pose(**pose)
+    except SurfaceError:
+        return None
+    return {key: tuple(map(float, pose.get(key, value))) for key, value in HOME.items()}
+
+
+@lru_cache(maxsize=CASES_KEPT)
+def _at_home(tables: str) -> Case:
+    """The case of some tables, as JSON; without what is wrong nothing is kept."""
+    return Case.from_toml(toml_document(json.loads(tables)))
+
+
+def clock_of(case: Case) -> Clock:
+    """The time limit of a case, from now on; kernels are loaded before, like everywhere."""
+    return Clock(case.search.time_limit).begin(time.monotonic())
+
+
+def arm_of(case: Case) -> Robot:
+    """The arm of a case, loaded once.
+
+    Raises:
+        RobotError: it cannot be loaded so.
+    """
+    return _load(toml_document({"robot": case.robot.table()}), case.surface.frame)
+
+
+@lru_cache(maxsize=ROBOTS_KEPT)
+def _load(table: str, surface_link: str | None) -> Robot:
+    """The arm of a [robot] table, written as a document; a link of it may carry the surface."""
+    part = read_robot(parse_toml(table)["robot"], [])
+    if part is None:
+        raise ValueError("the table of a robot that was read before cannot be read again")
+    return part.build(surface_link)
+
+
+def mounted_as(robot: Mapping[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """The [robot] table of an arm that stands where another one does, unless it says otherwise.
+
+    The base, and the axes that carry it or the surface, belong to the cell, and so does a tool
+    whose centre point is given (see `mounting_fault`); limits and locked joints belong to the arm.
+
+    Example:
+        >>> mounted_as({"name": "ur5"}, {"name": "panda", "base": {"position": [0, 0, 1]}})
+        {'base': {'position': [0, 0, 1]}, 'name': 'ur5'}
+    """
+    tool = TOOL if given.get("tcp") is not None and "tcp" not in robot else ()
+    kept = {key: given[key] for key in ("base", "axis", *tool) if given.get(key) is not None}
+    return {**kept, **robot}
+
+
+def mounting_fault(robot: Mapping[str, Any], given: Mapping[str, Any]) -> str | None:
+    """Why the other arm's tool cannot be mounted on this one; None where it can.
+
+    A tool centre point is given from the tool frame. Where the flanges of the two arms point along
+    different axes of that frame, the same numbers would be a tool that points elsewhere.
+    """
+    if given.get("tcp") is None or "tcp" in robot:
+        return None
+    ours, theirs = (
+        flange_axis(name=table.get("name"), tool_frame=table.get("tool_frame"))
+        for table in (robot, given)
+    )
+    if ours == theirs:
+        return None
+    return (
+        f"has a tool frame whose flange points along {list(ours)}, that of the case along "
+        f"{list(theirs)}, so robot.tcp does not fit it; expected a [robot] table with a tcp of its "
+        "own (in a study)"
+    )
+
+
+def cut_of(case: Case) -> Cells:
+    """The cells of a case; a mesh or STEP faces are read and cut once, and then placed.
+
+    Raises:
+        CaseError: there is no such surface, or it cannot be cut so.
+    """
+    from surfaces.meshes.cells import MeshCells
+
+    if case.surface.kind not in ("mesh", "step"):
+        return case.surface.cut()
+    file = os.stat(case.surface.table()["file"])
+    home = _cut(surface_at_home(case), file.st_mtime_ns, file.st_size)
+    placed = replace(
+        home.surface,
+        rotation=rotation_from_rpy(*np.radians(case.surface.rpy_deg)),
+        position=np.array(case.surface.position),
+    )
+    return MeshCells.of(placed, home.labels)
+
+
+def surface_at_home(case: Case) -> str:
+    """The [surface] table of a case as a document, with the surface at the world's origin."""
+    table = {key: value for key, value in case.surface.table().items() if value is not None}
+    return toml_document({"surface": table | HOME})
+
+
+@lru_cache(maxsize=MESHES_KEPT)
+def _cut(table: str, changed: int, size: int) -> MeshCells:
+    """The cells of the mesh of a [surface] table, written as a document."""
+    part = read_surface(parse_toml(table)["surface"], [])
+    if part is None:
+        raise ValueError("the table of a surface that was read before cannot be read again")
+    return cast("MeshCells", part.cut())
