@@ -101,17 +101,16 @@ def explain(
     if len(cells) == 0:
         return Explanation(verdict, (), (), None, 0, 0.0)
     found, motion = _explained(verdict, began, clock, progress)
-    if motion is None:
-        fast = asked.speed is not None
-        with suppress(OutOfTime), clock.enforced():
-            return replace(found, rates=rate_figures(verdict, clock, fast), asked=asked)
-        return replace(found, asked=asked)
-    seeded = check(robot, cells, task, search, seeds=motion, clock=clock.part(1.0))
-    if not seeded.feasible:
-        return found
-    again, _ = _explained(seeded, began, clock, progress)
-    evaluations = found.evaluations + again.evaluations
-    return replace(again, alone=verdict, evaluations=evaluations, asked=asked)
+    if motion is not None:
+        seeded = check(robot, cells, task, search, seeds=motion, clock=clock.part(1.0))
+        if seeded.feasible:
+            again, _ = _explained(seeded, began, clock, progress)
+            evaluations = found.evaluations + again.evaluations
+            found = replace(again, alone=verdict, evaluations=evaluations)
+    rates = None
+    with suppress(OutOfTime), clock.enforced():
+        rates = rate_figures(found.verdict, clock, more=asked.speed is not None)
+    return replace(found, rates=rates, asked=asked)
 
 
 def _explained(

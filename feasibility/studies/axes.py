@@ -64,7 +64,7 @@ class Variation:
         return math.prod((len(axis.values) for axis in self.axes), start=self.count or 1)
 
     @property
-    def frames(self) -> int:
+    def cases(self) -> int:
         """Number of tasks that differ in more than the pose of the surface."""
         sampled = not all(span.is_pose for span in self.ranges)
         sizes = (len(axis.values) for axis in self.axes if not axis.is_pose)

@@ -21,7 +21,7 @@ from feasibility.cases import (
     parse_toml,
     read_surface,
 )
-from feasibility.studies.axes import POSES, Variation
+from feasibility.studies.axes import POSES, Key, Variation
 from feasibility.studies.built_cases import (
     arm_of,
     case_of,
@@ -66,26 +66,16 @@ def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[Stud
         others = [(entry, value) for entry, value in row if not entry.is_pose]
         name = json.dumps([value for _, value in others], sort_keys=True)
         if name not in checked:
-            tables, found = copy.deepcopy(base), []
-            for entry, value in others:
-                if entry.path == ("robot",):
-                    other = mounting_fault(value, base.get("robot", {}))
-                    found += (
-                        [] if other is None else [Fault("robot", f"{value.get('name')} {other}")]
-                    )
-                    value = mounted_as(value, base.get("robot", {}))
-                put(tables, entry.path, copy.deepcopy(value))
-            found = found or faults_of(tables)
-            # Defaults of the case are filled in.
-            checked[name] = None if found else as_read(case_of(tables).to_tables())
+            made, found = _case_with(base, others)
+            checked[name] = None if found else made
             texts = {k: shown(v) for k, v in parameters.items() if k.split(".")[1:2] not in POSED}
             for fault in found:
                 cause = fault.key, cause_of(fault.message)
                 refused.setdefault(cause, (fault, []))[1].append(texts)
-        frame = checked[name]
-        if frame is None:
+        case = checked[name]
+        if case is None:
             continue
-        tables = {**frame, "surface": copy.deepcopy(frame["surface"])}
+        tables = {**case, "surface": copy.deepcopy(case["surface"])}
         for entry, value in row:
             if entry.is_pose:
                 numbers = list(map(float, value)) if isinstance(value, list) else float(value)
@@ -93,6 +83,21 @@ def tasks_of(base: Tables, varied: Variation, faults: list[Fault]) -> tuple[Stud
         tasks.append(StudyTask(tables, parameters))
     faults += [_as_one(*alike) for alike in refused.values()]
     return tuple(tasks)
+
+
+def _case_with(base: Tables, values: Sequence[tuple[Key, Any]]) -> tuple[Tables, list[Fault]]:
+    """The base with some values and all defaults filled in, or what is wrong with it."""
+    tables, faults = copy.deepcopy(base), []
+    given = base.get("robot", {})
+    for entry, value in values:
+        if entry.path == ("robot",):
+            fault = mounting_fault(value, given)
+            if fault is not None:
+                faults.append(Fault("robot", f"{value.get('name', value.get('urdf'))} {fault}"))
+            value = mounted_as(value, given)
+        put(tables, entry.path, copy.deepcopy(value))
+    faults = faults or faults_of(tables)
+    return ({} if faults else as_read(case_of(tables).to_tables())), faults
 
 
 def _as_one(first: Fault, texts: list[dict[str, str]]) -> Fault:

@@ -49,7 +49,7 @@ from feasibility.studies.scheduling import Tables
 MOST_TASKS = 1_000_000
 MOST_ALIKE = 3  # values of one key, wrong for the same cause, that are reported one by one
 MOST_INDICES = 8  # of the others
-MOST_FRAMES = 10_000  # combinations of everything but the surface's pose: each is checked by itself
+MOST_CASES = 10_000  # combinations of everything but the surface's pose: each is checked by itself
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -124,9 +124,9 @@ def read_study(
     varied = _absolute(varied, base_dir)
     if varied.size > MOST_TASKS:
         faults.append(Fault("vary", f"makes {varied.size} tasks; at most {MOST_TASKS} will do"))
-    elif varied.frames > MOST_FRAMES:
-        what = f"makes {varied.frames} cases besides those that differ in the pose"
-        faults.append(Fault("vary", f"{what}; at most {MOST_FRAMES} will do"))
+    elif varied.cases > MOST_CASES:
+        what = f"makes {varied.cases} cases besides those that differ in the pose"
+        faults.append(Fault("vary", f"{what}; at most {MOST_CASES} will do"))
     else:
         _check(base, varied, faults)
     if faults:

@@ -142,7 +142,8 @@ def _tables_of(case: Case, robots: Sequence[str]) -> list[Tables]:
     """
     base = {title: as_read(table) for title, table in case.to_tables().items()}
     if case.search.method != "complete":
-        base["search"] = {"seed": case.search.seed}
+        kept = ("seed", "time_limit")
+        base["search"] = {key: base["search"][key] for key in kept if key in base["search"]}
     faults, made = [], []
     if not robots:
         faults.append(Fault("--robots", "is empty; expected names such as ur5,panda,puma560"))

@@ -16,7 +16,7 @@ import study_works
 from small_cases import TEXTS, small_case
 
 from feasibility import check
-from feasibility.cases import Case
+from feasibility.cases import Case, load_case
 from feasibility.cases.case import CaseError
 from feasibility.cli.main import main
 from feasibility.cli.study_compare import compare as compare_command
@@ -93,6 +93,12 @@ def test_other_arms_carry_the_same_tool(tmp_path) -> None:
     (tmp_path / "nozzle.toml").write_text(given)
     with pytest.raises(CaseError, match=r"kinova has a tool frame.*tcp does not fit"):
         read_study(study, tmp_path)
+
+
+def test_a_greedy_case_is_compared_by_the_complete_search_in_the_same_time() -> None:
+    settings = ["search.method=greedy", "search.step_deg=1", "search.seed=3", "search.time_limit=5"]
+    (tables,) = _tables_of(load_case("paper/4a", settings), ["ur5"])
+    assert tables["search"] == {"seed": 3, "time_limit": 5.0}
 
 
 def test_each_arm_says_what_its_verdict_says(strip, compared) -> None:
