@@ -21,8 +21,8 @@ from feasibility.paper.jcell_grid import (
     neighbour,
     place_joints,
     place_tool,
+    rolls_within,
 )
-from feasibility.paper.jcell_roll import rolls_within
 
 RUNNING, FOUND, EXHAUSTED, CAPPED, FULL = 0, 1, 2, 3, 4  # what a call is doing: counters[STATE]
 STATE, DEPTH, NODES, PLACED, CALL = 0, 1, 2, 3, 4  # places in `Memory.counters`
@@ -94,7 +94,7 @@ def begin_search(chain, grid, offsets, target, memory):  # type: ignore[no-untyp
     slot = _mixed(_key(offsets)) & (memory.table.shape[0] - 1)
     memory.table[slot] = counters[CALL] << 32
     memory.stack_node[0], memory.stack_next[0] = 0, 0
-    place_tool(chain, grid, offsets, memory.stack_tool[0, :6])
+    place_tool(chain, grid, offsets, memory.stack_tool[0, :6], np.empty(3))
     memory.stack_tool[0, 6] = distance(memory.stack_tool[0], target)
 
 
@@ -211,7 +211,7 @@ def extend_search(chain, patch_kernel, triangles, grid, target, target_cell, bud
             stack_tool[depth, :6] = tool
             stack_tool[depth, 6] = nearer
             if depth % REFRESH == 0:
-                place_tool(chain, grid, nodes[count - 1], stack_tool[depth, :6])
+                place_tool(chain, grid, nodes[count - 1], stack_tool[depth, :6], np.empty(3))
                 counters[PLACED] += n
     counters[STATE], counters[DEPTH], counters[NODES] = state, depth, count
 

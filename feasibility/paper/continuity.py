@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.paper import algorithm_1 as jcells
-from feasibility.paper.jcell_grid import Grid, cell_of, place_tool
-from feasibility.paper.jcell_roll import rolls_within
+from feasibility.paper.jcell_grid import Grid, cell_of, place_tool, rolls_within
 from feasibility.paper.jcell_steps import Steps
 from feasibility.search import Search
 from feasibility.task import Task
@@ -149,7 +148,7 @@ class JSpace:
         if (offsets < self._grid.lowest).any() or (offsets > self._grid.highest).any():
             return -1
         tool, grid = np.empty(6), self._grid
-        place_tool(self._chain, grid, offsets, tool)
+        place_tool(self._chain, grid, offsets, tool, np.empty(3))
         limits = grid.side, grid.height, grid.tolerance, grid.cone_cosine, grid.approach
         cell = int(cell_of(*self._place, *limits, tool))
         if cell >= 0 and grid.roll[1] < np.inf:

@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from coverable_kernels import njit
 from robots import frames
-from surfaces import cell_under
-from surfaces.patches import cell_at, closest_on_patch
+from surfaces import cell_under, u_direction_under
+from surfaces.patches import cell_at, closest_on_patch, u_direction
 
 HAIR = 1e-12  # [m], [1]: required beyond the task, so that another rounding of the same q agrees
 
@@ -152,13 +152,48 @@ def cell_of(patch_kernel, triangles, side, height, tolerance, cosine, approach, 
 
 
 @njit(cache=True, error_model="numpy")
-def place_tool(chain, grid, offsets, tool):  # type: ignore[no-untyped-def]
-    """Tool point and axis (6,) of one J-cell, by forward kinematics of the chain."""
+def place_tool(chain, grid, offsets, tool, reference):  # type: ignore[no-untyped-def]
+    """Tool point and axis (6,) and reference axis (3,) of one J-cell, by forward kinematics."""
     n = offsets.shape[0]
     q = np.empty(n)
     for i in range(n):
         q[i] = grid.origin[i] + offsets[i] * grid.step[i]
-    frames(chain, q, np.empty((n, 3)), np.empty((n, 3)), tool[:3], tool[3:], np.empty(3))
+    frames(chain, q, np.empty((n, 3)), np.empty((n, 3)), tool[:3], tool[3:], reference)
+
+
+@njit(cache=True, error_model="numpy")
+def rolls_within(chain, patch_kernel, triangles, grid, offsets, tool):  # type: ignore[no-untyped-def]
+    """True where a J-cell with its tool (6,) has a roll in the task's range: eq. (6).
+
+    See `feasibility.roll`. The arguments are those of `cell_of`, and a `Chain` and the `Grid`. It
+    is checked last, so only J-cells that satisfy all else are placed once more for it.
+    """
+    x = np.empty(3)
+    place_tool(chain, grid, offsets, np.empty(6), x)
+    nx, ny, nz, tx, ty, tz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    if triangles is not None:
+        _, _, nx, ny, nz = cell_under(triangles, tool[0], tool[1], tool[2])
+        tx, ty, tz = u_direction_under(triangles)
+    if patch_kernel is not None:
+        u, v, _, nx, ny, nz = closest_on_patch(patch_kernel, tool[0], tool[1], tool[2])
+        tx, ty, tz = u_direction(patch_kernel, u, v)
+    bx, by, bz = -grid.side * nx, -grid.side * ny, -grid.side * nz
+    if grid.approach.shape[0] == 3:
+        bx, by, bz = grid.approach[0], grid.approach[1], grid.approach[2]
+    if grid.reference.shape[0] == 3:
+        tx, ty, tz = grid.reference[0], grid.reference[1], grid.reference[2]
+    along = tx * bx + ty * by + tz * bz
+    tx, ty, tz = tx - along * bx, ty - along * by, tz - along * bz
+    ux, uy, uz = by * tz - bz * ty, bz * tx - bx * tz, bx * ty - by * tx
+    a0, a1, a2 = tool[3], tool[4], tool[5]
+    y0, y1, y2 = a1 * x[2] - a2 * x[1], a2 * x[0] - a0 * x[2], a0 * x[1] - a1 * x[0]
+    # Both times the length of t, which changes no angle.
+    cosine = tx * x[0] + ty * x[1] + tz * x[2] + ux * y0 + uy * y1 + uz * y2
+    sine = ux * x[0] + uy * x[1] + uz * x[2] - tx * y0 - ty * y1 - tz * y2
+    if cosine == 0.0 and sine == 0.0:
+        return False
+    off = np.arctan2(sine, cosine) - grid.roll[0]
+    return abs(np.arctan2(np.sin(off), np.cos(off))) <= grid.roll[1] - HAIR
 
 
 @njit(cache=True, error_model="numpy")

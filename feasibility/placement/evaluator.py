@@ -49,7 +49,7 @@ class Stage(StrEnum):
     BOUND = "bound"
     """A target is proved out of reach: no search was run."""
     PROBE = "probe"
-    """Newton's method failed at some of a few cells: no search was run."""
+    """Newton's method failed at one of the probed cells: no search was run."""
     SEARCH = "search"
     """A short search was run."""
     CHECK = "check"

@@ -79,16 +79,15 @@ def probe(exploration: Exploration, cells: NDArray[np.int64]) -> NDArray[np.bool
     _probe(exploration.arrays, exploration.work, cells, guesses, hits)
     if len(exploration.arrays.collisions):
         for k in np.flatnonzero(hits).tolist():
-            hits[k] = _lands_clear(exploration, int(cells[k]), guesses)
+            hits[k] = _projects_clear(exploration, int(cells[k]), guesses)
     return hits.astype(bool)
 
 
-def _lands_clear(exploration: Exploration, cell: int, guesses: NDArray[np.float64]) -> bool:
-    """Does any of some guesses lead to a configuration over a cell that does not collide?"""
-    case = exploration.arrays, exploration.work, cell
-    landed = guesses.copy()
+def _projects_clear(exploration: Exploration, cell: int, guesses: NDArray[np.float64]) -> bool:
+    """Does any guess lead to a configuration over the cell that does not collide?"""
+    at = exploration.arrays, exploration.work, cell
     return any(
-        project_onto_cell(*case, q, PROJECTION_STEPS) and moved_clear(*case, q) for q in landed
+        project_onto_cell(*at, q, PROJECTION_STEPS) and moved_clear(*at, q) for q in guesses.copy()
     )
 
 

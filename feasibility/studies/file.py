@@ -27,7 +27,7 @@ from functools import reduce
 from operator import getitem
 from typing import Any
 
-from coverable_errors import Fault, close, printable, shown
+from coverable_errors import Fault, shown
 from feasibility.cases import (
     TABLES,
     CaseError,
@@ -108,15 +108,12 @@ def read_study(
     description = document.get("description", "")
     if not isinstance(description, str):
         faults.append(Fault("description", f"must be a sentence, got {shown(description)}"))
+    section = Section("", document, faults)
+    section.take("description")
     for title in ("base", "vary"):
-        if title not in document:
-            faults.append(Fault(title, f"is missing; expected a table [{title}]"))
-    known = ("description", "base", "vary")
-    for key in document:
-        if key not in known:
-            guess = close(key, known)
-            hint = f"did you mean {guess}?" if guess else f"known are {', '.join(known)}"
-            faults.append(Fault(printable(key), f"is not known here; {hint}"))
+        if not section.has(title):
+            section.fault(title, f"is missing; expected a table [{title}]")
+    section.refuse_others()
     base = _read_base(document["base"], base_dir, faults) if "base" in document else None
     varied = read_variation(document["vary"], faults) if "vary" in document else None
     if base is None or varied is None:
