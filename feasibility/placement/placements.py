@@ -22,8 +22,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
+from coverable_errors import Checks, Fault
 from feasibility.clock import Clock
 from feasibility.collisions import checked_words
 from feasibility.notices import compiling_notice
@@ -179,20 +178,16 @@ def _check_settings(
     cells: Cells, search: Search, count: int, around: int, keep: int, time_limit: float | None
 ) -> None:
     """Refuse what makes no question."""
-    number = "expected a whole number in"
-    method = f'the search for placements works with method "complete", not {search.method!r}'
-    too_long = time_limit is not None and not 0.0 < time_limit < np.inf
-    checks = {
-        "there are no cells to cover; cut the surface into some": len(cells) == 0,
-        method: search.method != "complete",
-        f"count: {number} 1 .. {MOST:,} of poses to try, got {count}": not 1 <= count <= MOST,
-        f"around: {number} 0 .. {MOST:,} of poses, got {around}": not 0 <= around <= MOST,
-        f"keep: {number} 1 .. {MOST:,} of placements, got {keep}": not 1 <= keep <= MOST,
-        f"time_limit: expected a finite number > 0 (s), got {time_limit}": too_long,
-    }
-    faults = [text for text, wrong in checks.items() if wrong]
-    if faults:
-        raise PlacementError(faults)
+    checks = Checks("place", PlacementError)
+    if len(cells) == 0:
+        checks.keep(Fault("", "there are no cells to cover; cut the surface into some"))
+    checks.choice("method", search.method, ("complete",))
+    checks.whole("count", count, 1, MOST)
+    checks.whole("around", around, 0, MOST)
+    checks.whole("keep", keep, 1, MOST)
+    if time_limit is not None:
+        checks.positive("time_limit", time_limit, "seconds")
+    checks.done()
 
 
 def _ruled_out(

@@ -75,7 +75,7 @@ def test_a_working_directory_that_is_gone(
 
 def test_counts_and_speeds_beyond_all_use(capsys: pytest.CaptureFixture[str]) -> None:
     place = "place", "paper/4a", *SMALL, "--x", "0", "1"
-    assert "count: expected a whole number in 1 .. 100,000" in said(
+    assert "count must be a whole number in 1 .. 100,000" in said(
         capsys, *place, "--count", "99999999999"
     )
     for count in ("99999999999", "-1"):

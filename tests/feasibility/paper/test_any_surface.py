@@ -126,7 +126,7 @@ def test_creases_are_named_and_not_crossed() -> None:
     assert verdict.answer is Answer.INFEASIBLE
     assert not (verdict.covered & roof.creased).any()
     assert verdict.covered.any()
-    assert "where the surface is creased or bends most" in verdict.message
+    assert "where the surface is creased or most curved" in verdict.message
     slope = np.radians(10.0)
     sides = [
         plane((0, 0.2), (-0.1, 0.1), position=(0.35, 0, 0.2), rpy_deg=(0, -10, 0)),
