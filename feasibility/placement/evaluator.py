@@ -25,7 +25,7 @@ from feasibility.placement.quick_search import (
     spread_cells,
 )
 from feasibility.placement.reach_bound import Reach
-from feasibility.placement.region import Array, Pose, moved_cells
+from feasibility.placement.region import Pose, moved_cells
 from feasibility.roadmap import (
     Exploration,
     SearchArrays,
@@ -159,16 +159,13 @@ class LocalEvaluator:
             pose: where the surface's frame stands.
             early: whether bounds and probes may end it before a search.
         """
-        distances = self.reach.distances(pose.values[None])[0]
-        in_reach = float(self.reach.share(pose.values[None])[0])
-        if early and distances.max() > self.reach.reach + self.reach.tolerance:
-            return Trial(pose, Stage.BOUND, in_reach)
-        exploration = Exploration(self.robot, self.cells, self.problem_at(pose), self.search.seed)
-        probed = self._searched(exploration, distances, early)
+        if early and not self.reach.within(pose.values[None]).all():
+            return Trial(pose, Stage.BOUND, self._in_reach(pose))
+        exploration, probed = self._searched(pose, early)
         if probed < 1.0:
             fk = int(exploration.work.counts[0])
-            return Trial(pose, Stage.PROBE, in_reach, probed, fk=fk)
-        return replace(self.trial_of(exploration, pose, in_reach, probed), early=early)
+            return Trial(pose, Stage.PROBE, self._in_reach(pose), probed, fk=fk)
+        return self._trial_of(exploration, pose, early)
 
     def try_all(self, poses: Sequence[Pose], early: bool) -> list[Trial]:
         """See `Evaluator`."""
@@ -178,16 +175,22 @@ class LocalEvaluator:
         """See `Evaluator`."""
         return [self.check_at(pose, causes) for pose in poses]
 
-    def _searched(self, exploration: Exploration, distances: Array, early: bool) -> float:
-        """Probe and search; returns the share of probed cells that were reached."""
+    def _in_reach(self, pose: Pose) -> float:
+        """Share of the area that the reach bound leaves open."""
+        return float(self.reach.share(pose.values[None])[0])
+
+    def _searched(self, pose: Pose, early: bool) -> tuple[Exploration, float]:
+        """Probe and search; returns the share of probed cells that were reached, too."""
+        exploration = Exploration(self.robot, self.cells, self.problem_at(pose), self.search.seed)
         if early:
+            distances = self.reach.distances(pose.values[None])[0]
             ends = [int(distances.argmax()), int(distances.argmin())]
             some = np.array(list(dict.fromkeys([*ends, *self.probes])), dtype=np.int64)
             hits = probe(exploration, some)
             if not hits.all():
-                return float(hits.mean())
+                return exploration, float(hits.mean())
         search_quickly(exploration, early)
-        return 1.0
+        return exploration, 1.0
 
     def replayed(self, trial: Trial, component: int) -> str:
         """Replay the motion behind one of a trial's `covers`, which is found again for that.
@@ -200,10 +203,7 @@ class LocalEvaluator:
         if trial.stage is Stage.CHECK:
             exploration = self._explored(cells)
         else:
-            problem = self.problem_at(trial.pose)
-            exploration = Exploration(self.robot, self.cells, problem, self.search.seed)
-            distances = self.reach.distances(trial.pose.values[None])[0]
-            self._searched(exploration, distances, trial.early)
+            exploration, _ = self._searched(trial.pose, trial.early)
         cover = trial.covers[component]
         for root in exploration.roots():
             if (exploration.covers(root) >= cover).all():
@@ -224,13 +224,13 @@ class LocalEvaluator:
         tried = self.try_at(pose, early=False) if verdict.feasible else None
         if tried is not None and not tried.complete:
             # The search of `check` again, for the margins that its motion leaves.
-            tried = self.trial_of(self._explored(cells), pose, 1.0, 1.0)
+            tried = self._trial_of(self._explored(cells), pose, early=False)
         return Trial(
             pose=pose,
             stage=Stage.CHECK,
-            in_reach=float(self.reach.share(pose.values[None])[0]),
+            in_reach=self._in_reach(pose),
             probed=1.0 if verdict.feasible else 0.0,
-            share=self.share_of(verdict.covered),
+            share=self._share_of(verdict.covered),
             margins=None if tried is None else tried.margins,
             covers=component_covers(verdict)[:MOST_COVERS],
             answer=verdict.answer,
@@ -248,14 +248,12 @@ class LocalEvaluator:
         explore(exploration)
         return exploration
 
-    def share_of(self, cover: NDArray[np.bool_]) -> float:
+    def _share_of(self, cover: NDArray[np.bool_]) -> float:
         """Share of the area that some cells (N,) have."""
         areas = self.cells.areas
         return 1.0 if cover.all() else float(areas[cover].sum() / areas.sum())
 
-    def trial_of(
-        self, exploration: Exploration, pose: Pose, in_reach: float, probed: float
-    ) -> Trial:
+    def _trial_of(self, exploration: Exploration, pose: Pose, early: bool) -> Trial:
         """What a search found."""
         covers = covers_of(exploration)
         margins = None
@@ -265,10 +263,11 @@ class LocalEvaluator:
         return Trial(
             pose=pose,
             stage=Stage.SEARCH,
-            in_reach=in_reach,
-            probed=probed,
-            share=self.share_of(covers[0]) if len(covers) else 0.0,
+            in_reach=self._in_reach(pose),
+            probed=1.0,
+            share=self._share_of(covers[0]) if len(covers) else 0.0,
             margins=margins,
             covers=covers,
+            early=early,
             fk=int(exploration.work.counts[0]),
         )
