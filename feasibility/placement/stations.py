@@ -20,13 +20,14 @@ from feasibility.placement.evaluator import LocalEvaluator, Trial
 from feasibility.placement.placements import COUNT, Placements
 from feasibility.placement.reach_bound import Reach
 from feasibility.placement.refinement import Evaluator, search_all
+from feasibility.read_only import ReadOnlyArrays
 from feasibility.search import Progress, Search
 
 TIME_LIMIT = 60.0  # [s] for the optimum; tables of thousands of rows take far less
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Station:
+class Station(ReadOnlyArrays):
     """One arm at one placement, doing one continuous motion."""
 
     placement: int
@@ -40,7 +41,7 @@ class Station:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stations:
+class Stations(ReadOnlyArrays):
     """The fewest stations found."""
 
     stations: tuple[Station, ...]
@@ -139,10 +140,8 @@ def fewest_stations(
     # Each cell to the first of them that covers it.
     owner = np.where(can, np.argmax(table[rows], axis=0) if rows else 0, -1)
     stations = [
-        Station(*motions[row], covers=table[row].copy(), cells=np.flatnonzero(owner == k))
+        Station(*motions[row], covers=table[row], cells=np.flatnonzero(owner == k))
         for k, row in enumerate(rows)
     ]
     stations.sort(key=lambda station: (-len(station.cells), station.placement, station.component))
-    for station in stations:
-        station.covers.flags.writeable = station.cells.flags.writeable = False
     return Stations(tuple(stations), np.flatnonzero(~can), found.bound)
