@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import io
 import re
-import shutil
 from pathlib import Path
 
+from pictures import chromium, save_small
 from PIL import Image
 from playwright.sync_api import Page, expect, sync_playwright
 
@@ -22,7 +22,6 @@ from feasibility.live import Live
 
 HERE = Path(__file__).parent
 SIZE = {"width": 1000, "height": 600}  # [pixel]
-LARGEST = 200_000  # [byte] of a PNG
 PATIENCE = 120_000  # [ms]
 CASE = """
 [robot]
@@ -47,18 +46,9 @@ cone_deg = 20
 
 
 def keep(page: Page, name: str) -> None:
-    """Take a picture of the page, as a small PNG.
-
-    Raises:
-        SystemExit: it is not small.
-    """
+    """Take a picture of the page, as a small PNG."""
     with Image.open(io.BytesIO(page.screenshot())) as image:
-        painted = image.convert("RGB")
-    for smaller in (painted, painted.quantize(256), painted.quantize(64)):
-        smaller.save(HERE / name, optimize=True)
-        if (HERE / name).stat().st_size <= LARGEST:
-            return
-    raise SystemExit(f"{name} has more than {LARGEST} bytes")
+        save_small(image.convert("RGB"), HERE / name)
 
 
 def answered(page: Page, kind: str) -> None:
@@ -104,17 +94,10 @@ def story(page: Page) -> None:
 
 
 def main() -> None:
-    """Make the pictures.
-
-    Raises:
-        SystemExit: there is no Chromium.
-    """
-    path = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None)
-    if path is None:
-        raise SystemExit("docs/live_pictures.py needs chromium on the PATH")
+    """Make the pictures."""
     flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--disable-dev-shm-usage"]
     with Live(Case.from_toml(CASE, name="hood.toml")) as live, sync_playwright() as tools:
-        browser = tools.chromium.launch(executable_path=path, args=flags)
+        browser = tools.chromium.launch(executable_path=chromium(), args=flags)
         page = browser.new_page(viewport=SIZE)
         page.goto(live.url)
         story(page)

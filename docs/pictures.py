@@ -61,15 +61,10 @@ def photograph(page: Path, picture: Path) -> None:
     Raises:
         SystemExit: there is no Chromium, or it painted nothing.
     """
-    browser = next(
-        filter(None, map(shutil.which, ("chromium", "chromium-browser", "chrome"))), None
-    )
-    if browser is None:
-        raise SystemExit("docs/pictures.py needs chromium on the PATH")
     with tempfile.TemporaryDirectory() as profile:
         subprocess.run(
             [
-                browser, "--headless=new", "--no-sandbox", "--disable-gpu",
+                chromium(), "--headless=new", "--no-sandbox", "--disable-gpu",
                 "--disable-dev-shm-usage", "--virtual-time-budget=15000",
                 f"--user-data-dir={profile}", f"--window-size={SIZE[0]},{SIZE[1]}",
                 f"--screenshot={picture}", page.resolve().as_uri(),
@@ -81,6 +76,28 @@ def photograph(page: Path, picture: Path) -> None:
     # A browser without WebGL paints the background alone, and says that all went well.
     if len(np.unique(np.asarray(painted).reshape(-1, 3), axis=0)) < 300:
         raise SystemExit(f"{picture} is empty: this chromium has no WebGL")
+    save_small(painted, picture)
+
+
+def chromium() -> str:
+    """The path of a Chromium.
+
+    Raises:
+        SystemExit: there is none.
+    """
+    names = ("chromium", "chromium-browser", "chrome")
+    browser = next(filter(None, map(shutil.which, names)), None)
+    if browser is None:
+        raise SystemExit("the pictures need chromium on the PATH")
+    return browser
+
+
+def save_small(painted: Image.Image, picture: Path) -> None:
+    """Save a small PNG.
+
+    Raises:
+        SystemExit: it is not small.
+    """
     # Fewer colours only where the file would be too large: they shift the rare ones.
     for smaller in (painted, painted.quantize(256), painted.quantize(64)):
         smaller.save(picture, optimize=True)
@@ -90,7 +107,7 @@ def photograph(page: Path, picture: Path) -> None:
 
 
 def main() -> None:
-    """Make the pictures that are asked for."""
+    """Make the pictures that are named, or all."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(PICTURES)}")
     parser.add_argument("--keep", metavar="FOLDER", help="where to leave the pages")
