@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_kernels import njit
 from feasibility.paper.jcell_grid import (
     HAIR,
@@ -33,17 +34,17 @@ REFRESH = 256  # levels of the stack between full evaluations of the tool: keeps
 class Memory(NamedTuple):
     """Working memory of one call; all that it takes to stop it and go on later."""
 
-    counters: NDArray[np.int64]
+    counters: Ints
     """(5,) STATE, DEPTH, NODES (the first, and those checked), PLACED (joint frames), CALL."""
-    table: NDArray[np.int64]
+    table: Ints
     """(2^k,) open-addressing hash table over `nodes`: CALL << 32 | node."""
     nodes: NDArray[np.int32]
     """(m, n) offsets of every J-cell checked in this call; row 0 is where it began."""
-    stack_node: NDArray[np.int64]
+    stack_node: Ints
     """(s,) J-cells from the first to the one being expanded."""
-    stack_next: NDArray[np.int64]
+    stack_next: Ints
     """(s,) number of the next neighbour to look at, for each of them."""
-    stack_tool: NDArray[np.float64]
+    stack_tool: Array
     """(s, 7) tool point, approach axis, distance from the target point, for each of them."""
 
 

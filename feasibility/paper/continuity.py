@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import ArgumentError
 from feasibility.clock import Clock
 from feasibility.paper import algorithm_1 as jcells
@@ -52,7 +53,7 @@ class Continuity:
     jcells: NDArray[np.int32]
     """(k, n) offsets of the path from the J-cell it began at to the first in the target cell; no
     rows unless found."""
-    q: NDArray[np.float64]
+    q: Array
     """(k, n) their configurations, rad or m."""
     checked: int
     """J-cells evaluated."""
@@ -138,7 +139,7 @@ class JSpace:
             self._chain, *self._place, self._grid, target, 0, 0, self._cap, self._memory
         )
 
-    def q(self, jcells: ArrayLike) -> NDArray[np.float64]:
+    def q(self, jcells: ArrayLike) -> Array:
         """Configurations (..., n) of J-cells given as offsets (..., n)."""
         return self.start + np.asarray(jcells) * self.steps.size
 
@@ -202,14 +203,12 @@ class JSpace:
         )
 
 
-def _least(values: NDArray[np.float64]) -> float:
+def _least(values: Array) -> float:
     """The least; inf of none."""
     return float(values.min(initial=np.inf))
 
 
-def _last_offset(
-    origin: NDArray[np.float64], step: NDArray[np.float64], upper: NDArray[np.float64]
-) -> NDArray[np.int64]:
+def _last_offset(origin: Array, step: Array, upper: Array) -> Ints:
     """The greatest integer k (n,) with origin + k * step <= upper, as floating point rounds it."""
     last = np.clip(np.floor((upper - origin) / step), -FAR, FAR).astype(np.int64)
     last[origin + last * step > upper] -= 1

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.roll import projected, roll_of
 from feasibility.targets import u_directions
 from feasibility.task import Task
 from robots import Kinematics
 from surfaces import Cells
-
-Array = NDArray[np.float64]
 
 
 def approaches_at(cells: Cells, task: Task, points: Array) -> Array:

@@ -18,8 +18,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_kernels import njit
 from robots import frames
 from surfaces import cell_under, u_direction_under
@@ -31,17 +31,17 @@ HAIR = 1e-12  # [m], [1]: required beyond the task, so that another rounding of 
 class Grid(NamedTuple):
     """The J-cells of one arm around one start configuration, and what makes them feasible."""
 
-    origin: NDArray[np.float64]
+    origin: Array
     """(n,) q_start, rad or m."""
-    step: NDArray[np.float64]
+    step: Array
     """(n,) delta q, rad or m."""
-    sine: NDArray[np.float64]
+    sine: Array
     """(n,) sin(delta q)."""
-    cosine: NDArray[np.float64]
+    cosine: Array
     """(n,) cos(delta q)."""
-    lowest: NDArray[np.int64]
+    lowest: Ints
     """(n,) least offset inside the joint limits."""
-    highest: NDArray[np.int64]
+    highest: Ints
     """(n,) greatest offset inside the joint limits."""
     moves_all: bool
     """True: any joints may move at once (3^n - 1 neighbours); False: one of them (2 n)."""
@@ -49,17 +49,17 @@ class Grid(NamedTuple):
     """-1.0 inside, +1.0 outside."""
     height: float
     """m, signed height of the tool point over the surface: side sign times standoff."""
-    tolerance: float | NDArray[np.float64]
+    tolerance: float | Array
     """m, allowed distance of a J-cell from the offset surface; on triangles (N + 1,), over each
     cell and over the border of several."""
-    cone_cosine: float | NDArray[np.float64]
+    cone_cosine: float | Array
     """Least cosine between approach axis and approach direction, -2 when any angle will do; on
     triangles likewise (N + 1,)."""
-    approach: NDArray[np.float64]
+    approach: Array
     """(3,) the approach direction where it is one for all of the surface; (0,) for its normals."""
-    roll: NDArray[np.float64]
+    roll: Array
     """(2,) rad, middle and half width of the range of the roll; half is inf where it is free."""
-    reference: NDArray[np.float64]
+    reference: Array
     """(3,) the direction that it is measured from; (0,) for the u direction."""
 
 

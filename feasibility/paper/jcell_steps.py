@@ -37,8 +37,8 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.cone import chord_of
 from feasibility.search import Search
 from feasibility.targets import target_curves
@@ -47,8 +47,6 @@ from robots import Robot
 from surfaces import Cells, Triangulation, triangulation
 from surfaces.patches import ClosedFormPatch, GridCells
 from surfaces.piecewise import PieceCells
-
-Array = NDArray[np.float64]
 
 TOLERANCE_STEPS = 0.5
 """Default tolerance, in steps times reach: half of what the tool can move in one step."""
@@ -89,7 +87,7 @@ class Steps:
         return "the tolerance, the cone or the roll" if roll else "the tolerance or the cone"
 
     @property
-    def usable(self) -> NDArray[np.bool_]:
+    def usable(self) -> Mask:
         """(N,) cells over which some J-cell may be feasible: the step is not too coarse there."""
         fine = (self.sag < self.tolerance) & (self.cone_cosine < 1.0)
         return np.asarray(fine & bool(self.roll[1] > 0.0))

@@ -20,8 +20,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.paper.exact_rolls import rolls_at
 from feasibility.paper.jcell_grid import HAIR
@@ -32,7 +33,6 @@ from feasibility.task import Task
 from robots import Kinematics, Robot
 from surfaces import Cells
 
-Array = NDArray[np.float64]
 JCell = tuple[int, ...]
 """A J-cell, by its offsets from the one at the start, in steps of delta q."""
 

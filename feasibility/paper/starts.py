@@ -16,8 +16,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.clock import Clock
 from feasibility.search import Search
 from feasibility.task import Targets, Task
@@ -42,10 +42,10 @@ class StartProjection:
     def __init__(
         self,
         robot: Robot,
-        point: NDArray[np.float64],
-        approach: NDArray[np.float64],
+        point: Array,
+        approach: Array,
         cone: float,
-        reference: NDArray[np.float64] | None = None,
+        reference: Array | None = None,
     ) -> None:
         """Configurations of `robot` with the tool at `point` (3,) m, its axis at `approach` (3,).
 
@@ -60,9 +60,7 @@ class StartProjection:
         reach = robot.reach
         self._length = 0.3 * reach if 0.0 < reach < np.inf else 1.0  # m per rad of misalignment
 
-    def _rows(
-        self, q: NDArray[np.float64], align: bool
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _rows(self, q: Array, align: bool) -> tuple[Array, Array]:
         """Residuals (m,) and their Jacobian (m, n): tool point, then alignment or violated cone."""
         point, axis = self._kinematics.tool(q)
         point_rows, axis_rows = self._kinematics.jacobians(q)
@@ -86,9 +84,7 @@ class StartProjection:
             np.vstack([point_rows, self._length * self._approach @ axis_rows]),
         )
 
-    def project(
-        self, q: NDArray[np.float64], align: bool, steps: int = 60
-    ) -> NDArray[np.float64] | None:
+    def project(self, q: Array, align: bool, steps: int = 60) -> Array | None:
         """Damped Newton steps from q (n,) onto the manifold, joints stopping at their limits.
 
         Returns:
@@ -123,13 +119,11 @@ class StartProjection:
                     return None
         return q if np.abs(residual).max() < ACCURACY else None
 
-    def _free(self, q: NDArray[np.float64], pull: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _free(self, q: Array, pull: Array) -> Mask:
         """(n,) joints that are not held at a limit by a pull (n,) beyond it."""
         return ~(((q <= self._lower) & (pull < 0)) | ((q >= self._upper) & (pull > 0)))
 
-    def toward(
-        self, q: NDArray[np.float64], goal: NDArray[np.float64], align: bool
-    ) -> NDArray[np.float64]:
+    def toward(self, q: Array, goal: Array, align: bool) -> Array:
         """Follow the manifold from q (n,) towards `goal` (n,), until it comes no nearer."""
         for _ in range(STRIDES):
             _, jacobian = self._rows(q, align)
@@ -153,13 +147,13 @@ class StartProjection:
 
 def starts(
     robot: Robot,
-    point: NDArray[np.float64],
-    approach: NDArray[np.float64],
+    point: Array,
+    approach: Array,
     cone: float,
     seed: int = 0,
     patience: int = DRY_SEEDS,
-    reference: NDArray[np.float64] | None = None,
-) -> Iterator[NDArray[np.float64]]:
+    reference: Array | None = None,
+) -> Iterator[Array]:
     """Configurations (n,) over one target, one per distinct branch, as they are found.
 
     Args:
@@ -176,7 +170,7 @@ def starts(
     middle = window.mean(axis=0)  # of the limits; zero for endless joints
     for align in (True, False) if reference is None else (True,):
         rng = np.random.default_rng(seed)
-        found: list[NDArray[np.float64]] = []
+        found: list[Array] = []
         left = patience
         while left > 0 and len(found) < MOST_STARTS:
             left -= 1
@@ -199,9 +193,9 @@ def candidates(
     cells: Cells,
     task: Task,
     search: Search,
-    usable: NDArray[np.bool_],
+    usable: Mask,
     clock: Clock | None = None,
-) -> Iterator[NDArray[np.float64]]:
+) -> Iterator[Array]:
     """Start configurations (n,) over the start cell, as many as the search asks for.
 
     The start cell of a grid is the one in the middle of the list (cell 45 of 90), from where this
@@ -236,7 +230,7 @@ def candidates(
             return
 
 
-def _references(task: Task, targets: Targets, cell: int) -> tuple[NDArray[np.float64] | None, ...]:
+def _references(task: Task, targets: Targets, cell: int) -> tuple[Array | None, ...]:
     """Where the TCP's reference axis may point at the start: at the middle roll, or else anywhere.
 
     Anywhere alone where the roll is free.
@@ -247,7 +241,7 @@ def _references(task: Task, targets: Targets, cell: int) -> tuple[NDArray[np.flo
     return (np.cos(psi) * t + np.sin(psi) * np.cross(b, t), None)
 
 
-def _window(robot: Robot) -> NDArray[np.float64]:
+def _window(robot: Robot) -> Array:
     """(2, n) the part of the limits that starts are drawn from, rad or m.
 
     At most one turn of each joint, about the middle of its limits (about zero, or next to its only

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.verdict import Verdict, Walk
 from robots import Kinematics
 from surfaces import Cells
@@ -51,7 +52,7 @@ class Tree:
     complete: bool = True
     """False when the time limit stopped the search."""
 
-    def motion(self, a: int, b: int) -> NDArray[np.float64]:
+    def motion(self, a: int, b: int) -> Array:
         """Configurations (k, n) along the edge between cells a and b, from a to b."""
         forward = self.edges.get((a, b))
         return self.space.q(self.edges[b, a][::-1] if forward is None else forward)
@@ -100,11 +101,11 @@ def tree_walk(verdict: Verdict) -> Walk | None:
     return Walk(q=q, cell=_at_centres(verdict, q))
 
 
-def there_and_back(tree: nx.DiGraph, root: int) -> NDArray[np.float64]:
+def there_and_back(tree: nx.DiGraph, root: int) -> Array:
     """(k, n) one motion along the tree depth first, up to the last cell; rad or m."""
     import networkx as nx
 
-    parts: list[NDArray[np.float64]] = [np.atleast_2d(tree.nodes[root]["q"])]
+    parts: list[Array] = [np.atleast_2d(tree.nodes[root]["q"])]
     last = 0  # part that enters the last cell
     for parent, child, kind in nx.dfs_labeled_edges(tree, root):
         if parent != child:
@@ -114,7 +115,7 @@ def there_and_back(tree: nx.DiGraph, root: int) -> NDArray[np.float64]:
     return np.concatenate(parts[: max(last, 1)])
 
 
-def corners(q: NDArray[np.float64]) -> NDArray[np.float64]:
+def corners(q: Array) -> Array:
     """The rows of q (k, n) where the motion turns: equal moves in a row are one straight line."""
     if len(q) < 3:
         return q
@@ -123,7 +124,7 @@ def corners(q: NDArray[np.float64]) -> NDArray[np.float64]:
     return q[np.concatenate([[True], turns, [True]])]
 
 
-def _at_centres(verdict: Verdict, q: NDArray[np.float64]) -> NDArray[np.int64]:
+def _at_centres(verdict: Verdict, q: Array) -> Ints:
     """(k,) the cell at whose centre target the tool point is within the tolerance, or -1."""
     from scipy.spatial import KDTree
 

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.certification import replay_over_surface
 from feasibility.cone import angle_of
 from feasibility.paper.exact_rolls import approaches_at, rolls_at
@@ -24,8 +24,6 @@ from robots import Kinematics, Robot
 from surfaces import Cells
 from surfaces.patches import GridCells
 
-Array = NDArray[np.float64]
-
 SAME = 1e-9  # [rad], [m], [1]: rounding allowed where two computations of one number meet
 
 
@@ -35,7 +33,7 @@ class Path:
 
     cell: int
     neighbour: int
-    q: NDArray[np.float64]
+    q: Array
     """(k, n) configurations of its J-cells, rad or m."""
 
 
@@ -137,7 +135,7 @@ def _by_surface(
     return certificate.max_position_error, certificate.max_angle, list(map(str, found.faults))
 
 
-def _over_cells(cells: Cells, points: Array, which: Sequence[int]) -> NDArray[np.bool_]:
+def _over_cells(cells: Cells, points: Array, which: Sequence[int]) -> Mask:
     """(k,) whether points (k, 3) m are over the cells (k,)."""
     if not isinstance(cells, GridCells):
         return np.asarray(cells.locate(points) == np.asarray(which, dtype=np.int64))
@@ -145,9 +143,7 @@ def _over_cells(cells: Cells, points: Array, which: Sequence[int]) -> NDArray[np
     return within_cells(cells, np.column_stack([found.u, found.v]), which)
 
 
-def within_cells(
-    cells: GridCells, parameters: NDArray[np.float64], cell: Sequence[int]
-) -> NDArray[np.bool_]:
+def within_cells(cells: GridCells, parameters: Array, cell: Sequence[int]) -> Mask:
     """(k,) whether points with surface parameters (k, 2), rad or m, lie in the cells (k,)."""
     surface = cells.surface
     centres = np.column_stack([cells.u, cells.v])  # (N, 2) rad or m

@@ -9,7 +9,6 @@ from .placements import Placements as Placements
 from .placements import place as place
 from .refinement import Evaluator as Evaluator
 from .region import AXES as AXES
-from .region import Array as Array
 from .region import PlacementError as PlacementError
 from .region import Pose as Pose
 from .region import Region as Region

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Mask
 from feasibility.certification import replay
 from feasibility.checking import check
 from feasibility.placement.quick_search import (
@@ -86,7 +86,7 @@ class Trial:
     """Share of the area that the best single motion found covers; 0 without a search."""
     margins: Margins | None = None
     """None unless that motion covers every cell."""
-    covers: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    covers: Mask = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
     """(K, N) cells of the largest components found, none inside another, the best first."""
     answer: Answer | None = None
     """The answer of `feasibility.check`; None where it was not run."""
@@ -248,7 +248,7 @@ class LocalEvaluator:
         explore(exploration)
         return exploration
 
-    def _share_of(self, cover: NDArray[np.bool_]) -> float:
+    def _share_of(self, cover: Mask) -> float:
         """Share of the area that some cells (N,) have."""
         areas = self.cells.areas
         return 1.0 if cover.all() else float(areas[cover].sum() / areas.sum())

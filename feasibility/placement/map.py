@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.placement.evaluator import Stage
 from feasibility.placement.placements import Placements
 from feasibility.placement.refinement import Evaluator, search_all
-from feasibility.placement.region import AXES, Array, PlacementError, Pose, Region
+from feasibility.placement.region import AXES, PlacementError, Pose, Region
 from feasibility.search import Progress
 
 SIDE = 15  # places along each of the first two axes
@@ -31,7 +31,7 @@ class PlacementMap:
     """(a, b) or (a, b, c) largest share of the area that one motion was found to cover."""
     margin: Array
     """Likewise the margin, see `placement.quick_search`; 0 where not every cell is covered."""
-    known: NDArray[np.bool_]
+    known: Mask
     """Likewise, where a search was run; elsewhere share and margin are NaN."""
 
     def __post_init__(self) -> None:

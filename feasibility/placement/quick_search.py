@@ -14,8 +14,8 @@ centre away from both; each such step is certified, as those of the search are.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.compiled import allocating, kernel, put
 from feasibility.division import undominated
 from feasibility.roadmap import (
@@ -70,7 +70,7 @@ def _probe(problem, work, cells, guesses, hits):  # type: ignore[no-untyped-def]
                 break
 
 
-def probe(exploration: Exploration, cells: NDArray[np.int64]) -> NDArray[np.bool_]:
+def probe(exploration: Exploration, cells: Ints) -> Mask:
     """(k,) whether Newton's method finds a configuration over some cells (k,).
 
     Where collisions are checked, one that is clear of them.
@@ -83,7 +83,7 @@ def probe(exploration: Exploration, cells: NDArray[np.int64]) -> NDArray[np.bool
     return hits.astype(bool)
 
 
-def _projects_clear(exploration: Exploration, cell: int, guesses: NDArray[np.float64]) -> bool:
+def _projects_clear(exploration: Exploration, cell: int, guesses: Array) -> bool:
     """Does any guess lead to a configuration over the cell that does not collide?"""
     at = exploration.arrays, exploration.work, cell
     return any(
@@ -123,7 +123,7 @@ def spread_cells(cells: Cells) -> list[int]:
     return apart(features, PROBES, cells.middle, same=0.0)
 
 
-def covers_of(exploration: Exploration) -> NDArray[np.bool_]:
+def covers_of(exploration: Exploration) -> Mask:
     """(K, N) the largest components, none inside another, the best first."""
     roots = [root for root in exploration.roots() if exploration.roadmap.size[root] > 0]
     covers = exploration.roadmap.cover[roots[: 4 * MOST_COVERS]].astype(bool)
@@ -204,7 +204,7 @@ def _widest_margins(problem, aimed, work, roadmap, component, best):  # type: ig
             best[cell, 0], best[cell, 1] = here[0], here[1]
 
 
-def least_margins(exploration: Exploration) -> NDArray[np.float64]:
+def least_margins(exploration: Exploration) -> Array:
     """(2,) shares of limits and of cone that the best component leaves over every cell."""
     problem, work = exploration.arrays, exploration.work
     # Steps over a centre head for a cone that is next to nothing, and keep to the task's.

@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from feasibility.placement.region import Array, Pose, Region
+from coverable_arrays import Array, Mask
+from feasibility.placement.region import Pose, Region
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells, rotation_from_rpy
@@ -73,7 +73,7 @@ class Reach:
         return np.asarray(np.linalg.norm(np.einsum("kij,nj->kni", turns, self.targets) + offset,
                                          axis=2))  # fmt: skip
 
-    def within(self, values: Array) -> NDArray[np.bool_]:
+    def within(self, values: Array) -> Mask:
         """(k, N) False where a target is proved out of reach."""
         return self.distances(values) <= self.reach + self.tolerance
 

@@ -9,10 +9,11 @@ from typing import Protocol
 
 import numpy as np
 
+from coverable_arrays import Array
 from feasibility.clock import Clock, OutOfTime
 from feasibility.placement.evaluator import Stage, Trial
 from feasibility.placement.reach_bound import Reach
-from feasibility.placement.region import Array, Pose, Region
+from feasibility.placement.region import Pose, Region
 from feasibility.search import Progress
 
 DRAWS = 16  # as many times more are drawn where the bound leaves few

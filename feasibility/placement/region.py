@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import CoverableError
 from surfaces import Cells, Surface, rotation_from_rpy
 from surfaces.patches import GridCells
 
-Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
 AXES = ("x", "y", "z", "roll_deg", "pitch_deg", "yaw_deg")

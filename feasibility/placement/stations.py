@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints, Mask
 from feasibility.clock import Clock
 from feasibility.division import set_cover
 from feasibility.placement.evaluator import LocalEvaluator, Trial
@@ -34,9 +34,9 @@ class Station(ReadOnlyArrays):
     """Index of the placement."""
     component: int
     """Index of its component."""
-    covers: NDArray[np.bool_]
+    covers: Mask
     """(N,) cells that its motion can cover."""
-    cells: NDArray[np.int64]
+    cells: Ints
     """(k,) cells given to it: each cell to one station, to the one that covers most."""
 
 
@@ -46,7 +46,7 @@ class Stations(ReadOnlyArrays):
 
     stations: tuple[Station, ...]
     """The one given most cells first."""
-    left_out: NDArray[np.int64]
+    left_out: Ints
     """(k,) cells that no component covers."""
     bound: int
     """No fewer stations cover what these cover."""
@@ -115,9 +115,7 @@ def station_plan(
     return StationPlan(stations, tuple(trial for trial, _ in chosen), refusals)
 
 
-def fewest_stations(
-    covers: Sequence[NDArray[np.bool_]], n: int, time_limit: float = TIME_LIMIT
-) -> Stations:
+def fewest_stations(covers: Sequence[Mask], n: int, time_limit: float = TIME_LIMIT) -> Stations:
     """The fewest motions that together cover what all motions found cover.
 
     Args:

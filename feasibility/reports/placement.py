@@ -7,11 +7,11 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import counted
 from feasibility.collisions import checked
 from feasibility.placement import (
     AXES,
-    Array,
     PlacementMap,
     Placements,
     Pose,

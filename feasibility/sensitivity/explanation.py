@@ -8,8 +8,8 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.checking import check
 from feasibility.clock import Clock, OutOfTime
@@ -207,7 +207,7 @@ def cost_of(verdict: Verdict) -> int:
 def _thresholds(
     prober: Prober,
     verdict: Verdict,
-    q: NDArray[np.float64],
+    q: Array,
     motions: Sequence[Attempt],
     varied: Sequence[Quantity],
 ) -> Iterator[tuple[ThresholdSearch, Threshold]]:
@@ -234,7 +234,7 @@ def _thresholds(
         yield made, found
 
 
-def _motions(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> list[Attempt]:
+def _motions(prober: Prober, verdict: Verdict, q: Array) -> list[Attempt]:
     """The witness of a feasible case, and covering motions in other postures."""
     angle = None if verdict.certificate is None else verdict.certificate.max_angle
     start = Attempt(verdict.answer, verdict.evidence, verdict.message, q, verdict.witness, angle)
@@ -262,7 +262,7 @@ def other_motions(prober: Prober, guesses: int, most: int) -> list[Attempt]:
     return [attempt for attempt in found if attempt.found]
 
 
-def _posture(prober: Prober, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def _posture(prober: Prober, q: Array) -> Array:
     """(7 n,) numbers that differ where postures do: where the joints are, most of all.
 
     Joint values alone say little: wrists turned by half turns change them much.
@@ -272,9 +272,7 @@ def _posture(prober: Prober, q: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([origins.ravel(), 0.1 * axes.ravel(), 0.02 * q])
 
 
-def apart(
-    features: NDArray[np.float64], most: int, first: int = 0, same: float = SAME
-) -> list[int]:
+def apart(features: Array, most: int, first: int = 0, same: float = SAME) -> list[int]:
     """Rows of (k, m) features, each as far as can be from those chosen before it; up to `most`.
 
     Rows nearer than `same` to a chosen one are left out.
@@ -303,7 +301,7 @@ def _refine(
         found[k] = searches[k].tighter(found[k])
 
 
-def known_configurations(verdict: Verdict) -> NDArray[np.float64]:
+def known_configurations(verdict: Verdict) -> Array:
     """(N, n) a configuration over each cell that the best motion covers; NaN over the others."""
     q = np.full((len(verdict.cells), verdict.robot.n), np.nan)
     if verdict.witness is not None:
@@ -316,7 +314,7 @@ def known_configurations(verdict: Verdict) -> NDArray[np.float64]:
     return q
 
 
-def drop(prober: Prober, verdict: Verdict, q: NDArray[np.float64]) -> Dropped:
+def drop(prober: Prober, verdict: Verdict, q: Array) -> Dropped:
     """What the best motion misses, and one motion over all the rest, if that can be certified.
 
     Where a short search for it fails, the largest patch of a division has a motion of its own.

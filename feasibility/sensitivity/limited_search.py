@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.clock import OutOfTime
 from feasibility.compiled import kernel
 from feasibility.roadmap import (
@@ -56,7 +56,7 @@ class LimitedExploration(Exploration):
         left = self.most - float(self.work.counts[0])
         return int(min(super().budget(), max(left, LEAST)))
 
-    def add_seeds(self, cell: int, guesses: NDArray[np.float64]) -> int:
+    def add_seeds(self, cell: int, guesses: Array) -> int:
         """Add seeds, unless the limit is reached; see `Exploration.add_seeds`."""
         self.tick("looking for configurations")
         return super().add_seeds(cell, guesses)
@@ -69,7 +69,7 @@ class Attempt:
     answer: Answer
     evidence: Evidence
     detail: str
-    q: NDArray[np.float64]
+    q: Array
     """(N, n) a configuration of the best component over each cell; NaN where it has none."""
     walk: Walk | None
     """A covering motion; None unless feasible."""
@@ -108,7 +108,7 @@ class CollisionProofs:
         return self._latest
 
 
-def configurations(exploration: Exploration) -> NDArray[np.float64]:
+def configurations(exploration: Exploration) -> Array:
     """(N, n) a configuration of the best component over each cell; NaN where it has none."""
     roadmap = exploration.roadmap
     q = np.full((len(exploration.cells), exploration.robot.n), np.nan)
@@ -129,9 +129,7 @@ def certifiable(arrays: SearchArrays) -> bool:
     return smooth and known and arrays.cone_chord > 0.0
 
 
-def project_all(
-    arrays: SearchArrays, work: Work, order: NDArray[np.int64], q: NDArray[np.float64]
-) -> int:
+def project_all(arrays: SearchArrays, work: Work, order: Ints, q: Array) -> int:
     """Project row q[k] (n,) onto the self-motion manifold over cell k, for the cells of `order`.
 
     Where collisions are checked, it is moved clear of them too.

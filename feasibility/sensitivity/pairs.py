@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.clock import Clock
 from feasibility.roadmap import Ruling
 from feasibility.sensitivity.limited_search import Attempt
@@ -24,7 +24,6 @@ from feasibility.sensitivity.threshold_search import HINT_BOXES, ThresholdSearch
 from feasibility.sensitivity.thresholds import Change, Finding, Pair
 from feasibility.verdict import Verdict
 
-Floats = NDArray[np.float64]
 Step = tuple[Quantity, int]
 SHIFTS = (0.2, 0.5, 1.0)  # [1] of the largest shift: sizes that are tried
 NARROWING = 3  # verdicts' worth of evaluations for each side of a pair
@@ -38,7 +37,7 @@ class PairSearch:
 
     given: Variant
     verdict: Verdict
-    seeds: Floats
+    seeds: Array
     """(N, n) configurations of the best component; NaN where it has none."""
     cost: int
     """Evaluations that one verdict of the case takes."""

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.certification import replay
 from feasibility.clock import Clock, OutOfTime
 from feasibility.roadmap import (
@@ -45,8 +45,6 @@ from feasibility.sensitivity.limited_search import (
 from feasibility.sensitivity.quantities import OF_COLLISIONS, Kind, Quantity, Variant
 from feasibility.verdict import Answer, Evidence
 
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 MORE_SEEDS = 2  # missed cells that an attempt starts from, besides the first
 MOST_SUSPECTS = 12  # cells that are taken for hard
 AGAIN = 2.0  # times what spreading from the first seed took: all that a short attempt may take
@@ -150,7 +148,7 @@ class Prober:
         ends[quantity.kind is Kind.UPPER][quantity.joint] = value
         return self.arrays._replace(lower=ends[0], upper=ends[1])
 
-    def order(self) -> NDArray[np.int64]:
+    def order(self) -> Ints:
         """(N,) all cells, the hard ones first, then those at the boundary of the surface."""
         hard = np.array(self.suspects, dtype=np.int64)
         rest = self._spread[~np.isin(self._spread, hard)]
@@ -163,7 +161,7 @@ class Prober:
         self.suspects.insert(0, cell)
         del self.suspects[MOST_SUSPECTS:]
 
-    def follow(self, arrays: SearchArrays, q: Floats) -> tuple[int, Floats]:
+    def follow(self, arrays: SearchArrays, q: Array) -> tuple[int, Array]:
         """Project configurations q (N, n) of a case nearby onto the manifolds of this one.
 
         Returns:
@@ -181,7 +179,7 @@ class Prober:
 
     def rule(
         self, arrays: SearchArrays, cell: int, boxes: int, at: Steps | None = None
-    ) -> tuple[Ruling, Floats | None]:
+    ) -> tuple[Ruling, Array | None]:
         """The reach bound on one cell, then branch and bound with so many boxes, or fewer.
 
         Where the tool collides over the cell in every pose, the arm does not matter; where the arm
@@ -224,7 +222,7 @@ class Prober:
         blocked = blockers.arm_collides(arrays, self.work, cell, self.tick)
         return Ruling.PROVED if blocked else ruling, None
 
-    def beyond_reach(self, arrays: SearchArrays) -> Bools:
+    def beyond_reach(self, arrays: SearchArrays) -> Mask:
         """(N,) cells that are further away than the arm reaches.
 
         Revolute joints reach alike in any limits; a prismatic joint that is longer than in the case
@@ -240,10 +238,10 @@ class Prober:
     def attempt(
         self,
         arrays: SearchArrays,
-        seeds: Floats,
+        seeds: Array,
         most: float,
         deep: bool,
-        needed: Bools | None = None,
+        needed: Mask | None = None,
         hard: int = NO_CELL,
     ) -> Attempt:
         """Search for a covering motion, from known configurations first.
@@ -304,7 +302,7 @@ class Prober:
             detail = "unknown, because the time limit ran out"
         return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, q, None)
 
-    def confirmed(self, variant: Variant, attempt: Attempt, needed: Bools | None = None) -> Attempt:
+    def confirmed(self, variant: Variant, attempt: Attempt, needed: Mask | None = None) -> Attempt:
         """An attempt once its motion is replayed: still feasible, or undecided if refused."""
         if attempt.walk is None or attempt.angle is not None:
             return attempt
@@ -318,7 +316,7 @@ class Prober:
         detail = f"a motion was found, but the replay refuses it: {replayed.refusal}"
         return Attempt(Answer.UNDECIDED, Evidence.BUDGET, detail, attempt.q, None)
 
-    def _add_seeds(self, exploration: LimitedExploration, seeds: Floats, deep: bool) -> None:
+    def _add_seeds(self, exploration: LimitedExploration, seeds: Array, deep: bool) -> None:
         """Add seeds until one component covers every cell, hard cells first."""
         known = np.asarray(np.isfinite(seeds).all(axis=1))
         first = [cell for cell in self.suspects if known[cell]][:1]

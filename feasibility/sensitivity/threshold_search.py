@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.roadmap import Ruling
 from feasibility.sensitivity.limited_search import NO_CELL, Attempt
 from feasibility.sensitivity.probes import Prober
@@ -23,7 +23,6 @@ from feasibility.sensitivity.thresholds import Finding, Span, Threshold
 from feasibility.sensitivity.warm_start import Reached, WarmStart, last_true
 from feasibility.verdict import Answer, Evidence
 
-Floats = NDArray[np.float64]
 PROOF_BOXES = 3000  # for one cell
 HINT_BOXES = 1500  # for one cell, where a configuration is as welcome as a proof
 BEYOND = (5, 2, 1)  # steps past the last feasible value at which a proof is attempted
@@ -136,7 +135,7 @@ class ThresholdSearch:
 
     # -- a case that is not ----------------------------------------------------------------------
 
-    def widen(self, here: Finding, seeds: Floats) -> Threshold:
+    def widen(self, here: Finding, seeds: Array) -> Threshold:
         """How far the quantity has to go for the case to become feasible.
 
         Args:
@@ -176,7 +175,7 @@ class ThresholdSearch:
         reported = self._reported(good)
         return Span(reported, other) if reported.feasible else Span(self._reported(entry), reported)
 
-    def _look(self, k: int, seeds: Floats) -> Attempt | Finding:
+    def _look(self, k: int, seeds: Array) -> Attempt | Finding:
         """Is it feasible at k steps? An attempt if so, or what speaks against it."""
         arrays = self.prober.arrays_at(self.quantity, k)
         missed = np.flatnonzero(~np.isfinite(seeds).all(axis=1))
@@ -270,7 +269,7 @@ class ThresholdSearch:
                     best = reached
         return best
 
-    def _short_of(self, good: Probe, bad: int, q: Floats, share: float) -> Reached:
+    def _short_of(self, good: Probe, bad: int, q: Array, share: float) -> Reached:
         """Short of a failed search by a share of the way to it, with its configurations."""
         back = max(round(share * abs(bad - good.k)), 1)
         return Reached(bad - back if bad > good.k else bad + back, q, NO_CELL)
@@ -310,7 +309,7 @@ class ThresholdSearch:
         attempt = self._search(k, seeds, deep=True, hard=hard[0] if hard else NO_CELL)
         return Probe(k, attempt) if attempt.found else self._finding(k, attempt)
 
-    def _proof_beyond(self, bracket: Bracket, far: int) -> tuple[Finding | None, Floats | None]:
+    def _proof_beyond(self, bracket: Bracket, far: int) -> tuple[Finding | None, Array | None]:
         """A proof of the cell that failed, as near as one is found; or what covers that cell."""
         sign = 1 if far > bracket.good.k else -1
         proof, q = None, None
@@ -323,7 +322,7 @@ class ThresholdSearch:
             proof = self._proof(k, bracket.failed)
         return proof, q
 
-    def _search(self, k: int, seeds: Floats, deep: bool = False, hard: int = NO_CELL) -> Attempt:
+    def _search(self, k: int, seeds: Array, deep: bool = False, hard: int = NO_CELL) -> Attempt:
         """Search at k steps: from the seeds alone, or deeper, with half of what is left."""
         left = self.stop - self.prober.spent
         most = max(left, self.verdict_cost) // 2 if deep else SHORT * self.verdict_cost

@@ -9,9 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Ints
 from feasibility.read_only import ReadOnlyArrays
 from feasibility.sensitivity.quantities import Quantity
 from feasibility.speed import RateFigures
@@ -129,7 +127,7 @@ class Pair:
 class Dropped(ReadOnlyArrays):
     """The cells without which one motion covers the rest."""
 
-    cells: NDArray[np.int64]
+    cells: Ints
     """(k,) flat indices."""
     area: float
     """m^2."""

@@ -11,9 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from coverable_arrays import Array, Ints
 from feasibility.sensitivity.limited_search import NO_CELL, project_all
 from feasibility.sensitivity.probes import Prober
 from feasibility.sensitivity.quantities import Quantity
@@ -28,7 +26,7 @@ class Reached(NamedTuple):
 
     k: int
     """Number of steps."""
-    q: NDArray[np.float64]
+    q: Array
     """(N, n) configurations there, or some way further on."""
     cell: int
     """The cell that fails at the next step; `NO_CELL` if there is none, or none was tried."""
@@ -37,15 +35,13 @@ class Reached(NamedTuple):
 class WarmStart:
     """Configurations over all cells, each at the value it was projected at last."""
 
-    def __init__(
-        self, prober: Prober, quantity: Quantity, start: int, q: NDArray[np.float64]
-    ) -> None:
+    def __init__(self, prober: Prober, quantity: Quantity, start: int, q: Array) -> None:
         """Begin at `start` steps with configurations (N, n) that are over their cells there."""
         self.prober, self.quantity, self.start = prober, quantity, start
         self.first = q
         self.q = q.copy()
 
-    def projects(self, cells: NDArray[np.int64], k: int) -> int:
+    def projects(self, cells: Ints, k: int) -> int:
         """How many of these cells project at k steps, before the first that does not."""
         found = self.q.copy()
         arrays = self.prober.centres_at(self.quantity, k)
@@ -84,7 +80,7 @@ class WarmStart:
             steps = [step for step in steps if step < length] + [length]
         return [self.start + sign * step for step in steps]
 
-    def _common_reach(self, order: NDArray[np.int64], low: int, k: int) -> Reached:
+    def _common_reach(self, order: Ints, low: int, k: int) -> Reached:
         """The last value up to k steps at which every cell projects.
 
         Some are known to at `low`. Cells that were projected further on before are left there: they
@@ -105,7 +101,7 @@ class WarmStart:
             return Reached(k, self.first, failed)
         return Reached(k, self.q.copy(), failed)
 
-    def _reach_of(self, cell: NDArray[np.int64], low: int, bad: int) -> int:
+    def _reach_of(self, cell: Ints, low: int, bad: int) -> int:
         """The last value up to `bad`, where it failed from afar, at which a cell (1,) projects."""
         start, top = low, bad
         if low != self.start and not self.projects(cell, low):

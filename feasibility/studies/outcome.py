@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Mask
 from feasibility.collisions import gather
 from feasibility.division import undominated
 from feasibility.studies.built_cases import arm_of, case_of, clock_of, cut_of
@@ -140,7 +140,7 @@ def outcome_of(verdict: Verdict) -> Outcome:
     }
 
 
-def component_covers(verdict: Verdict) -> NDArray[np.bool_]:
+def component_covers(verdict: Verdict) -> Mask:
     """(K, N) the cells that single motions cover, none inside another, the best first."""
     covers = np.zeros((len(verdict.components), len(verdict.cells)), dtype=bool)
     for row, cells in zip(covers, verdict.components, strict=True):
@@ -194,7 +194,7 @@ def finite(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def bits_of(cover: NDArray[np.bool_]) -> str:
+def bits_of(cover: Mask) -> str:
     """Cells (N,) as hexadecimal bits, the first cell first.
 
     Example:
@@ -204,7 +204,7 @@ def bits_of(cover: NDArray[np.bool_]) -> str:
     return np.packbits(cover).tobytes().hex()
 
 
-def cells_of(bits: str, n: int) -> NDArray[np.bool_]:
+def cells_of(bits: str, n: int) -> Mask:
     """(n,) the cells that `bits_of` wrote.
 
     Example:
