@@ -57,12 +57,13 @@ feasibility: task
 feasibility.targets
 feasibility: found problem verdict
 feasibility.treated
-feasibility.certification: faults kinematic_bounds
+feasibility.certification: faults rows jacobians lever_bounds
 feasibility.certification.collisions
 feasibility.certification.tool_alone
 feasibility.certification.joint_boxes
 feasibility.certification.rolls
-feasibility.certification: box_cutting box_exclusion cells_reached curve_deviations curve_matching empty_region lever_bounds linear_models motion_replay order parts_agreement proof_verification refutation region rolls_along stretches surface_replay tree_shape
+feasibility.certification.cut_proofs
+feasibility.certification: cells_reached curve_deviations curve_matching motion_replay order rolls_along stretches surface_replay
 feasibility.certification.areas
 feasibility.paper
 feasibility.cases

@@ -1,4 +1,4 @@
-"""How far a tool moves over a box of joints, and how far off a linear model of that is.
+"""How far a tool moves over a box of joints, or along a motion, and how far off its linear model.
 
 **Lemma.** Let L_j be at least the lever r_j of joint j, the distance of the tool point from its
 axis, everywhere in the box, and h_j its half width. Then for every d in the box
@@ -14,6 +14,9 @@ joints behind j alone. Change these one by one, the last first: joint k moves th
 most 2 sin(h_k / 2) L_k, not more than min(h_k, 2) L_k, or by h_k if it slides; so
 L_j = r_j(c) + sum_{k behind j} min(h_k, 2) L_k. A distance to a line changes by no more than the
 point does. QED
+
+Along a segment q(s), s from 0 to 1, with |q'| <= d, |p''| <= D with d in place of h. Every place of
+it is within d / 2 of one of its ends, so the larger lever at the two takes the place of r_j(c).
 """
 
 from __future__ import annotations
@@ -26,6 +29,34 @@ from numpy.typing import NDArray
 from robots import Robot
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+def largest_levers(levers: Array, half: Array, prismatic: Mask, cap: Array | float) -> Array:
+    """(m, n) L_j of the lemma.
+
+    Args:
+        levers: (m, n) r_j or s_j at the centres; of a prismatic joint 1 for points, 0 for axes.
+        half: (m, n) h_j, rad or m.
+        prismatic: (n,) which joints slide.
+        cap: what no lever exceeds anywhere, of each joint (n,) or of all.
+    """
+    largest, behind = np.array(levers), np.zeros(len(levers))
+    caps = np.broadcast_to(cap, levers.shape[1])
+    for j in range(levers.shape[1] - 1, -1, -1):
+        turned = half[:, j]
+        if not prismatic[j]:
+            largest[:, j] = np.minimum(levers[:, j] + behind, caps[j])
+            turned = np.minimum(turned, 2.0)
+        behind = behind + largest[:, j] * turned
+    return largest
+
+
+def second_derivative_bound(largest: Array, steps: Array, prismatic: Mask) -> Array:
+    """(m,) D, from L_j and the changes of joints (m, n), h_j or d_j."""
+    turns = np.where(prismatic, 0.0, steps)
+    before = np.cumsum(turns, axis=1) - turns
+    return np.asarray((largest * steps * (turns + 2.0 * before)).sum(axis=1))
 
 
 class LeverBounds(NamedTuple):
@@ -37,29 +68,46 @@ class LeverBounds(NamedTuple):
     """(m,) D."""
 
 
-def lever_bounds(
-    levers: Array, half: Array, prismatic: NDArray[np.bool_], cap: Array
-) -> LeverBounds:
-    """L_j and D of the lemma.
+def lever_bounds(levers: Array, half: Array, prismatic: Mask, cap: Array | float) -> LeverBounds:
+    """L_j and D over boxes; see `largest_levers`."""
+    largest = largest_levers(levers, half, prismatic, cap)
+    return LeverBounds(largest, second_derivative_bound(largest, half, prismatic))
+
+
+def levers_along(
+    steps: Array, prismatic: Mask, first: Array, last: Array, cap: Array | float
+) -> Array:
+    """(m, n) L_j along m segments with |q'| <= steps (m, n), from the levers at both ends."""
+    return largest_levers(np.maximum(first, last), 0.5 * steps, prismatic, cap)
+
+
+def second_derivatives(
+    steps: Array, prismatic: Mask, levers: Array, cap: float, own: Array | None = None
+) -> Array:
+    """(m,) D of |p''| (or of |a''|) along segments, straight ones in joint space by default.
 
     Args:
-        levers: (m, n) r_j or s_j at the centres; of a prismatic joint 1 for points, 0 for axes.
-        half: (m, n) h_j.
+        steps: (m, n) absolute joint changes; along curves bounds on |dq/ds|, s from 0 to 1.
         prismatic: (n,) which joints slide.
-        cap: (n,) what no lever exceeds anywhere.
+        levers: (m + 1, n) r_j (or s_j) at the ends of the segments.
+        cap: upper bound of every lever (1 for sines, inf for lengths).
+        own: (m, n) bounds on the joints' own |d^2q/ds^2|; each adds that times its lever.
     """
-    largest = np.empty_like(levers)
-    behind = np.zeros(len(levers))
-    for j in range(levers.shape[1] - 1, -1, -1):
-        if prismatic[j]:
-            largest[:, j] = levers[:, j]
-            behind = behind + levers[:, j] * half[:, j]
-        else:
-            largest[:, j] = np.minimum(levers[:, j] + behind, cap[j])
-            behind = behind + largest[:, j] * np.minimum(half[:, j], 2.0)
-    turns = np.where(prismatic, 0.0, half)
-    before = np.cumsum(turns, axis=1) - turns
-    return LeverBounds(largest, (largest * half * (turns + 2.0 * before)).sum(axis=1))
+    largest = levers_along(steps, prismatic, levers[:-1], levers[1:], cap)
+    total = second_derivative_bound(largest, steps, prismatic)
+    return total if own is None else total + (largest * own).sum(axis=1)
+
+
+def peaks(a: Array, b: Array, most: Array) -> Array:
+    """(m,) largest values along m segments of a norm with the values a and b (m,) at their ends.
+
+    `most` (m,) bounds the second derivative, so the norm is at most
+    (1 - s) a + s b + s (1 - s) most / 2, whose largest value this is. NaN comes out as NaN.
+    """
+    slope = np.abs(b - a)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inner = 0.5 * (a + b) + most / 8.0 + slope**2 / (2.0 * most)
+    return np.where(2.0 * slope >= most, np.maximum(a, b), inner)
 
 
 def out_of_line(robot: Robot) -> str:

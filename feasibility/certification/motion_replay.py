@@ -3,7 +3,7 @@
 It shares no code with the search but the curves between cell centres, and compares these with the
 surface's own closest points and normals (`feasibility.certification.curve_matching`). Besides, it
 uses Pinocchio's frame placements and joint Jacobians, and the bound between samples
-(`kinematic_bounds`); it sees only the walk, not how it was found. Whether bodies collide is judged
+(`lever_bounds`); it sees only the walk, not how it was found. Whether bodies collide is judged
 by `feasibility.certification.collisions`.
 """
 
@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.curve_matching import CurveMatch, match_to_curves
-from feasibility.certification.kinematic_bounds import peaks, placements, second_derivatives
+from feasibility.certification.jacobians import placements
+from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.order import order_of_marks
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.rolls import (

@@ -5,7 +5,7 @@ the places x0 and x1: found for their tool points, though any would do. `surface
 continuous path from x0 to x1 of straight pieces, and for each piece numbers D_T and D_b such that
 T and b differ from straight lines by at most t (1 - t) / 2 of them, t the piece's own parameter.
 Tool point and axis differ likewise from straight lines, by D_p and D_a of the stretch
-(`kinematic_bounds`), and by w^2 D_p and w^2 D_a on a part of it that is w of the whole. So on the
+(`lever_bounds`), and by w^2 D_p and w^2 D_a on a part of it that is w of the whole. So on the
 part that goes with a piece
 
     |p - T| <= (1 - t) e0 + t e1 + t (1 - t) / 2 (w^2 D_p + D_T)
@@ -24,14 +24,16 @@ between its ends; and p is off its chord by D_p / 8 at most.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.kinematic_bounds import Placements, peaks, second_derivatives
+from feasibility.certification.jacobians import Placements
+from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.rolls import Held, ToolAxes, reference_axes, tool_frames
+from feasibility.certification.rows import Rows
 from feasibility.task import Task
 from robots import Kinematics, Robot
 from surfaces import Cells
@@ -44,7 +46,8 @@ Mask = NDArray[np.bool_]
 CLOSE_TO_ZERO = 1e-12  # [m], [1]: rounding of double arithmetic on unit vectors
 
 
-class Samples(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class Samples(Rows):
     """k exact configurations of a motion, compared with the surface."""
 
     row: Ints
@@ -67,25 +70,9 @@ class Samples(NamedTuple):
     roll: Array
     """(k,) rad, how far the roll is off the middle of its range; 0 where it is free."""
 
-    def of(self, rows: Mask | Ints) -> Samples:
-        """Some of them."""
-        return Samples(
-            self.row[rows], self.share[rows], self.points[rows], self.axes[rows],
-            self.places.of(rows), self.error[rows], self.chord[rows], self.facets[rows],
-            self.x[rows], self.roll[rows],
-        )  # fmt: skip
 
-    @staticmethod
-    def join(parts: list[Samples]) -> Samples:
-        """Samples one after the other; at least one part."""
-        row, share, points, axes, error, chord, facets, x, roll = (
-            np.concatenate([part[k] for part in parts]) for k in (0, 1, 2, 3, 5, 6, 7, 8, 9)
-        )
-        places = Places.join(*(part.places for part in parts))
-        return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
-
-
-class Stretches(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class Stretches(Rows):
     """k stretches from sample to sample."""
 
     start: Samples
@@ -95,19 +82,15 @@ class Stretches(NamedTuple):
     length: Array
     """(k,) share of the segment between two rows."""
 
-    def of(self, rows: Mask | Ints) -> Stretches:
-        """Some of them."""
-        return Stretches(self.start.of(rows), self.end.of(rows), self.bends[rows],
-                         self.length[rows])  # fmt: skip
-
     def halves(self, middle: Samples) -> Stretches:
         """Both halves of each, first all first halves."""
-        ends = Samples.join([self.start, middle]), Samples.join([middle, self.end])
+        ends = Samples.join(self.start, middle), Samples.join(middle, self.end)
         bends = 0.25 * np.concatenate([self.bends, self.bends])
         return Stretches(*ends, bends, 0.5 * np.concatenate([self.length, self.length]))
 
 
-class Bounds(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class Bounds(Rows):
     """What is known along k stretches."""
 
     error: Array
@@ -120,11 +103,6 @@ class Bounds(NamedTuple):
     """(k,) whether a path of places from one end to the other is known."""
     roll: Array
     """(k,) rad, bounds of how far the roll is off the middle of its range; 0 where it is free."""
-
-    def of(self, rows: Mask | Ints) -> Bounds:
-        """Some of them."""
-        return Bounds(self.error[rows], self.chord[rows], self.facets[rows], self.joined[rows],
-                      self.roll[rows])  # fmt: skip
 
 
 class Judge:

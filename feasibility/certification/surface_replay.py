@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from feasibility.certification.cells_reached import cells_reached, in_order, missed_text
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.faults import Judged, MotionFault
-from feasibility.certification.kinematic_bounds import placements
+from feasibility.certification.jacobians import placements
 from feasibility.certification.order import order_of_places
 from feasibility.certification.rolls import CLOSE_TO_ZERO as ROLL_CLOSE
 from feasibility.certification.stretches import CLOSE_TO_ZERO, Bounds, Judge, Samples, Stretches
@@ -96,7 +96,7 @@ def replay_over_surface(
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
     looked = _Between(judge, rows, stretches)
     faults += looked.faults
-    samples = in_order(Samples.join([at_rows, *looked.samples]))
+    samples = in_order(Samples.join(at_rows, *looked.samples))
     reached = cells_reached(robot, cells, task, rows, samples)
     missed = np.flatnonzero(~reached if needed is None else needed & ~reached)
     if len(missed):
@@ -151,7 +151,7 @@ class _Between:
                 break
             left = self._halved(left, wrong)
         if wrong:
-            self.faults = _exact_faults(judge, Samples.join(wrong), "place")
+            self.faults = _exact_faults(judge, Samples.join(*wrong), "place")
         elif len(left.length):
             self.faults = [_open_fault(judge, left, bounds)]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.kinematic_bounds import placements
+from feasibility.certification.jacobians import placements
 from feasibility.certification.rolls import Held
 from feasibility.certification.stretches import Judge, Samples, Stretches
 from feasibility.task import Task

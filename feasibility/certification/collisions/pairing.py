@@ -13,7 +13,7 @@ neither gets there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ from feasibility.certification.collisions.mesh_pieces import MeshPart
 from feasibility.certification.collisions.parting import by_balls, guesses, lows, parted
 from feasibility.certification.collisions.pieces import Below, Piece
 from feasibility.certification.collisions.plane_search import NEAR, Couples
-from feasibility.certification.collisions.relative_motion import Motion, Stretches, joined
+from feasibility.certification.collisions.relative_motion import Motion, Stretches
 
 Array = NDArray[np.float64]
 
@@ -91,7 +91,7 @@ class Pairing:
         if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
             self._hints = glimpse(self.a.tree, self.b, s)
             if not self.a.closed:
-                self.stretches = s.bounded(np.maximum(s.bound, self._hints), s.across)
+                self.stretches = replace(s, bound=np.maximum(s.bound, self._hints))
         else:
             for n in guesses(self.a, self.b, s):
                 s = _raised(self.a, self.b, s, n)
@@ -165,7 +165,7 @@ class Pairing:
 
     def _cheaply(self, a: Piece, b: Piece, s: Stretches, aim: float) -> Stretches:
         """Certify by balls, the planes of longer stretches, and guessed directions."""
-        s = self._accepted(s.bounded(np.maximum(s.bound, by_balls(a, b, s)), s.across), aim)
+        s = self._accepted(replace(s, bound=np.maximum(s.bound, by_balls(a, b, s))), aim)
         for n in (s.across, *guesses(a, b, s)) if len(s.row) else ():
             s = _raised(a, b, s, n)
         return self._accepted(s, aim)
@@ -201,7 +201,7 @@ class Pairing:
             else:
                 failures = 0
             s = self._accepted(s, aim)
-        return _all_of([*left, s])
+        return Stretches.join(*left, s)
 
     def _box_by_box(
         self, a: MeshPart, b: Piece, s: Stretches, needed: float, aim: float
@@ -326,15 +326,8 @@ def _raised(a: Piece, b: Piece, s: Stretches, n: Array) -> Stretches:
     """Stretches with the bounds that planes across n, (3,) or (k, 3), give."""
     found = parted(a, b, s, n)
     better = (found > s.bound)[:, None]
-    return s.bounded(np.maximum(s.bound, found), np.where(better, n, s.across))
-
-
-def _all_of(parts: list[Stretches]) -> Stretches:
-    """Several sets of stretches as one."""
-    whole = parts[0]
-    for part in parts[1:]:
-        whole = joined(whole, part)
-    return whole
+    across = np.where(better, n, s.across)
+    return replace(s, bound=np.maximum(s.bound, found), across=across)
 
 
 def _middle(s: Stretches) -> Place:

@@ -19,6 +19,7 @@ from feasibility.certification.collisions.parting import nearest_points, unit
 from feasibility.certification.collisions.pieces import Piece
 from feasibility.certification.collisions.relative_motion import Stretches
 from feasibility.certification.collisions.trees import Level
+from feasibility.certification.rows import Rows
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -29,7 +30,7 @@ LAST_STEPS = 16  # the same for triangles
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Couples:
+class Couples(Rows):
     """Stretches and boxes, or triangles, two by two."""
 
     at: Indices
@@ -38,10 +39,6 @@ class Couples:
     """(p,) index of the box in its level."""
     low: Array
     """(p,) m, bounds of their distances."""
-
-    def of(self, chosen: NDArray[np.bool_] | Indices | slice) -> Couples:
-        """Some of them."""
-        return Couples(self.at[chosen], self.boxes[chosen], self.low[chosen])
 
 
 def ball_bounds(

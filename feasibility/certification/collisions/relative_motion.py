@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError
 from feasibility.certification.collisions.outer_kernels import chord_bounds, outer_bounds
+from feasibility.certification.rows import Rows
 from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
@@ -35,7 +36,7 @@ KEPT = 16  # arms whose twists are remembered
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Poses:
+class Poses(Rows):
     """Where a body is, as seen from another, k times."""
 
     rotations: Array
@@ -43,22 +44,13 @@ class Poses:
     points: Array
     """(k, 3) m."""
 
-    def of(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Poses:
-        """Some of them."""
-        return Poses(self.rotations[chosen], self.points[chosen])
-
-    def and_(self, others: Poses) -> Poses:
-        """These, and others behind them."""
-        rotations = np.concatenate([self.rotations, others.rotations])
-        return Poses(rotations, np.concatenate([self.points, others.points]))
-
     def moved(self, point: Array) -> Array:
         """(k, 3) m, where a point (3,) of the body is."""
         return np.asarray(self.rotations @ point + self.points)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Stretches:
+class Stretches(Rows):
     """Parts of segments between rows of a motion, and how a body moves along them."""
 
     row: NDArray[np.intp]
@@ -79,28 +71,6 @@ class Stretches:
     """(k,) m, a lower bound of the distance along each that is known already."""
     across: Array
     """(k, 3) the normal of the plane that gave it, 0 where it is from elsewhere."""
-
-    def of(self, chosen: NDArray[np.bool_] | NDArray[np.intp]) -> Stretches:
-        """Some of them."""
-        return Stretches(
-            self.row[chosen],
-            self.share[chosen],
-            self.length[chosen],
-            self.first.of(chosen),
-            self.last.of(chosen),
-            self.delta[chosen],
-            self.moved[chosen],
-            self.deviation[chosen],
-            self.bound[chosen],
-            self.across[chosen],
-        )
-
-    def bounded(self, bound: Array, across: Array) -> Stretches:
-        """The same with other bounds, (k,) m, and the normals (k, 3) of the planes behind them."""
-        return Stretches(
-            self.row, self.share, self.length, self.first, self.last, self.delta, self.moved,
-            self.deviation, bound, across,
-        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -205,7 +175,7 @@ class Motion:
         delta, moved = 0.25 * stretches.delta, 0.5 * stretches.moved
         before = replace(stretches, length=half, last=middle, delta=delta, moved=moved)
         behind = replace(before, share=share, first=middle, last=stretches.last)
-        return joined(before, behind)
+        return Stretches.join(before, behind)
 
     def pose(self, a: int, b: int, row: int, share: float) -> Poses:
         """Pose of joint b as seen from joint a at one instant."""
@@ -234,22 +204,6 @@ def _own_twists(robot: Robot) -> Array:
     linear, angular = np.split(kinematics.twists(q)[0].T, 2, axis=1)
     there = np.stack([linear + np.cross(angular, frames.points[0, 1:]), angular], axis=1)
     return np.ascontiguousarray((there @ frames.rotations[0, 1:]).reshape(-1, 6))
-
-
-def joined(one: Stretches, other: Stretches) -> Stretches:
-    """Both, one behind the other."""
-    return Stretches(
-        np.concatenate([one.row, other.row]),
-        np.concatenate([one.share, other.share]),
-        np.concatenate([one.length, other.length]),
-        one.first.and_(other.first),
-        one.last.and_(other.last),
-        np.concatenate([one.delta, other.delta]),
-        np.concatenate([one.moved, other.moved]),
-        np.concatenate([one.deviation, other.deviation]),
-        np.concatenate([one.bound, other.bound]),
-        np.concatenate([one.across, other.across]),
-    )
 
 
 def _seen_from(rotations: Array, points: Array, a: int, b: int) -> Poses:

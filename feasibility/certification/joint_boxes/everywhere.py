@@ -15,6 +15,7 @@ joints beyond i move p, those up to i turn the difference.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.collisions import collision_replay
 from feasibility.certification.joint_boxes.depths import depths, points_inside
+from feasibility.certification.rows import Rows
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot
 
@@ -58,7 +60,8 @@ class _Couples(NamedTuple):
     """Each with the clearance that the pair has to have, m."""
 
 
-class _Middles(NamedTuple):
+@dataclass(frozen=True, eq=False, slots=True)
+class _Middles(Rows):
     """Of m boxes, their half widths and what Pinocchio says of the arm at their middles."""
 
     half: Array
@@ -77,10 +80,6 @@ class _Middles(NamedTuple):
     """(m, 3) m"""
     off: Array
     """(m,) m, how far the tool point may be from the target in the box."""
-
-    def some(self, which: NDArray[np.int64]) -> _Middles:
-        """Some of the boxes."""
-        return _Middles(*(part[which] for part in self))
 
 
 class Overlapping:
@@ -114,7 +113,7 @@ class Overlapping:
             left = np.flatnonzero(~found)
             if not len(left):
                 break
-            blocked = self._overlap(couples, boxes.some(left))
+            blocked = self._overlap(couples, boxes.of(left))
             found[left] = blocked
             hits[k] = blocked.sum()
         order = np.argsort(-hits, kind="stable")

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from feasibility.certification.kinematic_bounds import placements, second_derivatives
-from feasibility.certification.rates.jacobians import Jacobians, jacobians
+from feasibility.certification.jacobians import Jacobians, jacobians, placements
+from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.certification.rates.segment_rates import (
     SegmentRates,
     length_unit,
@@ -33,7 +33,7 @@ from feasibility.certification.rates.segment_rates import (
 )
 from feasibility.task import Task
 from feasibility.verdict import Walk
-from robots import Robot
+from robots import Kinematics, Robot
 from surfaces import Cells
 
 Array = NDArray[np.float64]
@@ -98,7 +98,7 @@ def replay_rates(
     asked = (None, np.inf) if closely else (speed, sigma)
     found = segment_rates(robot, starts, ends, *asked, resting=resting)
     moving = ~resting
-    at = jacobians(robot, walk.q)
+    at = jacobians(Kinematics(robot), walk.q)
     points = at.points
     waits = resting & (_times(robot, starts, ends) > 0.0)
     if speed is not None and len(starts):

@@ -5,7 +5,7 @@ by s. Run so that it has the speed v, joint j turns at v |d_j| / |p'(s)|: inside
 
     v <= |p'(s)| min_j V_j / |d_j|.
 
-|p''| <= D (the bound of `kinematic_bounds`), so |p'| >= (|p'(0)| + |p'(1)| - D) / 2, and
+|p''| <= D (`lever_bounds`), so |p'| >= (|p'(0)| + |p'(1)| - D) / 2, and
 |p'| >= |p(1) - p(0)| - D / 2. Halves of a segment have a quarter of D.
 
 **Singularities.** sigma is the smallest of the five singular values that count of the Jacobian of
@@ -27,9 +27,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.lever_bounds import longest_levers
-from feasibility.certification.rates.jacobians import Jacobians, jacobians, largest_between
-from robots import Robot
+from feasibility.certification.jacobians import Jacobians, jacobians
+from feasibility.certification.lever_bounds import (
+    levers_along,
+    longest_levers,
+    second_derivative_bound,
+)
+from feasibility.certification.rows import Rows
+from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -57,8 +62,8 @@ class SegmentRates:
     """(m,) upper bound: that of an exact configuration."""
 
 
-@dataclass
-class _Pieces:
+@dataclass(frozen=True, eq=False, slots=True)
+class _Pieces(Rows):
     """Parts of segments that are still looked at."""
 
     owner: Ints
@@ -68,12 +73,6 @@ class _Pieces:
     last: Jacobians
     sigmas: Array
     """(k, 2) the smallest singular values at both ends; NaN where they do not matter."""
-
-    def of(self, rows: NDArray[np.bool_]) -> _Pieces:
-        return _Pieces(
-            self.owner[rows], self.low[rows], self.high[rows], self.first.of(rows),
-            self.last.of(rows), self.sigmas[rows],
-        )  # fmt: skip
 
 
 @np.errstate(invalid="ignore")  # NaN where the velocity of a joint is not known
@@ -133,7 +132,7 @@ def _whole(robot: Robot, starts: Array, ends: Array, with_sigma: bool) -> _Piece
     m = len(starts)
     alone = np.ones(m, dtype=bool)
     alone[:-1] = (ends[:-1] != starts[1:]).any(axis=1)
-    at = jacobians(robot, np.vstack([starts, ends[alone]]))
+    at = jacobians(Kinematics(robot), np.vstack([starts, ends[alone]]))
     before, after = np.arange(m), np.arange(1, m + 1)
     after[alone] = m + np.arange(alone.sum())
     sigma = _sigma(robot, at, with_sigma)
@@ -179,26 +178,24 @@ def _halved(robot: Robot, starts: Array, ends: Array, left: _Pieces, with_sigma:
         return left
     middle = 0.5 * (left.low + left.high)
     begins = starts[left.owner]
-    at = jacobians(robot, begins + middle[:, None] * (ends[left.owner] - begins))
-
-    def joined(a: Jacobians, b: Jacobians) -> Jacobians:
-        return Jacobians(*(np.concatenate(pair) for pair in zip(a, b, strict=True)))
-
+    at = jacobians(Kinematics(robot), begins + middle[:, None] * (ends[left.owner] - begins))
     sigma, (before, after) = _sigma(robot, at, with_sigma), left.sigmas.T
     sigmas = np.vstack([np.column_stack([before, sigma]), np.column_stack([sigma, after])])
     return _Pieces(
-        np.concatenate([left.owner, left.owner]), np.concatenate([left.low, middle]),
-        np.concatenate([middle, left.high]), joined(left.first, at), joined(at, left.last), sigmas,
-    )  # fmt: skip
+        np.concatenate([left.owner, left.owner]),
+        np.concatenate([left.low, middle]),
+        np.concatenate([middle, left.high]),
+        Jacobians.join(left.first, at),
+        Jacobians.join(at, left.last),
+        sigmas,
+    )
 
 
 def _way_bounds(robot: Robot, ways: Array, width: Array, p: _Pieces) -> tuple[Array, Array, Array]:
     """Lower bound of |p'| by the segment's own parameter, and its values at both ends, (k,)."""
     steps = np.abs(ways) * width[:, None]
-    levers = largest_between(steps, robot.prismatic, p.first.levers, p.last.levers, np.inf)
-    turns = np.where(robot.prismatic, 0.0, steps)
-    before = np.cumsum(turns, axis=1) - turns
-    bend = (levers * steps * (turns + 2.0 * before)).sum(axis=1)
+    levers = levers_along(steps, robot.prismatic, p.first.levers, p.last.levers, np.inf)
+    bend = second_derivative_bound(levers, steps, robot.prismatic)
     ends = [
         np.linalg.norm(np.einsum("kij,kj->ki", at.point, ways), axis=1) for at in (p.first, p.last)
     ]
@@ -216,7 +213,7 @@ def _sigma_bounds(robot: Robot, steps: Array, p: _Pieces) -> tuple[Array, Array,
         (p.first.levers, p.last.levers, np.inf, scale),
         (p.first.sines, p.last.sines, 1.0, 1.0),
     ):
-        most = largest_between(steps, robot.prismatic, first, last, cap)
+        most = levers_along(steps, robot.prismatic, first, last, cap)
         own = np.cumsum(turns, axis=1)
         moved = most * steps
         behind = np.cumsum(moved[:, ::-1], axis=1)[:, ::-1] - moved

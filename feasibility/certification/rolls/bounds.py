@@ -24,7 +24,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.kinematic_bounds import peaks, second_derivatives
+from feasibility.certification.jacobians import cross, lengths
+from feasibility.certification.lever_bounds import peaks, second_derivatives
 from feasibility.roll import Roll, cosine_and_sine
 from robots import Kinematics, Robot
 
@@ -61,10 +62,8 @@ def reference_axes(robot: Robot, q: Array) -> Array:
 
 def tool_frames(robot: Robot, q: Array, axes: Array, x: Array) -> ToolFrames:
     """The frames at q (m, n), whose approach and reference axes (m, 3) are known."""
-    angular = Kinematics(robot).twists(q)[:, 3:].transpose(0, 2, 1)
-    x_sines, y_sines = (
-        np.linalg.norm(np.cross(angular, axis[:, None]), axis=2) for axis in (x, np.cross(axes, x))
-    )
+    angular = Kinematics(robot).twists(q)[:, 3:]
+    x_sines, y_sines = (lengths(cross(angular, axis)) for axis in (x, np.cross(axes, x)))
     return ToolFrames(x, x_sines, y_sines)
 
 

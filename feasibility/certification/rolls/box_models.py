@@ -4,7 +4,7 @@ A range of half width h <= 90 deg about its middle m says F >= 0 of both (see `r
 
     F = x . p + y . (b x p)    p = t turned about b by m +- h, and on by -+90 deg
 
-and F <= 2 always. So |F - 1| <= 1, one coordinate each beside those of `linear_models`. In joints,
+and F <= 2 always. So |F - 1| <= 1, one coordinate each beside those of `cut_proofs`. In joints,
 x and y follow their linear models within D_x / 2 and D_y / 2 and move by at most M_x and M_y. Over
 a part of the surface let b = b0 + sum_i g_i s_i and t = t0 + sum_i k_i s_i, |s_i| <= 1, within r_b
 and r_t; then u = b x t has the slopes g_i x t0 + b0 x k_i, within

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from feasibility import Task, check, verify
-from feasibility.certification import replay
-from feasibility.certification.kinematic_bounds import placements
+from feasibility.certification import placements, replay
 from feasibility.collisions import Collision
 from feasibility.paths import PathError, coverage_path
 from feasibility.roadmap.exploration import Exploration

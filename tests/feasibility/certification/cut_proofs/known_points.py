@@ -11,10 +11,10 @@ from random_arms import random_arm
 from scipy.spatial.transform import Rotation
 
 from feasibility import Task
-from feasibility.certification.box_cutting import smaller
-from feasibility.certification.empty_region import Claim, Emptiness
-from feasibility.certification.linear_models import Allowed, Arm, Boxes, target_parts
-from feasibility.certification.region import Region
+from feasibility.certification.cut_proofs.box_cutting import smaller
+from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness
+from feasibility.certification.cut_proofs.linear_models import Allowed, Arm, Boxes, target_parts
+from feasibility.certification.cut_proofs.region import Region
 from feasibility.certification.rolls import reference_axes
 from feasibility.roll import projected, roll_of
 from robots import Kinematics

@@ -19,12 +19,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.box_cutting import smaller
-from feasibility.certification.box_exclusion import contract, directions_for, nearest, separated
+from feasibility.certification.cut_proofs.box_cutting import smaller
+from feasibility.certification.cut_proofs.box_exclusion import (
+    contract,
+    directions_for,
+    nearest,
+    separated,
+)
+from feasibility.certification.cut_proofs.linear_models import (
+    Allowed,
+    Arm,
+    Array,
+    Boxes,
+    Models,
+    Parts,
+)
+from feasibility.certification.cut_proofs.refutation import Refuter
+from feasibility.certification.cut_proofs.region import Region
 from feasibility.certification.joint_boxes import Overlapping
-from feasibility.certification.linear_models import Allowed, Arm, Array, Boxes, Models, Parts
-from feasibility.certification.refutation import Refuter
-from feasibility.certification.region import Region
 
 BATCH = 2048  # boxes at a time
 FIRST_TRY = 300  # boxes after which a refutation is first tried
@@ -147,15 +159,15 @@ class Emptiness:
         normals = self.parts.centre[boxes.part, 3:]
         low, high = contract(models, directions_for(models, normals))
         kept = np.asarray(~(low > high).any(axis=1))
-        models, boxes, low, high = models[kept], boxes[kept], low[kept], high[kept]
+        models, boxes, low, high = models.of(kept), boxes.of(kept), low[kept], high[kept]
         models = replace(models, low=low, high=high)
         place, missed = nearest(models)
         kept = ~separated(models, missed)
-        boxes, models, place = boxes[kept], models[kept], place[kept]
+        boxes, models, place = boxes.of(kept), models.of(kept), place[kept]
         if self.overlapping is None:
             return boxes, models, place
         kept = ~self._overlap(self.overlapping, boxes, models)
-        return boxes[kept], models[kept], place[kept]
+        return boxes.of(kept), models.of(kept), place[kept]
 
     def _overlap(self, overlapping: Overlapping, boxes: Boxes, models: Models) -> NDArray[np.bool_]:
         """(m,) boxes, as far as their models leave them, in which bodies overlap everywhere."""
@@ -178,13 +190,13 @@ def _next(waiting: list[Boxes]) -> Boxes:
     taken, size = [], 0
     while waiting and size < BATCH:
         boxes = waiting.pop()
-        room = BATCH - size
-        if len(boxes) > room:
-            waiting.append(boxes[: len(boxes) - room])
-            boxes = boxes[len(boxes) - room :]
+        more = len(boxes) + size - BATCH
+        if more > 0:
+            waiting.append(boxes.of(slice(more)))
+            boxes = boxes.of(slice(more, None))
         taken.append(boxes)
         size += len(boxes)
-    return Boxes.joined(taken)
+    return Boxes.join(*taken)
 
 
 def _spread(boxes: Boxes) -> NDArray[np.int64]:

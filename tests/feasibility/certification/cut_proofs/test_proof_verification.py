@@ -325,7 +325,7 @@ def test_no_tree_is_accepted_where_a_motion_covers_all(tmp_path, seed):
 
 def test_surfaces_whose_bounds_miss_them_prove_nothing(tmp_path):
     """The parts of a smaller patch hold no place of the larger one's rim."""
-    from feasibility.certification.proof_verification import verify_on
+    from feasibility.certification.cut_proofs.proof_verification import verify_on
 
     case = elbow_case(tmp_path)
     parts = plane((0.99, 1.01), (-0.2, 0.25), side="inside").parts(1e-4, 0.1)
@@ -343,7 +343,7 @@ def test_the_verifier_shares_no_code_with_the_search():
         [sys.executable, "-c", LOADING], capture_output=True, text=True, check=True, cwd=ROOT
     )
     loaded = set(shown.stdout.split())
-    assert "feasibility.certification.proof_verification" in loaded
+    assert "feasibility.certification.cut_proofs.proof_verification" in loaded
     search = ("feasibility.roadmap", "feasibility.paper", "feasibility.search", "robots.chain")
     assert not [name for name in loaded if f"{name}.".startswith(tuple(f"{s}." for s in search))]
 

@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.jacobians import Jacobians, cross, jacobians, lengths
 from feasibility.certification.lever_bounds import Array, lever_bounds, longest_levers
 from feasibility.certification.rolls import (
     ReferenceParts,
@@ -32,6 +33,7 @@ from feasibility.certification.rolls import (
     reference_parts,
     roll_models,
 )
+from feasibility.certification.rows import Rows
 from feasibility.roll import Roll
 from feasibility.task import Targets, Task
 from robots import Kinematics, Robot
@@ -113,7 +115,7 @@ class Allowed(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Boxes:
+class Boxes(Rows):
     """m boxes of joints and surface parameters."""
 
     low: Array
@@ -134,23 +136,9 @@ class Boxes:
         """(m, n + 2) their centres."""
         return 0.5 * (self.low + self.high)
 
-    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.int64] | slice) -> Boxes:
-        """Some of the boxes."""
-        return Boxes(self.low[which], self.high[which], self.part[which], self.claim[which])
-
-    @staticmethod
-    def joined(boxes: list[Boxes]) -> Boxes:
-        """All of them in one."""
-        return Boxes(
-            np.concatenate([some.low for some in boxes]),
-            np.concatenate([some.high for some in boxes]),
-            np.concatenate([some.part for some in boxes]),
-            np.concatenate([some.claim for some in boxes]),
-        )
-
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Models:
+class Models(Rows):
     """Linear models of m boxes: |residual + columns . d| <= radius, for d from low to high."""
 
     residual: Array
@@ -166,10 +154,6 @@ class Models:
     """(m, n + 2)"""
     reach: Array
     """(m, n + 2) m, by how much each variable can change the residual, at most."""
-
-    def __getitem__(self, which: NDArray[np.bool_] | NDArray[np.int64]) -> Models:
-        """Some of the models."""
-        return Models(*(getattr(self, name)[which] for name in Models.__slots__))
 
 
 class Arm:
@@ -187,16 +171,15 @@ class Arm:
         """The linear model of every box."""
         n, length = self.n, allowed.length
         centre, half = boxes.centre, 0.5 * (boxes.high - boxes.low)
-        by_joint, tool = derivatives(self.kinematics, centre[:, :n], length)
+        at_centre = jacobians(self.kinematics, centre[:, :n])
+        by_joint, tool = _weighted(at_centre, length)
         weights = np.array([1.0, 1.0, 1.0, length, length, length])
         slopes = parts.slopes[boxes.part] * weights
         target = parts.centre[boxes.part] * weights
         target = target + (centre[:, n:, None] * slopes).sum(axis=1)
         h = half[:, :n]
-        levers = np.linalg.norm(by_joint[..., :3], axis=2)
-        sines = np.linalg.norm(by_joint[..., 3:], axis=2) / length
-        of_point = lever_bounds(levers, h, self.prismatic, self.caps)
-        of_axis = lever_bounds(sines, h, self.prismatic, np.ones(n))
+        of_point = lever_bounds(at_centre.levers, h, self.prismatic, self.caps)
+        of_axis = lever_bounds(at_centre.sines, h, self.prismatic, 1.0)
         radius = np.empty((len(boxes), 2))
         radius[:, 0] = allowed.position + parts.radius[boxes.part, 0] + 0.5 * of_point.second
         radius[:, 1] = allowed.axis + parts.radius[boxes.part, 1] + 0.5 * of_axis.second
@@ -233,13 +216,11 @@ class Arm:
         n, length = self.n, allowed.length
         axes = self.kinematics.tools(q)[1]
         x = reference_axes(self.robot, q)
-        both = np.stack([x, _cross(axes, x)], axis=1)
-        turning = self.kinematics.twists(q).transpose(0, 2, 1)[..., 3:]
-        columns = _cross(turning[:, :, None], both[:, None])
-        bounds = [
-            lever_bounds(np.linalg.norm(columns[:, :, k], axis=2), half, self.prismatic, np.ones(n))
-            for k in (0, 1)
-        ]
+        both = np.stack([x, np.cross(axes, x)], axis=1)
+        angular = self.kinematics.twists(q)[:, 3:]
+        turned = [cross(angular, both[:, k]) for k in (0, 1)]
+        bounds = [lever_bounds(lengths(one), half, self.prismatic, 1.0) for one in turned]
+        columns = np.stack(turned, axis=1).transpose(0, 3, 1, 2)
         moves = [np.minimum((bound.largest * half).sum(axis=1), 2.0) for bound in bounds]
         seconds = np.column_stack([bound.second for bound in bounds])
         tool = ToolModel(both, columns, seconds, np.column_stack(moves))
@@ -267,21 +248,11 @@ def derivatives(kinematics: Kinematics, q: Array, length: float) -> tuple[Array,
 
     Those of the axis are multiplied by `length` (m).
     """
-    twists = kinematics.twists(q).transpose(0, 2, 1)
-    points, axes = kinematics.tools(q)
-    turning = twists[..., 3:]
-    by_joint = np.concatenate(
-        [
-            twists[..., :3] + _cross(turning, points[:, None]),
-            length * _cross(turning, axes[:, None]),
-        ],
-        axis=2,
-    )
-    return by_joint, np.concatenate([points, length * axes], axis=1)
+    return _weighted(jacobians(kinematics, q), length)
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products of the last axes; `np.cross` takes twice as long."""
-    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
-    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-1)
+def _weighted(at: Jacobians, length: float) -> tuple[Array, Array]:
+    """`derivatives`, from known Jacobians."""
+    by_joint = np.concatenate([at.point, length * at.axis], axis=1)
+    tool = np.concatenate([at.points, length * at.axes], axis=1)
+    return np.ascontiguousarray(by_joint.transpose(0, 2, 1)), tool

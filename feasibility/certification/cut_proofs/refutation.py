@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.box_exclusion import excess
-from feasibility.certification.linear_models import Arm, Array, Models, derivatives
-from feasibility.certification.parts_agreement import closest_places
-from feasibility.certification.region import Region
+from feasibility.certification.cut_proofs.box_exclusion import excess
+from feasibility.certification.cut_proofs.linear_models import Arm, Array, Models, derivatives
+from feasibility.certification.cut_proofs.parts_agreement import closest_places
+from feasibility.certification.cut_proofs.region import Region
 from feasibility.certification.rolls import off_middle, reference_axes, roll_vectors
 from feasibility.roll import projected
 from feasibility.targets import u_directions

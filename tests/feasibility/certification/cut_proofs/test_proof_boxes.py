@@ -5,9 +5,9 @@ import pytest
 from known_points import confirmed, known, lost
 from random_arms import random_arm
 
-from feasibility.certification import linear_models
+from feasibility.certification.cut_proofs import linear_models
+from feasibility.certification.cut_proofs.linear_models import derivatives
 from feasibility.certification.lever_bounds import LeverBounds, lever_bounds, longest_levers
-from feasibility.certification.linear_models import derivatives
 from robots import Kinematics
 
 

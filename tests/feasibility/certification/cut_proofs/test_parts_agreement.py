@@ -9,7 +9,11 @@ from proof_cases import FLAT, elbow, elbow_case
 from random_surfaces import KINDS, random_surface
 
 from feasibility.certification import verify_proof
-from feasibility.certification.parts_agreement import disagreement, on_a_finest_part, places
+from feasibility.certification.cut_proofs.parts_agreement import (
+    disagreement,
+    on_a_finest_part,
+    places,
+)
 from surfaces import bspline, mesh, piecewise, plane
 from surfaces.meshes.triangle_mesh import TriangleMesh
 

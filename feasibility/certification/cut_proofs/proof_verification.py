@@ -11,8 +11,8 @@ A tree of one leaf proves its claim too where the tool collides in every pose wi
 cone of the cell's target, whatever the arm does (`feasibility.certification.tool_alone`). And where
 bodies are to stay clear of each other, M and leaves hold only what is clear.
 
-Both say that a region is empty, which `feasibility.certification.empty_region` proves by bounds
-(`linear_models`, `box_exclusion`). A joint that the tree opens at t is to have no q in M at any
+Both say that a region is empty, which `empty_region` proves by bounds (`linear_models`,
+`box_exclusion`). A joint that the tree opens at t is to have no q in M at any
 t + 2 pi k; all turns place the tool alike, so one of them stands for all, and t .. t + 2 pi for the
 joint's interval. A joint that slides without limits may be as far out as the tool can reach.
 
@@ -26,21 +26,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from feasibility.certification.empty_region import Claim, Emptiness, Outcome
-from feasibility.certification.joint_boxes import Overlapping, overlapping_of
-from feasibility.certification.lever_bounds import out_of_line, stretched_length
-from feasibility.certification.linear_models import (
+from feasibility.certification.cut_proofs.empty_region import Claim, Emptiness, Outcome
+from feasibility.certification.cut_proofs.linear_models import (
     Allowed,
     Arm,
     Parts,
     target_parts,
     with_cells,
 )
-from feasibility.certification.parts_agreement import disagreement
-from feasibility.certification.refutation import Refuter
-from feasibility.certification.region import TURN, Region
+from feasibility.certification.cut_proofs.parts_agreement import disagreement
+from feasibility.certification.cut_proofs.refutation import Refuter
+from feasibility.certification.cut_proofs.region import TURN, Region
+from feasibility.certification.cut_proofs.tree_shape import malformed
+from feasibility.certification.joint_boxes import Overlapping, overlapping_of
+from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.certification.tool_alone import PoseCheck, never_clear
-from feasibility.certification.tree_shape import malformed
 from feasibility.collisions import gather
 from feasibility.cut_tree import Cut, CutTree, Leaf
 from feasibility.cut_words import hyperplane

@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.linear_models import Array, Models
+from feasibility.certification.cut_proofs.linear_models import Array, Models
 
 SWEEPS = 2  # of the coordinate descent
 STEEPEST = 3  # columns of which the pairwise cross products are tried as directions

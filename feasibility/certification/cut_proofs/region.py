@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.linear_models import GUARD, Array, Models
+from feasibility.certification.cut_proofs.linear_models import GUARD, Array, Models
 
 TURN = 2.0 * np.pi
 ON_CUT = 1e-9  # [rad], [m] by which w . q may pass the value that it should have

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.linear_models import Array, Boxes, Models, Parts
+from feasibility.certification.cut_proofs.linear_models import Array, Boxes, Models, Parts
 
 KEPT = 0.7  # share of a box's width, in its shortest joint, over which contraction is no progress
 FEW = 100  # boxes: so few are cut several times at once, as none of them will be proved empty yet
@@ -32,10 +32,10 @@ def smaller(boxes: Boxes, models: Models, parts: Parts, length: float) -> Boxes:
     share = np.where(boxes.high > boxes.low, (high - low) / width, 1.0)
     much = share.min(axis=1) < KEPT
     now = Boxes(low, high, boxes.part, boxes.claim)
-    rest, reach = now[~much], models.reach[~much]
+    rest, reach = now.of(~much), models.reach[~much]
     for _ in range(TIMES if len(boxes) < FEW else 1):
         rest, reach = cut(rest, reach, parts, length)
-    return Boxes.joined([now[much], rest])
+    return Boxes.join(now.of(much), rest)
 
 
 def cut(boxes: Boxes, reach: Array, parts: Parts, length: float) -> tuple[Boxes, Array]:
@@ -59,9 +59,9 @@ def cut(boxes: Boxes, reach: Array, parts: Parts, length: float) -> tuple[Boxes,
     along = np.where(
         surface_first, n + np.argmax(reach[:, n:], axis=1), np.argmax(reach[:, :n], axis=1)
     )
-    halved = _halves(boxes[~to_children], reach[~to_children], along[~to_children])
-    made = halved + _children(boxes[to_children], reach[to_children], parts)
-    return Boxes.joined([some for some, _ in made]), np.concatenate([r for _, r in made])
+    halved = _halves(boxes.of(~to_children), reach[~to_children], along[~to_children])
+    made = halved + _children(boxes.of(to_children), reach[to_children], parts)
+    return Boxes.join(*(some for some, _ in made)), np.concatenate([r for _, r in made])
 
 
 def _halves(boxes: Boxes, reach: Array, along: NDArray[np.int64]) -> list[tuple[Boxes, Array]]:
@@ -93,5 +93,5 @@ def _children(boxes: Boxes, reach: Array, parts: Parts) -> list[tuple[Boxes, Arr
         low[:, n:], high[:, n:] = np.maximum(low[:, n:], -1.0), np.minimum(high[:, n:], 1.0)
         kept = np.asarray(~(low > high).any(axis=1))
         child = Boxes(low, high, parts.children[boxes.part, side], boxes.claim)
-        made.append((child[kept], shrunk[kept]))
+        made.append((child.of(kept), shrunk[kept]))
     return made
