@@ -57,7 +57,7 @@ feasibility: task
 feasibility.targets
 feasibility: found problem verdict
 feasibility.treated
-feasibility.certification: faults rows jacobians lever_bounds
+feasibility.certification: faults rows jacobians lever_bounds piecewise_cubics
 feasibility.certification.collisions
 feasibility.certification.tool_alone
 feasibility.certification.joint_boxes

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.piecewise_cubics import SAMPLES, samples
 from feasibility.targets import TargetCurves, beside_facets
 from feasibility.task import Task
 from surfaces import Cells
@@ -12,7 +13,6 @@ from surfaces import Cells
 Array = NDArray[np.float64]
 
 BLOCK = 4096  # curves at once
-SAMPLES = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # on each piece, compared with the surface
 MOST_PARTS = 400  # of a curve over a mesh, each with these samples
 
 
@@ -85,7 +85,4 @@ def _samples(
         length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
         fine = np.ceil(length / apart / len(SAMPLES)).astype(np.int64)
         count = np.maximum(count, np.minimum(fine, MOST_PARTS))
-    owner = np.repeat(np.arange(len(used)), count)
-    part = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    t = ((part[:, None] + SAMPLES) / count[owner][:, None]).reshape(-1)
-    return np.repeat(owner, len(SAMPLES)), t
+    return samples(count)

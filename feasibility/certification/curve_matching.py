@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.curve_deviations import curve_deviations
+from feasibility.certification.piecewise_cubics import PiecewiseCubics
 from feasibility.certification.rolls import FrameMatch, MatchedPlaces, match_frames
 from feasibility.targets import TargetCurves, target_curves
 from feasibility.task import Task
@@ -22,10 +23,6 @@ from surfaces import Cells
 
 Array = NDArray[np.float64]
 
-GUESSES = 4  # parameters tried first on each piece of a curve
-NEWTON_STEPS = 16  # from the best of them, at most
-CONVERGED = 1e-7  # [1] of a curve: a step this small is the last
-BLOCK = 4096  # waypoints at once, to bound the memory
 ARRIVED = 0.02  # [1] share of the tolerance: a tool point this near to a centre is at it
 STAYS = -1  # in place of a curve: the walk stays over one cell
 
@@ -86,7 +83,8 @@ def match_to_curves(cells: Cells, task: Task, walk: Walk, points: Array, axes: A
     target, approach = np.empty((m, 3)), np.empty((m, 3))
     target[places.resting] = aims.points[places.cell]
     approach[places.resting] = aims.approaches[places.cell]
-    target[places.along], approach[places.along] = _at(curves, places.curve, places.t)
+    at = PiecewiseCubics(curves.first, curves.cubics).at(places.curve, places.t)
+    target[places.along], approach[places.along] = at[:, :3], at[:, 3:]
 
     moves = places.moves
     derivative_bounds, deviations = np.zeros((m - 1, 3)), np.zeros((m - 1, 2))
@@ -168,32 +166,6 @@ def _curves(cells: Cells, start: NDArray[np.int64], end: NDArray[np.int64]) -> N
     return np.where(start == end, STAYS, np.where(known, row, STAYS - 1))
 
 
-def _pieces(
-    curves: TargetCurves, curve: NDArray[np.int64], t: Array
-) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
-    """Piece (k,) that t falls into, s (k,) on it, and number of pieces (k,) of the curve."""
-    first = curves.first[curve]
-    count = curves.first[curve + 1] - first
-    along = t * count
-    piece = np.minimum(np.maximum(along.astype(np.int64), 0), count - 1)
-    return first + piece, along - piece, count
-
-
-def _at(curves: TargetCurves, curve: NDArray[np.int64], t: Array) -> tuple[Array, Array]:
-    """Target points and approach directions (k, 3) at t."""
-    values = _values(curves, curve, t, 6)
-    return values[:, :3], values[:, 3:]
-
-
-def _powers(s: Array) -> Array:
-    """(k, 4) 1, s, s^2, s^3."""
-    powers = np.empty((len(s), 4))
-    powers[:, 0], powers[:, 1] = 1.0, s
-    powers[:, 2] = square = s * s
-    powers[:, 3] = square * s
-    return powers
-
-
 def _matched_parameters(
     curves: TargetCurves, curve: NDArray[np.int64], points: Array, near: float
 ) -> tuple[Array, NDArray[np.bool_]]:
@@ -202,12 +174,13 @@ def _matched_parameters(
     A tool point within `near` (m) of a centre may be taken to be there, which costs up to that
     distance; this is done only where the deviation bound of the curve costs more.
     """
-    t = _nearest(curves, curve, points)
+    targets = PiecewiseCubics(curves.first, curves.cubics[..., :3].copy())
+    t = targets.nearest(curve, points)
     arrived = np.zeros(len(curve), dtype=bool)
     pays = curves.deviations[curve, 1] > curves.centre_curvature * near
     where = np.flatnonzero(pays)
     for end in (0.0, 1.0) if len(where) else ():
-        centre, _ = _at(curves, curve[where], np.full(len(where), end))
+        centre = targets.at(curve[where], np.full(len(where), end))
         there = where[np.linalg.norm(points[where] - centre, axis=1) <= near]
         t[there], arrived[there] = end, True
     return t, arrived
@@ -222,86 +195,16 @@ def _matched_between_poses(
     axis off by 1 as much as a point off by `lean` (m).
     """
     scale = np.array([1.0, 1.0, 1.0, lean, lean, lean])
-    t = _nearest(curves._replace(cubics=scale * curves.cubics), curve, scale * tools)
+    t = PiecewiseCubics(curves.first, scale * curves.cubics).nearest(curve, scale * tools)
     return t, np.zeros(len(t), dtype=bool)
-
-
-def _values(curves: TargetCurves, curve: NDArray[np.int64], t: Array, axes: int) -> Array:
-    """(k, axes) target points (m) at t, and perhaps directions."""
-    piece, s, _ = _pieces(curves, curve, t)
-    return np.asarray(np.einsum("kp,kpd->kd", _powers(s), curves.cubics[piece, :, :axes]))
-
-
-def _places(
-    curves: TargetCurves, curve: NDArray[np.int64], t: Array, axes: int
-) -> tuple[Array, Array]:
-    """`_values` at t, by coordinate (axes, k), and their derivatives by t."""
-    piece, s, count = _pieces(curves, curve, t)
-    a, b, c, d = curves.cubics.take(piece, axis=0)[:, :, :axes].transpose(1, 2, 0)
-    bent, turned = s * d, s * c
-    slope = b + turned + turned + 3.0 * s * bent
-    return a + s * (b + turned + s * bent), slope * count
-
-
-def _nearest(curves: TargetCurves, curve: NDArray[np.int64], points: Array) -> Array:
-    """(k,) t of the place on each curve that is closest to a tool point (k, 3), or more numbers."""
-    axes = points.shape[1]
-    t = np.empty(len(curve))
-    counts = curves.first[curve + 1] - curves.first[curve]
-    for count in np.unique(counts):
-        alike = np.flatnonzero(counts == count)
-        # Not where two pieces join: a curve may have zero speed there, where Newton's method fails.
-        inner = (np.arange(GUESSES * count) + 0.5) / (GUESSES * count)
-        grid = np.concatenate([[0.0], inner, [1.0]])
-        used, which = np.unique(curve[alike], return_inverse=True)
-        along = _values(curves, np.repeat(used, len(grid)), np.tile(grid, len(used)), axes)
-        tried = along.reshape(len(used), len(grid), axes)
-        for first in range(0, len(alike), BLOCK):
-            some = slice(first, first + BLOCK)
-            away = tried[which[some]].transpose(2, 0, 1) - points[alike[some]].T[:, :, None]
-            t[alike[some]] = grid[np.argmin(_square(away), axis=1)]
-    # Newton steps, shortened where one leads further away: they overshoot next to a point where a
-    # curve has zero speed.
-    left, width = np.arange(len(t)), 1.0 / (GUESSES * counts)
-    wanted, here_t, here_curve = points.T, t.copy(), curve
-    off, slope = _places(curves, curve, t, axes)
-    off -= wanted
-    for _ in range(NEWTON_STEPS):
-        square = _square(slope)
-        step = (off * slope).sum(axis=0)
-        step = np.divide(step, square, out=np.zeros(len(left)), where=square > 0.0)
-        step = np.minimum(np.maximum(step, -width), width)
-        tried_t = np.minimum(np.maximum(here_t - step, 0.0), 1.0)
-        there, there_slope = _places(curves, here_curve, tried_t, axes)
-        there -= wanted
-        nearer = _square(there) < _square(off)
-        here_t = np.where(nearer, tried_t, here_t)
-        off, slope = np.where(nearer, there, off), np.where(nearer, there_slope, slope)
-        t[left] = here_t
-        width = np.where(nearer, width, 0.25 * np.abs(step))
-        open_ = np.flatnonzero(np.abs(step) > CONVERGED)
-        if len(open_) == 0:
-            break
-        left, here_curve = left[open_], here_curve[open_]
-        here_t, width = here_t[open_], width[open_]
-        off, slope, wanted = (a[:, open_] for a in (off, slope, wanted))
-    return t
-
-
-def _square(a: Array) -> Array:
-    """(...,) sums of squares of (axes, ...); numpy's own sums are slow over three numbers."""
-    total = a[0] * a[0]
-    for one in a[1:]:
-        total += one * one
-    return total
 
 
 def _derivative_bounds(
     curves: TargetCurves, curve: NDArray[np.int64], t0: Array, t1: Array
 ) -> Array:
     """(k, 3) see `CurveMatch.derivative_bounds`, of segments from t0 to t1 on curves."""
-    low, _, _ = _pieces(curves, curve, np.minimum(t0, t1))
-    high, _, _ = _pieces(curves, curve, np.maximum(t0, t1))
+    cubics = PiecewiseCubics(curves.first, curves.cubics)
+    low, high = (cubics.pieces(curve, end(t0, t1)).piece for end in (np.minimum, np.maximum))
     known = np.column_stack([curves.derivative_bounds, curves.curvature])
     most = known[low]
     for ahead in range(1, int((high - low).max(initial=0)) + 1):

@@ -131,6 +131,12 @@ class Judge:
         tolerance = self.task.effective_tolerance
         look = max(self.task.standoff, self.offset.least_look)
         places = self.offset.nearest(points, points + look * axes, tolerance)
+        return self.over(places, row, share, points, axes, x)
+
+    def over(
+        self, places: Places, row: Ints, share: Array, points: Array, axes: Array, x: Array
+    ) -> Samples:
+        """`compared`, with the places that they are said to be over."""
         target, normal = self.offset.at(places)
         error = np.linalg.norm(points - target, axis=1)
         approaches = self._held.approaches(normal)
@@ -138,6 +144,12 @@ class Judge:
         facets = self.offset.facets(points)
         roll = self._held.rolls(x, axes, approaches, places)
         return Samples(row, share, points, axes, places, error, chord, facets, x, roll)
+
+    def middles(self, rows: Array, stretches: Stretches) -> Samples:
+        """Samples in the middle of stretches of the motion `rows` (m, n)."""
+        row, share = stretches.start.row, stretches.start.share + 0.5 * stretches.length
+        q = rows[row] + share[:, None] * (rows[row + 1] - rows[row])
+        return self.sampled(row, share, q)
 
     def between_rows(self, rows: Array, poses: Placements, at: Samples) -> Stretches:
         """The stretches from row to row, with the samples `at` every row."""

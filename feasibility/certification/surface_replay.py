@@ -17,6 +17,7 @@ Where bodies are given, they have to stay clear of each other too (`collisions`)
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,7 +95,7 @@ def replay_over_surface(
     good = judge.within(at_rows)
     faults += _exact_faults(judge, at_rows.of(~good), "row")
     stretches = judge.between_rows(rows, poses, at_rows).of(good[:-1] & good[1:])
-    looked = _Between(judge, rows, stretches)
+    looked = _between(judge, rows, stretches)
     faults += looked.faults
     samples = in_order(Samples.join(at_rows, *looked.samples))
     reached = cells_reached(robot, cells, task, rows, samples)
@@ -127,46 +128,44 @@ def less_deviations(task: Task, surface: Surface) -> Task:
     return replace(task, tolerance=max(tolerance, 1e-12), cone_deg=max(cone_deg, 0.0))
 
 
-class _Between:
-    """What is found between rows: stretches judged, and halved as needed."""
+class _Between(NamedTuple):
+    """What is found between rows."""
 
-    def __init__(self, judge: Judge, rows: Array, stretches: Stretches) -> None:
-        """Judge stretches whose ends are good."""
-        self.judge, self.rows = judge, rows
-        self.error = self.chord = self.roll = 0.0
-        self.faults: list[MotionFault] = []
-        self.samples: list[Samples] = []
-        wrong: list[Samples] = []
-        left, seen = stretches, 0
-        for level in range(LEVELS + 1):
-            bounds = judge.bounds(left)
-            good = judge.within(bounds)
-            self.error = max(self.error, float(np.max(bounds.error[good], initial=0.0)))
-            self.chord = max(self.chord, float(np.max(bounds.chord[good], initial=0.0)))
-            self.roll = max(self.roll, float(np.max(bounds.roll[good], initial=0.0)))
-            left, bounds = left.of(~good), bounds.of(~good)
-            seen += len(left.length)
-            enough = sum(len(part.row) for part in wrong) > ENOUGH
-            if not len(left.length) or enough or level == LEVELS or seen > MOST_SAMPLES:
-                break
-            left = self._halved(left, wrong)
-        if wrong:
-            self.faults = _exact_faults(judge, Samples.join(*wrong), "place")
-        elif len(left.length):
-            self.faults = [_open_fault(judge, left, bounds)]
+    error: float
+    """m, bound of |p - T|; and of |a - b|, and rad of the roll, where stretches are right."""
+    chord: float
+    roll: float
+    faults: list[MotionFault]
+    samples: list[Samples]
 
-    def _halved(self, left: Stretches, wrong: list[Samples]) -> Stretches:
-        """The halves of stretches whose middles are good."""
-        start = left.start
-        share = start.share + 0.5 * left.length
-        ahead = self.rows[start.row + 1] - self.rows[start.row]
-        q = self.rows[start.row] + share[:, None] * ahead
-        middle = self.judge.sampled(start.row, share, q)
-        good = self.judge.within(middle)
-        self.samples.append(middle)
+
+def _between(judge: Judge, rows: Array, stretches: Stretches) -> _Between:
+    """Judge stretches whose ends are good, halved as needed."""
+    most, samples, wrong = np.zeros(3), list[Samples](), list[Samples]()
+    left, seen = stretches, 0
+    for level in range(LEVELS + 1):
+        bounds = judge.bounds(left)
+        good = judge.within(bounds)
+        each = (bounds.error, bounds.chord, bounds.roll)
+        most = np.maximum(most, [np.max(one[good], initial=0.0) for one in each])
+        left, bounds = left.of(~good), bounds.of(~good)
+        seen += len(left.length)
+        enough = sum(len(part.row) for part in wrong) > ENOUGH
+        if not len(left.length) or enough or level == LEVELS or seen > MOST_SAMPLES:
+            break
+        middle = judge.middles(rows, left)
+        good = judge.within(middle)
+        samples.append(middle)
         if not good.all():
             wrong.append(middle.of(~good))
-        return left.of(good).halves(middle.of(good))
+        left = left.of(good).halves(middle.of(good))
+    faults = list[MotionFault]()
+    if wrong:
+        faults = _exact_faults(judge, Samples.join(*wrong), "place")
+    elif len(left.length):
+        faults = [_open_fault(judge, left, bounds)]
+    error, chord, roll = most.tolist()
+    return _Between(error, chord, roll, faults, samples)
 
 
 def _malformed(robot: Robot, rows: Array) -> MotionFault | None:

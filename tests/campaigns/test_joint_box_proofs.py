@@ -9,7 +9,7 @@ from built_scenes import ARMS
 
 from feasibility import Answer, CauseKind, Evidence, check
 from feasibility.certification import verify_proof
-from feasibility.certification.joint_boxes import overlapping_of
+from feasibility.certification.joint_boxes import Overlapping
 from feasibility.cut_tree import CutTree, Leaf
 from feasibility.roadmap.joint_boxes import JointBoxes
 
@@ -48,7 +48,7 @@ def test_nothing_is_claimed_around_clear_configurations(name: str) -> None:
         assert case.any_clear(found.q[None]), seed
         target = case.target(found.point, found.approach)
         assert case.blocking(target, found.low, found.high, most=300) is None, seed
-        overlapping = overlapping_of(found.robot, found.bodies)
+        overlapping = Overlapping(found.robot, found.bodies)
         assert overlapping is not None
         box = found.low[None], found.high[None]
         assert not overlapping.everywhere(*box, found.point[None], np.array([0.001]))[0], seed

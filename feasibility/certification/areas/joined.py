@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.jacobians import placements
-from feasibility.certification.rolls import Held
-from feasibility.certification.stretches import Judge, Samples, Stretches
+from feasibility.certification.stretches import Judge, Stretches
 from feasibility.task import Task
 from robots import Robot
 from surfaces import Cells
@@ -52,8 +51,9 @@ def joined(
     # Pairs of rows, of which every second stretch is asked for.
     row = np.stack([came[step], step], axis=1).ravel()
     row = np.concatenate([row, alone])
-    at = _samples(robot, cells, task, offset, q[row], places.of(row))
-    poses = placements(robot, q[row])
+    poses, x = placements(robot, q[row]), judge.reference_axes(q[row])
+    start = np.zeros(len(row))
+    at = judge.over(places.of(row), np.arange(len(row)), start, poses.points, poses.axes, x)
     stretches = judge.between_rows(q[row], poses, at).of(np.arange(0, 2 * len(step), 2))
     good = np.zeros(len(q), dtype=bool)
     inside = ((q >= robot.lower - CLOSE_TO_LIMIT) & (q <= robot.upper + CLOSE_TO_LIMIT)).all(axis=1)
@@ -80,35 +80,11 @@ def _hold(judge: Judge, stretches: Stretches, rows: Array) -> Mask:
             held[owner] = False
         if not len(owner) or level == HALVINGS:
             break
-        row, share = left.start.row, left.start.share + 0.5 * left.length
-        q = rows[row] + share[:, None] * (rows[row + 1] - rows[row])
-        middle = judge.sampled(row, share, q)
+        middle = judge.middles(rows, left)
         good = judge.within(middle)
         held[owner[~good]] = False
         left, owner = left.of(good).halves(middle.of(good)), np.tile(owner[good], 2)
     return held
-
-
-def _samples(
-    robot: Robot, cells: Cells, task: Task, offset: OffsetSurface, q: Array, places: Places
-) -> Samples:
-    """Configurations compared with the places that they are said to be over."""
-    poses = placements(robot, q)
-    target, normal = offset.at(places)
-    approaches = Held.of(task, cells, offset).approaches(normal)
-    count = len(q)
-    return Samples(
-        np.arange(count),
-        np.zeros(count),
-        poses.points,
-        poses.axes,
-        places,
-        np.linalg.norm(poses.points - target, axis=1),
-        np.linalg.norm(poses.axes - approaches, axis=1),
-        offset.facets(poses.points),
-        np.zeros((count, 3)),
-        np.zeros(count),
-    )
 
 
 def _back_to_beginning(good: Mask, came: Ints) -> Mask:

@@ -13,10 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from feasibility.certification.collisions.coal_distances import coal_distance
 from feasibility.certification.collisions.collision_replay import ready_bodies
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
-from feasibility.certification.collisions.pieces import Below
+from feasibility.certification.collisions.pieces import Below, coal_distance
 from feasibility.certification.collisions.relative_motion import Motion, Stretches
 from feasibility.collisions import Bodies
 from robots import Kinematics, Robot

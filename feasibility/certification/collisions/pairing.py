@@ -19,13 +19,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.collisions.budgets import Budget, TooNear
-from feasibility.certification.collisions.coal_distances import COAL, coal_distance
-from feasibility.certification.collisions.cutting import FEW, can_be_cut, cut, is_exact
 from feasibility.certification.collisions.descent import Descent, glimpse
 from feasibility.certification.collisions.inside import one_inside_other
 from feasibility.certification.collisions.mesh_pieces import MeshPart
 from feasibility.certification.collisions.parting import by_balls, guesses, lows, parted
-from feasibility.certification.collisions.pieces import Below, Piece
+from feasibility.certification.collisions.pieces import (
+    COAL,
+    FEW,
+    Below,
+    Piece,
+    can_be_cut,
+    coal_distance,
+    cut,
+    is_exact,
+)
 from feasibility.certification.collisions.plane_search import NEAR, Couples
 from feasibility.certification.collisions.relative_motion import Motion, Stretches
 

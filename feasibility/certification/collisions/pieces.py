@@ -8,7 +8,7 @@ only asked for distances and nearest points, from which directions n are taken.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,9 @@ from robots.urdf import Cylinder
 Array = NDArray[np.float64]
 
 TINY = 1e-300  # what keeps quotients of zeros finite
+FEW = 8  # triangles, into no less of which a sheet is cut for a hull, which is larger than its mesh
+COAL = 1e-6  # [m] more than coal's distances are off, which stops at GJK = 1e-8
+GJK = 1e-8  # [m]
 NO_CIRCLE = np.zeros(4)
 
 
@@ -142,3 +145,46 @@ class Below(Piece):
 def moved(placement: Array, points: Array) -> Array:
     """Points (k, 3) of a shape's frame in the joint's frame."""
     return np.asarray(points @ placement[:3, :3].T + placement[:3, 3])
+
+
+@cache
+def _coal() -> tuple[Any, Any, Any]:
+    """Coal's module, and a request that keeps to its tolerances."""
+    import coal
+
+    request = coal.DistanceRequest()
+    request.enable_signed_distance, request.gjk_tolerance = True, GJK
+    return coal, request, coal.DistanceResult
+
+
+def coal_distance(a: Piece, b: Piece, rotation: Array, point: Array) -> tuple[float, Array, Array]:
+    """Coal's distance (m) of two pieces, b at a pose in the frame of a, and its nearest points."""
+    coal, request, result_of = _coal()
+    result = result_of()
+    pose_a = coal.Transform3s(a.placement[:3, :3], a.placement[:3, 3])
+    turned = rotation @ b.placement[:3, :3]
+    pose_b = coal.Transform3s(turned, rotation @ b.placement[:3, 3] + point)
+    distance = coal.distance(a.geometry, pose_a, b.geometry, pose_b, request, result)
+    return float(distance), result.getNearestPoint1(), result.getNearestPoint2()
+
+
+def is_exact(a: Piece, b: Piece) -> bool:
+    """Are they no larger than the bodies? For a half space, a hull is its mesh."""
+    return isinstance(a, Below) or (a.exact and b.exact)
+
+
+def can_be_cut(a: Piece, b: Piece) -> bool:
+    """May smaller pieces be clear where these are not?"""
+    return not isinstance(a, Below) and (_worth_cutting(a, b) or _worth_cutting(b, a))
+
+
+def cut(a: Piece, b: Piece) -> list[tuple[Piece, Piece]]:
+    """The larger of two pieces that are worth it, cut into its parts."""
+    if _worth_cutting(a, b) and (a.ball >= b.ball or not _worth_cutting(b, a)):
+        return [(part, b) for part in a.parts]
+    return [(a, part) for part in b.parts]
+
+
+def _worth_cutting(piece: Piece, other: Piece) -> bool:
+    """Has it parts, and not so few triangles that the other's hull is what hinders?"""
+    return bool(piece.parts) and (other.exact or not piece.exact or piece.triangles > FEW)

@@ -38,7 +38,7 @@ from feasibility.certification.cut_proofs.parts_agreement import disagreement
 from feasibility.certification.cut_proofs.refutation import Refuter
 from feasibility.certification.cut_proofs.region import TURN, Region
 from feasibility.certification.cut_proofs.tree_shape import malformed
-from feasibility.certification.joint_boxes import Overlapping, overlapping_of
+from feasibility.certification.joint_boxes import Overlapping
 from feasibility.certification.lever_bounds import out_of_line, stretched_length
 from feasibility.certification.tool_alone import PoseCheck, never_clear
 from feasibility.collisions import gather
@@ -155,7 +155,7 @@ def verify_on(
 
     found = tested(most if bodies is None else min(most, WITHOUT_BODIES))
     if found.failed is not None and bodies is not None:
-        found = tested(most, overlapping_of(robot, bodies))
+        found = tested(most, Overlapping(robot, bodies))
     if found.failed is None:
         return ProofCheck("", found.boxes)
     return ProofCheck(_refusal(claims[found.failed], found), found.boxes)

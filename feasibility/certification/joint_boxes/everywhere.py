@@ -179,11 +179,6 @@ def _length_of_cross(a: Array, b: Array, more: Array | None = None) -> Array:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def overlapping_of(robot: Robot, bodies: Bodies | None) -> Overlapping | None:
-    """What looks for boxes in which bodies overlap; None where collisions are not checked."""
-    return None if bodies is None else Overlapping(robot, bodies)
-
-
 def _depths(body: _Inside, boxes: _Middles, x: Array) -> Array:
     """(m, k) m, how deep points (m, k, 3) are inside a body; -inf outside."""
     own = (x - boxes.origins[:, body.joint, None]) @ boxes.rotations[:, body.joint]

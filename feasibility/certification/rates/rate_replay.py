@@ -23,10 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from coverable_errors import ArgumentError, Fault
 from feasibility.certification.jacobians import Jacobians, jacobians, placements
 from feasibility.certification.lever_bounds import second_derivatives
 from feasibility.certification.rates.segment_rates import (
     SegmentRates,
+    fastest_anywhere,
     length_unit,
     segment_rates,
     smallest_singular,
@@ -209,3 +211,28 @@ def _stops(points: Array, targets: Array, resting: Mask, waits: Mask) -> tuple[S
     corners = moving[1:][turned & (waited[moving[1:]] == waited[moving[:-1]])]
     stops += [Stop("corner", int(k), _nearest(targets, points[k])) for k in corners]
     return tuple(sorted(stops, key=lambda stop: stop.row))
+
+
+def check_rates(robot: Robot, task: Task) -> None:
+    """Refuse a speed that no motion of this arm has, or that nobody can judge.
+
+    Raises:
+        ArgumentError: joints have no velocity limits, or the speed is beyond all of them together.
+    """
+    if task.speed is None:
+        return
+    unknown = [
+        name
+        for name, most in zip(robot.joint_names, robot.max_velocity.tolist(), strict=True)
+        if not np.isfinite(most)
+    ]
+    if unknown:
+        what = f"cannot be judged: the URDF of {robot.name!r} limits no velocity of "
+        named = ", ".join(unknown)
+        add = 'add velocity="..." to <limit>, or max_velocity_deg (_m) to [[robot.axis]]'
+        raise ArgumentError(Fault("speed", what + named, expected=add), "task")
+    most = fastest_anywhere(robot)
+    if task.speed > most:
+        what = f"got {task.speed:g}, but with all joints at their velocities the tool of "
+        what += f"{robot.name!r} has less than {most:.3g} m/s anywhere"
+        raise ArgumentError(Fault("speed", what, expected="give less"), "task")

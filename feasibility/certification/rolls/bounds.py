@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from feasibility.certification.jacobians import cross, lengths
 from feasibility.certification.lever_bounds import peaks, second_derivatives
-from feasibility.roll import Roll, cosine_and_sine
+from feasibility.roll import Roll
 from robots import Kinematics, Robot
 
 Array = NDArray[np.float64]
@@ -69,7 +69,13 @@ def tool_frames(robot: Robot, q: Array, axes: Array, x: Array) -> ToolFrames:
 
 def roll_vectors(x: Array, axes: Array, references: Array, approaches: Array, roll: Roll) -> Array:
     """(..., 2) z, from x, a, t and b (..., 3)."""
-    cosine, sine = cosine_and_sine(x, axes, references, approaches)
+    return vectors_of(x, np.cross(axes, x), references, np.cross(approaches, references), roll)
+
+
+def vectors_of(x: Array, y: Array, t: Array, u: Array, roll: Roll) -> Array:
+    """(..., 2) z, from vectors (..., 3) that need not be unit or square."""
+    cosine = (t * x).sum(axis=-1) + (u * y).sum(axis=-1)
+    sine = (u * x).sum(axis=-1) - (t * y).sum(axis=-1)
     c, s = np.cos(roll.middle), np.sin(roll.middle)
     return np.stack([c * cosine + s * sine, c * sine - s * cosine], axis=-1)
 

@@ -128,14 +128,9 @@ class RollModels(NamedTuple):
     """(m, 2)"""
 
 
+@np.errstate(invalid="ignore")  # inf * 0, where nothing is known, is NaN on the way
 def roll_models(tool: ToolModel, target: TargetModel, roll: Roll) -> RollModels:
     """F - 1 for both ends of a range of at most 180 degrees."""
-    with np.errstate(invalid="ignore"):  # inf * 0: nothing is known
-        return _roll_models(tool, target, roll)
-
-
-def _roll_models(tool: ToolModel, target: TargetModel, roll: Roll) -> RollModels:
-    """`roll_models`; a radius may be NaN on the way."""
     b, t = target.values[:, 0], target.values[:, 1]
     db, dt = target.slopes[:, :, 0], target.slopes[:, :, 1]
     r_b, r_t = target.radius.T

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from feasibility.certification.piecewise_cubics import PiecewiseCubics, samples
 from feasibility.roll import projected
 from feasibility.targets import FrameCurves, TargetCurves, reference_directions
 from feasibility.task import Task
@@ -14,8 +15,6 @@ from surfaces import Cells
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-
-SAMPLES = np.array([0.07, 0.29, 0.51, 0.73, 0.94])  # on each piece, compared with the surface
 
 
 class MatchedPlaces(NamedTuple):
@@ -69,21 +68,14 @@ def match_frames(
         return None
     references = np.empty_like(approaches)
     references[places.resting] = centres[places.cell]
-    references[places.along] = _at(curves.first, frames.cubics, places.curve, places.t)
+    fitted = PiecewiseCubics(curves.first, frames.cubics)
+    references[places.along] = fitted.at(places.curve, places.t)
     segments = len(approaches) - 1
     bounds, deviations = np.zeros((segments, 2)), np.zeros(segments)
     used, which = np.unique(places.way, return_inverse=True)
     bounds[places.moves] = _bounds(curves.first, frames, places.way, places.ends)
     deviations[places.moves] = _deviations(cells, task, curves, frames, used)[which]
     return FrameMatch(approaches, references, bounds, deviations)
-
-
-def _at(first: Ints, cubics: Array, curve: Ints, t: Array) -> Array:
-    """(k, d) values of cubics (P, 4, d) at t (k,) of some curves."""
-    count = np.diff(first)[curve]
-    piece = np.clip((t * count).astype(np.int64), 0, count - 1)
-    powers = np.vander(t * count - piece, 4, increasing=True)
-    return np.asarray(np.einsum("kp,kpd->kd", powers, cubics[first[curve] + piece]))
 
 
 def _bounds(first: Ints, frames: FrameCurves, curve: Ints, ends: Array) -> Array:
@@ -101,17 +93,14 @@ def _deviations(
     cells: Cells, task: Task, curves: TargetCurves, frames: FrameCurves, used: Ints
 ) -> Array:
     """(k,) how far t on some curves is from the surface's own: at samples that no fit has used."""
-    count = np.diff(curves.first)[used]
-    owner = np.repeat(np.arange(len(used)), count)
-    part = np.arange(len(owner)) - np.repeat(np.cumsum(count) - count, count)
-    t = ((part[:, None] + SAMPLES) / count[owner][:, None]).reshape(-1)
-    owner = np.repeat(owner, len(SAMPLES))
+    owner, t = samples(np.diff(curves.first)[used])
     deviations = frames.deviations[used].copy()
-    approach = _at(curves.first, curves.cubics[..., 3:], used[owner], t)
+    approach = PiecewiseCubics(curves.first, curves.cubics[..., 3:]).at(used[owner], t)
     if task.along_normals(cells) and not cells.surface.bare:
         closest = cells.surface.closest(cells.curves.at(used[owner], t)[0])
         approach = -cells.surface.side_sign * closest.normal
     own, _ = projected(reference_directions(cells, task, used[owner], t), approach)
-    off = np.linalg.norm(_at(curves.first, frames.cubics, used[owner], t) - own, axis=1)
+    fitted = PiecewiseCubics(curves.first, frames.cubics).at(used[owner], t)
+    off = np.linalg.norm(fitted - own, axis=1)
     np.maximum.at(deviations, owner, np.where(np.isnan(off), np.inf, off))
     return deviations

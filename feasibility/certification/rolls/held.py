@@ -26,6 +26,7 @@ from feasibility.certification.rolls.bounds import (
     off_middle,
     products_of_changes,
     roll_vectors,
+    vectors_of,
 )
 from feasibility.roll import Roll, projected
 from feasibility.task import Task
@@ -124,7 +125,7 @@ class Held:
         share = path.share[..., None]
         ends = (start.x, end.x), (np.cross(start.axes, start.x), np.cross(end.axes, end.x))
         x, y = ((1.0 - share) * one[:, None] + share * other[:, None] for one, other in ends)
-        z = _vectors(x, y, references, np.cross(approaches, references), self.roll)
+        z = vectors_of(x, y, references, np.cross(approaches, references), self.roll)
         unknown = 0.5 * path.share * (1.0 - path.share) * bend[:, None]
         db, dt = np.diff(approaches, axis=1), np.diff(references, axis=1)
         du = np.diff(np.cross(approaches, references), axis=1)
@@ -159,11 +160,3 @@ class Held:
                 bends = np.minimum(bends, second)
         bends[:, 1] = 0.0
         return np.asarray(np.where(np.isnan(bends), np.inf, bends))
-
-
-def _vectors(x: Array, y: Array, t: Array, u: Array, roll: Roll) -> Array:
-    """(..., 2) z of `rolls.bounds`, from vectors that need not be unit or square."""
-    cosine = (t * x).sum(axis=-1) + (u * y).sum(axis=-1)
-    sine = (u * x).sum(axis=-1) - (t * y).sum(axis=-1)
-    c, s = np.cos(roll.middle), np.sin(roll.middle)
-    return np.stack([c * cosine + s * sine, c * sine - s * cosine], axis=-1)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from feasibility.certification.collisions.coal_distances import COAL, coal_distance
 from feasibility.certification.collisions.first_look import Body, CoupledBodies, FirstLook
+from feasibility.certification.collisions.pieces import COAL, coal_distance
 from feasibility.certification.collisions.relative_motion import Motion
 from feasibility.certification.collisions.shape_pieces import piece_of
 from feasibility.collisions import HalfSpace

@@ -7,9 +7,9 @@ import pytest
 from capsule_arms import at, planar_arm
 from scipy.optimize import nnls
 
-from feasibility.certification.collisions.coal_distances import coal_distance
 from feasibility.certification.collisions.descent import Descent, glimpse
-from feasibility.certification.collisions.nearest_of_simplices import nearest_of
+from feasibility.certification.collisions.pieces import coal_distance
+from feasibility.certification.collisions.plane_search import nearest_of
 from feasibility.certification.collisions.relative_motion import Motion
 from feasibility.certification.collisions.shape_pieces import piece_of, sheet_piece
 from feasibility.certification.collisions.trees import Tree

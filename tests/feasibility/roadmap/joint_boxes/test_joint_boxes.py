@@ -11,7 +11,7 @@ from built_scenes import arm
 
 from feasibility import CauseKind, Evidence, check
 from feasibility.certification import verify_proof
-from feasibility.certification.joint_boxes import overlapping_of
+from feasibility.certification.joint_boxes import Overlapping
 from feasibility.roadmap.joint_boxes import JointBoxes
 from feasibility.roadmap.joint_boxes.at_target import at_target
 from feasibility.roadmap.joint_boxes.frames import Boxes, frames_at, moves, moves_from_tool
@@ -109,7 +109,7 @@ def test_nothing_is_claimed_where_a_configuration_is_clear(name: str) -> None:
         target = case.target(found.point, found.approach)
         assert case.any_clear(found.q[None]), seed
         assert case.blocking(target, found.low, found.high, most=200) is None, seed
-        overlapping = overlapping_of(found.robot, found.bodies)
+        overlapping = Overlapping(found.robot, found.bodies)
         assert overlapping is not None
         box = found.low[None], found.high[None]
         assert not overlapping.everywhere(*box, found.point[None], np.array([0.001]))[0], seed
