@@ -76,14 +76,16 @@ def rolls_along(
     inside = bool((off <= roll.half + CLOSE_TO_ZERO).all())
     dx, db, dt = (np.diff(values, axis=0) for values in (frames.x, b, t))
     dy, du = np.diff(np.cross(axes, frames.x), axis=0), np.diff(np.cross(b, t), axis=0)
-    bend_b, bend_t = matched.derivative_bounds[:, 1], by_t[:, 1]
+    second_b, second_t = matched.derivative_bounds[:, 1], by_t[:, 1]
     with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
-        slope_b = np.linalg.norm(db, axis=1) + 0.5 * bend_b
-        bend_u = LENGTH * (bend_b + bend_t) + 2.0 * slope_b * by_t[:, 0]
-        bend = frames.bends(robot, np.abs(np.diff(q, axis=0))) + ROOT * (bend_t + bend_u)
-        bend += products_of_changes(dx, dy, dt, du)
+        slope_b = np.linalg.norm(db, axis=1) + 0.5 * second_b
+        second_u = LENGTH * (second_b + second_t) + 2.0 * slope_b * by_t[:, 0]
+        second = frames.second_derivatives(robot, np.abs(np.diff(q, axis=0))) + ROOT * (
+            second_t + second_u
+        )
+        second += products_of_changes(dx, dy, dt, du)
         unknown = ROOT * LENGTH * (2.0 * deviations + matched.deviations[:, 1])
     ends = np.repeat(unknown[:, None], 2, axis=1)
-    between = largest_off(z[:-1], z[1:], bend, ends, roll.half)
+    between = largest_off(z[:-1], z[1:], second, ends, roll.half)
     most = float(np.max(between, initial=np.max(off, initial=0.0)))
     return Rolls(most, row, at, inside and bool(most <= roll.half + CLOSE_TO_ZERO), inside)

@@ -77,7 +77,7 @@ class Stretches(Rows):
 
     start: Samples
     end: Samples
-    bends: Array
+    second: Array
     """(k, 3) D_p (m), D_a and D_x + D_y by the stretch's own parameter."""
     length: Array
     """(k,) share of the segment between two rows."""
@@ -85,8 +85,8 @@ class Stretches(Rows):
     def halves(self, middle: Samples) -> Stretches:
         """Both halves of each, first all first halves."""
         ends = Samples.join(self.start, middle), Samples.join(middle, self.end)
-        bends = 0.25 * np.concatenate([self.bends, self.bends])
-        return Stretches(*ends, bends, 0.5 * np.concatenate([self.length, self.length]))
+        second = 0.25 * np.concatenate([self.second, self.second])
+        return Stretches(*ends, second, 0.5 * np.concatenate([self.length, self.length]))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -154,16 +154,18 @@ class Judge:
     def between_rows(self, rows: Array, poses: Placements, at: Samples) -> Stretches:
         """The stretches from row to row, with the samples `at` every row."""
         steps, slides = np.abs(np.diff(rows, axis=0)), self.robot.prismatic
-        bends = [
+        second = [
             second_derivatives(steps, slides, poses.levers, np.inf),
             second_derivatives(steps, slides, poses.sines, 1.0),
             np.zeros(len(steps)),
         ]
         if self.task.roll is not None:
-            bends[2] = tool_frames(self.robot, rows, at.axes, at.x).bends(self.robot, steps)
+            second[2] = tool_frames(self.robot, rows, at.axes, at.x).second_derivatives(
+                self.robot, steps
+            )
         index = np.arange(len(rows))
         ends = at.of(index[:-1]), at.of(index[1:])
-        return Stretches(*ends, np.stack(bends, axis=1), np.ones(len(steps)))
+        return Stretches(*ends, np.stack(second, axis=1), np.ones(len(steps)))
 
     def bounds(self, s: Stretches) -> Bounds:
         """See the module's text."""
@@ -171,19 +173,20 @@ class Judge:
         share, bounds = path.share[..., None], path.derivative_bounds
         width = np.diff(path.share, axis=1) ** 2
         found = []
-        approaches, turned = self._held.approaches(path.normals), self._held.bends(path)
-        for start, end, aims, bend, bends in (
-            (s.start.points, s.end.points, path.points, s.bends[:, :1], bounds[..., 0]),
-            (s.start.axes, s.end.axes, approaches, s.bends[:, 1:2], turned),
+        approaches = self._held.approaches(path.normals)
+        of_axes = self._held.second_derivatives(path)
+        for start, end, aims, own, of_targets in (
+            (s.start.points, s.end.points, path.points, s.second[:, :1], bounds[..., 0]),
+            (s.start.axes, s.end.axes, approaches, s.second[:, 1:2], of_axes),
         ):  # fmt: skip
             line = (1.0 - share) * start[:, None] + share * end[:, None]
-            sag = 0.5 * path.share * (1.0 - path.share) * bend
+            sag = 0.5 * path.share * (1.0 - path.share) * own
             off = np.linalg.norm(line - aims, axis=2) + sag
-            peak = peaks(off[:, :-1], off[:, 1:], width * bend + bends)
+            peak = peaks(off[:, :-1], off[:, 1:], width * own + of_targets)
             found.append(peak.max(axis=1, initial=0.0))
         joined = np.asarray(np.isfinite(bounds).all(axis=(1, 2)))
         first, last = ToolAxes(s.start.axes, s.start.x), ToolAxes(s.end.axes, s.end.x)
-        roll = self._held.rolls_between(first, last, s.bends[:, 2], path, approaches)
+        roll = self._held.rolls_between(first, last, s.second[:, 2], path, approaches)
         return Bounds(found[0], found[1], _apart(s), joined, roll)
 
     def within(self, one: Samples | Bounds) -> Mask:
@@ -208,5 +211,5 @@ def _apart(s: Stretches) -> Array:
     if known.any():
         step = ((s.end.points[known] - s.start.points[known]) ** 2).sum(axis=1)
         square = -peaks(-(a[known] ** 2), -(b[known] ** 2), 2.0 * step)
-        least[known] = np.sqrt(np.maximum(square, 0.0)) - s.bends[known, 0] / 8.0
+        least[known] = np.sqrt(np.maximum(square, 0.0)) - s.second[known, 0] / 8.0
     return least

@@ -27,15 +27,17 @@ class TooNear(Exception):
 class Budget:
     """Distances of two bodies along one motion."""
 
-    def __init__(self, ask: Callable[[int, float], float], moved: Array, most_calls: int) -> None:
+    def __init__(
+        self, measure: Callable[[int, float], float], moved: Array, most_calls: int
+    ) -> None:
         """What is known of the motion.
 
         Args:
-            ask: the distance (m) at a row, and a share of the way to the next.
+            measure: the distance (m) at a row, and a share of the way to the next.
             moved: (m - 1,) m, M of each segment.
-            most_calls: how often `ask` may be called.
+            most_calls: how often `measure` may be called.
         """
-        self._ask, self._moved, self._left = ask, moved, most_calls
+        self._measure, self._moved, self._left = measure, moved, most_calls
         self._way = np.concatenate([[0.0], np.cumsum(moved)])
 
     def certify(self, rows: NDArray[np.intp], needed: Array, aim: float) -> float:
@@ -47,7 +49,7 @@ class Budget:
             aim: m; no higher bound is looked for.
 
         Raises:
-            TooNear: less was met, or calls ran out.
+            TooNear: less was measured, or calls ran out.
         """
         known = np.full(len(self._way), np.nan)
         least = np.full(len(self._way), -np.inf)
@@ -93,7 +95,7 @@ class Budget:
         if self._left <= 0:
             raise TooNear(row, share, np.nan)
         self._left -= 1
-        distance = self._ask(row, share)
+        distance = self._measure(row, share)
         if not distance >= needed:
             raise TooNear(row, share, distance)
         return distance

@@ -46,13 +46,13 @@ class CollisionReplay(Judged):
 
     min_clearance: float | None
     """m, certified: no pair comes nearer along an accepted motion; None where there is no pair. Of
-    a refused one, the least distance that was met."""
+    a refused one, the least distance that was measured."""
     nearest_pair: tuple[str, str] | None
     """The pair that it is of."""
     faults: tuple[CollisionFault, ...]
     """One for each pair that comes too near, the nearest first; none when it is accepted."""
     calls: int
-    """How often coal was asked."""
+    """How often coal was called."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -93,12 +93,12 @@ class BodiesOfOwners:
         empty = sorted(name for name, parts in self._of.items() if not parts)
         if empty:
             raise ArgumentError(f"pairs name what has no body: {', '.join(empty)}")
-        asked = [
+        checked = [
             Couple(pair, a, b, a.deviation + b.deviation)
             for pair in bodies.pairs
             for a, b in self.couples(pair)
         ]
-        self.ordered = tuple(sorted(asked, key=_outermost))
+        self.ordered = tuple(sorted(checked, key=_outermost))
         """All couples of all pairs, what is furthest from the base first."""
         self.known = CoupledBodies([(one.a, one.b) for one in self.ordered])
 
@@ -125,10 +125,10 @@ def collision_replay(
 
     Args:
         robot: the arm.
-        bodies: everything that can collide, and the pairs that are asked for.
+        bodies: everything that can collide, and the pairs that are checked.
         q: (m, n) rows, rad or m, unwrapped. Values that are not finite refuse.
         deviations: (m - 1, n) bounds on how far each joint is from the straight lines, for motions
-            that are bent between rows; none by default.
+            that are curved between rows; none by default.
 
     Raises:
         ArgumentError: the bodies are malformed, or q or deviations do not have that shape.
@@ -156,7 +156,7 @@ def collision_replay(
     return _judged(ready, motion)
 
 
-class _Asked:
+class _Checked:
     """Two bodies of a pair."""
 
     def __init__(self, couple: Couple) -> None:
@@ -172,7 +172,7 @@ class _Asked:
 
     @property
     def distance(self) -> float:
-        """m, certified, or met where they are refused."""
+        """m, certified, or measured where they are refused."""
         if self.pairing is None:
             return self.low - ROUNDING - self.deviation
         place, bound = self.pairing.place, self.pairing.bound
@@ -181,45 +181,45 @@ class _Asked:
 
 def _judged(ready: BodiesOfOwners, motion: Motion) -> CollisionReplay:
     """All pairs, the nearest first: how near they come sets what is aimed at."""
-    asked = [_Asked(couple) for couple in ready.ordered]
+    checked = [_Checked(couple) for couple in ready.ordered]
     look = FirstLook(motion, ready.known)
-    for one, low in zip(asked, look.low.min(axis=1).tolist(), strict=True):
+    for one, low in zip(checked, look.low.min(axis=1).tolist(), strict=True):
         one.low = low
 
     def paired(number: int) -> Pairing:
-        one = asked[number]
+        one = checked[number]
         if one.pairing is None:
             joints, stretches = (one.a.joint, one.b.joint), look.stretches(number)
             one.pairing = Pairing(one.a.piece, one.b.piece, joints, motion, stretches)
         return one.pairing
 
-    nearest, heap = np.inf, [(one.low - one.deviation, k, False) for k, one in enumerate(asked)]
+    nearest, heap = np.inf, [(one.low - one.deviation, k, False) for k, one in enumerate(checked)]
     heapq.heapify(heap)
     while heap and heap[0][0] < nearest:
         low, number, guessed = heapq.heappop(heap)
         if guessed:
-            nearest = min(nearest, paired(number).meet() - asked[number].deviation)
+            nearest = min(nearest, paired(number).meet() - checked[number].deviation)
         else:
-            seems = paired(number).guess() - asked[number].deviation
+            seems = paired(number).guess() - checked[number].deviation
             heapq.heappush(heap, (max(low, seems), number, True))
-    for number, one in enumerate(asked):
+    for number, one in enumerate(checked):
         aim = max(one.needed, NEAR * nearest + one.deviation)
         if one.pairing is not None or one.low < aim + ROUNDING:
             paired(number).certify(one.needed, aim)
-    return _outcome(asked)
+    return _outcome(checked)
 
 
-def _outcome(asked: list[_Asked]) -> CollisionReplay:
+def _outcome(checked: list[_Checked]) -> CollisionReplay:
     """What was found, in words."""
     faults: dict[tuple[str, str], CollisionFault] = {}
-    pairings = [one.pairing for one in asked if one.pairing is not None]
-    for one in asked:
+    pairings = [one.pairing for one in checked if one.pairing is not None]
+    for one in checked:
         if one.pairing is not None and one.pairing.place is not None:
             fault = _fault(one.pair, one.pairing.place, one.distance)
             known = faults.get(fault.pair)
             if known is None or not fault.distance >= known.distance:
                 faults[fault.pair] = fault
-    least = min(asked, key=_decided)
+    least = min(checked, key=_decided)
     ordered = sorted(faults.values(), key=_decided)
     return CollisionReplay(
         min_clearance=float(least.distance),
@@ -238,7 +238,7 @@ def _outermost(one: Couple) -> tuple[object, ...]:
     return (-one.b.joint, *names, *a.centre, *b.centre)
 
 
-def _decided(one: _Asked | CollisionFault) -> float:
+def _decided(one: _Checked | CollisionFault) -> float:
     """m, its distance; infinite where that was not decided."""
     return math.inf if math.isnan(one.distance) else one.distance
 

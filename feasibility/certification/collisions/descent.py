@@ -67,7 +67,7 @@ class Descent:
         return Couples(couples.at, couples.boxes, low), most
 
 
-def glimpse(tree: Tree, b: Piece, s: Stretches) -> Array:
+def rough_bounds(tree: Tree, b: Piece, s: Stretches) -> Array:
     """(k,) m, rough bounds of the distances of a body from all triangles along stretches.
 
     They say nothing of the inside, if these bound a solid.

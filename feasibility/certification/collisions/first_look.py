@@ -57,9 +57,9 @@ class FirstLook:
         self._motion, self._known = motion, known
         # A half space, whose ball has no end, is at rest.
         finite = np.where(np.isfinite(known.balls), known.balls, 0.0)
-        self._sways = motion.sways(known.joints, known.centres, finite)
+        self._moving = motion.body_motions(known.joints, known.centres, finite)
         self.low: Array = motion.outer_bounds(
-            self._sways, known.joints, known.centres, known.balls, known.halves, known.couples
+            self._moving, known.joints, known.centres, known.balls, known.halves, known.couples
         )
         """(c, m - 1) m, lower bounds of each couple's distance along each segment."""
 
@@ -67,4 +67,4 @@ class FirstLook:
         """The segments, as the second body of a couple moves as seen from the first."""
         a, b = self._known.couples[couple].tolist()
         joints = int(self._known.joints[a]), int(self._known.joints[b])
-        return self._motion.stretches_of(self._sways, *joints, b, self.low[couple])
+        return self._motion.stretches_of(self._moving, *joints, b, self.low[couple])

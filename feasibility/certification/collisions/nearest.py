@@ -1,6 +1,6 @@
 """Which two bodies come nearest at each row of a motion, and where: for pictures, no evidence.
 
-Coal is asked only where two bodies may be the nearest. From row to row their distance changes by
+Coal is called only where two bodies may be the nearest. From row to row their distance changes by
 at most the way M that a point of one moves as seen from the other (`relative_motion`), so what was
 measured at one row bounds the distance at all others.
 """
@@ -106,7 +106,7 @@ class _Couple:
         self.low = apart
         """(m,) m, the distance at each row is at least this."""
 
-    def ask(self, row: int, exactly: bool) -> float:
+    def measure(self, row: int, exactly: bool) -> float:
         """The distance (m) at a row, of the bodies or of the hulls of meshes; improves `low`."""
         distance = self.line(row, exactly)[0] - self.deviation
         self.low = np.maximum(self.low, distance - np.abs(self.way - self.way[row]))
@@ -143,7 +143,7 @@ def _searched(couples: list[_Couple], count: int) -> tuple[Array, NDArray[np.int
             if low[k, row] >= distances[row]:
                 break
             exactly = couples[k].exact or k in hulls
-            distance = couples[k].ask(row, exactly)
+            distance = couples[k].measure(row, exactly)
             low[k] = couples[k].low
             hulls.add(k)
             if exactly and distance < distances[row]:

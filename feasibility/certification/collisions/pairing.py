@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from feasibility.certification.collisions.budgets import Budget, TooNear
-from feasibility.certification.collisions.descent import Descent, glimpse
+from feasibility.certification.collisions.descent import Descent, rough_bounds
 from feasibility.certification.collisions.inside import one_inside_other
 from feasibility.certification.collisions.mesh_pieces import MeshPart
 from feasibility.certification.collisions.parting import by_balls, guesses, lows, parted
@@ -65,7 +65,7 @@ class Place:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Met:
+class Measured:
     """What coal says of two pieces at an end of a stretch."""
 
     stretch: int
@@ -96,7 +96,7 @@ class Pairing:
         """Improve the bounds without coal; how near (m) the bodies seem to come, at least."""
         s = self.stretches
         if isinstance(self.a, MeshPart) and self.a.triangles > FEW:
-            self._hints = glimpse(self.a.tree, self.b, s)
+            self._hints = rough_bounds(self.a.tree, self.b, s)
             if not self.a.closed:
                 self.stretches = replace(s, bound=np.maximum(s.bound, self._hints))
         else:
@@ -111,12 +111,12 @@ class Pairing:
         That of the bodies themselves: their hulls may be much nearer.
         """
         s = self.stretches
-        met = self._asked(self.a, self.b, s, int(np.argmin(self._hints)))
+        measured = self._measured(self.a, self.b, s, int(np.argmin(self._hints)))
         if not (isinstance(self.a, MeshPart) and self.a.triangles > FEW):
-            self.stretches = _raised_along(self.a, self.b, s, met, np.inf)
+            self.stretches = _raised_along(self.a, self.b, s, measured, np.inf)
         if is_exact(self.a, self.b):
-            return met.distance
-        pose = s.first.of(np.array([met.stretch]))
+            return measured.distance
+        pose = s.first.of(np.array([measured.stretch]))
         self.calls += 1
         return coal_distance(self.a.truth, self.b.truth, pose.rotations[0], pose.points[0])[0]
 
@@ -156,10 +156,10 @@ class Pairing:
         else:  # hulls may be near where the bodies are not
             enough = max(needed, ENOUGH * aim)
             s = self._accepted(s, enough, (s.length <= 0.25) & (s.bound >= enough))
-            bent = (s.length > 0.25) & (s.bound + s.delta >= enough)
-            if not bent.all():
-                self._by_budget(a.truth, b.truth, s.of(~bent), needed, aim)
-            s = s.of(bent)
+            curved = (s.length > 0.25) & (s.bound + s.delta >= enough)
+            if not curved.all():
+                self._by_budget(a.truth, b.truth, s.of(~curved), needed, aim)
+            s = s.of(curved)
         return [(a, b, self.motion.halves(s, *self.joints))] if len(s.row) else []
 
     def _accepted(
@@ -182,10 +182,10 @@ class Pairing:
         exact, whole = is_exact(a, b), a is self.a and b is self.b
         left, failures, asked = [s.of(np.zeros(len(s.row), dtype=bool))], 0, 0
         while len(s.row) and not (failures >= FAILURES and (can_be_cut(a, b) or not exact)):
-            if not can_be_cut(a, b):  # a plane is there, and shorter stretches are less bent
-                bent = (s.bound < aim) & (s.bound + s.delta >= aim) & (s.delta > ROUNDING)
-                left.append(s.of(bent))
-                s = s.of(~bent)
+            if not can_be_cut(a, b):  # a plane is there, and shorter stretches are less curved
+                curved = (s.bound < aim) & (s.bound + s.delta >= aim) & (s.delta > ROUNDING)
+                left.append(s.of(curved))
+                s = s.of(~curved)
                 if not len(s.row):
                     break
             asked += 1
@@ -193,13 +193,13 @@ class Pairing:
                 aim = max(needed, TIRED * aim)
             worst = int(np.argmin(s.bound))
             for end in (False, True):
-                met = self._asked(a, b, s, worst, end)
-                if whole and exact:  # no higher bound can be found than what was met
-                    aim = max(needed, min(aim, NEAR * met.distance))
-                if exact and self._too_near(a, b, s, met, needed):
+                measured = self._measured(a, b, s, worst, end)
+                if whole and exact:  # no higher bound can be found than what was measured
+                    aim = max(needed, min(aim, NEAR * measured.distance))
+                if exact and self._too_near(a, b, s, measured, needed):
                     return s
-                s = _raised_along(a, b, s, met, aim)
-                if met.n is None or s.bound[worst] >= aim or s.delta[worst] < ROUNDING:
+                s = _raised_along(a, b, s, measured, aim)
+                if measured.n is None or s.bound[worst] >= aim or s.delta[worst] < ROUNDING:
                     break
             if s.bound[worst] < aim:
                 failures += 1
@@ -217,7 +217,7 @@ class Pairing:
         descent = Descent(a.tree, b, needed, aim)
         couples = descent.parted(s)
         exact = is_exact(a, b)
-        if exact and self._met_too_near(a, b, s, couples, needed):
+        if exact and self._measured_too_near(a, b, s, couples, needed):
             return []
         for _ in range(HALVINGS if exact and len(couples.at) else 0):
             used, at = np.unique(couples.at, return_inverse=True)
@@ -239,7 +239,7 @@ class Pairing:
             self._by_budget(triangles, b.truth, rest, needed, aim)
         return []
 
-    def _met_too_near(
+    def _measured_too_near(
         self, a: Piece, b: Piece, s: Stretches, couples: Couples, needed: float
     ) -> bool:
         """Are they nearer than needed at the worst of what no plane parts? Sets `place` if so."""
@@ -247,37 +247,39 @@ class Pairing:
         at = worst.at[np.argsort(worst.low)]
         for k in at[np.sort(np.unique(at, return_index=True)[1])][:LOOKS]:
             for end in (False, True):
-                if self._too_near(a, b, s, self._asked(a, b, s, int(k), end), needed):
+                if self._too_near(a, b, s, self._measured(a, b, s, int(k), end), needed):
                     return True
         return False
 
-    def _asked(self, a: Piece, b: Piece, s: Stretches, k: int, end: bool = False) -> Met:
+    def _measured(self, a: Piece, b: Piece, s: Stretches, k: int, end: bool = False) -> Measured:
         """Ask coal at an end of stretch k."""
         poses = (s.last if end else s.first).of(np.array([k]))
         if isinstance(a, Below):
             n = a.thin[None]
-            return Met(k, end, float(lows(b, poses, n)[0] - a.support(n)[0]), n[0])
+            return Measured(k, end, float(lows(b, poses, n)[0] - a.support(n)[0]), n[0])
         self.calls += 1
         distance, near_a, near_b = coal_distance(a, b, poses.rotations[0], poses.points[0])
         apart = near_b - near_a
         length = float(np.linalg.norm(apart))
         clear = distance > 0.0 and length > 0.0
-        return Met(k, end, distance, apart / length if clear else None)
+        return Measured(k, end, distance, apart / length if clear else None)
 
-    def _too_near(self, a: Piece, b: Piece, s: Stretches, met: Met, needed: float) -> bool:
-        """Are exact pieces nearer than `needed` where they were met? Sets `place` if so.
+    def _too_near(
+        self, a: Piece, b: Piece, s: Stretches, measured: Measured, needed: float
+    ) -> bool:
+        """Are exact pieces nearer than `needed` where they were measured? Sets `place` if so.
 
         What coal calls far enough, but no plane of its own shows, is at the edge to rounding.
         """
-        k, deviation = met.stretch, float(s.deviation[met.stretch])
-        near = met.distance - deviation < needed
-        if not near and met.n is not None and not can_be_cut(a, b):
-            poses, n = (s.last if met.end else s.first).of(np.array([k])), met.n[None]
+        k, deviation = measured.stretch, float(s.deviation[measured.stretch])
+        near = measured.distance - deviation < needed
+        if not near and measured.n is not None and not can_be_cut(a, b):
+            poses, n = (s.last if measured.end else s.first).of(np.array([k])), measured.n[None]
             near = float(lows(b, poses, n)[0] - a.support(n)[0]) - deviation < needed
         if near:
-            row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if met.end else 0.0))
+            row, share = int(s.row[k]), float(s.share[k] + (s.length[k] if measured.end else 0.0))
             over = share == 1.0
-            self.place = Place(row + over, 0.0 if over else share, met.distance)
+            self.place = Place(row + over, 0.0 if over else share, measured.distance)
         return near
 
     def _by_budget(self, a: Piece, b: Piece, s: Stretches, needed: float, aim: float) -> None:
@@ -296,11 +298,11 @@ class Pairing:
         try:
             bound = budget.certify(rows, needed + s.deviation[first], aim)
             self.bound = min(self.bound, bound - float(s.deviation.max()))
-        except TooNear as met:
-            pose = self.motion.pose(*self.joints, met.row, met.share)
+        except TooNear as near:
+            pose = self.motion.pose(*self.joints, near.row, near.share)
             depth = coal_distance(self.a, self.b, pose.rotations[0], pose.points[0])[0]
-            overlap = met.distance <= 0.0
-            self.place = Place(met.row, met.share, min(depth, 0.0) if overlap else met.distance)
+            overlap = near.distance <= 0.0
+            self.place = Place(near.row, near.share, min(depth, 0.0) if overlap else near.distance)
 
     def _begins_inside(self, s: Stretches, needed: float) -> bool:
         """Is one body inside the other at the first row? Sets `place` if so."""
@@ -314,19 +316,19 @@ class Pairing:
         return self.place is not None
 
 
-def _raised_along(a: Piece, b: Piece, s: Stretches, met: Met, aim: float) -> Stretches:
-    """Stretches with the bounds that the plane where bodies were met gives, below `aim`.
+def _raised_along(a: Piece, b: Piece, s: Stretches, measured: Measured, aim: float) -> Stretches:
+    """Stretches with the bounds that the plane where bodies were measured gives, below `aim`.
 
     It stays with the first body on all of them, or turns with the other: as a link swings about
     the base, so does the plane between them.
     """
-    if met.n is None:
+    if measured.n is None:
         return s
-    there = (s.last if met.end else s.first).rotations[met.stretch]
-    s = _raised(a, b, s, met.n)
+    there = (s.last if measured.end else s.first).rotations[measured.stretch]
+    s = _raised(a, b, s, measured.n)
     if (s.bound >= aim).all():
         return s
-    return _raised(a, b, s, s.first.rotations @ (there.T @ met.n))
+    return _raised(a, b, s, s.first.rotations @ (there.T @ measured.n))
 
 
 def _raised(a: Piece, b: Piece, s: Stretches, n: Array) -> Stretches:

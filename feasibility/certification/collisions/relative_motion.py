@@ -74,7 +74,7 @@ class Stretches(Rows):
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Sways:
+class BodyMotions:
     """How bodies, each within a ball on a joint, move along every segment, seen from any joint.
 
     All arrays have the axes (n + 1, m - 1, B): the joint from which body b is seen, 0 for the root;
@@ -115,12 +115,12 @@ class Motion:
         self._frames = self._kinematics.joints(q)
         self._relative: dict[tuple[int, int], Poses] = {}
 
-    def sways(self, joints: Indices, centres: Array, balls: Array) -> Sways:
+    def body_motions(self, joints: Indices, centres: Array, balls: Array) -> BodyMotions:
         """How balls with `centres` (B, 3) and radii `balls` (B,), m, on `joints` (B,) move."""
         steps, n = np.abs(np.diff(self.q, axis=0)), self.q.shape[1]
         turns = np.where(self.prismatic, 0.0, steps)
         turned = np.cumsum(turns, axis=1) - turns
-        found = Sways(*(np.zeros((n + 1, len(steps), len(joints))) for _ in range(3)))
+        found = BodyMotions(*(np.zeros((n + 1, len(steps), len(joints))) for _ in range(3)))
         frames, levers = self._frames, np.empty((len(joints), n))
         chord_bounds(
             frames.rotations, frames.points, _own_twists(self._robot), self.prismatic, steps,
@@ -130,27 +130,29 @@ class Motion:
         return found
 
     def outer_bounds(
-        self, sways: Sways, joints: Indices, centres: Array, balls: Array, halves: Array,
+        self, moving: BodyMotions, joints: Indices, centres: Array, balls: Array, halves: Array,
         couples: Indices,
     ) -> Array:  # fmt: skip
         """(c, m - 1) m, how far couples (c, 2) of bodies stay apart, at least.
 
-        By their balls, as in `sways`, and boxes with half the sides `halves` (B, 3), m.
+        By their balls, as in `moving`, and boxes with half the sides `halves` (B, 3), m.
         """
         frames, low = self._frames, np.empty((len(couples), len(self.q) - 1))
         outer_bounds(
             frames.rotations, frames.points, joints, centres, balls, halves, couples,
-            sways.delta, sways.deviation, low,
+            moving.delta, moving.deviation, low,
         )  # fmt: skip
         return low
 
     def stretches(self, a: int, b: int, centre: Array, ball: float) -> Stretches:
         """Every segment, as a body on joint b within a ball moves as seen from joint a <= b."""
-        sways = self.sways(np.array([b]), centre[None], np.array([ball]))
-        return self.stretches_of(sways, a, b, 0, np.full(len(self.q) - 1, -np.inf))
+        moving = self.body_motions(np.array([b]), centre[None], np.array([ball]))
+        return self.stretches_of(moving, a, b, 0, np.full(len(self.q) - 1, -np.inf))
 
-    def stretches_of(self, sways: Sways, a: int, b: int, body: int, bound: Array) -> Stretches:
-        """The same of a body of `sways` on joint b, with bounds (m - 1,) m that are known."""
+    def stretches_of(
+        self, moving: BodyMotions, a: int, b: int, body: int, bound: Array
+    ) -> Stretches:
+        """The same of a body of `moving` on joint b, with bounds (m - 1,) m that are known."""
         poses, count = self._poses(a, b), len(self.q) - 1
         return Stretches(
             np.arange(count),
@@ -158,9 +160,9 @@ class Motion:
             np.ones(count),
             Poses(poses.rotations[:-1], poses.points[:-1]),
             Poses(poses.rotations[1:], poses.points[1:]),
-            sways.delta[a, :, body],
-            sways.moved[a, :, body],
-            sways.deviation[a, :, body],
+            moving.delta[a, :, body],
+            moving.moved[a, :, body],
+            moving.deviation[a, :, body],
             bound,
             np.zeros((count, 3)),
         )

@@ -155,9 +155,9 @@ def in_place(robot: Robot, cells: Cells, task: Task, q: Array) -> Mask:
     poses = placements(robot, q)
     off, nearest = cKDTree(targets).query(poses.points)
     after = np.linalg.norm(poses.points[1:] - targets[nearest[:-1]], axis=1)
-    bend = second_derivatives(np.abs(np.diff(q, axis=0)), robot.prismatic, poses.levers, np.inf)
+    second = second_derivatives(np.abs(np.diff(q, axis=0)), robot.prismatic, poses.levers, np.inf)
     ends = np.maximum(off[:-1], after)
-    return np.asarray((ends <= IN_PLACE * tolerance) & (ends + bend / 8.0 <= tolerance))
+    return np.asarray((ends <= IN_PLACE * tolerance) & (ends + second / 8.0 <= tolerance))
 
 
 def too_slow(

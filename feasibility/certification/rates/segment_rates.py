@@ -195,12 +195,12 @@ def _way_bounds(robot: Robot, ways: Array, width: Array, p: _Pieces) -> tuple[Ar
     """Lower bound of |p'| by the segment's own parameter, and its values at both ends, (k,)."""
     steps = np.abs(ways) * width[:, None]
     levers = levers_along(steps, robot.prismatic, p.first.levers, p.last.levers, np.inf)
-    bend = second_derivative_bound(levers, steps, robot.prismatic)
+    second = second_derivative_bound(levers, steps, robot.prismatic)
     ends = [
         np.linalg.norm(np.einsum("kij,kj->ki", at.point, ways), axis=1) for at in (p.first, p.last)
     ]
     chord = np.linalg.norm(p.last.points - p.first.points, axis=1)
-    low = np.maximum(0.5 * ((ends[0] + ends[1]) * width - bend), chord - 0.5 * bend)
+    low = np.maximum(0.5 * ((ends[0] + ends[1]) * width - second), chord - 0.5 * second)
     return low / width, ends[0], ends[1]
 
 

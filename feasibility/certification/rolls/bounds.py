@@ -46,7 +46,7 @@ class ToolFrames(NamedTuple):
     y_sines: Array
     """(m, n) the same with y, the third axis."""
 
-    def bends(self, robot: Robot, steps: Array) -> Array:
+    def second_derivatives(self, robot: Robot, steps: Array) -> Array:
         """(m - 1,) D_x + D_y between rows that differ by `steps` (m - 1, n), absolute."""
         both = (self.x_sines, self.y_sines)
         found = [second_derivatives(steps, robot.prismatic, sines, 1.0) for sines in both]
@@ -92,12 +92,12 @@ def off_middle(z: Array) -> Array:
     return np.abs(np.arctan2(z[..., 1], z[..., 0]))
 
 
-def largest_off(z0: Array, z1: Array, bend: Array, unknown: Array, half: float) -> Array:
+def largest_off(z0: Array, z1: Array, second: Array, unknown: Array, half: float) -> Array:
     """(k,) rad, bounds on |off| along k stretches, where that is shown to be at most `half`.
 
     Args:
         z0, z1: (k, 2) at both ends.
-        bend: (k,) D.
+        second: (k,) D.
         unknown: (k, 2) how much less F may be at both ends than z shows.
         half: rad, half the range of the roll.
 
@@ -107,7 +107,7 @@ def largest_off(z0: Array, z1: Array, bend: Array, unknown: Array, half: float) 
 
     def holds(angle: Array, sign: float) -> NDArray[np.bool_]:
         ends = [np.sin(angle) * z[:, 0] - sign * np.cos(angle) * z[:, 1] for z in (z0, z1)]
-        low = peaks(unknown[:, 0] - ends[0], unknown[:, 1] - ends[1], bend)
+        low = peaks(unknown[:, 0] - ends[0], unknown[:, 1] - ends[1], second)
         return np.asarray(low <= CLOSE_TO_ZERO)
 
     most = np.full(len(z0), min(half, 0.5 * np.pi))

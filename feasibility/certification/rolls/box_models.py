@@ -75,8 +75,9 @@ def reference_parts(
     deviation = np.where(shortest > 0.0, radius / np.maximum(shortest, 1e-300), np.inf)
     h = sine - beta - deviation
     with np.errstate(invalid="ignore"):
-        bent = 2.0 * (2.0 / np.sqrt(3.0)) * beta**2 + 2.0 * beta**2
-        reached = 0.5 * second_derivative_of_unit(h, beta, bent) + deviation / np.maximum(h, 1e-300)
+        second = 2.0 * (2.0 / np.sqrt(3.0)) * beta**2 + 2.0 * beta**2
+        reached = 0.5 * second_derivative_of_unit(h, beta, second)
+        reached += deviation / np.maximum(h, 1e-300)
     # dt along db: what db does to g = r - (r . b) b, square to t, over its length.
     db = slopes / np.maximum(length, 1e-300)[:, None, None]
     db = db - (db * b[:, None]).sum(axis=2, keepdims=True) * b[:, None]

@@ -81,7 +81,7 @@ class Held:
             return self.sign * normals
         return np.where(np.isnan(normals), np.nan, self.approach)
 
-    def bends(self, path: PlacePaths) -> Array:
+    def second_derivatives(self, path: PlacePaths) -> Array:
         """(k, 3) D_b of the pieces of paths."""
         bounds = path.derivative_bounds[..., 1]
         return bounds if self.approach is None else np.zeros_like(bounds)
@@ -106,17 +106,17 @@ class Held:
         return off_middle(roll_vectors(x, axes, references, approaches, self.roll))
 
     def rolls_between(
-        self, start: ToolAxes, end: ToolAxes, bend: Array, path: PlacePaths, approaches: Array
+        self, start: ToolAxes, end: ToolAxes, second: Array, path: PlacePaths, approaches: Array
     ) -> Array:
         """(k,) rad, bounds on that along stretches; inf where the roll may leave its range.
 
         Args:
             start, end: the tool at both ends.
-            bend: (k,) D_x + D_y along the stretch.
+            second: (k,) D_x + D_y along the stretch.
             path: of places.
             approaches: (k, 4, 3) at its four places.
         """
-        count = len(bend)
+        count = len(second)
         if self.roll is None:
             return np.zeros(count)
         known = [self._references(path.place(k), approaches[:, k]) for k in range(4)]
@@ -126,15 +126,18 @@ class Held:
         ends = (start.x, end.x), (np.cross(start.axes, start.x), np.cross(end.axes, end.x))
         x, y = ((1.0 - share) * one[:, None] + share * other[:, None] for one, other in ends)
         z = vectors_of(x, y, references, np.cross(approaches, references), self.roll)
-        unknown = 0.5 * path.share * (1.0 - path.share) * bend[:, None]
+        unknown = 0.5 * path.share * (1.0 - path.share) * second[:, None]
         db, dt = np.diff(approaches, axis=1), np.diff(references, axis=1)
         du = np.diff(np.cross(approaches, references), axis=1)
         width = np.diff(path.share, axis=1)
-        bend_b, bend_t = self.bends(path), self._bends_of_references(path, db, sines)
+        second_b, second_t = (
+            self.second_derivatives(path),
+            self._second_of_references(path, db, sines),
+        )
         with np.errstate(invalid="ignore"):  # inf * 0 is NaN, and refused
-            bend_u = bend_b + bend_t
-            bend_u += 2.0 * np.linalg.norm(db, axis=2) * np.linalg.norm(dt, axis=2)
-            most = width**2 * bend[:, None] + ROOT * (bend_t + bend_u)
+            second_u = second_b + second_t
+            second_u += 2.0 * np.linalg.norm(db, axis=2) * np.linalg.norm(dt, axis=2)
+            most = width**2 * second[:, None] + ROOT * (second_t + second_u)
             most += products_of_changes(np.diff(x, axis=1), np.diff(y, axis=1), dt, du)
         most[:, 1] = 0.0  # on the spot: right on both sides is enough
         found = [
@@ -143,10 +146,10 @@ class Held:
         ]
         return np.asarray(np.max(found, axis=0))
 
-    def _bends_of_references(self, path: PlacePaths, db: Array, sines: Array) -> Array:
+    def _second_of_references(self, path: PlacePaths, db: Array, sines: Array) -> Array:
         """(k, 3) D_t of the pieces; 0 where the place changes sides on the spot."""
-        bend_b = self.bends(path)
-        beta = np.linalg.norm(db, axis=2) + 0.5 * bend_b
+        second_b = self.second_derivatives(path)
+        beta = np.linalg.norm(db, axis=2) + 0.5 * second_b
         own = np.zeros_like(beta)
         for piece in (FIRST, LAST) if self.reference is None else ():
             own[:, piece] = self.offset.tangent_slopes(path.place(piece), path.place(piece + 1))
@@ -154,9 +157,9 @@ class Held:
             least = np.minimum(sines[:, :-1], sines[:, 1:]) - 0.5 * (beta + own)
             known = least > 0.0
             first = np.divide(beta + own, least, out=np.full_like(beta, np.inf), where=known)
-            bends = 4.0 * first
+            second = 4.0 * first
             if self.reference is not None and self.smooth:
-                second = second_derivative_of_unit(least, beta, 2.0 * bend_b + 2.0 * beta**2)
-                bends = np.minimum(bends, second)
-        bends[:, 1] = 0.0
-        return np.asarray(np.where(np.isnan(bends), np.inf, bends))
+                smooth = second_derivative_of_unit(least, beta, 2.0 * second_b + 2.0 * beta**2)
+                second = np.minimum(second, smooth)
+        second[:, 1] = 0.0
+        return np.asarray(np.where(np.isnan(second), np.inf, second))

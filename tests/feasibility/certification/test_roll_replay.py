@@ -142,7 +142,7 @@ def test_bounds_hold_between_configurations(arm):
         z = roll_vectors(x, axes, t, b, roll)
         ends = [np.diff(v[[0, -1]], axis=0) for v in (x, np.cross(axes, x), t, np.cross(b, t))]
         frames = tool_frames(robot, q[[0, -1]], axes[[0, -1]], x[[0, -1]])
-        bend = frames.bends(robot, np.abs(q[-1] - q[0])[None])
+        bend = frames.second_derivatives(robot, np.abs(q[-1] - q[0])[None])
         # Second derivatives of the frame's own vectors, from dense differences.
         for vector in (t, np.cross(b, t)):
             second = np.linalg.norm(np.diff(vector, 2, axis=0), axis=1).max() * (len(s) - 1) ** 2

@@ -7,7 +7,7 @@ import pytest
 from capsule_arms import at, planar_arm
 from scipy.optimize import nnls
 
-from feasibility.certification.collisions.descent import Descent, glimpse
+from feasibility.certification.collisions.descent import Descent, rough_bounds
 from feasibility.certification.collisions.pieces import coal_distance
 from feasibility.certification.collisions.plane_search import nearest_of
 from feasibility.certification.collisions.relative_motion import Motion
@@ -78,7 +78,7 @@ def test_bounds_are_never_above_the_distance_and_seldom_far_below(body):
         true[row] = min(
             coal_distance(sheet, piece, one.rotations[0], one.points[0])[0] for one in poses
         )
-    assert (glimpse(sheet.tree, piece, s) <= true + 1e-6).all()
+    assert (rough_bounds(sheet.tree, piece, s) <= true + 1e-6).all()
     assert true.min() < 0.03 < 0.1 < true.max()  # or nothing is asked
     for aim in (0.03, 0.05, 0.1):
         descent = Descent(sheet.tree, piece, aim, aim)
