@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from feasibility.clock import Clock, OutOfTime
 from feasibility.found import Found
@@ -26,6 +27,10 @@ NOT_REPLAYED = (
 IN_PIECES = (
     " (With one convex hull for each shape of a link, {} of {} cells were covered; so the links "
     "were cut into convex pieces.)"
+)
+START_IN_PIECES = (
+    " (With one convex hull for each shape of a link, the start would collide; so the links were "
+    "cut into convex pieces.)"
 )
 NOT_IN_PIECES = " (With the links cut into convex pieces no more was found: {} of {} cells.)"
 
@@ -57,9 +62,13 @@ def attempts_at(
 ) -> tuple[list[Attempt], str]:
     """All attempts, that which counts first; and a remark on the shapes of the links, or "".
 
-    Where nothing is decided and convex hulls of links kept the search from going on, the links are
-    cut into convex pieces.
+    Where nothing is decided and convex hulls of links kept the search from going on, or from
+    beginning at the arm's start, the links are cut into convex pieces.
     """
+    if search.method == "complete":
+        begun = _with_clear_start(problem, clock)
+        if begun is not problem:
+            return _with_these_shapes(begun, search, clock, method), START_IN_PIECES
     tried = _with_these_shapes(problem, search, clock, method)
     if tried[0].decided or not tried[0].found.hindered:
         return tried, ""
@@ -111,6 +120,25 @@ def _in_pieces(problem: Problem, clock: Clock) -> Problem | None:
             return None if clock.out_of_time else problem.in_pieces
     except OutOfTime:
         return None
+
+
+def _with_clear_start(problem: Problem, clock: Clock) -> Problem:
+    """The problem, with links cut into pieces if only their hulls collide at the arm's start."""
+    start = problem.robot.start
+    if start is None or _is_clear(problem, start):
+        return problem
+    finer = _in_pieces(problem, clock)
+    return problem if finer is None or not _is_clear(finer, start) else finer
+
+
+def _is_clear(problem: Problem, q: NDArray[np.float64]) -> bool:
+    """Are the convex bodies of the search as far apart at q (n,) as they have to be?"""
+    from feasibility.collisions import collision_buffer, segment_clear
+
+    bodies = problem.bodies
+    if bodies is None:
+        return True
+    return bool(segment_clear(collision_buffer(bodies, problem.robot), q, q) > 0.0)
 
 
 def _nothing(problem: Problem, clock: Clock) -> Found:

@@ -1,9 +1,9 @@
+from .asked_bodies import gather as gather
 from .bodies import Bodies as Bodies
 from .bodies import LeftOut as LeftOut
 from .bodies import Pair as Pair
 from .bodies import Seat as Seat
 from .bodies import Soup as Soup
-from .bodies import gather as gather
 from .kernels import INFLUENCE as INFLUENCE
 from .kernels import Counts as Counts
 from .kernels import Nearest as Nearest

@@ -12,9 +12,7 @@ from feasibility.collisions.scene import Obstacle
 from robots.shapes import Polytope, Solid
 
 if TYPE_CHECKING:
-    from feasibility.collisions.settings import Collision
-    from robots import Robot
-    from surfaces import Sheet, Surface
+    from surfaces import Sheet
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -88,28 +86,3 @@ class Bodies:
     """What a user should know, one sentence each."""
     carried: tuple[Seat, ...] = ()
     """The objects of the scene that move, for pictures."""
-
-
-def gather(
-    robot: Robot, surface: Surface, collision: Collision | None, standoff: float
-) -> Bodies | None:
-    """All bodies and pairs of one problem; None where collisions are not checked.
-
-    Args:
-        robot: the arm.
-        surface: what it works on.
-        collision: what is asked for.
-        standoff: m; where it is 0 the tool touches the surface, and that pair is left out.
-
-    Raises:
-        RobotError: no link has a shape, or the SRDF is not of this arm.
-        ArgumentError: a pair names something that is not there; all such names are given.
-        SurfaceError: no bounds on the surface are known.
-    """
-    if collision is not None and collision.surface and surface.wall is None:
-        collision = collision.without_surface
-    if collision is None or not collision.checked:
-        return None
-    from feasibility.collisions.gathering import gathered  # it reads meshes
-
-    return gathered(robot, surface, collision, float(standoff))

@@ -6,11 +6,12 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coverable_errors import ArgumentError, Checks, Fault
-from feasibility.certification import replay
+from feasibility.certification import collision_replay, replay
 from feasibility.clock import Clock, OutOfTime
-from feasibility.collisions import blamed, segment_clear
+from feasibility.collisions import Bodies, blamed, segment_clear
 from feasibility.found import Found
 from feasibility.notices import REASONS, compiling_notice
 from feasibility.problem import Problem
@@ -85,7 +86,7 @@ def _search(
         if seeds is not None:
             known = _known(problem, seeds)
         if begin is not None and known is None:
-            _begin(exploration, begin)
+            _begin(exploration, begin, problem.bodies)
         if seeds is not None:
             _plant(exploration, seeds)
         if known is None:
@@ -153,7 +154,7 @@ def _known(problem: Problem, seeds: Walk) -> Walk | None:
     return seeds if marked.all() and _replayed(problem, seeds).accepted else None
 
 
-def _begin(exploration: Exploration, cell: int) -> None:
+def _begin(exploration: Exploration, cell: int, bodies: Bodies | None) -> None:
     """Begin the search at the arm's start, which is over a cell.
 
     Raises:
@@ -164,10 +165,22 @@ def _begin(exploration: Exploration, cell: int) -> None:
         what = f"is over pose {cell}; a toolpath is run from its first pose, so begin there"
         raise ArgumentError([Fault("start", what)])
     arrays, start = exploration.arrays, np.array(exploration.robot.start)
-    if len(arrays.collisions) and not segment_clear(arrays.collisions, start, start) > 0.0:
-        what = "collides, or is nearer than the clearances allow; choose another start"
-        raise ArgumentError([Fault("start", what)])
+    if bodies is not None and not segment_clear(arrays.collisions, start, start) > 0.0:
+        raise ArgumentError([Fault("start", _collides(exploration, bodies, start))])
     exploration.begin_at(cell, start)
+
+
+def _collides(exploration: Exploration, bodies: Bodies, start: NDArray[np.float64]) -> str:
+    """Why a start (n,) is refused: for the shapes, or for the bodies around them alone."""
+    judged = collision_replay(exploration.robot, bodies, start[None])
+    if not judged.accepted:
+        found = "; ".join(fault.text for fault in judged.faults)
+        return f"collides, or is too near ({found}); choose another start"
+    pair = bodies.pairs[int(blamed(exploration.arrays.collisions))]
+    return (
+        f"is clear, but the convex bodies that the search puts around {pair.first} and "
+        f"{pair.second} are larger than their shapes, and collide; choose another start"
+    )
 
 
 def _plant(exploration: Exploration, seeds: Walk) -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from oracle_build import built
 from oracle_cases import Problem
@@ -13,11 +14,16 @@ from coverable_errors import ArgumentError
 from feasibility import Search, Task, check, verify
 from feasibility.collisions import Collision, Obstacle
 from feasibility.paths import coverage_path
-from robots import RobotError, load_robot
+from robots import Kinematics, RobotError, load_robot
 from surfaces import plane
 
 DISCONNECTED = Path(__file__).parents[1] / "oracle" / "puma560_disconnected.json"
 UR5 = load_robot("ur5")
+CLEAR_BUT_FOR_HULLS = (
+    [-2.361, 0.726, 0.925, 1.859, -0.731, 3.128, 3.021],  # link5 and link7
+    [-0.224, -1.135, 1.611, 0.198, -1.588, 2.205, -0.308],  # link2 and link4
+)
+PARTED_BY_THE_JUDGE_ALONE = [-1.937, 1.083, -2.766, -1.947, -0.155, 0.667, -0.835]
 PLATE = plane((0.4, 0.6), (-0.15, 0.15), position=(0, 0, 0.2)).cells(3, 4)
 TASK = Task(standoff=0.01, cone_deg=25)
 
@@ -73,6 +79,35 @@ def test_a_start_that_collides_is_refused(started):
     ball = Obstacle.sphere("ball", 0.32, position=(0.5, 0.0, 0.5))
     with pytest.raises(ArgumentError, match="start collides"):
         check(started, PLATE, replace(TASK, collision=Collision(scene=(ball,))))
+
+
+def _under(robot, q):
+    """Cells of a small plate beneath the tool at q, square to it."""
+    point, axis = Kinematics(robot).tool(q)
+    around = np.linalg.qr(np.column_stack([axis, np.eye(3)[np.argmin(np.abs(axis))]]))[0]
+    rotation = np.column_stack([np.cross(around[:, 1], -axis), around[:, 1], -axis])
+    rpy_deg = np.degrees(pin.rpy.matrixToRpy(rotation))
+    place = point + 0.01 * axis
+    sides = (-0.01, 0.01), (-0.01, 0.01)
+    return plane(*sides, position=place, rpy_deg=rpy_deg, side="outside").cells(1, 1)
+
+
+@pytest.mark.parametrize("q", CLEAR_BUT_FOR_HULLS)
+def test_a_start_at_which_only_hulls_collide_is_none_that_collides(q):
+    arm = replace(load_robot("xarm7"), start=np.array(q))
+    cells, task = _under(arm, arm.start), replace(TASK, collision=Collision(surface=False))
+    verdict = check(arm, cells, task)
+    assert verdict.feasible
+    np.testing.assert_array_equal(verdict.witness.q[0], arm.start)
+    assert "the start would collide" in verdict.message
+    assert verify(verdict).holds
+
+
+def test_a_start_at_which_only_the_search_cannot_part_the_links_says_so():
+    arm = replace(load_robot("panda"), start=np.array(PARTED_BY_THE_JUDGE_ALONE))
+    task = replace(TASK, collision=Collision(surface=False))
+    with pytest.raises(ArgumentError, match=r"start is clear, but .*panda_link5 and panda_hand"):
+        check(arm, _under(arm, arm.start), task)
 
 
 def test_only_what_the_start_leads_to_counts():

@@ -1,0 +1,39 @@
+"""All bodies and pairs of one problem, where collisions are checked at all.
+
+What gathers them reads meshes, and is imported only then.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from feasibility.collisions.bodies import Bodies
+    from feasibility.collisions.settings import Collision
+    from robots import Robot
+    from surfaces import Surface
+
+
+def gather(
+    robot: Robot, surface: Surface, collision: Collision | None, standoff: float
+) -> Bodies | None:
+    """All bodies and pairs of one problem; None where collisions are not checked.
+
+    Args:
+        robot: the arm.
+        surface: what it works on.
+        collision: what is asked for.
+        standoff: m; where it is 0 the tool touches the surface, and that pair is left out.
+
+    Raises:
+        RobotError: no link has a shape, or the SRDF is not of this arm.
+        ArgumentError: a pair names something that is not there; all such names are given.
+        SurfaceError: no bounds on the surface are known.
+    """
+    if collision is not None and collision.surface and surface.wall is None:
+        collision = collision.without_surface
+    if collision is None or not collision.checked:
+        return None
+    from feasibility.collisions.gathering import gathered
+
+    return gathered(robot, surface, collision, float(standoff))
