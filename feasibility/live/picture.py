@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.cases import Setup
 from feasibility.verdict import Answer, Evidence, Verdict
 from feasibility.viewer import (
@@ -38,8 +38,6 @@ from feasibility.viewer import patch as filled
 from feasibility.viewer.frames import GROUP, carried, world_tracks
 from robots import Robot
 from surfaces import Cells
-
-Array = NDArray[np.float64]
 
 SURFACE, CELLS = "/surface", "/cells"
 COVERED: Colour = (0.13, 0.60, 0.33)
@@ -116,7 +114,7 @@ def cell_triangles(cells: Cells) -> dict[str, str]:
     return {name: _base64(array.tobytes()) for name, array in arrays.items()}
 
 
-def quick_paint(covered: NDArray[np.bool_]) -> Paint:
+def quick_paint(covered: Mask) -> Paint:
     """Two colours: what one motion reaches, and the rest."""
     missed = int((~covered).sum())
     entries = [_entry(f"reached ({len(covered) - missed})", COVERED)]

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.clock import Clock, OutOfTime
 from feasibility.notices import compiling_notice
 from feasibility.paper import greedy_search
@@ -35,9 +35,9 @@ LARGEST = 3  # parts that a round tries to join
 class Reached(NamedTuple):
     """What a quick look found."""
 
-    covered: NDArray[np.bool_]
+    covered: Mask
     """(N,) cells that one motion reaches."""
-    q: NDArray[np.float64] | None
+    q: Array | None
     """(n,) a configuration of that motion; None where it reaches nothing."""
 
 

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import counted
 from feasibility.collisions import Asked, LeftOut, checked_words
 from feasibility.results import plain
@@ -92,7 +92,7 @@ def csv_text(rows: Iterable[Iterable[Any]]) -> str:
 def walk_csv(robot: Robot, walk: Walk) -> str:
     """A motion as CSV: `cell`, empty between centres, then one column per joint, rad or m.
 
-    Floats are written so that they read back as the same numbers.
+    Array are written so that they read back as the same numbers.
     """
     rows = zip(walk.cell.tolist(), walk.q.tolist(), strict=True)
     lines = (["" if cell < 0 else cell, *map(repr, q)] for cell, q in rows)
@@ -146,7 +146,7 @@ def certificate_json(certificate: Certificate) -> dict[str, Any]:
 
 
 def measured_json(
-    robot: Robot, certificate: Certificate | None, q: NDArray[np.float64] | None
+    robot: Robot, certificate: Certificate | None, q: Array | None
 ) -> dict[str, Any] | None:
     """What the replay of a motion q (m, n) measured, with limits and clearance; null without one.
 
@@ -159,9 +159,7 @@ def measured_json(
     return found | clearance_json(certificate)
 
 
-def limit_margin_deg(
-    robot: Robot, certificate: Certificate, q: NDArray[np.float64] | None
-) -> float:
+def limit_margin_deg(robot: Robot, certificate: Certificate, q: Array | None) -> float:
     """Least distance of a revolute joint from its limits, degrees; inf without such limits.
 
     The certificate's own margin mixes radians and metres where an arm has prismatic joints. Limits
@@ -178,7 +176,7 @@ def limit_margin_deg(
 def certificate_text(
     robot: Robot,
     certificate: Certificate,
-    q: NDArray[np.float64] | None,
+    q: Array | None,
     task: Task,
     tolerance: float | None,
     noun: str = "waypoint",

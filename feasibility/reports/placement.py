@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from numpy.typing import NDArray
-
-from coverable_arrays import Array
+from coverable_arrays import Array, Mask
 from coverable_errors import counted
 from feasibility.collisions import checked
 from feasibility.placement import (
@@ -107,7 +105,7 @@ def _map_json(chart: PlacementMap) -> dict[str, Any]:
     }
 
 
-def _nulled(values: Array, unknown: NDArray[Any]) -> Any:
+def _nulled(values: Array, unknown: Mask) -> Any:
     """Nested lists with None where a value is unknown."""
     plain = values.astype(object)
     plain[unknown] = None

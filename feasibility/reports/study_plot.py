@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Mask
 from feasibility.reports.parts import COLOURS
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def charts(labels: Sequence[str], rows: Sequence[Row]) -> Charts:
     return Charts(made, len(pairs) - len(chosen))
 
 
-def _numbers(labels: Sequence[str], rows: Sequence[Row]) -> dict[str, NDArray[np.float64]]:
+def _numbers(labels: Sequence[str], rows: Sequence[Row]) -> dict[str, Array]:
     """The values (R,) of what varies and is a number, of those that take two values or more."""
     found = {}
     for label in labels:
@@ -104,14 +104,14 @@ def worded(label: str) -> str:
     return label
 
 
-def _shares(rows: Sequence[Row]) -> NDArray[np.float64]:
+def _shares(rows: Sequence[Row]) -> Array:
     """(R,) covered shares of the area in percent."""
     return np.array([100.0 * float(row.result["share"]) for row in rows])
 
 
 def _panels(
     labels: Sequence[str], axes: Mapping[str, Any], rows: Sequence[Row]
-) -> list[tuple[str, NDArray[np.bool_], NDArray[np.float64]]]:
+) -> list[tuple[str, Mask, Array]]:
     """Rows that share a map: by the first key that is no number, if it has few values."""
     share = _shares(rows)
     for label in labels:
@@ -124,7 +124,7 @@ def _panels(
     return [("", np.ones(len(rows), dtype=bool), share)]
 
 
-def _share_chart(label: str, values: NDArray[np.float64], rows: Sequence[Row]) -> Chart:
+def _share_chart(label: str, values: Array, rows: Sequence[Row]) -> Chart:
     """The share of every row over one number, and the best and the mean share at each value."""
     share = _shares(rows)
     verdicts = np.array([str(row.result["verdict"]) for row in rows])
@@ -149,8 +149,8 @@ def _share_chart(label: str, values: NDArray[np.float64], rows: Sequence[Row]) -
 
 def _map_chart(
     labels: tuple[str, str],
-    values: tuple[NDArray[np.float64], NDArray[np.float64]],
-    share: NDArray[np.float64],
+    values: tuple[Array, Array],
+    share: Array,
     words: str,
 ) -> Chart:
     """The share over two numbers: fields with the best of each pair of values, or dots."""
@@ -185,7 +185,7 @@ def _map_chart(
     return Chart(caption, _svg(figure, caption))
 
 
-def _ticks(put: Any, values: NDArray[np.float64]) -> None:
+def _ticks(put: Any, values: Array) -> None:
     """Name at most `MOST_TICKS` of the places 0, 1, 2, ... by their values."""
     step = -(-len(values) // MOST_TICKS)
     places = np.arange(0, len(values), step)

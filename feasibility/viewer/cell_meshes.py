@@ -11,15 +11,12 @@ from dataclasses import dataclass, fields
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from feasibility.viewer.meshes import merge_vertices, split_at_creases
 from surfaces import Cells, Triangles
 from surfaces.meshes import half_edge_ends, half_edges
 from surfaces.meshes.cells import MeshCells
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 FULL_DETAIL = 1_500  # cells; more are drawn without centre marks, and edges as plain lines
 BUDGET = 30_000  # triangles
@@ -73,7 +70,7 @@ class DisplayMesh:
     """(F,) cell of each face."""
     places: Ints
     """(V,) equal for vertices that share a place, where normals differ."""
-    on_border: NDArray[np.bool_]
+    on_border: Mask
     """(V,) vertices on the border of the mesh."""
 
     def __post_init__(self) -> None:
@@ -148,7 +145,7 @@ def make_display_mesh(cells: MeshCells, budget: int = BUDGET) -> DisplayMesh:
     )
 
 
-def _thinned(cells: MeshCells, on_border: NDArray[np.bool_], budget: int) -> tuple[Ints, Ints]:
+def _thinned(cells: MeshCells, on_border: Mask, budget: int) -> tuple[Ints, Ints]:
     """Merge vertices at a wider and wider spacing, until few enough faces (F, 3) are left.
 
     Returns:
@@ -171,7 +168,7 @@ def _thinned(cells: MeshCells, on_border: NDArray[np.bool_], budget: int) -> tup
     )
 
 
-def _kinds(faces: Ints, labels: Ints, on_border: NDArray[np.bool_]) -> Ints:
+def _kinds(faces: Ints, labels: Ints, on_border: Mask) -> Ints:
     """(V,) equal for vertices that may be merged: in one cell, or on one border of two cells."""
     count = int(labels.max()) + 1
     touching = np.unique(faces.ravel() * count + np.repeat(labels, 3))

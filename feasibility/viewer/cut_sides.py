@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints
 from feasibility.cut_tree import Cut, Leaf
 from feasibility.cut_words import place_of
 from feasibility.verdict import Verdict
@@ -21,7 +21,7 @@ LOST: Colour = (0.84, 0.12, 0.12)
 class Sides:
     """Where the cells are reached."""
 
-    labels: NDArray[np.int64]
+    labels: Ints
     """(N,) `BELOW`, `ABOVE`, `BOTH`; -1 where no motion was found that reaches the cell."""
     lost: tuple[int, ...]
     """Cells that are proved uncoverable in one of the proof's regions each."""

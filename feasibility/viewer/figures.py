@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_errors import ArgumentError
 from feasibility.placement import AXES, PlacementMap, Placements
 from feasibility.verdict import Verdict
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.patches import Patch
 
-Array = NDArray[np.float64]
 
 DOTS_PER_INCH = 110
 BORDERS = (0.72, 0.75, 0.78)
@@ -164,7 +163,7 @@ def plot_transition(verdict: Verdict, edge: tuple[int, int] | None = None) -> Pl
     return figure
 
 
-def cells_below(verdict: Verdict, walk: Array) -> NDArray[np.int64]:
+def cells_below(verdict: Verdict, walk: Array) -> Ints:
     """The cell (k,) below the tool point at each row of a walk (k, n); -1 off the patch."""
     points, _ = Kinematics(verdict.robot).tools(walk)
     return verdict.cells.locate(points)
@@ -219,9 +218,7 @@ def in_short(verdict: Verdict) -> str:
     return f"{verdict.answer}, {covered}, {verdict.n_edges} edges"
 
 
-def _fill(
-    axes: Axes, outlines: Sequence[Array], cells: NDArray[np.int64], colour: Colour, label: str
-) -> Patch:
+def _fill(axes: Axes, outlines: Sequence[Array], cells: Ints, colour: Colour, label: str) -> Patch:
     """Fill some cells (k,); returns their line of the legend."""
     from matplotlib.collections import PolyCollection
     from matplotlib.patches import Patch

@@ -8,14 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from coverable_meshes import FilePart
 from feasibility.viewer.threejs import Colour
 from robots.urdf import Box, Capsule, Cylinder, Sphere
-
-Array = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 CREASE = 0.7  # [rad]: edges sharper than this keep a visible edge (40 degrees)
 DEGREE = 57.0  # [1/rad] normals that agree to about a degree are one

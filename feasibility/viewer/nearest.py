@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.certification.collisions import NearPair, nearest_along
 from feasibility.collisions import Bodies
 from feasibility.viewer import threejs
@@ -19,8 +19,6 @@ from feasibility.viewer.robot import extent
 from feasibility.viewer.scene import Layer
 from feasibility.viewer.threejs import Colour, Command
 from robots import Robot
-
-Array = NDArray[np.float64]
 
 ROOT = "/nearest pair"
 LINE: Colour = (0.90, 0.00, 0.55)

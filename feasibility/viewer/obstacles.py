@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.collisions import TOOL, Bodies, HalfSpace, Obstacle, Seat
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
@@ -17,8 +17,6 @@ from feasibility.viewer.scene import Layer, hidden
 from feasibility.viewer.threejs import Colour, Command
 from robots import Robot
 from robots.shapes import Polytope, Triangles
-
-Array = NDArray[np.float64]
 
 HULLS = "/hulls"  # a tree of joints beside that of the arm
 SCENE: Colour = (0.66, 0.54, 0.40)

@@ -11,13 +11,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.compiled import kernel
 from feasibility.viewer.html_page import Camera
 from feasibility.viewer.threejs import Command, numbers_of
-
-Array = NDArray[np.float64]
 
 LENS = np.tan(np.radians(37.5))  # half the height of meshcat's picture at a distance of 1
 NEAR = 0.02  # [m]: what is nearer to the camera is left out
@@ -34,7 +32,7 @@ class _Part:
 
     points: Array
     """(V, 3) m."""
-    faces: NDArray[np.int64] | None
+    faces: Ints | None
     """(F, 3); None for line segments, two points each."""
     colours: Array
     """(V, 3), 0..1, with the light that falls on each point."""
@@ -138,7 +136,7 @@ def _part(scene: dict[str, Any], places: Sequence[Array]) -> _Part:
     return _Part(points, faces, np.minimum(colours, 1.0), float(material["opacity"]), on_top)
 
 
-def _normals(points: Array, faces: NDArray[np.int64]) -> Array:
+def _normals(points: Array, faces: Ints) -> Array:
     """(V, 3) the mean normal of the faces at each point."""
     a, b, c = points[faces].transpose(1, 0, 2)
     across = np.cross(b - a, c - a)

@@ -11,8 +11,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import counted
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
@@ -143,7 +143,7 @@ def view_division(
 
 def painting(
     trajectory: Trajectory | None, motion: Motion, limits: MotionLimits | None
-) -> tuple[tuple[float, float], NDArray[np.float64] | None]:
+) -> tuple[tuple[float, float], Array | None]:
     """When the tool is over the surface, s, and the share (k,) of their velocities that joints use.
 
     Entry and exit leave no trail. None in place of the shares without limits.
@@ -165,7 +165,7 @@ def trail_pieces(
     motion: Motion,
     radius: float,
     when: tuple[float, float],
-    use: NDArray[np.float64] | None = None,
+    use: Array | None = None,
 ) -> tuple[list[Layer], list[dict[str, Any]]]:
     """The tool's trail in pieces, and the tracks that show each when the tool has passed.
 
@@ -201,7 +201,7 @@ def trail_pieces(
     return layers, tracks
 
 
-def _along(move: Reconfiguration, count: int) -> NDArray[np.float64]:
+def _along(move: Reconfiguration, count: int) -> Array:
     """(k, n) rad or m, configurations along a move: its waypoints, and others in between."""
     rows = move.waypoints
     dense = max(2, -(-count // (len(rows) - 1)) + 1)

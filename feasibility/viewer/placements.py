@@ -11,8 +11,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError, counted
 from feasibility.cases import Setup
 from feasibility.placement import Pose, Stage, Trial, moved_cells
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     from feasibility.placement import Placements, StationPlan
     from feasibility.studies import Row, StudyTask
 
-Array = NDArray[np.float64]
 
 LOOKED = 24  # configurations of a motion that have to be in the picture
 NEARER = 0.9  # [1] of the distance from which a ball around everything would fill the picture

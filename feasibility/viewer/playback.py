@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import ArgumentError
 from feasibility.verdict import Verdict
 from feasibility.viewer import threejs
@@ -30,21 +30,21 @@ JOINED = 1e-6  # [rad] or [m]: largest gap between the end of one motion and the
 class Motion:
     """Straight lines in joint space, to be played at an even pace."""
 
-    walk: NDArray[np.float64]
+    walk: Array
     """(m, n) waypoints, rad or m."""
-    seconds: NDArray[np.float64]
+    seconds: Array
     """(m,) when each waypoint is passed, from 0."""
-    points: NDArray[np.float64]
+    points: Array
     """(m, 3) m, the tool point at each waypoint."""
     there_and_back: bool
     """Played to the end and back again, rather than once more from the start."""
     label: str
 
-    def at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def at(self, times: Array) -> Array:
         """Configurations (k, n) at the given times (k,) s."""
         return np.column_stack([np.interp(times, self.seconds, row) for row in self.walk.T])
 
-    def tool_at(self, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    def tool_at(self, times: Array) -> Array:
         """Tool points (k, 3) m at the given times (k,) s."""
         return np.column_stack([np.interp(times, self.seconds, row) for row in self.points.T])
 
@@ -66,7 +66,7 @@ def motion_of(verdict: Verdict) -> Motion | None:
     return paced(verdict.robot, walk_along(verdict.graph, cells), True, "one path of the tree")
 
 
-def longest_path(tree: nx.DiGraph | None, centres: NDArray[np.float64]) -> list[int]:
+def longest_path(tree: nx.DiGraph | None, centres: Array) -> list[int]:
     """Cells from the root of the search tree to the leaf furthest along it; empty without a tree.
 
     The length of a step is the distance between the centres (N, 3) of its two cells.
@@ -79,13 +79,13 @@ def longest_path(tree: nx.DiGraph | None, centres: NDArray[np.float64]) -> list[
     return list(nx.dag_longest_path(lengths))
 
 
-def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
+def walk_along(graph: nx.Graph, cells: list[int]) -> Array:
     """The motions of successive edges, each in the direction of travel, as one walk (m, n).
 
     Raises:
         ArgumentError: an edge has no motion, or a motion does not start at the end of the last one.
     """
-    rows: list[NDArray[np.float64]] = []
+    rows: list[Array] = []
     for a, b in itertools.pairwise(cells):
         motion = np.asarray(graph.edges[a, b]["motion"], dtype=float)
         motion = motion if a < b else motion[::-1]
@@ -101,7 +101,7 @@ def walk_along(graph: nx.Graph, cells: list[int]) -> NDArray[np.float64]:
     return np.concatenate(rows)
 
 
-def paced(robot: Robot, walk: NDArray[np.float64], there_and_back: bool, label: str) -> Motion:
+def paced(robot: Robot, walk: Array, there_and_back: bool, label: str) -> Motion:
     """Time a walk (m, n) so that the tool travels evenly.
 
     Where the tool point rests and only joints move, their motion counts: 1 rad as a twentieth of
@@ -129,7 +129,7 @@ def timed(robot: Robot, trajectory: Trajectory, label: str) -> Motion:
     return Motion(q, time, Kinematics(robot).tools(q)[0], False, label)
 
 
-def key_times(motion: Motion) -> NDArray[np.float64]:
+def key_times(motion: Motion) -> Array:
     """Even times (k,) s of the key frames, at most `KEY_FRAMES` of them."""
     return np.linspace(0.0, float(motion.seconds[-1]), min(KEY_FRAMES, 4 * len(motion.walk)))
 
@@ -163,7 +163,7 @@ def animate(
     return threejs.animation(tracks, play=play, there_and_back=motion.there_and_back)
 
 
-def quaternions(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+def quaternions(rotations: Array) -> Array:
     """Unit quaternions (k, 4) as x, y, z, w of rotations (k, 3, 3), without jumps of sign."""
     from scipy.spatial.transform import Rotation
 

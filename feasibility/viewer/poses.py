@@ -11,8 +11,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints, Mask
 from coverable_errors import counted
 from feasibility.placement import Pose, Stage, Trial, moved_cells
 from feasibility.viewer import threejs
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from feasibility.placement import StationPlan
     from feasibility.studies import Row
 
-Array = NDArray[np.float64]
 
 MOST = 96  # segments of one outline
 FINEST = 8  # pieces that a cell's side is cut into, at most
@@ -84,7 +83,7 @@ class Tried:
 
     pose: Pose
     kind: Class
-    cover: NDArray[np.bool_] | None
+    cover: Mask | None
     """(N,) cells that the best motion found covers; None where that is not known."""
 
 
@@ -190,7 +189,7 @@ def _spread(poses: Sequence[Pose]) -> list[Pose]:
     return [poses[int(k)] for k in chosen]
 
 
-def _thick(lines: Array, poses: Sequence[Pose]) -> tuple[Array, NDArray[np.int64]]:
+def _thick(lines: Array, poses: Sequence[Pose]) -> tuple[Array, Ints]:
     """Segments (k, 2, 3) m as tubes, at every pose: vertices and faces."""
     vertices, faces = tubes(list(lines), THICK * _size(lines.reshape(-1, 3)), sides=4)
     every = np.concatenate([placed(vertices, pose) for pose in poses])

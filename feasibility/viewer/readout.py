@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.viewer.html_page import Readout
 from feasibility.viewer.playback import Motion, key_times
 from robots import Kinematics, Robot
@@ -49,7 +49,7 @@ def with_nearest(readout: Readout, distances: list[float], names: tuple[str, ...
     return replace(readout, rows=rows, nearest=names)
 
 
-def distance_and_angle(robot: Robot, cells: Cells, q: NDArray[np.float64]) -> NDArray[np.float64]:
+def distance_and_angle(robot: Robot, cells: Cells, q: Array) -> Array:
     """(2, k): mm from the surface on its working side, and degrees from the normal there."""
     points, axes = Kinematics(robot).tools(q)
     closest = cells.surface.closest(points)

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from coverable_meshes import MeshError, MeshFiles
 from feasibility.viewer import threejs
 from feasibility.viewer.meshes import (
@@ -52,7 +53,7 @@ def joint_paths(robot: Robot, root: str = ROOT) -> tuple[str, ...]:
     return tuple(paths)
 
 
-def home(robot: Robot) -> NDArray[np.float64]:
+def home(robot: Robot) -> Array:
     """(n,) of an arm without work: at zero, or at the limit next to it."""
     return np.clip(np.zeros(robot.n), robot.lower, robot.upper)
 
@@ -62,7 +63,7 @@ def extent(robot: Robot) -> float:
     return robot.reach if np.isfinite(robot.reach) else 1.0
 
 
-def joint_placements(robot: Robot, walk: ArrayLike) -> NDArray[np.float64]:
+def joint_placements(robot: Robot, walk: ArrayLike) -> Array:
     """Each joint's frame in the frame of the joint before it, by Pinocchio.
 
     Args:

@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array, Ints
 from coverable_errors import counted
 from feasibility.verdict import Cause, CauseKind, Verdict
 from feasibility.viewer import threejs
@@ -81,7 +82,7 @@ def mesh_layer(
     return Layer((command,), Entry(label, colour, path))
 
 
-def lines_layer(label: str, colour: Colour, path: str, ends: NDArray[np.float64]) -> Layer:
+def lines_layer(label: str, colour: Colour, path: str, ends: Array) -> Layer:
     """Line segments (..., 2, 3) m with a line of the legend."""
     command = threejs.segments(path, ends.reshape(-1, 3), colour)
     return Layer((command,), Entry(label, colour, path))
@@ -161,7 +162,7 @@ def _frames(verdict: Verdict) -> Iterator[Layer]:
         yield lines_layer(label, REFERENCE, path, ends)
 
 
-def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) -> list[Layer]:
+def patch_layers(cells: Cells, labels: Ints, names: Sequence[str]) -> list[Layer]:
     """Cells filled with one colour for each label.
 
     Args:
@@ -181,7 +182,7 @@ def patch_layers(cells: Cells, labels: NDArray[np.int64], names: Sequence[str]) 
 
 def filled(
     cells: Cells,
-    which: NDArray[np.int64],
+    which: Ints,
     colour: Colour,
     path: str,
     label: str,
@@ -193,13 +194,13 @@ def filled(
 
 
 def drawn_lines(
-    lines: Sequence[NDArray[np.float64]], radius: float, colour: Colour, path: str, label: str
+    lines: Sequence[Array], radius: float, colour: Colour, path: str, label: str
 ) -> Layer:
     """Polylines, (k, 3) m each, as tubes."""
     return mesh_layer(label, colour, path, *tubes(lines, radius), lit=False)
 
 
-def edge_lines(verdict: Verdict) -> NDArray[np.float64]:
+def edge_lines(verdict: Verdict) -> Array:
     """The edges of G, in the order of `graph.edges`: lines (E, k, 3) m at the standoff.
 
     Each runs over the surface from target to target and shows that a motion joins the two cells.
@@ -227,7 +228,7 @@ class Missed:
     """None where no cause is known."""
     pair: tuple[str, str] | None
     """The two bodies that are in the way, if that is known."""
-    which: NDArray[np.int64]
+    which: Ints
     """Flat indices of the cells."""
     colour: Colour
 
@@ -238,7 +239,7 @@ class Missed:
         return words if self.pair is None else f"{words}: {' and '.join(self.pair)}"
 
 
-def missed_groups(causes: Sequence[Cause], missed: NDArray[np.int64]) -> list[Missed]:
+def missed_groups(causes: Sequence[Cause], missed: Ints) -> list[Missed]:
     """Cells that are not covered, by cause, and by the pair of bodies that is in the way.
 
     Cells of one pair have a colour of their own.

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from feasibility.viewer import robot as robot_visuals
 from feasibility.viewer import threejs
 from feasibility.viewer.frames import in_world, triad
@@ -12,8 +13,6 @@ from feasibility.viewer.html_page import Camera
 from feasibility.viewer.threejs import Command
 from robots import Robot
 from surfaces import Cells
-
-Array = NDArray[np.float64]
 
 THICKNESS = 0.12  # [1] of the reach: by how much links may stand out beyond their joints
 STILL = np.eye(4)

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from coverable_arrays import Array, Mask
 from coverable_errors import ArgumentError
 
-Array = NDArray[np.float64]
 Command = dict[str, Any]
 Colour = tuple[float, float, float]
 """Red, green, blue, each 0 to 1."""
@@ -112,7 +112,7 @@ def segments(path: str, points: ArrayLike, colour: Colour, *, colours: Any = Non
     return _object(path, "LineSegments", data, material)
 
 
-def transform(path: str, matrix: NDArray[np.float64]) -> Command:
+def transform(path: str, matrix: Array) -> Command:
     """Place what is at `path` by a homogeneous (4, 4) matrix."""
     return {"type": "set_transform", "path": path, "matrix": matrix.T.reshape(-1).tolist()}
 
@@ -141,7 +141,7 @@ def appearing(path: str, when: float, end: float) -> dict[str, Any]:
     return shown(path, np.array([0.0, when, max(end, when)]), np.array([False, True, True]))
 
 
-def shown(path: str, times: Array, visible: NDArray[np.bool_]) -> dict[str, Any]:
+def shown(path: str, times: Array, visible: Mask) -> dict[str, Any]:
     """What is at `path` shown or hidden, `visible` (k,), from each of the times (k,) s on."""
     return _clip(path, "visible", "bool", times, visible.tolist())
 

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import counted
 from feasibility.collisions import checked_words, gather
 from feasibility.cut_words import sentence
@@ -40,8 +40,6 @@ from feasibility.viewer.stage import camera_on, ground
 from feasibility.viewer.threejs import Command
 from robots import Robot
 from surfaces import Cells
-
-Array = NDArray[np.float64]
 
 ARM: threejs.Colour = (0.35, 0.37, 0.40)
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array, Ints
 from feasibility.area import percent_down
 from feasibility.viewer.cell_meshes import cell_size
 from feasibility.viewer.html_page import Entry, Readout
@@ -54,12 +54,12 @@ def certified_layer(
     return mesh_layer(label, colour, path, vertices, every, normals=normals, opacity=0.55)
 
 
-def _triangle() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _triangle() -> tuple[Array, Ints]:
     """Corners of a triangle as shares of themselves, and its face."""
     return np.eye(3), np.array([[0, 1, 2]])
 
 
-def _square() -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _square() -> tuple[Array, Ints]:
     """A grid of places on a rectangle as shares of its corners, and its faces."""
     s, t = (part.ravel() for part in np.meshgrid(*[np.linspace(0.0, 1.0, PIECES + 1)] * 2))
     i, j = (part.ravel() for part in np.meshgrid(*[np.arange(PIECES)] * 2))

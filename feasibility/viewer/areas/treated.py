@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Ints
 from feasibility.treated import TreatedArea
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
@@ -15,8 +15,6 @@ from feasibility.viewer.playback import Motion
 from feasibility.viewer.scene import SURFACE, Layer, mesh_layer
 from feasibility.viewer.threejs import Colour, Command
 from surfaces.passes import WorkingMesh
-
-Ints = NDArray[np.int64]
 
 UNTREATED: Colour = (0.84, 0.12, 0.12)
 TIMES: tuple[tuple[str, Colour], ...] = (  # a sequence that colour-blind readers can tell apart

@@ -12,15 +12,14 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from coverable_arrays import Array
 from feasibility.viewer import threejs
 from feasibility.viewer.html_page import Entry
 from robots import Kinematics, Robot
 
 GROUP = "/with the surface"
-
-Array = NDArray[np.float64]
 
 
 def root_in_world(robot: Robot, walk: ArrayLike) -> Array:

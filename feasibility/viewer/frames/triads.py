@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from feasibility.viewer import threejs
 from feasibility.viewer.robot import extent, joint_paths
 from robots import Robot
@@ -13,7 +13,7 @@ AXES = ((0.85, 0.1, 0.1), (0.1, 0.65, 0.1), (0.1, 0.2, 0.9))
 SMALL = 0.1  # [1] of the reach: length of an axis
 
 
-def triad(path: str, place: NDArray[np.float64], length: float) -> threejs.Command:
+def triad(path: str, place: Array, length: float) -> threejs.Command:
     """The axes of a frame.
 
     Args:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from coverable_arrays import Array
 
 WIDTH = 0.5  # [1] of the height
 GAP = 0.25  # [1] of the height, between digits
@@ -16,7 +15,7 @@ _DIGITS = (
 """Strokes from corner to corner: top a b, middle c d, bottom e f."""
 
 
-def digit_lines(number: int, origin: Floats, along: Floats, up: Floats) -> list[Floats]:
+def digit_lines(number: int, origin: Array, along: Array, up: Array) -> list[Array]:
     """Polylines (k, 3) m of a number.
 
     Args:

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from coverable_arrays import Array
 from coverable_errors import counted
 from feasibility.paths import CoveragePath
 from feasibility.runs import PlannedPasses
@@ -26,8 +26,6 @@ from feasibility.viewer.scene import MISSED, OUTLINES, PATCHES, Layer, drawn_lin
 from feasibility.viewer.viewer import View, compose, titled
 from robots import Robot
 from surfaces.passes import Pass, working_mesh
-
-Floats = NDArray[np.float64]
 
 THIN = 0.03  # [1] of the distance between passes: radius of their lines
 TALL = 0.5  # [1] of it: height of their numbers
@@ -115,7 +113,7 @@ def _pass_layers(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[La
     return layers
 
 
-def _left_out(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[Floats]:
+def _left_out(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[Array]:
     """Lines (k, 3) m of the parts of passes on which no path works."""
     places, worked = along.places, np.zeros(len(along.cells) - 1, dtype=bool)
     for path in paths:
@@ -134,7 +132,7 @@ def _left_out(along: PlannedPasses, paths: Sequence[CoveragePath]) -> list[Float
     return lines
 
 
-def _number(each: Pass, along: PlannedPasses) -> list[Floats]:
+def _number(each: Pass, along: PlannedPasses) -> list[Array]:
     """The number of a pass before the beginning of a stretch, upright on the tool's side."""
     spacing, side = along.passes.spacing, along.passes.surface.side_sign
     heading = each.points[1] - each.points[0]
