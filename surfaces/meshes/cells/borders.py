@@ -12,13 +12,40 @@ from coverable_arrays import Array, Ints, Mask
 from coverable_kernels import njit
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.closest_point import on_triangle
-from surfaces.meshes.triangle_mesh import sum_by
+from surfaces.meshes.triangle_mesh import edge_partners, sum_by
 from surfaces.protected import Protected
 
 kernel = njit(cache=True, error_model="numpy")
 
 _INSIDE = 0.25  # of sqrt(area): as far from the border as this is well inside (a disc has 0.56)
 _DEEP = 0.8  # of the greatest distance to the border: as good as the greatest
+
+
+class LabelledFaces(NamedTuple):
+    """The faces of a clean mesh, grouped into N cells."""
+
+    vertices: Array
+    """(V, 3) m."""
+    faces: Ints
+    """(F, 3) vertex indices."""
+    labels: Ints
+    """(F,) cell of each face."""
+    partner: Ints
+    """(F, 3) see `triangle_mesh.edge_partners`."""
+    across: Ints
+    """(F, 3) the cell on the other side of each edge; -1 at the border of the mesh."""
+
+    @staticmethod
+    def of(vertices: Array, faces: Ints, labels: Ints) -> LabelledFaces:
+        """With what follows from the faces."""
+        partner = edge_partners(faces)
+        across = np.where(partner >= 0, labels[partner // 3], -1)
+        return LabelledFaces(vertices, faces, labels, partner, across)
+
+    @property
+    def border(self) -> Mask:
+        """(F, 3) whether an edge lies on its cell's border."""
+        return np.asarray(self.across != self.labels[:, None])
 
 
 class FacePoints(NamedTuple):
@@ -32,9 +59,7 @@ class FacePoints(NamedTuple):
     """(N, 3) barycentric coordinates on that face, >= 0, of sum 1."""
 
 
-def centre_points(
-    vertices: Array, faces: Ints, labels: Ints, areas: Array, border: Mask
-) -> FacePoints:
+def centre_points(mesh: LabelledFaces, areas: Array) -> FacePoints:
     """The point of each cell nearest to its centroid; elsewhere where that is at its border.
 
     The centroid of a ring or a horseshoe lies outside, and the point nearest to it on the border.
@@ -42,14 +67,11 @@ def centre_points(
     those the one nearest to the centroid.
 
     Args:
-        vertices: (V, 3) m.
-        faces: (F, 3) vertex indices.
-        labels: (F,) cell of each face.
+        mesh: the cells.
         areas: (F,) m^2, of the faces.
-        border: (F, 3) whether an edge lies on its cell's border.
     """
-    count = int(labels.max()) + 1
-    corners = vertices[faces]
+    labels, count = mesh.labels, int(mesh.labels.max()) + 1
+    corners = mesh.vertices[mesh.faces]
     middles = corners.mean(axis=1)
     total = sum_by(labels, areas, count)
     centroids = sum_by(labels, areas[:, None] * middles, count) / total[:, None]
@@ -57,7 +79,7 @@ def centre_points(
     indptr = np.searchsorted(labels[order], np.arange(count + 1))
     chosen = np.empty(count, dtype=np.int64)
     weights = np.empty((count, 3))
-    _choose(corners, middles, border, order, indptr, centroids, total, chosen, weights)
+    _choose(corners, middles, mesh.border, order, indptr, centroids, total, chosen, weights)
     points = np.einsum("nk,nkc->nc", weights, corners[chosen])
     return FacePoints(points, chosen, weights)
 
@@ -160,23 +182,17 @@ class SharedBorders(NamedTuple):
     """(M, 3) m, the place on each border that is nearest to its mean."""
 
 
-def outlines(vertices: Array, faces: Ints, partner: Ints, labels: Ints) -> Outlines:
-    """The border lines of all cells.
-
-    Args:
-        vertices: (V, 3) m.
-        faces: (F, 3) vertex indices.
-        partner: (F, 3) see `triangle_mesh.edge_partners`.
-        labels: (F,) cell of each face.
-    """
-    other = np.where(partner >= 0, labels[partner // 3], -1)
-    border = other != labels[:, None]
-    order = np.argsort(labels, kind="stable")
-    chain, starts, cells = _loops(faces, partner, labels, border, order, int(border.sum()))
-    return Outlines(vertices[chain], chain, starts, cells)
+def outlines(mesh: LabelledFaces) -> Outlines:
+    """The border lines of all cells."""
+    border = mesh.border
+    order = np.argsort(mesh.labels, kind="stable")
+    chain, starts, cells = _loops(
+        mesh.faces, mesh.partner, mesh.labels, border, order, int(border.sum())
+    )
+    return Outlines(mesh.vertices[chain], chain, starts, cells)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _loops(faces, partner, labels, border, order, total):  # type: ignore[no-untyped-def]
     """Follow each border edge to the next one of the same cell, turning about their vertex."""
     chain = np.empty(total, dtype=np.int64)
@@ -203,12 +219,12 @@ def _loops(faces, partner, labels, border, order, total):  # type: ignore[no-unt
     return chain, starts[: loops + 1], cells[:loops]
 
 
-def shared_borders(vertices: Array, faces: Ints, partner: Ints, labels: Ints) -> SharedBorders:
-    """Which cells share a border, how long it is, and its middle; arguments as of `outlines`."""
+def shared_borders(mesh: LabelledFaces) -> SharedBorders:
+    """Which cells share a border, how long it is, and its middle."""
+    vertices, faces, labels = mesh.vertices, mesh.faces, mesh.labels
     count = int(labels.max()) + 1
-    other = np.where(partner >= 0, labels[partner // 3], -1)
-    face, k = np.nonzero(other > labels[:, None])
-    keys, pair = np.unique(labels[face] * count + other[face, k], return_inverse=True)
+    face, k = np.nonzero(mesh.across > labels[:, None])
+    keys, pair = np.unique(labels[face] * count + mesh.across[face, k], return_inverse=True)
     start, end = vertices[faces[face, k]], vertices[faces[face, (k + 1) % 3]]
     length = np.linalg.norm(end - start, axis=1)
     total = sum_by(pair, length, len(keys))

@@ -186,11 +186,6 @@ class MeshCells(Cells):
         )  # fmt: skip
         return faces, weights
 
-    @property
-    def border_lengths(self) -> Array:
-        """(M,) m, length of the border that each of `pairs` shares."""
-        return self.figures.borders.lengths
-
     @cached_property
     def members(self) -> tuple[Ints, Ints]:
         """Faces cell by cell (F,), and where each cell's begin (N + 1,)."""

@@ -10,6 +10,7 @@ import numpy as np
 from coverable_arrays import Array, Ints, Mask
 from surfaces.adjacency import Neighbours
 from surfaces.meshes.cells.borders import (
+    LabelledFaces,
     Outlines,
     SharedBorders,
     centre_points,
@@ -17,7 +18,7 @@ from surfaces.meshes.cells.borders import (
     outlines,
     shared_borders,
 )
-from surfaces.meshes.triangle_mesh import doubled_areas, edge_partners, sum_by
+from surfaces.meshes.triangle_mesh import doubled_areas, sum_by
 from surfaces.protected import Protected
 from surfaces.surface import SurfaceError
 
@@ -38,15 +39,11 @@ class Figures(Protected):
     """(N,) the face each centre lies on."""
     weights: Array
     """(N, 3) the centres' barycentric coordinates there."""
-    mean_normals: Array
-    """(N, 3) unit, area-weighted; the centre's normal where the mean is zero (a closed cell)."""
     flatness: Array
-    """(N,) rad, the largest angle between a face's normal and the mean normal."""
+    """(N,) rad, the largest angle between a face's normal and the mean of all, weighted by area;
+    or the centre's normal where the mean is zero (a closed cell)."""
     crease: Array
     """(N,) rad, the largest angle between two faces of the cell that share an edge."""
-    sagitta: Array
-    """(N,) m, the largest distance of a vertex from the plane through the centre, across the
-    mean normal."""
     borders: SharedBorders
     """Neighbouring pairs, and the border they share."""
     neighbours: Neighbours
@@ -61,8 +58,7 @@ def figures(vertices: Array, faces: Ints, vertex_normals: Array, labels: Ints) -
     Args:
         vertices: (V, 3) m.
         faces: (F, 3) vertex indices of a clean mesh.
-        vertex_normals: (V, 3) of any length; of a mesh that was made finer, those that
-            `Subdivision.spread` carried over.
+        vertex_normals: (V, 3) of any length.
         labels: (F,) cell of each face; every one of 0..N-1 is used.
 
     Raises:
@@ -72,40 +68,32 @@ def figures(vertices: Array, faces: Ints, vertex_normals: Array, labels: Ints) -
     if (used == 0).any():
         raise SurfaceError(f"cell {int(np.argmin(used))} has no face; number cells from 0 on")
     count = len(used)
-    partner = edge_partners(faces)
-    other = np.where(partner >= 0, labels[partner // 3], -1)
-    corners = vertices[faces]
+    mesh = LabelledFaces.of(vertices, faces, labels)
     double = doubled_areas(vertices, faces)
     face_areas = np.linalg.norm(double, axis=1) / 2.0
     face_normals = _unit(double)
-    border = other != labels[:, None]
-    places = centre_points(vertices, faces, labels, face_areas, border)
+    places = centre_points(mesh, face_areas)
     normals = np.einsum("nk,nkc->nc", places.weights, vertex_normals[faces[places.faces]])
     normals = _unit(normals, instead=face_normals[places.faces])
     areas = sum_by(labels, face_areas, count)
     mean = _unit(sum_by(labels, double, count), instead=normals, least=1e-12 * areas)
-    flatness, crease, sagitta = np.zeros(count), np.zeros(count), np.zeros(count)
+    flatness, crease = np.zeros((2, count))
     np.maximum.at(flatness, labels, _angle(face_normals, mean[labels]))
-    face, k = np.nonzero(~border)
-    bend = _angle(face_normals[face], face_normals[partner[face, k] // 3])
-    np.maximum.at(crease, labels[face], bend)
-    height = corners - places.points[labels][:, None]
-    off_plane = abs(np.einsum("fkc,fc->fk", height, mean[labels])).max(axis=1)
-    np.maximum.at(sagitta, labels, off_plane)
-    borders = shared_borders(vertices, faces, partner, labels)
+    face, k = np.nonzero(~mesh.border)
+    fold = _angle(face_normals[face], face_normals[mesh.partner[face, k] // 3])
+    np.maximum.at(crease, labels[face], fold)
+    borders = shared_borders(mesh)
     return Figures(
         centres=places.points,
         normals=normals,
         areas=areas,
         faces=places.faces,
         weights=places.weights,
-        mean_normals=mean,
         flatness=flatness,
         crease=crease,
-        sagitta=sagitta,
         borders=borders,
         neighbours=clockwise_neighbours(borders, places.points, normals),
-        outlines=outlines(vertices, faces, partner, labels),
+        outlines=outlines(mesh),
     )
 
 

@@ -135,7 +135,7 @@ def test_borders_are_the_edges_between_cells_and_the_rim(cells):
     assert set(drawn) == expected
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
     cone_chord = cells.surface.mesh.edges.border_lengths.sum()
-    assert length == pytest.approx(cells.border_lengths.sum() + cone_chord)
+    assert length == pytest.approx(cells.figures.borders.lengths.sum() + cone_chord)
 
 
 def test_creases_stay_sharp():
@@ -184,7 +184,7 @@ def test_a_fine_mesh_is_thinned_and_its_cells_still_meet_as_they_did(fine):
     lines = display.borders()
     length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).sum()
     cone_chord = fine.surface.mesh.edges.border_lengths.sum()
-    assert length == pytest.approx(fine.border_lengths.sum() + cone_chord, rel=0.02)
+    assert length == pytest.approx(fine.figures.borders.lengths.sum() + cone_chord, rel=0.02)
     assert len(lines) < len(fine.borders()) / 2
 
 
