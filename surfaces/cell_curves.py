@@ -48,16 +48,14 @@ class CellCurves(Protected):
 
     def at(self, curves: Ints, t: Array) -> tuple[Array, Array]:
         """Point (k, 3) m and normal (k, 3) at t (k,) of some curves (k,)."""
-        powers, cubics = self._local(curves, t)
-        values = np.einsum("kp,kpd->kd", powers, cubics)
-        return values[:, :3], values[:, 3:]
-
-    def slopes(self, curves: Ints, t: Array) -> tuple[Array, Array]:
-        """Derivatives by t of point (k, 3) m and normal (k, 3)."""
-        powers, cubics = self._local(curves, t)
-        count = self.first[curves + 1] - self.first[curves]
-        by_s = np.column_stack([powers[:, 0], 2.0 * powers[:, 1], 3.0 * powers[:, 2]])
-        values = np.einsum("kp,kpd->kd", by_s, cubics[:, 1:]) * count[:, None]
+        first = self.first[curves]
+        count = self.first[curves + 1] - first
+        along = t * count
+        piece = np.minimum(np.maximum(np.floor(along), 0), count - 1).astype(np.int64)
+        s = along - piece
+        square = s * s
+        powers = np.stack([np.ones(len(s)), s, square, square * s], axis=1)
+        values = np.einsum("kp,kpd->kd", powers, self.cubics.take(first + piece, axis=0))
         return values[:, :3], values[:, 3:]
 
     def folds(self, height: float) -> Mask:
@@ -105,17 +103,6 @@ class CellCurves(Protected):
         if not self.rests.any():
             return np.zeros(len(self), dtype=bool)
         return np.logical_or.reduceat(self.rests, self.first[:-1])
-
-    def _local(self, curves: Ints, t: Array) -> tuple[Array, Array]:
-        """Powers 1, s, s^2, s^3 (k, 4), and the cubics (k, 4, 6) that hold at t."""
-        first = self.first[curves]
-        count = self.first[curves + 1] - first
-        along = t * count
-        piece = np.minimum(np.maximum(np.floor(along), 0), count - 1).astype(np.int64)
-        s = along - piece
-        square = s * s
-        powers = np.stack([np.ones(len(s)), s, square, square * s], axis=1)
-        return powers, self.cubics.take(first + piece, axis=0)
 
 
 def slopes_of(cubics: Array, s: float) -> Array:
