@@ -98,7 +98,7 @@ def grid_neighbours(
         bottom = _over_pole(i, j, columns, bottom, i == rows - 1, upper=False)
     table = np.stack([*top, *right, *bottom, *left], axis=1)
     valid = (table >= 0) & (table != np.arange(rows * columns)[:, None])
-    if any(closed) or any(poles):  # only then can one cell be met twice
+    if any(closed) or any(poles):  # only then can one cell come twice
         for later in range(1, table.shape[1]):
             valid[:, later] &= (table[:, [later]] != table[:, :later]).all(axis=1)
     indptr = np.concatenate([[0], np.cumsum(valid.sum(axis=1))])
@@ -110,8 +110,8 @@ def _over_pole(
 ) -> list[Ints]:
     """Slots of the neighbours above or below, clockwise; in the last row those across the pole.
 
-    Walking clockwise around a cell at the upper pole, one meets the columns across it in falling
-    order; at the lower pole in rising order.
+    Clockwise around a cell at the upper pole, the columns across it come in falling order; at the
+    lower pole in rising order.
     """
     half = columns // 2
     across = [half - 1, half, half + 1] + ([half + 2] if columns % 2 else [])

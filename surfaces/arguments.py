@@ -76,7 +76,7 @@ class Checks(coverable_errors.Checks):
 
 
 def check_pose(side: Any = "inside", position: Any = ORIGIN, rpy_deg: Any = ORIGIN) -> None:
-    """Refuse what makes no pose, before there is a surface to stand there.
+    """Refuse arguments that make no pose, before there is a surface.
 
     Raises:
         SurfaceError: with everything that is wrong.

@@ -232,7 +232,7 @@ class Cells(Protected, ABC):
 
     @abstractmethod
     def unrolled(self) -> Unrolled:
-        """The cells laid flat, for pictures on paper."""
+        """The cells on a plane, for pictures on paper."""
 
     def seen_from_outside(self, outlines: Iterable[Array]) -> Unrolled:
         """The picture along the mean normal, x right and y down, from N outlines (k, 3) m.

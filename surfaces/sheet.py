@@ -29,14 +29,14 @@ KEPT = 8  # surfaces whose triangles are remembered: one that is moved has the s
 class Sheet(Protected):
     """A two-sided sheet of triangles in the root frame.
 
-    The whole surface is meant, margins outside the outermost cell centres included. Triangles of a
-    smooth surface need not meet at their edges: only their distance says something, and what stays
-    further than `deviation` from all of them does not touch the surface.
+    It covers all of the surface, margins outside the outermost cell centres included. Triangles of
+    a smooth surface may leave gaps at their edges: only distances count, and what stays further
+    than `deviation` from all of them does not touch the surface.
     """
 
     own: Array
-    """(k, 3, 3) m, the corners of each triangle in the surface's own frame, the same wherever it
-    stands."""
+    """(k, 3, 3) m, the corners of each triangle in the surface's own frame, the same at any
+    pose."""
     rotation: Array
     """(3, 3) of that frame in the root frame."""
     position: Array

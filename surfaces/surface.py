@@ -20,7 +20,7 @@ TURN_TOLERANCE = 1e-9  # [rad]: a range this close to a full turn is one
 
 
 class SurfaceError(CoverableError):
-    """A surface that cannot be built as asked: what was wrong, where, and what would do."""
+    """A surface that cannot be built: what was wrong, where, and what would do."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -107,9 +107,9 @@ class Surface(Protected, ABC):
 
     @abstractmethod
     def parts(self, flat: float, straight: float, most: int = MOST_PARTS) -> SurfaceParts:
-        """The whole surface, margins outside the outermost cell centres included, as a tree.
+        """All of the surface, margins outside the outermost cell centres included, as a tree.
 
-        Parts are cut in halves, the roughest first, until none is rougher than asked or there are
+        Parts are cut in halves, the roughest first, until none is rougher than wanted or there are
         `most` of them.
 
         Args:

@@ -19,7 +19,7 @@ CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
 HALVES = np.array([[0, 1, 2], [0, 2, 3]])
 MOST_ROUNDS = 60
 _AIM = 0.97  # of the deviation: what a cut aims at, since errors shrink only nearly as is assumed
-_AT_ONCE = 8  # cuts along one parameter that errors foretell well
+_AT_ONCE = 8  # cuts along one parameter that errors predict well
 
 
 class FlatTiles(NamedTuple):

@@ -42,7 +42,6 @@ surfaces.piecewise
 surfaces.toolpaths
 surfaces.meshes: triangle_mesh normals closest_point face_tree places_on_faces facets mesh_parts
 surfaces.meshes.repair
-surfaces.meshes.files
 surfaces.meshes: mesh_surface selection sources
 surfaces.meshes.cells
 surfaces.step_files

@@ -154,7 +154,7 @@ def area_from(
     if cut is None:
         raise ArgumentError(_words("without a surface between the cells"))
     if not len(cell):
-        none = HeldTiles(cut.whole(np.zeros(0, np.int64)), np.zeros(0, np.int64), NO_GAINS)
+        none = HeldTiles(cut.of_cells(np.zeros(0, np.int64)), np.zeros(0, np.int64), NO_GAINS)
         nodes = Nodes(np.zeros((0, robot.n)), none.tiles.middles, np.zeros(0, np.int64))
         return _made(cells, cut, none, nodes, 0, 0)
     faces = len(cut.touching[0]) if cut.touching is not None else 0

@@ -37,7 +37,7 @@ def spread_over(lander: Lander, which: Ints, cell: Ints, q: Array) -> HeldTiles:
     """
     cut = lander.cut
     begun = lander.settled(lander.add(Nodes(q, cut.centres(cell), np.full(len(q), -1))))
-    tiles = cut.whole(which)
+    tiles = cut.of_cells(which)
     if cut.touching is None:
         source, rows = np.full(len(which), -1), np.searchsorted(which, cell)
         source[rows] = begun

@@ -193,7 +193,7 @@ def _objects(section: Section, key: str) -> list[_Entry]:
 
 def _object(section: Section, key: str, k: int, entry: Any) -> _Entry | None:
     """One object; None where it has faults."""
-    from surfaces.meshes.files import metres_per_unit
+    from surfaces.meshes import metres_per_unit
 
     before = len(section.faults)
     found = Section(f"collision.{key}[{k}]", entry, section.faults)

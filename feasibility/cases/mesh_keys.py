@@ -79,8 +79,7 @@ def build_mesh(values: Values, pose: Mapping[str, Any]) -> MeshSurface:
         CaseError: the file cannot be used, or nothing is left of it.
     """
     from surfaces import SurfaceError
-    from surfaces.meshes import mesh, take_faces
-    from surfaces.meshes.files import read_mesh
+    from surfaces.meshes import mesh, read_mesh, take_faces
 
     file = values["file"]
     try:
@@ -167,7 +166,7 @@ def _faults_of(key: str) -> Iterator[None]:
 
 def _check_mesh(section: Section, values: Values) -> None:
     """The unit, and numbers of faces; which there are, the file says."""
-    from surfaces.meshes.files import metres_per_unit
+    from surfaces.meshes import metres_per_unit
 
     if "scale" in values:
         section.make(metres_per_unit, {"scale": values["scale"]})

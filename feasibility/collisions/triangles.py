@@ -39,7 +39,7 @@ def read_triangles(path: str | os.PathLike[str], scale: float | None = None) -> 
             unlikely size.
     """
     from coverable_meshes import read_raw
-    from surfaces.meshes.files import metres_per_unit, refuse_unlikely_unit
+    from surfaces.meshes import metres_per_unit, refuse_unlikely_unit
 
     checks = Checks()
     name = repr(Path(os.fsdecode(path)).name[:100])

@@ -21,7 +21,7 @@ def cell_tiles(cells: Cells, height: float) -> CellTiles | None:
         >>> from surfaces import plane
         >>> cells = plane((0.0, 0.4), (0.0, 0.2)).cells(2, 1)
         >>> tiles = cell_tiles(cells, 0.01)
-        >>> halves = tiles.halves(tiles.whole(np.arange(2)))
+        >>> halves = tiles.halves(tiles.of_cells(np.arange(2)))
         >>> tiles.areas(halves).round(6).tolist()
         [0.02, 0.02, 0.02, 0.02]
     """

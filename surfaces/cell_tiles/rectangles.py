@@ -29,8 +29,8 @@ class Rectangles(CellTiles):
     first: Ints
     """(pieces + 1,) the first cell of each."""
 
-    def whole(self, which: Ints) -> Tiles:
-        """See `CellTiles.whole`."""
+    def of_cells(self, which: Ints) -> Tiles:
+        """See `CellTiles.of_cells`."""
         chart = np.searchsorted(self.first, which, side="right") - 1
         corners = np.empty((len(which), 4, 2))
         for k in np.unique(chart):
@@ -46,7 +46,7 @@ class Rectangles(CellTiles):
 
     def centres(self, which: Ints) -> Places:
         """See `CellTiles.centres`."""
-        return self.whole(which).middles
+        return self.of_cells(which).middles
 
     def lines(self, start: Places, end: Places, parts: Ints) -> Lines:
         """See `CellTiles.lines`: the shorter way round where a parameter closes."""

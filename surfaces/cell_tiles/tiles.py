@@ -1,7 +1,7 @@
 """Tiles: connected pieces of cells, rectangles of parameters or triangles on a face.
 
 Over a place x with the point f(x) and the outward unit normal n(x), the offset surface at a signed
-height h has the point T(x) = f(x) + h n(x). What is said of a whole tile rests on how far T and n
+height h has the point T(x) = f(x) + h n(x). What holds all over a tile rests on how far T and n
 are, over all of it, from what is straight between its corners.
 """
 
@@ -77,7 +77,7 @@ class CellTiles(ABC):
     """The offset surface that the bounds are of."""
 
     @abstractmethod
-    def whole(self, which: Ints) -> Tiles:
+    def of_cells(self, which: Ints) -> Tiles:
         """Tiles that together are some cells."""
 
     @abstractmethod

@@ -34,8 +34,8 @@ class FaceTriangles(CellTiles):
 
     cells: MeshCells
 
-    def whole(self, which: Ints) -> Tiles:
-        """See `CellTiles.whole`: the faces."""
+    def of_cells(self, which: Ints) -> Tiles:
+        """See `CellTiles.of_cells`: the faces."""
         wanted = np.zeros(len(self.cells), dtype=bool)
         wanted[which] = True
         faces = np.flatnonzero(wanted[self.cells.labels])

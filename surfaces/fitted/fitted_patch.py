@@ -126,7 +126,7 @@ def poles_of(points: Array) -> list[tuple[int, int]]:
     return found
 
 
-def meeting_ends(points: Array) -> Flags:
+def coinciding_ends(points: Array) -> Flags:
     """Whether the first and last row of a grid (m, n, 3) are the same points; and the columns."""
     least = ONE_PLACE * extent_of(points)
     rows = np.abs(points[0] - points[-1]).max() <= least

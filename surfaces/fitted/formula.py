@@ -19,8 +19,8 @@ from surfaces.arguments import ORIGIN, Checks
 from surfaces.fitted.calls import HOW, Formula
 from surfaces.fitted.fitted_patch import (
     FittedPatch,
+    coinciding_ends,
     extent_of,
-    meeting_ends,
     outward_words,
     poles_of,
     spline_through,
@@ -32,7 +32,7 @@ DEGREE = 5
 FEWEST, MOST = 9, 129  # points along each parameter
 CLOSE = 1e-7  # of the extent: a spline this near is near enough
 FARTHEST = 1e-4  # of the extent: one that is further off is refused
-BETWEEN = (0.21, 0.5)  # shares of the way between two points where the deviation is measured
+BETWEEN = (0.21, 0.5)  # shares of the distance between two points where the deviation is measured
 MORE = 1.5  # times as much is stated, for the places between these
 STEP = 1e-3  # of a range: of differences, for normals
 EDGES = 1e-3  # of a range, what a pole is to be cut off by, at least
@@ -147,9 +147,9 @@ def _refuse_poles(formula: Formula, ranges: Ranges) -> None:
 def _best(formula: Formula, ranges: Ranges) -> _Fit:
     """The spline of as few points as are near enough; closed where that is as near."""
     points, _ = _grid(formula, ranges, (FEWEST, FEWEST))
-    meet = meeting_ends(points)
-    found = _refined(formula, ranges, meet)
-    if any(meet) and found.off > CLOSE * extent_of(points):
+    coincide = coinciding_ends(points)
+    found = _refined(formula, ranges, coincide)
+    if any(coincide) and found.off > CLOSE * extent_of(points):
         kinked = _refined(formula, ranges, (False, False))
         if kinked.off < 0.1 * found.off:
             word = "Where its ends meet g has a kink, so they are not joined."

@@ -13,8 +13,8 @@ from surfaces.arguments import ORIGIN, Checks, metres
 from surfaces.fitted.fitted_patch import (
     ONE_PLACE,
     FittedPatch,
+    coinciding_ends,
     extent_of,
-    meeting_ends,
     outward_words,
     poles_of,
     spline_through,
@@ -68,15 +68,15 @@ def grid(
     if found is None:  # cannot be: without points there are faults
         raise SurfaceError("grid: there are no points")
     lines = (_line(found), _line(found.swapaxes(0, 1)))
-    meet = meeting_ends(found)
-    closed = (meet[0] and _smooth(found), meet[1] and _smooth(found.swapaxes(0, 1)))
+    coincide = coinciding_ends(found)
+    closed = (coincide[0] and _smooth(found), coincide[1] and _smooth(found.swapaxes(0, 1)))
     net = spline_through(found, lines, DEGREE, closed)
     faults = regularity_faults(net)
     if faults:
         raise SurfaceError([Fault("points", text) for text in faults], "grid")
     return FittedPatch(
         u_range=(0.0, 1.0), v_range=(0.0, 1.0), net=net, made_from="grid", off=(0.0, 0.0),
-        words=_words(net, found, lines, meet, closed), **pose,
+        words=_words(net, found, lines, coincide, closed), **pose,
     )  # fmt: skip
 
 
@@ -129,7 +129,7 @@ def _words(
     net: SplineMap,
     points: Array,
     lines: tuple[Array, Array],
-    meet: tuple[bool, bool],
+    coincide: tuple[bool, bool],
     closed: tuple[bool, bool],
 ) -> tuple[str, ...]:
     """What a user should know."""
@@ -140,7 +140,7 @@ def _words(
         "how far the points leave the surface open.",
         outward_words(net.normal(np.array([[0.5, 0.5]]))),
     ]
-    for what, touch, joined in zip(("rows", "columns"), meet, closed, strict=True):
+    for what, touch, joined in zip(("rows", "columns"), coincide, closed, strict=True):
         if touch and not joined:
             words.append(f"The first and last {what} meet at a crease, so they are not joined.")
     return tuple(words)

@@ -11,6 +11,10 @@ from .selection import cut_box as cut_box
 from .selection import cut_plane as cut_plane
 from .selection import faces_within_cone as faces_within_cone
 from .selection import take_faces as take_faces
+from .sources import metres_per_unit as metres_per_unit
+from .sources import read_mesh as read_mesh
+from .sources import refuse_unlikely_unit as refuse_unlikely_unit
+from .sources import with_likely_unit as with_likely_unit
 from .triangle_mesh import TriangleMesh as TriangleMesh
 from .triangle_mesh import half_edge_ends as half_edge_ends
 from .triangle_mesh import half_edges as half_edges

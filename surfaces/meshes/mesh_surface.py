@@ -247,7 +247,7 @@ class MeshSurface(Surface):
 
     @cached_property
     def face_tree(self) -> FaceTree:
-        """The faces in the own frame, for whoever asks which is nearest."""
+        """The faces in the own frame, to find the nearest one."""
         from surfaces.meshes.face_tree import FaceTree
 
         return FaceTree.of(self.face_balls[0])
@@ -272,7 +272,7 @@ def mesh(
             checked and repaired, see `surfaces.meshes.repair.clean`.
         scale: metres per unit of the source. Without it the unit is the one in the `units` of a
             `trimesh.Trimesh`, else the metre, and a part above 20 m or below 1 mm is refused, but
-            for a `TriangleMesh`, which is in metres; see `surfaces.meshes.files.read_mesh`.
+            for a `TriangleMesh`, which is in metres; see `surfaces.meshes.read_mesh`.
         side: 'outside' for a tool on the side that the faces look to, 'inside' for the other.
         position: (3,) m, origin of the mesh's frame in the root frame.
         rpy_deg: (3,) fixed-axis roll, pitch, yaw of the mesh's frame.

@@ -6,13 +6,13 @@ Each bound holds for every place of a part, by one of these arguments; none is s
 (1 - cos h) / 2. And sin t - (t / h) sin h is 0 at 0 and h, concave between them, hence >= 0 and
 largest where cos t = sin(h) / h.
 
-**Bend.** f of one parameter with |f''| <= M on a segment of half length h (f' Lipschitz is enough).
-Let s be its chord, D = f(0) - s(0) in the middle; |D| <= M h^2 / 2. E = f - s - D / 2 is D / 2 in
-the middle and -D / 2 at the ends. On either half, with 0 <= k <= 1 along it, E differs from the
-straight line between these by at most M h^2 k (1 - k) / 2, so
+**Bounded curve.** f of one parameter with |f''| <= M on a segment of half length h (for which f'
+Lipschitz is enough). Let s be its chord, D = f(0) - s(0) in the middle; |D| <= M h^2 / 2.
+E = f - s - D / 2 is D / 2 in the middle and -D / 2 at the ends. On either half, with 0 <= k <= 1
+along it, E differs from the straight line between these by at most M h^2 k (1 - k) / 2, so
 |E| <= M h^2 / 4 (|1 - 2 k| + 2 k (1 - k)) <= M h^2 / 4. It holds for each coordinate apart.
 
-**Turning.** (r cos t, r sin t, z) for r = r_0 + r_1 x + e, |e| <= e_r, z likewise, and the arc
+**Turned.** (r cos t, r sin t, z) for r = r_0 + r_1 x + e, |e| <= e_r, z likewise, and the arc
 cos t = C + c, sin t = S y + s. With the model (C (r_0 + r_1 x), r_0 S y, z_0 + z_1 x), what is left
 is (C e + r c, (r - r_0) S y + r s, e_z). Of the second, r_1 S x y is a twist beside the axis;
 without it e S y + r s is left.
@@ -84,7 +84,7 @@ def circle(middle: Array, half: Array, radius: float, inward: bool = False) -> C
     )
 
 
-def bend(places: Array, most: Array, half: Array) -> CurveModel:
+def bounded_curve(places: Array, most: Array, half: Array) -> CurveModel:
     """A curve from its places at both ends and in the middle.
 
     Args:

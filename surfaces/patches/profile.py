@@ -70,15 +70,15 @@ class Profile(Protected):
         inner = self.knots[:-1, None] + steps * np.diff(self.knots)[:, None]
         return np.append(inner.reshape(-1), self.knots[-1])
 
-    def most(self, low: Array, high: Array) -> tuple[Array, Array]:
+    def derivative_bounds(self, low: Array, high: Array) -> tuple[Array, Array]:
         """(k, 2) the largest second and third derivatives of r and z over low..high (k,)."""
         last = len(self.knots) - 2
         first = np.clip(np.searchsorted(self.knots, low, side="right") - 1, 0, last)
         end = np.clip(np.searchsorted(self.knots, high, side="left") - 1, first, last)
-        bends, changes = self._largest
+        seconds, thirds = self._largest
         ends = np.maximum(np.abs(self.at(low, 2)), np.abs(self.at(high, 2)))
-        inner = largest_between(bends, first + 1, end + 1)
-        return np.maximum(ends, inner), largest_between(changes, first, end + 1)
+        inner = largest_between(seconds, first + 1, end + 1)
+        return np.maximum(ends, inner), largest_between(thirds, first, end + 1)
 
     @cached_property
     def _largest(self) -> tuple[list[Array], list[Array]]:
@@ -153,8 +153,8 @@ class Profile(Protected):
         """
         s = self.fractions(_SAMPLES)
         speed = np.linalg.norm(self.at(s, 1), axis=1)
-        bend = np.linalg.norm(self.at(self.knots, 2), axis=1)
-        most = np.repeat(np.maximum(bend[:-1], bend[1:]), _SAMPLES)
+        second = np.linalg.norm(self.at(self.knots, 2), axis=1)
+        most = np.repeat(np.maximum(second[:-1], second[1:]), _SAMPLES)
         least = np.minimum(speed[:-1], speed[1:]) - most * np.diff(s) / 2.0
         worst = int(np.argmin(least))
         wrong_way = [

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from coverable_arrays import Array
 from coverable_errors import Fault
 from surfaces.arguments import ORIGIN, Checks, metres
-from surfaces.patches.affine_models import SpaceModel, bend, turned, unit_curve
+from surfaces.patches.affine_models import SpaceModel, bounded_curve, turned, unit_curve
 from surfaces.patches.patch import EDGE, LocalClosestPoints, SmoothPatch, azimuth
 from surfaces.patches.profile import Profile
 from surfaces.patches.quadrature import rectangle_areas
@@ -82,11 +82,11 @@ class Revolution(SmoothPatch):
         """
         u0, u1 = low[:, 0], high[:, 0]
         half = (u1 - u0) / 2.0
-        bends, changes = self.profile.most(u0, u1)
+        second, third = self.profile.derivative_bounds(u0, u1)
         at = np.stack([u0, u0 + half, u1])
-        curve = bend(self.profile.at(at), bends, half)
+        curve = bounded_curve(self.profile.at(at), second, half)
         leftward = self.profile.at(at, 1)[..., ::-1] * np.array([-1.0, 1.0])
-        normal = unit_curve(bend(leftward, changes[:, ::-1], half))
+        normal = unit_curve(bounded_curve(leftward, third[:, ::-1], half))
         around = low[:, 1], high[:, 1], 1
         return turned(curve, *around).model(), turned(normal, *around).model()
 

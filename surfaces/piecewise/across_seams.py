@@ -41,7 +41,7 @@ class SeamPairs:
         return 2.0 * np.arcsin(np.clip(0.5 * apart, 0.0, 1.0))
 
     def of(self, pairs: Ints) -> SeamPairs:
-        """Some of the pairs (k, 2), i < j, in the order asked for."""
+        """Some of the pairs (k, 2), i < j, in the given order."""
         row = np.searchsorted(_keys(self.pairs), _keys(pairs))
         return self.rows(row)
 

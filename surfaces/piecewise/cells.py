@@ -189,7 +189,7 @@ class PieceCells(Cells):
         return np.concatenate([grid.borders(samples) for grid in self.grids])
 
     def triangles(self, which: Ints, samples: int = 8, inset: float = 0.0) -> Triangles:
-        """See `Cells.triangles`; cell by cell in the order asked for."""
+        """See `Cells.triangles`; cell by cell in the given order."""
         which = np.asarray(which, dtype=np.int64)
         corners, faces = (samples + 1) ** 2, 2 * samples**2  # of one cell
         vertices, normals = np.empty((2, len(which), corners, 3))

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 GAP = 1e-4  # m, how far apart two borders may be that are one seam
 SHARE = 1e-3  # [1], and the same as a share of the shortest border
-WIDEST = 0.02  # [1], what may be asked for, as a share of the shortest border
+WIDEST = 0.02  # [1], the largest gap that may be given, as a share of the shortest border
 CREASE = math.radians(2.0)  # seams that bend by more are reported
 MOST_PIECES = 200
 

@@ -1,4 +1,4 @@
-"""The offset surface of any surface, for whoever has to say where on it a tool is."""
+"""The offset surface of any surface, to find the place under a tool."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ BoxBounds = Callable[[Any, Array, Array], Array]
 
 
 def box_bounds(patch: Any) -> BoxBounds:
-    """The function for a kind of patch; of one that is not known here nothing is bounded."""
+    """The function for a kind of patch; for one that is not known here all bounds are inf."""
     return _KINDS.get(patch.kind, _unknown)
 
 

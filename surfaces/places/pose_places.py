@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from scipy.spatial import cKDTree
 
 NEAREST = 4  # poses around a point whose curves are looked at
-TURN = 1e-3  # m beside which a turn of the tool by 1 rad is none, unless nothing else tells places
+TURN = 1e-3  # m: what a turn of the tool by 1 rad counts, where places have to be distinguished
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ class PosePlaces(OffsetSurface):
     def nearest(self, points: Array, ahead: Array, within: float) -> Places:
         """See `OffsetSurface.nearest`: on the curves of the poses around, by point and direction.
 
-        Where a tool looks `ahead` is, and tells places apart where it turns on the spot.
+        The tool looks towards `ahead`, which distinguishes places where it turns on the spot.
         """
         chart, t = np.full(len(points), -1, dtype=np.int64), np.zeros(len(points))
         known = np.flatnonzero(np.isfinite(points).all(axis=1) & np.isfinite(ahead).all(axis=1))

@@ -5,7 +5,7 @@ environment, with caps on memory and processor time, and from the moment it sees
 without a free file descriptor: whatever the file names, nothing can be opened.
 
 The standard input holds the job as a line of JSON, and then the file. What leaves is a line of
-JSON too, and after it the bytes of the arrays it tells of: (V, 3) float64 m, (F, 3) int32.
+JSON too, and after it the bytes of the arrays it describes: (V, 3) float64 m, (F, 3) int32.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ class Part:
 
         Args:
             numbers: of the faces.
-            deviation: m, asked for.
+            deviation: m, wanted.
             angle: rad, between neighbouring triangles on a curved face, about.
 
         Raises:
@@ -223,14 +223,14 @@ def faces_of(shape: Any) -> Iterator[Any]:
 
 
 def unplaced(face: Any) -> Any:
-    """The same for a face wherever a part with it stands."""
+    """The same for a face at any place of a part with it."""
     from OCP.TopLoc import TopLoc_Location
 
     return face.Located(TopLoc_Location())
 
 
 def answer(job: dict[str, Any], data: bytes) -> bytes:
-    """What is asked of the file: its faces, and triangles of some.
+    """The faces of the file, and triangles of some.
 
     Raises:
         Refused: there is no such face, or nothing can be read.
@@ -238,20 +238,20 @@ def answer(job: dict[str, Any], data: bytes) -> bytes:
     import numpy as np
 
     part = Part(data)
-    said: dict[str, Any] = {"faces": part.described()}
-    colours = [face["colour"] for face in said["faces"]]
+    reply: dict[str, Any] = {"faces": part.described()}
+    colours = [face["colour"] for face in reply["faces"]]
     numbers = job["numbers"]
     if job["colour"]:
         numbers = [k + 1 for k, colour in enumerate(colours) if colour == job["colour"]]
     numbers = [number for number in dict.fromkeys(numbers) if number <= len(colours)]
     if not numbers:
-        return json.dumps(said).encode() + b"\n"
+        return json.dumps(reply).encode() + b"\n"
     made = part.triangulated(numbers, job["deviation"], job["angle"])
     vertices = np.array(made.vertices, dtype="<f8").reshape(-1, 3)
     corners = np.array(made.corners, dtype="<i4").reshape(-1, 3)
-    said |= {"taken": numbers, "deviation": made.deviation}
-    said |= {"vertices": len(vertices), "triangles": len(corners)}
-    return json.dumps(said).encode() + b"\n" + vertices.tobytes() + corners.tobytes()
+    reply |= {"taken": numbers, "deviation": made.deviation}
+    reply |= {"vertices": len(vertices), "triangles": len(corners)}
+    return json.dumps(reply).encode() + b"\n" + vertices.tobytes() + corners.tobytes()
 
 
 def _load_all() -> None:
@@ -267,15 +267,15 @@ def main() -> None:
     sys.path[:0] = job["library"]
     _load_all()
     written = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # Open CASCADE writes to the standard output what it thinks of a file
+    os.dup2(2, 1)  # Open CASCADE writes messages to the standard output
     resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
     try:
-        said = answer(job, data)
+        reply = answer(job, data)
     except Refused as error:
-        said = json.dumps({"fault": str(error)}).encode() + b"\n"
+        reply = json.dumps({"fault": str(error)}).encode() + b"\n"
     except MemoryError:
-        said = json.dumps({"fault": "needs too much memory"}).encode() + b"\n"
-    written.write(said)
+        reply = json.dumps({"fault": "needs too much memory"}).encode() + b"\n"
+    written.write(reply)
     written.flush()
     os._exit(0)
 

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from coverable_errors import Fault, shown
 from surfaces.arguments import ORIGIN, Checks
-from surfaces.meshes import MeshSurface, TriangleMesh, mesh
-from surfaces.meshes.files import with_likely_unit
+from surfaces.meshes import MeshSurface, TriangleMesh, mesh, with_likely_unit
 from surfaces.meshes.repair import clean
 from surfaces.step_files.step_process import CAPS, Caps, Read, read_step
 from surfaces.surface import Side, SurfaceError

@@ -27,7 +27,7 @@ from feasibility.cases import CaseError, load_case
 from feasibility.studies import Store, load_study, open_workers, run_tasks
 from feasibility.viewer.robot import draw
 from robots import load_robot
-from surfaces.meshes.files import read_mesh
+from surfaces.meshes import read_mesh
 
 MOST_MEMORY = 1 << 30  # [byte]
 MOST_TIME = 20  # [s] of processor time

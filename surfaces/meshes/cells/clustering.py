@@ -235,7 +235,7 @@ def _number_of_cells(total: float, count: int | None, size: float | None) -> int
             raise SurfaceError(Fault("size", got, expected="must be a finite number > 0 (metres)"))
         ideal = total / size**2
         count = max(round(ideal), 1) if ideal < 1e9 else 10**9
-    number = _whole(count)
+    number = _integer(count)
     if not 1 <= number <= MOST_CELLS:
         key, got = ("count", "got") if size is None else ("size", f"got {size:g} m, which makes")
         expected = f"must make 1 to {MOST_CELLS:,} cells"
@@ -243,7 +243,7 @@ def _number_of_cells(total: float, count: int | None, size: float | None) -> int
     return number
 
 
-def _whole(value: Any) -> int:
+def _integer(value: Any) -> int:
     """A whole number, or a clear error."""
     try:
         number = operator.index(value)

@@ -1,4 +1,4 @@
-"""Curves over creases, by way of a corner; and over tight bends, slow where the normal turns.
+"""Curves over creases, through a corner; and over tight bends, slow where the normal turns.
 
 A smooth curve cannot turn a corner without leaving the surface. So a curve over a crease consists
 of four straight legs: up to the strip along the crease where the normal turns (see

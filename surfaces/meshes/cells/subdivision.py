@@ -104,7 +104,7 @@ def halve(vertices: Array, faces: Ints, edges: EdgeLengths, wanted: Mask) -> Sub
 def cut_across(vertices: Array, faces: Ints, edges: EdgeLengths, count: Ints) -> Subdivision:
     """Cut edges into `count` (E,) equal parts each, and join the points like a ladder's rungs.
 
-    Every face needs an edge that stays whole: the ladder's base. The rungs lead from there to the
+    Every face needs an edge that is not cut: the ladder's base. The rungs lead from there to the
     corner on the other side.
     """
     first = len(vertices) + np.concatenate([[0], np.cumsum(count - 1)])

@@ -54,12 +54,12 @@ def oriented(vertices: Array, faces: Ints) -> tuple[Ints, int]:
             f"the piece of {piece.sum()} faces around {place(middle)} has only one side, as a "
             "Moebius strip has, so it has no outer normal; cut it through before exporting it"
         )
-    standing = np.bincount(nodes[:count], areas, 2 * count)
-    # As it stands or turned over: whichever of the two mirror images leaves more area standing.
-    # On a tie the image in which the first face of the piece stands: numbered lower.
+    unchanged = np.bincount(nodes[:count], areas, 2 * count)
+    # Of the two mirror images the one that leaves more area unchanged; on a tie the one that leaves
+    # the first face of the piece so, which has the lower number.
     mine, mirror = nodes[:count], nodes[count:]
-    near = np.isclose(standing[mine], standing[mirror], rtol=1e-9, atol=0.0)
-    turned = np.where(near, mirror < mine, standing[mirror] > standing[mine])
+    near = np.isclose(unchanged[mine], unchanged[mirror], rtol=1e-9, atol=0.0)
+    turned = np.where(near, mirror < mine, unchanged[mirror] > unchanged[mine])
     faces = faces.copy()
     faces[turned] = faces[turned][:, ::-1]
     return faces, int(turned.sum())

@@ -44,7 +44,7 @@ from surfaces import (
     take_faces,
     torus,
 )
-from surfaces.meshes.files import read_mesh
+from surfaces.meshes import read_mesh
 
 POSE = {"position": (0.1, -0.2, 0.3), "rpy_deg": (10.0, 20.0, -30.0)}
 POSED = "position = [0.1, -0.2, 0.3]\nrpy_deg = [10, 20, -30]\n"

@@ -36,7 +36,7 @@ def test_what_is_said_of_a_tile_holds_all_over_it(kind):
         surface = random_surface(kind, rng)
         cells = cells_of(surface, rng)
         cut = cell_tiles(cells, float(rng.normal() * np.sqrt(cells.areas.mean())))
-        tiles = cut.whole(np.arange(len(cells)))
+        tiles = cut.of_cells(np.arange(len(cells)))
         total = cut.areas(tiles).sum()
         assert total == pytest.approx(cells.areas.sum(), rel=1e-6)
         for _ in range(int(rng.integers(0, 7))):
@@ -59,7 +59,7 @@ def test_what_is_said_of_a_tile_holds_all_over_it(kind):
 
 def test_halves_shrink_the_bounds_to_a_quarter():
     cut = cell_tiles(sphere(1.0, (10, 90), (0, 90)).cells(2, 2), -0.1)
-    tiles = cut.whole(np.arange(4))
+    tiles = cut.of_cells(np.arange(4))
     before = cut.bounds(tiles).radii.max(axis=0)
     for _ in range(4):
         tiles = cut.halves(tiles)
@@ -85,7 +85,7 @@ def test_lines_over_the_faces_of_a_mesh_stay_on_them():
     indptr, touching = cut.touching
     face = np.flatnonzero(np.diff(indptr))[:20]
     other = touching[indptr[face]]
-    tiles = cut.whole(np.arange(4))
+    tiles = cut.of_cells(np.arange(4))
     row = np.argsort(tiles.chart)
     ends = [tiles.of(row[chart]).middles for chart in (face, other)]
     lines = cut.lines(*ends, np.full(len(face), 3))

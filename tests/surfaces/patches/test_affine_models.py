@@ -5,7 +5,7 @@ import pytest
 from part_walks import residuals
 
 from surfaces.parts import PartModels, SurfaceParts, around
-from surfaces.patches.affine_models import CurveModel, arc, bend, turned, unit_model
+from surfaces.patches.affine_models import CurveModel, arc, bounded_curve, turned, unit_model
 
 SIGNS = np.array([-1.0, 1.0])
 
@@ -41,7 +41,7 @@ def test_a_bend_holds_whatever_the_second_derivative_does_within_its_bound():
         value = np.concatenate([[0.0], np.cumsum((slope[:-1] + slope[1:]) / 2.0 * width)])
         value += rng.normal() + rng.normal() * s
         places = np.stack([value, 0.0 * value], axis=1)[[0, steps // 2, steps], None]
-        model = bend(places, np.array([[most, 0.0]]), np.array([half]))
+        model = bounded_curve(places, np.array([[most, 0.0]]), np.array([half]))
         left = value - model.centre[0, 0] - model.slope[0, 0] * s / half
         worst = max(worst, np.abs(left).max() / model.error[0, 0])
     assert 0.999 <= worst <= 1.0 + 1e-6

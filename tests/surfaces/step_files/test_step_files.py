@@ -247,9 +247,9 @@ def test_the_process_opens_nothing_once_it_sees_the_file(tmp_path):
     """What stands before `answer` in the child closes the door: tried with a child that tries."""
     text = CHILD.read_text()
     tries = text.replace(
-        "        said = answer(job, data)",
-        "        try:\n            open('/dev/null')\n            said = b'opened'\n"
-        "        except OSError as error:\n            said = str(error.errno).encode()",
+        "        reply = answer(job, data)",
+        "        try:\n            open('/dev/null')\n            reply = b'opened'\n"
+        "        except OSError as error:\n            reply = str(error.errno).encode()",
     )
     assert tries != text
     script = tmp_path / "tries.py"

@@ -14,10 +14,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from surfaces import SurfaceError
-from surfaces.meshes.files import read_mesh
+from surfaces.meshes import read_mesh
 from surfaces.meshes.repair import notes_of
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.parametrize("entry", corpus.REFUSED, ids=lambda entry: entry.file[:40])
@@ -52,7 +52,7 @@ def test_the_whole_corpus_in_two_gigabytes(tmp_path):
 import resource
 resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
 from pathlib import Path
-from surfaces.meshes.files import read_mesh
+from surfaces.meshes import read_mesh
 from surfaces import SurfaceError
 for path in sorted(Path({str(tmp_path)!r}).iterdir()):
     try:

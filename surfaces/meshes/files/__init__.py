@@ -1,5 +1,0 @@
-"""Mesh files into surfaces, in metres."""
-
-from lazy_loader import attach_stub
-
-__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
