@@ -2,14 +2,22 @@
 
 import gc
 import signal
+from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, settings
 from hypothesis.internal.conjecture import providers
 
 # Hypothesis mixes numbers out of the project's source into its examples, of those modules that
 # happen to be loaded; tests that are meant to be the same each time would differ with what ran
 # before them in the process. No module counts as the project's own.
 providers.is_local_module_file = lambda path: False
+
+# The same examples each time, however long a busy machine takes over one, or over making them up.
+settings.register_profile(
+    "suite", derandomize=True, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("suite")
 
 # A shell lets its background jobs ignore Ctrl-C, and their children with them. Tests that interrupt
 # a command they started wait for it in vain, unless it starts with Python's own handler.
@@ -32,6 +40,15 @@ LONGEST = (
 )  # fmt: skip
 
 
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """What tests share holds no examples, and need not be imported to look for them.
+
+    One such file is a script because its libraries should not be loaded beside Pinocchio's.
+    """
+    shared = collection_path.suffix == ".py" and not collection_path.name.startswith("test_")
+    return True if shared else None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the files that take longest first."""
     place = {name: number for number, name in enumerate(LONGEST)}
@@ -41,4 +58,5 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     """What is loaded by now stays: collections of garbage need not look through it each time."""
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)  # they would be a twentieth of all processor time otherwise
     gc.enable()

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from guards import GUARD_S
 from PIL import Image
 
 import coverable
@@ -229,7 +230,7 @@ def test_a_wheel_works_outside_the_checkout(tmp_path: Path) -> None:
         ["-m", "pip", "install", "-q", "--no-deps", "--target", "site",
          "--find-links", "wheels", "--no-index", "coverable"],
     ):  # fmt: skip
-        subprocess.run([sys.executable, *step], cwd=tmp_path, check=True, timeout=600)
+        subprocess.run([sys.executable, *step], cwd=tmp_path, check=True, timeout=GUARD_S)
     environment = {
         **os.environ,
         "PYTHONPATH": str(tmp_path / "site"),
@@ -239,7 +240,7 @@ def test_a_wheel_works_outside_the_checkout(tmp_path: Path) -> None:
     def run(*arguments: str) -> str:
         done = subprocess.run(
             [sys.executable, *arguments], cwd=tmp_path, env=environment, capture_output=True,
-            text=True, check=True, timeout=600,
+            text=True, check=True, timeout=GUARD_S,
         )  # fmt: skip
         return done.stdout
 

@@ -18,6 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from guards import GUARD_S
 from small_cases import TEXTS
 
 from feasibility.results import load_result
@@ -25,7 +26,6 @@ from feasibility.studies import Store
 
 MOMENTS = 200
 SEED = 20260713
-GUARD_S = 300  # against hanging alone
 EXITING = 0x4  # PF_EXITING of Linux: the process is past its last instruction
 
 BEGIN = """

@@ -15,6 +15,7 @@ import networkx as nx
 import numpy as np
 import pytest
 from dense_replay import assert_motion, assert_over, assert_witness
+from guards import GUARD_S
 from oracle_build import built
 from oracle_cases import Problem
 from random_cases import draw, draw_ur5
@@ -169,7 +170,7 @@ def test_another_process_finds_the_same_motion() -> None:
         capture_output=True,
         text=True,
         check=True,
-        timeout=300,
+        timeout=GUARD_S,
     )
     assert other.stdout.strip() == here
 
@@ -370,7 +371,7 @@ def test_ctrl_c_ends_a_hard_search(tmp_path) -> None:
     assert child.stdout is not None
     assert child.stdout.readline() == "searching\n"
     child.send_signal(signal.SIGINT)
-    out, err = child.communicate(timeout=300)
+    out, err = child.communicate(timeout=GUARD_S)
     assert (child.returncode, out) == (130, "")
     # Before it there may be a word about kernels that had to be compiled.
     assert err.endswith("coverable: interrupted\n")

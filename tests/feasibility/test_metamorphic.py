@@ -17,7 +17,7 @@ from feasibility import CauseKind, Task, Verdict, check
 from robots import Robot, load_robot
 from surfaces import Surface, cylinder, hyperboloid, plane, rotation_from_rpy, sphere
 
-FEW = settings(max_examples=6, derandomize=True, deadline=None, database=None)
+FEW = settings(max_examples=6)
 PUMA = load_robot("puma560", limits="set-1")
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bad_cases import BAD_CASES, GOOD, write
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from surface_parts import pairs, surfaces, triples
 
@@ -134,7 +134,7 @@ def cases(draw):
 
 
 @given(cases())
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=100)
 def test_toml_gives_back_the_same_case(case):
     text = case.to_toml()
     again = Case.from_toml(text)
@@ -154,10 +154,6 @@ def test_a_bad_case_is_refused_with_its_key_and_what_was_expected(name, tmp_path
         assert words in str(error)
     assert len(str(error)) < 6000
     assert str(error).isprintable() or all(line.isprintable() for line in str(error).split("\n"))
-
-
-def test_the_corpus_is_large_enough():
-    assert len(BAD_CASES) >= 60
 
 
 def test_all_faults_come_together():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import surface_parts
 from bad_cases import GOOD, SURFACES, surface, write
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from small_cases import small_case, small_verdict
 from surface_files import MESH, NET, POINTS, cube, mesh_case, net_case, sheet, write_stl
@@ -392,7 +392,7 @@ def spoiled(draw):
 
 
 @given(spoiled())
-@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=150)
 def test_whatever_a_table_holds_it_is_read_or_refused_with_places(table):
     faults = []
     part = read_surface(table, faults)

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from guards import GUARD_S
 from small_cases import TEXTS, small_verdict
 
 import feasibility.checking
@@ -25,7 +26,6 @@ from feasibility.cli.main import main
 from feasibility.safe_files import write_whole
 
 INTERRUPTED = "coverable: interrupted\n"
-GUARD_S = 300  # against hanging alone
 
 AT_IMPORT = """
 import os, sys
@@ -213,7 +213,7 @@ def test_in_an_import_it_waits_until_the_module_is_whole(tmp_path):
     lines = "import signal", "signal.raise_signal(signal.SIGINT)", "whole = True"
     (tmp_path / "imported_when_interrupted.py").write_text("\n".join(lines))
     done = subprocess.run(
-        [sys.executable, "-c", IMPORT, tmp_path], capture_output=True, text=True, timeout=300
+        [sys.executable, "-c", IMPORT, tmp_path], capture_output=True, text=True, timeout=GUARD_S
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "True\n", "")
 

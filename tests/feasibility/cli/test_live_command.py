@@ -9,10 +9,11 @@ import sys
 import urllib.request
 from pathlib import Path
 
+from guards import GUARD_S
+
 from feasibility.cli.main import main
 
 ROOT = Path(__file__).parents[3]
-GUARD_S = 300.0
 
 
 def test_bad_input_is_one_message(capsys):

@@ -14,6 +14,7 @@ import numpy as np
 import psutil
 import pytest
 import umsgpack
+from guards import GUARD_S
 from small_cases import small_case
 
 from feasibility import check
@@ -27,8 +28,6 @@ from feasibility.live.sessions import MOST
 from feasibility.live.workbench import Workbench
 from feasibility.reports import verdict as report
 from feasibility.viewer import View
-
-GUARD_S = 300.0
 
 
 class Client:

@@ -429,7 +429,7 @@ def test_a_placement_that_nobody_can_try_is_no_answer() -> None:
 ANGLES = st.floats(-180.0, 180.0)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(ANGLES, st.one_of(st.floats(-90.0, 90.0), st.sampled_from([-90.0, 90.0])), ANGLES)
 def test_a_surface_says_where_it_stands(roll: float, pitch: float, yaw: float) -> None:
     surface = plane((0, 1), (0, 1), position=(1, 2, 3), rpy_deg=(roll, pitch, yaw))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import psutil
 import pytest
+from guards import GUARD_S
 
 from feasibility.viewer.live_server import LiveView
 
@@ -37,7 +38,7 @@ def test_the_server_listens_on_the_loopback_address_alone():
                 urllib.request.urlopen(request)
             refused.value.close()
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", live.port), timeout=120)
+        socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S)
     live.close()
 
 
@@ -53,18 +54,18 @@ def test_the_server_dies_with_its_owner_even_when_that_is_killed():
     ) as owner:
         port = int(owner.stdout.readline())
         assert psutil.Process(owner.pid).children(recursive=True) == []
-        socket.create_connection(("127.0.0.1", port), timeout=120).close()
+        socket.create_connection(("127.0.0.1", port), timeout=GUARD_S).close()
         owner.send_signal(signal.SIGKILL)
-        owner.wait(timeout=120)
+        owner.wait(timeout=GUARD_S)
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", port), timeout=120)
+        socket.create_connection(("127.0.0.1", port), timeout=GUARD_S)
 
 
 def test_a_browser_that_goes_away_is_no_fault(capfd):
     with LiveView("page" * 10_000_000) as live:
-        with socket.create_connection(("127.0.0.1", live.port), timeout=120) as browser:
+        with socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S) as browser:
             browser.sendall(f"GET {live.url} HTTP/1.1\r\n".encode())
-        with socket.create_connection(("127.0.0.1", live.port), timeout=120) as browser:
+        with socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S) as browser:
             path = live.url.split(str(live.port))[1]
             host = f"127.0.0.1:{live.port}"
             browser.sendall(f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())

@@ -21,6 +21,7 @@ import pinocchio as pin
 import pytest
 import umsgpack
 from fabricated import DOME, STEPS, TASK, every_cause, verdict_on
+from guards import GUARD_S
 from scipy.spatial.transform import Rotation
 
 from feasibility import CauseKind
@@ -372,7 +373,7 @@ def test_a_script_waits_until_it_is_interrupted(feasible, monkeypatch):
     monkeypatch.delattr(sys, "ps1", raising=False)
     live = show(feasible)
     with pytest.raises(ConnectionRefusedError):
-        socket.create_connection(("127.0.0.1", live.port), timeout=120)
+        socket.create_connection(("127.0.0.1", live.port), timeout=GUARD_S)
 
 
 def test_the_title_says_the_verdict_and_what_is_covered(feasible, infeasible):
@@ -431,7 +432,7 @@ if BROWSER is not None:  # the data of the scene is tested above, with and witho
                 f"--user-data-dir={tmp_path / 'profile'}", "--window-size=700,500",
                 f"--screenshot={picture}", page.as_uri(),
             ],
-            check=True, capture_output=True, timeout=300,
+            check=True, capture_output=True, timeout=GUARD_S,
         )  # fmt: skip
         with Image.open(picture) as image:
             pixels = np.asarray(image.convert("RGB"), dtype=int)[:, 250:]  # beside the legend
@@ -454,7 +455,7 @@ if BROWSER is not None:  # the data of the scene is tested above, with and witho
                 "--disable-dev-shm-usage", "--virtual-time-budget=15000",
                 f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", file.as_uri(),
             ],
-            check=True, capture_output=True, timeout=300, text=True,
+            check=True, capture_output=True, timeout=GUARD_S, text=True,
         )  # fmt: skip
         answers = json.loads(
             html.unescape(re.search(r'<pre id="said">(.*?)</pre>', done.stdout)[1])

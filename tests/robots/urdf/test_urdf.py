@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 import pytest
+from guards import GUARD_S
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from urdf_corpus import ACCEPTED, FAULTY, LIMIT, REFUSED, arm, drawn, joint, link, mesh, urdf
@@ -411,7 +412,7 @@ print(counts["refused"], counts["accepted"])
         env={**os.environ, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=GUARD_S,
         check=False,
     )
     assert done.stderr == ""
@@ -465,9 +466,7 @@ def mutated(draw: st.DrawFn) -> bytes:
 
 @settings(
     max_examples=150,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.function_scoped_fixture],
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
 @given(data=mutated())
 def test_mutations_are_refused_or_sound(data: bytes, tmp_path: Path) -> None:
