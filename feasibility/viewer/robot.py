@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
@@ -90,12 +91,22 @@ def pose(robot: Robot, q: ArrayLike, root: str = ROOT) -> list[threejs.Command]:
     return [threejs.transform(path, place) for path, place in zip(paths, placements, strict=True)]
 
 
+_drawings: WeakKeyDictionary[Robot, Drawing] = WeakKeyDictionary()
+
+
 def draw(robot: Robot) -> Drawing:
     """Every visual of the URDF, on locked joints and off the chain too.
 
     Where a mesh cannot be had, a link that is left without a shape is drawn as a capsule; so is
-    every link of a robot whose URDF cannot be read or has no visuals.
+    every link of a robot whose URDF cannot be read or has no visuals. Files are read once for each
+    robot, however often it is drawn.
     """
+    if robot not in _drawings:
+        _drawings[robot] = _draw(robot)
+    return _drawings[robot]
+
+
+def _draw(robot: Robot) -> Drawing:
     visuals, notes = _visuals(robot)
     files = MeshFiles()
     missing: dict[str, list[str]] = {}  # what is wrong -> links

@@ -126,11 +126,12 @@ def test_a_mesh_that_cannot_be_had_becomes_a_capsule_and_a_note(tmp_path, conten
 
 
 def test_an_arm_without_pictures_is_a_chain_of_capsules(tmp_path):
-    bare = two_links(tmp_path)
+    bare, late = two_links(tmp_path), two_links(tmp_path)
     assert len(drawn(bare)) == 2
     (tmp_path / "two.urdf").unlink()
-    assert len(drawn(bare)) == 2
-    (note,) = draw(bare).notes
+    assert draw(bare).notes == ()  # files are read once for each robot
+    assert len(drawn(late)) == 2
+    (note,) = draw(late).notes
     assert "two.urdf" in note
 
 
