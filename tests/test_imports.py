@@ -127,7 +127,7 @@ class Import(NamedTuple):
     """Inside a function, or for type checkers alone: not needed to load the file."""
 
 
-def imports(source: str) -> Iterator[Import]:
+def imports(tree: ast.Module) -> Iterator[Import]:
     """All imports of a file, also those inside functions and for type checkers alone."""
 
     def visit(node: ast.AST, deferred: bool) -> Iterator[Import]:
@@ -141,7 +141,7 @@ def imports(source: str) -> Iterator[Import]:
             types = isinstance(child, ast.If) and ast.unparse(child.test) == "TYPE_CHECKING"
             yield from visit(child, deferred or later or types)
 
-    yield from visit(ast.parse(source), False)
+    yield from visit(tree, False)
 
 
 def _files() -> dict[str, Path]:
@@ -157,9 +157,15 @@ FILES = _files()
 
 
 @cache
+def tree_of(name: str) -> ast.Module:
+    """A module's syntax; each file is read when it is first asked for."""
+    return ast.parse(FILES[name].read_text("utf-8"))
+
+
+@cache
 def imports_of(name: str) -> frozenset[Import]:
-    """All imports of a module; each file is read when it is first asked for."""
-    return frozenset(imports(FILES[name].read_text("utf-8")))
+    """All imports of a module."""
+    return frozenset(imports(tree_of(name)))
 
 
 @cache
@@ -177,6 +183,7 @@ def door(room: str) -> dict[str, str]:
     return handed
 
 
+@cache
 def is_room(module: str) -> bool:
     """Is this a folder with a door?"""
     return ROOT.joinpath(*module.split("."), "__init__.pyi").exists()
@@ -190,6 +197,7 @@ def home(module: str, name: str) -> str:
     return inner if inner in FILES else door(module)[name]
 
 
+@cache
 def homes(name: str, now_only: bool = False) -> set[str]:
     """The project's modules that a module imports from."""
     found: set[str] = set()
@@ -247,7 +255,7 @@ class A:
     def f(self):
         from robots import Chain
 """
-    assert list(imports(source)) == [
+    assert list(imports(ast.parse(source))) == [
         Import("typing", "TYPE_CHECKING", False),
         Import("numpy.linalg", "", False),
         Import("feasibility", "task", False),
@@ -368,8 +376,8 @@ def test_heavy_libraries_are_imported_where_they_are_used() -> None:
 
 
 def test_no_function_has_more_than_seventy_lines() -> None:
-    for name, path in FILES.items():
-        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for name in FILES:
+        for node in ast.walk(tree_of(name)):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 length = int(node.end_lineno or 0) - node.lineno + 1
                 assert length <= 70, f"{name}: {node.name} has {length} lines"

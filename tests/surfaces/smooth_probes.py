@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.optimize import least_squares, minimize
 
 POSE = {"position": (0.3, -1.2, 0.7), "rpy_deg": (25.0, -40.0, 110.0)}
 
@@ -50,36 +49,40 @@ def extrapolated_area(surface, breaks_u, breaks_v, pieces=48):
     return bc + (bc - ab) / 15
 
 
-def least_distance(surface, point, u_range, v_range, count=121):
-    """Distance of a point from the patch over the ranges: a grid, then descents by differences."""
+def least_distances(surface, points, u_range, v_range, count=121):
+    """Distances of points from the patch over the ranges: a grid, and finer ones in its valleys."""
     u, v = np.linspace(*u_range, count), np.linspace(*v_range, count)
     grid = surface.point(u[:, None], v[None, :])
-    distance = np.linalg.norm(grid - point, axis=-1)
     mesh = max(np.linalg.norm(np.diff(grid, axis=k), axis=-1).max() for k in (0, 1))
-    edged = np.pad(distance, 1, constant_values=np.inf)
-    around = [np.roll(edged, shift, axis=(0, 1)) for shift in ((0, 1), (0, -1), (1, 0), (-1, 0))]
-    valleys = np.argwhere(distance <= np.min(around, axis=0)[1:-1, 1:-1])
-    order = np.argsort([distance[i, j] for i, j in valleys])
-    step = np.array([u[1] - u[0], v[1] - v[0]])
-    bounds = np.array([u_range, v_range]) / step[:, None]
+    least = np.full(len(points), np.inf)
+    for k, point in enumerate(points):
+        distance = np.linalg.norm(grid - point, axis=-1)
+        edged = np.pad(distance, 1, constant_values=np.inf)
+        around = [np.roll(edged, by, axis=(0, 1)) for by in ((0, 1), (0, -1), (1, 0), (-1, 0))]
+        valleys = np.argwhere(distance <= np.min(around, axis=0)[1:-1, 1:-1])
+        for i, j in sorted(valleys.tolist(), key=lambda ij: distance[*ij])[:3]:
+            if distance[i, j] - 2.0 * mesh > least[k]:  # its surroundings are no nearer either
+                break
+            least[k] = min(least[k], _least_near(surface, point, (u, v), (i, j)))
+    return least
 
-    def residual(x):
-        return surface.point(*(x * step)) - point
 
-    best = np.inf
-    for i, j in valleys[order[:3]]:
-        if distance[i, j] - 2.0 * mesh > best:  # too far for its surroundings to be nearer
-            break
-        start = np.clip(np.array([u[i], v[j]]) / step, bounds[:, 0] + 1e-3, bounds[:, 1] - 1e-3)
-        found = least_squares(
-            residual, start, "3-point", bounds.T, ftol=None, xtol=1e-12, gtol=1e-15, max_nfev=300
-        )
-        free = minimize(
-            lambda x: float(np.linalg.norm(residual(x))), found.x, method="Nelder-Mead",
-            bounds=bounds, options={"xatol": 1e-8, "fatol": 1e-16, "maxfev": 400},
-        )  # fmt: skip
-        best = min(best, free.fun)
-    return best
+def _least_near(surface, point, lines, start):
+    """Least distance in the valley around a point of a grid: ever finer grids, which may move."""
+    at = [line[index] for line, index in zip(lines, start, strict=True)]
+    reach = [2.0 * (line[1] - line[0]) for line in lines]
+    for _ in range(30):
+        fine = [
+            np.clip(x + np.linspace(-r, r, 11), line[0], line[-1])
+            for x, r, line in zip(at, reach, lines, strict=True)
+        ]
+        distance = np.linalg.norm(surface.point(fine[0][:, None], fine[1]) - point, axis=-1)
+        best = np.unravel_index(distance.argmin(), distance.shape)
+        for k in (0, 1):
+            nearest = fine[k][best[k]]
+            reach[k] *= 1.0 if abs(nearest - at[k]) > 0.5 * reach[k] else 0.4
+            at[k] = nearest
+    return distance.min()
 
 
 def same_surface(one, other, tolerance=0.0):
@@ -108,3 +111,16 @@ def assert_pickles_and_moves(shape, motion):
     assert closest_point.height == pytest.approx(np.full(100, 0.01), abs=1e-14)
     assert closest_point.inside.all()
     return moved
+
+
+def assert_curves_lie_on(surface, curves, count=21):
+    """Within the deviations that they state; returns `count` points (E, count, 3) of each curve."""
+    pair = np.repeat(np.arange(len(curves)), count)
+    points, normals = curves.at(pair, np.tile(np.linspace(0, 1, count), len(curves)))
+    on = surface.closest(points)
+    assert on.inside.all()
+    assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
+    # The normal there may turn across the curve, where the surface bends more than along it.
+    apart = np.linalg.norm(normals - on.normal, axis=1)
+    assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
+    return points.reshape(-1, count, 3)

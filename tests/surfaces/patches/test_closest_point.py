@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from smooth_probes import least_distance
+from smooth_probes import least_distances
 
 from surfaces import cylinder, sphere
 from surfaces.patches.closest_point import ClosestPointSearch, Jet
@@ -124,7 +124,7 @@ def test_points_anywhere_get_the_nearest_point_of_the_patch(both):
             (exact.v_range, exact.v_closed),
         )
     )
-    expected = [least_distance(found, p, *ranges) for p in points]
+    expected = least_distances(found, points, *ranges)
     assert np.abs(distance - expected).max() < 1e-9
     # The normal leads from one in the patch to its point; one on the border is not inside.
     whole = exact.closest(points)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from part_walks import walk_all_over
+from part_walks import stated_over_least, walk_all_over
 from smooth_probes import POSE
 
 from surfaces import cone, cylinder, ellipsoid, hyperboloid, plane, sphere, torus
@@ -80,21 +80,6 @@ def test_radii_fall_by_four_where_sides_are_halved(patch):
 
 def test_radii_over_small_boxes_are_right_and_near_the_least_possible(patch):
     """No affine model leaves less than a third of the bound, over small boxes."""
-    rng = np.random.default_rng(3)
-    ends = np.array([patch.u_range, patch.v_range])
-    grid = np.linspace(-1.0, 1.0, 21)
-    x = np.stack(np.meshgrid(grid, grid), axis=-1).reshape(-1, 2)
-    affine = np.column_stack([np.ones(len(x)), x])
-    for _ in range(10):
-        middle = rng.uniform(ends[:, 0], ends[:, 1])
-        half = np.diff(ends)[:, 0] * rng.uniform(1e-3, 0.02, 2)
-        models = patch.part_models((middle - half)[None], (middle + half)[None])
-        u, v = (middle + x * half).T
-        for model, places in zip(
-            models, (patch.local_point(u, v), patch.local_normal(u, v)), strict=True
-        ):
-            best, *_ = np.linalg.lstsq(affine, places, rcond=None)
-            left = np.linalg.norm(places - affine @ best, axis=1).max()
-            assert model.error[0] <= 3.0 * left + 1e-12
-            off = places - affine @ np.vstack([model.centre, model.slopes[0]])
-            assert np.linalg.norm(off, axis=1).max() <= model.error[0] * (1.0 + 1e-9) + 1e-12
+    ratios = stated_over_least(patch, 1e-12)
+    assert np.median(ratios) <= 2.0
+    assert max(ratios) <= 3.0

@@ -9,7 +9,7 @@ from smooth_probes import (
     POSE,
     assert_pickles_and_moves,
     extrapolated_area,
-    least_distance,
+    least_distances,
     random_parameters,
     tangents,
 )
@@ -111,7 +111,7 @@ def test_no_point_of_the_whole_turn_is_nearer_than_the_foot(shape):
     placed = shape.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
     ranges = shape.u_range, (-1.0, math.tau + 1.0)
-    expected = np.array([least_distance(shape, p, *ranges) for p in points])
+    expected = least_distances(shape, points, *ranges)
     assert np.abs(distance - expected).max() < 1e-9
     leaning = np.abs(np.abs(closest_point.height) - distance) > 1e-12
     assert not closest_point.inside[leaning].any()

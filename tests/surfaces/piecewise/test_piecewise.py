@@ -8,7 +8,7 @@ import pickle
 
 import numpy as np
 import pytest
-from smooth_probes import POSE, least_distance
+from smooth_probes import POSE, assert_curves_lie_on, least_distances
 from spline_nets import hood, quarter_turn, turned
 
 from surfaces import Piecewise, SurfaceError, bspline, cone, cylinder, piecewise, plane, sphere
@@ -104,17 +104,9 @@ def test_a_patch_in_pieces_has_the_cells_and_neighbours_of_the_whole(name):
 @pytest.mark.parametrize("name", WHOLE, ids=str)
 def test_the_curves_of_pieces_run_on_the_joined_surface(name):
     whole, parts = cut_alike(name)
-    curves = parts.curves
-    pair = np.repeat(np.arange(len(parts.pairs)), 23)
-    closest_point, normal = curves.at(pair, np.tile(np.linspace(0, 1, 23), len(parts.pairs)))
     for surface in (whole.surface, parts.surface):
-        on = surface.closest(closest_point)
-        assert on.inside.all()
-        assert (np.abs(on.height) <= curves.deviations[pair, 0] + 1e-12).all()
-        apart = np.linalg.norm(normal - on.normal, axis=1)
-        assert (apart <= curves.deviations[pair, 1] + 1e-12).all()
-    assert curves.deviations.max() < 1e-5
-    ends = closest_point.reshape(-1, 23, 3)
+        ends = assert_curves_lie_on(surface, parts.curves, 23)
+    assert parts.curves.deviations.max() < 1e-5
     assert ends[:, 0] == pytest.approx(parts.centres[parts.pairs[:, 0]], abs=1e-12)
     assert ends[:, -1] == pytest.approx(parts.centres[parts.pairs[:, 1]], abs=1e-12)
 
@@ -156,12 +148,11 @@ def test_heights_are_distances_to_the_nearest_piece():
     points = rng.uniform((0.1, -0.1, 0.3), (0.4, 0.1, 0.5), (40, 3))
     closest_point = surface.closest(points)
     assert closest_point.inside.all()
-    for point, height in zip(points, closest_point.height, strict=True):
-        away = [
-            least_distance(piece, point, piece.u_range, piece.v_range) for piece in surface.pieces
-        ]
-        assert abs(height) == pytest.approx(min(away), abs=1e-8)
-        assert (height > 0) == (math.hypot(*point[:2]) > 0.2 - 0.5 * max(0.0, point[2] - 0.4))
+    away = [least_distances(p, points, p.u_range, p.v_range) for p in surface.pieces]
+    assert np.abs(closest_point.height) == pytest.approx(np.min(away, axis=0), abs=1e-12)
+    x, y, z = points.T
+    outside = np.hypot(x, y) > 0.2 - 0.5 * np.maximum(0.0, z - 0.4)
+    assert np.array_equal(closest_point.height > 0, outside)
 
 
 def test_long_sides_against_short_ones():

@@ -9,7 +9,7 @@ from smooth_probes import (
     POSE,
     assert_pickles_and_moves,
     extrapolated_area,
-    least_distance,
+    least_distances,
     random_parameters,
     same_surface,
     tangents,
@@ -129,7 +129,7 @@ def test_no_point_of_the_patch_is_nearer_than_the_foot(shape):
     closest_point = shape.closest(points)
     placed = shape.point(closest_point.u, closest_point.v)
     distance = np.linalg.norm(points - placed, axis=1)
-    expected = np.array([least_distance(shape, p, shape.u_range, shape.v_range) for p in points])
+    expected = least_distances(shape, points, shape.u_range, shape.v_range)
     assert np.abs(distance - expected).max() < 1e-9
     leaning = np.abs(np.abs(closest_point.height) - distance) > 1e-12
     assert (closest_point.inside == ~leaning).all()
